@@ -1,0 +1,6 @@
+//! The field on a desk: the simulated row and machine, the virtual Uno that runs the real firmware, and their reports.
+//!
+//! [`row`] says what stands in the row, [`machine`] how the weeder rolls past it and what its servo makes of the pulses,
+//! [`uno`] runs the firmware's ELF on simavr, and [`trial`] joins them and judges what happened to each plant.
+
+pub mod signal;
