@@ -1,0 +1,229 @@
+//! The search for the k nearest examples, and their vote.
+//!
+//! One pass over the examples keeps the k nearest so far, sorted. A neighbour is one 32-bit key, its distance above
+//! its label, so that comparing keys compares distances first and labels next, and moving a neighbour moves four
+//! bytes. Examples that are as far as the k-th nearest, but found no room, are counted by class: they vote too.
+
+use crate::{Examples, distance::DISTANCE_LIMIT};
+
+/// The largest k.
+pub const MAX_K: u8 = 15;
+
+/// What an answer is worth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Kind {
+    /// One class has more votes than any other, and the nearest example is within the radius.
+    Known,
+    /// Two or more classes share the most votes; the nearest example is within the radius.
+    Tie,
+    /// The nearest example is farther than the radius: nothing like it was learned.
+    Stranger,
+}
+
+/// The class of a query, and what speaks for it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Answer<const CLASSES: usize> {
+    /// The class with the most votes. Among equals the one with the nearest example; among these the smallest label.
+    /// For a [`Kind::Tie`] or a [`Kind::Stranger`] it is only the best guess.
+    pub label: u8,
+    /// The votes of each class: k in all, and more where several examples are as far as the k-th nearest.
+    pub votes: [usize; CLASSES],
+    /// The squared distance to the nearest example (see [`squared_distance`](crate::squared_distance)).
+    pub nearest: u32,
+    /// What the answer is worth.
+    pub kind: Kind,
+}
+
+/// Why there is no answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum ClassifyError {
+    /// k is 0 or above [`MAX_K`].
+    KOutOfRange,
+    /// There is no example at all.
+    NoExamples,
+    /// There are examples, but fewer than k.
+    TooFewExamples,
+    /// The label of an example that would vote is not below the number of classes.
+    UnknownLabel,
+}
+
+impl core::fmt::Display for ClassifyError {
+    fn fmt(&self, formatter: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        formatter.write_str(match self {
+            Self::KOutOfRange => "k is out of range: choose 1 to 15",
+            Self::NoExamples => "there are no examples: add at least k",
+            Self::TooFewExamples => "k is above the number of examples: add examples or choose a smaller k",
+            Self::UnknownLabel => "an example's label is not a class: labels run from 0 to the number of classes less 1",
+        })
+    }
+}
+
+impl core::error::Error for ClassifyError {}
+
+/// The class of `features` by the vote of its `k` nearest examples.
+///
+/// - All examples that are as far as the k-th nearest vote, so that the order of the examples never matters.
+/// - Each vote counts one, near or far; the class with the most votes wins (see [`Answer::label`] for ties).
+/// - `radius` is a squared distance: an answer whose nearest example is farther is a [`Kind::Stranger`], whatever the
+///   votes. `u32::MAX` knows no strangers.
+///
+/// ```
+/// use knn::{Answer, Example, Kind, classify};
+///
+/// const EXAMPLES: [Example<2>; 4] = [
+///     Example::new([20, 30], 0),
+///     Example::new([25, 35], 0),
+///     Example::new([180, 190], 1),
+///     Example::new([185, 200], 1),
+/// ];
+/// let answer: Answer<2> = classify(&EXAMPLES, &[30, 30], 3, 2_000)?;
+/// assert_eq!((answer.label, answer.votes, answer.kind), (0, [2, 1], Kind::Known));
+/// assert_eq!(answer.nearest, 50);
+///
+/// let answer: Answer<2> = classify(&EXAMPLES, &[100, 100], 3, 2_000)?;
+/// assert_eq!(answer.kind, Kind::Stranger);
+/// # Ok::<(), knn::ClassifyError>(())
+/// ```
+///
+/// # Errors
+///
+/// [`ClassifyError`], where k does not suit the number of examples or a voter's label is not a class.
+pub fn classify<const FEATURES: usize, const CLASSES: usize>(
+    examples: &(impl Examples<FEATURES> + ?Sized),
+    features: &[u8; FEATURES],
+    k: u8,
+    radius: u32,
+) -> Result<Answer<CLASSES>, ClassifyError> {
+    const { assert!(CLASSES > 0 && CLASSES <= 256, "there are 1 to 256 classes") };
+    if k == 0 || k > MAX_K {
+        return Err(ClassifyError::KOutOfRange);
+    }
+    let mut nearest = Nearest::<CLASSES>::new(k);
+    examples.for_each_distance(features, &mut |distance, label| {
+        nearest.consider(distance, label)
+    });
+    nearest.vote(radius)
+}
+
+/// The k nearest examples so far.
+struct Nearest<const CLASSES: usize> {
+    /// The first `k` are in use, nearest first.
+    neighbours: [Neighbour; MAX_K as usize],
+    k: u8,
+    /// The k-th of `neighbours`, which each example is compared with.
+    last: Neighbour,
+    /// Votes of the examples that are as far as `last` but are not among the neighbours.
+    level: [usize; CLASSES],
+    /// Whether one of these examples has a label that is not a class.
+    level_unknown: bool,
+}
+
+/// A distance of 24 bits above a label of 8.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Neighbour(u32);
+
+impl Neighbour {
+    /// Farther than every example.
+    const NONE: Self = Self(u32::MAX);
+
+    const fn new(distance: u32, label: u8) -> Self {
+        Self((distance << 8) | label as u32)
+    }
+
+    const fn distance(self) -> u32 {
+        self.0 >> 8
+    }
+
+    const fn label(self) -> u8 {
+        self.0 as u8
+    }
+}
+
+const _: () = assert!(Neighbour::NONE.distance() == DISTANCE_LIMIT - 1);
+
+impl<const CLASSES: usize> Nearest<CLASSES> {
+    const fn new(k: u8) -> Self {
+        Self {
+            neighbours: [Neighbour::NONE; MAX_K as usize],
+            k,
+            last: Neighbour::NONE,
+            level: [0; CLASSES],
+            level_unknown: false,
+        }
+    }
+
+    #[inline(always)]
+    fn consider(&mut self, distance: u32, label: u8) {
+        if distance <= self.last.distance() {
+            self.admit(Neighbour::new(distance, label));
+        }
+    }
+
+    #[inline(never)]
+    fn admit(&mut self, candidate: Neighbour) {
+        // The candidate takes its place, and each farther neighbour the next one; the last falls out.
+        let mut carried = candidate;
+        for neighbour in self.neighbours.iter_mut().take(usize::from(self.k)) {
+            if carried < *neighbour {
+                core::mem::swap(&mut carried, neighbour);
+            }
+            self.last = *neighbour;
+        }
+        if carried.distance() > self.last.distance() {
+            self.level = [0; CLASSES];
+            self.level_unknown = false;
+        } else if carried != Neighbour::NONE {
+            match self.level.get_mut(usize::from(carried.label())) {
+                Some(votes) => *votes = votes.saturating_add(1),
+                None => self.level_unknown = true,
+            }
+        }
+    }
+
+    fn vote(&self, radius: u32) -> Result<Answer<CLASSES>, ClassifyError> {
+        let nearest = self.neighbours[0];
+        if nearest == Neighbour::NONE {
+            return Err(ClassifyError::NoExamples);
+        }
+        if self.last == Neighbour::NONE {
+            return Err(ClassifyError::TooFewExamples);
+        }
+        if self.level_unknown {
+            return Err(ClassifyError::UnknownLabel);
+        }
+        let mut votes = self.level;
+        for neighbour in self.voters() {
+            match votes.get_mut(usize::from(neighbour.label())) {
+                Some(votes) => *votes = votes.saturating_add(1),
+                None => return Err(ClassifyError::UnknownLabel),
+            }
+        }
+        let most = votes.iter().copied().max().unwrap_or(0);
+        let leads = |label: u8| votes.get(usize::from(label)) == Some(&most);
+        // Neighbours are sorted by distance and then by label, and those that found no room come after them by the
+        // same order: the first leading class met this way is the nearest, and the smallest among equals.
+        let label = self
+            .voters()
+            .map(Neighbour::label)
+            .find(|&label| leads(label));
+        let mut leaders = (0..=u8::MAX).take(CLASSES).filter(|&label| leads(label));
+        let smallest = leaders.next().unwrap_or(0);
+        let kind = if nearest.distance() > radius {
+            Kind::Stranger
+        } else if leaders.next().is_some() {
+            Kind::Tie
+        } else {
+            Kind::Known
+        };
+        Ok(Answer {
+            label: label.unwrap_or(smallest),
+            votes,
+            nearest: nearest.distance(),
+            kind,
+        })
+    }
+
+    fn voters(&self) -> impl Iterator<Item = Neighbour> {
+        self.neighbours.iter().copied().take(usize::from(self.k))
+    }
+}

@@ -1,0 +1,141 @@
+//! Labelled examples, and the trait by which they are searched wherever they lie.
+//!
+//! Examples may lie in flash, EEPROM or SRAM. The classifier asks a store for one thing only: the distance of each of
+//! its examples to the query. A store that can hand out an example has that for nothing; one with a faster way, such as
+//! an assembly loop that reads flash, overrides [`Examples::for_each_distance`]. A pair of stores is a store.
+
+use crate::squared_distance;
+
+/// A labelled example: what was measured, and what it was.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Example<const FEATURES: usize> {
+    /// The features, each scaled to a byte (see [`Scale::quantise`](crate::Scale::quantise)).
+    pub features: [u8; FEATURES],
+    /// The class: 0 for the first, `CLASSES - 1` for the last.
+    pub label: u8,
+}
+
+impl<const FEATURES: usize> Example<FEATURES> {
+    /// An example of the class `label`.
+    #[must_use]
+    pub const fn new(features: [u8; FEATURES], label: u8) -> Self {
+        Self { features, label }
+    }
+}
+
+/// A store of labelled examples.
+///
+/// Implemented for slices, arrays, [`Table`](crate::Table), references to stores, and pairs of stores, which are
+/// searched as one set: `(&in_flash, &in_eeprom)`, or `(&a, (&b, &c))` for three.
+///
+/// ```
+/// use knn::{Example, Examples};
+///
+/// let built_in = [Example::new([10, 10], 0), Example::new([200, 10], 1)];
+/// let from_the_field = [Example::new([190, 30], 1)];
+/// let both = (&built_in, &from_the_field);
+/// assert_eq!(both.len(), 3);
+/// assert_eq!(both.count(1), 2);
+/// assert_eq!(both.example(2), Some(from_the_field[0]));
+/// ```
+pub trait Examples<const FEATURES: usize> {
+    /// The number of examples.
+    fn len(&self) -> usize;
+
+    /// The example at `index`, or `None` from [`len`](Self::len) on.
+    fn example(&self, index: usize) -> Option<Example<FEATURES>>;
+
+    /// Calls `visit` with the squared distance to `query` and the label, once for each example, in any order.
+    ///
+    /// Distances must equal those of [`squared_distance`]; they are then below 2^24.
+    #[inline]
+    fn for_each_distance(&self, query: &[u8; FEATURES], visit: &mut impl FnMut(u32, u8)) {
+        for index in 0..self.len() {
+            if let Some(example) = self.example(index) {
+                visit(squared_distance(query, &example.features), example.label);
+            }
+        }
+    }
+
+    /// Whether there are no examples.
+    fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The number of examples of one class.
+    fn count(&self, label: u8) -> usize {
+        (0..self.len())
+            .filter_map(|index| self.example(index))
+            .filter(|example| example.label == label)
+            .count()
+    }
+}
+
+impl<const FEATURES: usize> Examples<FEATURES> for [Example<FEATURES>] {
+    fn len(&self) -> usize {
+        self.len()
+    }
+
+    fn example(&self, index: usize) -> Option<Example<FEATURES>> {
+        self.get(index).copied()
+    }
+
+    #[inline]
+    fn for_each_distance(&self, query: &[u8; FEATURES], visit: &mut impl FnMut(u32, u8)) {
+        for example in self {
+            visit(squared_distance(query, &example.features), example.label);
+        }
+    }
+}
+
+impl<const FEATURES: usize, const N: usize> Examples<FEATURES> for [Example<FEATURES>; N] {
+    fn len(&self) -> usize {
+        N
+    }
+
+    fn example(&self, index: usize) -> Option<Example<FEATURES>> {
+        self.as_slice().get(index).copied()
+    }
+
+    #[inline]
+    fn for_each_distance(&self, query: &[u8; FEATURES], visit: &mut impl FnMut(u32, u8)) {
+        self.as_slice().for_each_distance(query, visit);
+    }
+}
+
+impl<const FEATURES: usize, Store: Examples<FEATURES> + ?Sized> Examples<FEATURES> for &Store {
+    fn len(&self) -> usize {
+        Examples::len(*self)
+    }
+
+    fn example(&self, index: usize) -> Option<Example<FEATURES>> {
+        Examples::example(*self, index)
+    }
+
+    #[inline]
+    fn for_each_distance(&self, query: &[u8; FEATURES], visit: &mut impl FnMut(u32, u8)) {
+        (**self).for_each_distance(query, visit);
+    }
+}
+
+/// Two stores searched as one set; the second's examples are counted after the first's.
+impl<const FEATURES: usize, First: Examples<FEATURES>, Second: Examples<FEATURES>>
+    Examples<FEATURES> for (First, Second)
+{
+    fn len(&self) -> usize {
+        self.0.len() + self.1.len()
+    }
+
+    fn example(&self, index: usize) -> Option<Example<FEATURES>> {
+        match index.checked_sub(self.0.len()) {
+            None => self.0.example(index),
+            Some(index) => self.1.example(index),
+        }
+    }
+
+    #[inline]
+    fn for_each_distance(&self, query: &[u8; FEATURES], visit: &mut impl FnMut(u32, u8)) {
+        self.0.for_each_distance(query, visit);
+        self.1.for_each_distance(query, visit);
+    }
+}
