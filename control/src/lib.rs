@@ -1,13 +1,30 @@
-//! control
+//! The weeder's decisions, from beam edge to swing, without a register, a clock, a float or a heap.
+//!
+//! The data's way: a beam edge with its position becomes an [`object`], the object's [`features`] a class, a plant a
+//! window of the [`schedule`], and the schedule with the present [`speed`] tells the [`tool`] whether to be in the row or
+//! out of it. [`controller`] is the front door through which all of that, the operator's switch and the [`console`] pass.
+//!
+//! Position and time are arguments everywhere, so that a test can bend both. What this crate does not do: read a pin,
+//! wait, or know how its text reaches a terminal.
+
 #![no_std]
 #![forbid(unsafe_code)]
-use ufmt::uWrite;
-use avr_progmem::progmem_display as F;
-avr_progmem::progmem! {
-    /// A table
-    pub static progmem NAMES: [u16; 40] = [7; 40];
-}
-/// hello
-pub fn hello<W: uWrite>(w: &mut W, n: u8) -> Result<(), W::Error> {
-    ufmt::uwrite!(w, "{}{}", F!("hello world this is a long text in flash"), NAMES.load_at(n as usize))
-}
+
+pub mod alarm;
+pub mod classifier;
+pub mod console;
+pub mod controller;
+pub mod event;
+pub mod examples;
+pub mod features;
+pub mod lamp;
+pub mod object;
+pub mod quadrature;
+pub mod reply;
+pub mod schedule;
+pub mod servo;
+pub mod settings;
+pub mod speed;
+pub mod switch;
+pub mod text;
+pub mod units;

@@ -1,0 +1,290 @@
+//! The console's grammar: bytes to lines, lines to commands.
+//!
+//! A line is at most 80 characters and ends with CR, LF or both; backspace works, because serial terminals send it. Words
+//! are separated by blanks. A line that cannot be understood becomes one [`Mistake`] and changes nothing. How commands
+//! are carried out and answered is the business of [`reply`](crate::reply).
+
+use crate::{settings::Setting, text::words};
+use heapless::Vec;
+
+/// Characters that a line may have.
+pub const LINE_LENGTH: usize = 80;
+
+words! {
+    /// The first word of a command.
+    pub enum Word, WORDS: 8 {
+        /// Lists the commands, or explains a setting.
+        Help = "help",
+        /// One line of figures.
+        Status = "status",
+        /// Shows one setting or all.
+        Get = "get",
+        /// Changes a setting.
+        Set = "set",
+        /// Goes to work.
+        Start = "start",
+        /// Takes the tool out.
+        Hold = "hold",
+        /// Clears an alarm.
+        Clear = "clear",
+        /// Tells what happens, or stops telling.
+        Events = "events",
+        /// Names the firmware.
+        Version = "version",
+    }
+}
+
+/// A line that was understood.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Command {
+    /// `help`.
+    Help,
+    /// `help name`.
+    Explain(Setting),
+    /// `status`.
+    Status,
+    /// `get`.
+    GetAll,
+    /// `get name`.
+    Get(Setting),
+    /// `set name value`.
+    Set(Setting, u16),
+    /// `start`, or `start now`.
+    Start {
+        /// At once, over unseen ground.
+        now: bool,
+    },
+    /// `hold`.
+    Hold,
+    /// `clear`.
+    Clear,
+    /// `events on|off`.
+    Events(bool),
+    /// `version`.
+    Version,
+}
+
+/// Why a line was not understood.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mistake {
+    /// More than [`LINE_LENGTH`] characters.
+    TooLong,
+    /// Characters other than printable ASCII.
+    NotText,
+    /// Characters went missing before they could be read.
+    CharactersLost,
+    /// No command begins like this.
+    UnknownCommand,
+    /// The command takes other words than these.
+    Usage(Word),
+    /// No setting has this name.
+    UnknownSetting,
+    /// The setting takes a whole number within its range.
+    Value(Setting),
+}
+
+/// Reads a line.
+///
+/// # Errors
+/// A [`Mistake`] that says what would have been right.
+pub fn parse(line: &[u8]) -> Result<Command, Mistake> {
+    let mut words = line
+        .split(|&byte| byte == b' ' || byte == b'\t')
+        .filter(|word| !word.is_empty());
+    let word = words.next().and_then(Word::find).ok_or(Mistake::UnknownCommand)?;
+    let (first, second) = (words.next(), words.next());
+    if words.next().is_some() {
+        return Err(Mistake::Usage(word));
+    }
+    let setting = |name| Setting::find(name).ok_or(Mistake::UnknownSetting);
+    match (word, first, second) {
+        (Word::Help, None, None) => Ok(Command::Help),
+        (Word::Help, Some(name), None) => setting(name).map(Command::Explain),
+        (Word::Status, None, None) => Ok(Command::Status),
+        (Word::Get, None, None) => Ok(Command::GetAll),
+        (Word::Get, Some(name), None) => setting(name).map(Command::Get),
+        (Word::Set, Some(name), Some(digits)) => {
+            let setting = setting(name)?;
+            let value = number(digits).ok_or(Mistake::Value(setting))?;
+            Ok(Command::Set(setting, value))
+        }
+        (Word::Start, None, None) => Ok(Command::Start { now: false }),
+        (Word::Start, Some([b'n', b'o', b'w']), None) => Ok(Command::Start { now: true }),
+        (Word::Hold, None, None) => Ok(Command::Hold),
+        (Word::Clear, None, None) => Ok(Command::Clear),
+        (Word::Events, Some([b'o', b'n']), None) => Ok(Command::Events(true)),
+        (Word::Events, Some([b'o', b'f', b'f']), None) => Ok(Command::Events(false)),
+        (Word::Version, None, None) => Ok(Command::Version),
+        _ => Err(Mistake::Usage(word)),
+    }
+}
+
+/// A whole number in 16 bits, digits only.
+fn number(digits: &[u8]) -> Option<u16> {
+    digits.iter().try_fold(0_u16, |number, &digit| {
+        let digit = digit.wrapping_sub(b'0');
+        (digit <= 9).then_some(())?;
+        number.checked_mul(10)?.checked_add(u16::from(digit))
+    })
+}
+
+/// Collects bytes to lines.
+#[derive(Clone, Debug, Default)]
+pub struct LineBuffer {
+    characters: Vec<u8, LINE_LENGTH>,
+    mistake: Option<Mistake>,
+}
+
+impl LineBuffer {
+    /// An empty line.
+    pub const fn new() -> Self {
+        Self {
+            characters: Vec::new(),
+            mistake: None,
+        }
+    }
+
+    /// Takes a byte. At a line's end, returns what the line says; an empty line says nothing.
+    pub fn take(&mut self, byte: u8) -> Option<Result<Command, Mistake>> {
+        match byte {
+            b'\r' | b'\n' => return self.end(),
+            0x08 | 0x7F => {
+                self.characters.pop();
+            }
+            b'\t' | b' '..=b'~' => {
+                if self.characters.push(byte).is_err() {
+                    self.spoil(Mistake::TooLong);
+                }
+            }
+            _ => self.spoil(Mistake::NotText),
+        }
+        None
+    }
+
+    /// Notes that bytes went missing: the line that they belonged to must not be carried out.
+    pub fn characters_lost(&mut self) {
+        self.spoil(Mistake::CharactersLost);
+    }
+
+    fn spoil(&mut self, mistake: Mistake) {
+        self.mistake.get_or_insert(mistake);
+    }
+
+    fn end(&mut self) -> Option<Result<Command, Mistake>> {
+        let line = core::mem::take(&mut self.characters);
+        match self.mistake.take() {
+            Some(mistake) => Some(Err(mistake)),
+            None if line.iter().all(|&byte| byte == b' ' || byte == b'\t') => None,
+            None => Some(parse(&line)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use std::vec::Vec;
+
+    fn answers(bytes: &[u8]) -> Vec<Result<Command, Mistake>> {
+        let mut line = LineBuffer::new();
+        bytes.iter().filter_map(|&byte| line.take(byte)).collect()
+    }
+
+    #[test]
+    fn every_command_is_understood_with_its_words() {
+        for (line, command) in [
+            (&b"help"[..], Command::Help),
+            (b"help k", Command::Explain(Setting::K)),
+            (b"status", Command::Status),
+            (b"get", Command::GetAll),
+            (b"get wheel_mm", Command::Get(Setting::WheelMm)),
+            (b"set wheel_mm 405", Command::Set(Setting::WheelMm, 405)),
+            (b"  set \t wheel_mm   405 ", Command::Set(Setting::WheelMm, 405)),
+            (b"start", Command::Start { now: false }),
+            (b"start now", Command::Start { now: true }),
+            (b"hold", Command::Hold),
+            (b"clear", Command::Clear),
+            (b"events on", Command::Events(true)),
+            (b"events off", Command::Events(false)),
+            (b"version", Command::Version),
+        ] {
+            assert_eq!(parse(line), Ok(command), "{}", line.escape_ascii());
+        }
+    }
+
+    #[test]
+    fn a_line_that_is_not_understood_says_what_would_be_right() {
+        for (line, mistake) in [
+            (&b"hepl"[..], Mistake::UnknownCommand),
+            (b"HELP", Mistake::UnknownCommand),
+            (b"help me now", Mistake::Usage(Word::Help)),
+            (b"help me", Mistake::UnknownSetting),
+            (b"status please", Mistake::Usage(Word::Status)),
+            (b"set wheel_mm", Mistake::Usage(Word::Set)),
+            (b"set wheel_mm 400 mm", Mistake::Usage(Word::Set)),
+            (b"set wheel 400", Mistake::UnknownSetting),
+            (b"set wheel_mm 4oo", Mistake::Value(Setting::WheelMm)),
+            (b"set wheel_mm -400", Mistake::Value(Setting::WheelMm)),
+            (b"set wheel_mm 65936", Mistake::Value(Setting::WheelMm)),
+            (b"start later", Mistake::Usage(Word::Start)),
+            (b"events", Mistake::Usage(Word::Events)),
+            (b"events maybe", Mistake::Usage(Word::Events)),
+        ] {
+            assert_eq!(parse(line), Err(mistake), "{}", line.escape_ascii());
+        }
+    }
+
+    #[test]
+    fn carriage_return_line_feed_or_both_end_a_line() {
+        let twice = [Ok(Command::Hold), Ok(Command::Clear)];
+        for text in [
+            &b"hold\rclear\r"[..],
+            b"hold\nclear\n",
+            b"hold\r\nclear\r\n",
+            b"\n\nhold\r\r\n \nclear\n",
+        ] {
+            assert_eq!(answers(text), twice, "{}", text.escape_ascii());
+        }
+    }
+
+    #[test]
+    fn backspace_takes_back_the_last_character() {
+        assert_eq!(
+            answers(b"hole\x08d\n\x7F\x7Fclear\n"),
+            [Ok(Command::Hold), Ok(Command::Clear)]
+        );
+    }
+
+    #[test]
+    fn a_spoiled_line_is_one_mistake_and_the_next_line_is_read() {
+        let mut text = [b'x'; 300].to_vec();
+        text.extend(b"\nstatus\n");
+        assert_eq!(answers(&text), [Err(Mistake::TooLong), Ok(Command::Status)]);
+        assert_eq!(
+            answers(b"\xFF\0\x1Bhold\nhold\n"),
+            [Err(Mistake::NotText), Ok(Command::Hold)]
+        );
+    }
+
+    #[test]
+    fn a_line_of_eighty_characters_is_not_too_long() {
+        let mut text = b"hold".to_vec();
+        text.resize(80, b' ');
+        text.push(b'\n');
+        assert_eq!(answers(&text), [Ok(Command::Hold)]);
+        text.insert(4, b' ');
+        assert_eq!(answers(&text), [Err(Mistake::TooLong)]);
+    }
+
+    #[test]
+    fn a_line_that_lost_characters_is_not_carried_out() {
+        let mut line = LineBuffer::new();
+        for &byte in b"hol" {
+            assert_eq!(line.take(byte), None);
+        }
+        line.characters_lost();
+        assert_eq!(line.take(b'd'), None);
+        assert_eq!(line.take(b'\n'), Some(Err(Mistake::CharactersLost)));
+    }
+}

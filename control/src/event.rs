@@ -1,0 +1,41 @@
+//! Events: what the machine has to tell while it works, one line each.
+
+use crate::{
+    alarm::Alarm,
+    classifier::Vote,
+    controller::State,
+    schedule::Plan,
+    units::{Position, Ticks},
+};
+
+/// Something that happened.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Event {
+    /// An object was seen in full and classified.
+    Object {
+        /// What it was taken for.
+        vote: Vote,
+        /// Where the beam broke.
+        leading: Position,
+        /// Distance since the last plant's leading edge, or since watching began.
+        spacing: Ticks,
+        /// The paper's schedule for it.
+        plan: Plan,
+    },
+    /// The tool was told to leave the row or to come back.
+    Swing {
+        /// Out of the row, or back into it.
+        out: bool,
+        /// The machine's position at the command.
+        position: Position,
+    },
+    /// The machine went from one state to another.
+    State(State),
+    /// A fault was latched.
+    Alarm {
+        /// Which.
+        alarm: Alarm,
+        /// The machine's position.
+        position: Position,
+    },
+}

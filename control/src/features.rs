@@ -1,0 +1,136 @@
+//! The paper's five features of an object.
+//!
+//! Speed, encoder value, delay, hold and actuation are given in millimetres and millimetres a second, as the paper's
+//! own machine would schedule the object: beam 400 mm ahead of the tool, 50 mm margin, 180 and 40 ms of lead. So the
+//! examples that one machine was taught with hold on another, whatever its wheel, its encoder and its settings.
+
+use crate::units::{Ticks, Wheel};
+
+/// Features in a vector.
+pub const COUNT: usize = 5;
+
+/// The forward speeds of the paper's trial, in mm/s: 1, 1.5, 2 and 2.5 km/h.
+pub const SPEED_CLASSES_MM_S: [i16; 4] = [278, 417, 556, 694];
+
+/// The machine as which every object is described.
+mod reference {
+    pub const BEAM_TO_TOOL_MM: i32 = 400;
+    pub const MARGIN_MM: i32 = 50;
+    pub const LEAD_OUT_MS: i32 = 180;
+    pub const LEAD_IN_MS: i32 = 40;
+}
+
+/// The feature vector of an object.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Features {
+    /// S: the machine's speed class in mm/s.
+    pub speed_mm_s: i16,
+    /// E: distance since the last plant's leading edge, the plant spacing, in mm.
+    pub spacing_mm: i16,
+    /// Y: delay until the command to leave the row (Eq. 1, less the lead), in mm.
+    pub delay_mm: i16,
+    /// Z: hold, the stretch that the tool stays out (Eq. 2), in mm.
+    pub hold_mm: i16,
+    /// R: actuation, where the command to come back falls (Eq. 3, less the lead), in mm.
+    pub actuation_mm: i16,
+}
+
+impl Features {
+    /// Describes an object of `width`, `spacing` behind the last plant, seen at `speed_mm_s`.
+    pub fn new(wheel: Wheel, speed_mm_s: i16, spacing: Ticks, width: Ticks) -> Self {
+        Self::describe(
+            speed_class(speed_mm_s),
+            wheel.millimetres(spacing),
+            wheel.millimetres(width),
+        )
+    }
+
+    /// Describes an object of `width_mm`, `spacing_mm` behind the last plant, in one of the speed classes.
+    pub const fn describe(speed_class_mm_s: i16, spacing_mm: i16, width_mm: i16) -> Self {
+        let speed = speed_class_mm_s as i32;
+        let delay = reference::BEAM_TO_TOOL_MM - reference::MARGIN_MM;
+        let hold = width_mm as i32 + 2 * reference::MARGIN_MM;
+        Self {
+            speed_mm_s: speed_class_mm_s,
+            spacing_mm,
+            delay_mm: limited(delay - speed * reference::LEAD_OUT_MS / 1000),
+            hold_mm: limited(hold),
+            actuation_mm: limited(delay + hold - speed * reference::LEAD_IN_MS / 1000),
+        }
+    }
+
+    /// The features in the paper's order: speed, encoder value, delay, hold, actuation.
+    pub const fn values(&self) -> [i32; COUNT] {
+        [
+            self.speed_mm_s as i32,
+            self.spacing_mm as i32,
+            self.delay_mm as i32,
+            self.hold_mm as i32,
+            self.actuation_mm as i32,
+        ]
+    }
+}
+
+const fn limited(millimetres: i32) -> i16 {
+    if millimetres > i16::MAX as i32 {
+        i16::MAX
+    } else {
+        millimetres as i16
+    }
+}
+
+/// The nearest of the paper's speed classes, in mm/s; faster than the fastest is the fastest.
+pub fn speed_class(speed_mm_s: i16) -> i16 {
+    let mut class = SPEED_CLASSES_MM_S[0];
+    for pair in SPEED_CLASSES_MM_S.windows(2) {
+        if speed_mm_s > (pair[0] + pair[1]) / 2 {
+            class = pair[1];
+        }
+    }
+    class
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WHEEL: Wheel = Wheel {
+        ticks_per_rev: 2400,
+        diameter_mm: 400,
+    };
+
+    #[test]
+    fn a_speed_belongs_to_the_nearest_of_the_papers_classes() {
+        for (speed, class) in [
+            (-50, 278),
+            (0, 278),
+            (347, 278),
+            (348, 417),
+            (486, 417),
+            (487, 556),
+            (694, 694),
+            (2778, 694),
+        ] {
+            assert_eq!(speed_class(speed), class, "{speed}");
+        }
+    }
+
+    #[test]
+    fn the_features_are_the_papers_schedule_on_the_reference_machine() {
+        // 150 mm of canopy at 2.5 km/h: Y = 350 mm less 124 mm of lead, Z = 250 mm, R = 600 mm less 27 mm.
+        let features = Features::new(WHEEL, 700, Ticks(955), Ticks(287));
+        assert_eq!(features.values(), [694, 500, 226, 250, 573]);
+    }
+
+    #[test]
+    fn another_wheel_gives_the_same_features() {
+        let small = Wheel {
+            ticks_per_rev: 1000,
+            diameter_mm: 250,
+        };
+        assert_eq!(
+            Features::new(small, 700, small.ticks(501), small.ticks(151)),
+            Features::new(WHEEL, 700, WHEEL.ticks(501), WHEEL.ticks(151)),
+        );
+    }
+}

@@ -1,0 +1,202 @@
+//! Objects in the row, from the edges of the beam.
+//!
+//! The beam is watched along the ground, not along time: what counts is its level at ground that it has not seen before.
+//! [`Watch`] keeps the frontier, the farthest ground seen. Rolling back lets the beam cross known ground, where its edges
+//! mean nothing; when the machine reaches the frontier again, watching goes on with the level that the beam then has. So
+//! a plant is one object, however often it is passed.
+//!
+//! A canopy is ragged: clear stretches shorter than the merging gap belong to the object, which ends only once the gap
+//! behind it has been seen in full. What an object is, plant or weed, is not decided here.
+
+use crate::units::{Position, Ticks};
+
+/// A stretch of ground over which the beam was broken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Object {
+    /// Where the beam broke.
+    pub leading: Position,
+    /// Where the beam cleared, at or ahead of `leading`.
+    pub trailing: Position,
+}
+
+impl Object {
+    /// How far the machine rolled while the beam was broken, the paper's `t S`.
+    pub fn width(&self) -> Ticks {
+        self.trailing - self.leading
+    }
+}
+
+/// What the beam sees at the frontier.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Sight {
+    /// Nothing.
+    Clear,
+    /// An object that began at `leading`.
+    Broken { leading: Position },
+    /// Clear ground behind an object, which may turn out to be a gap in it.
+    Gap(Object),
+}
+
+/// Watches the row through the beam.
+#[derive(Clone, Debug)]
+pub struct Watch {
+    frontier: Position,
+    /// The beam's level where the machine now is, at or behind the frontier.
+    broken: bool,
+    sight: Sight,
+}
+
+impl Watch {
+    /// Begins to watch at `ground`, with the beam broken or not.
+    pub fn start(ground: Position, broken: bool) -> Self {
+        let sight = if broken {
+            Sight::Broken { leading: ground }
+        } else {
+            Sight::Clear
+        };
+        Self {
+            frontier: ground,
+            broken,
+            sight,
+        }
+    }
+
+    /// The farthest ground seen.
+    pub fn frontier(&self) -> Position {
+        self.frontier
+    }
+
+    /// Whether the beam is broken where the machine now is.
+    pub fn is_broken(&self) -> bool {
+        self.broken
+    }
+
+    /// Where the object began whose end has not been seen yet.
+    pub fn open(&self) -> Option<Position> {
+        match self.sight {
+            Sight::Clear => None,
+            Sight::Broken { leading } | Sight::Gap(Object { leading, .. }) => Some(leading),
+        }
+    }
+
+    /// Takes an edge of the beam at `ground`; returns the object that was complete before it.
+    pub fn edge(&mut self, ground: Position, broken: bool, merge_gap: Ticks) -> Option<Object> {
+        let complete = self.roll_to(ground, merge_gap);
+        self.broken = broken;
+        if ground == self.frontier {
+            self.turn();
+        }
+        complete
+    }
+
+    /// The machine has rolled to `ground` without an edge; returns the object that this completes.
+    pub fn roll_to(&mut self, ground: Position, merge_gap: Ticks) -> Option<Object> {
+        if !ground.is_ahead_of(self.frontier) {
+            return None;
+        }
+        // The machine may have come back to the frontier with another level than it left with.
+        self.turn();
+        self.frontier = ground;
+        match self.sight {
+            Sight::Gap(object) if ground - object.trailing >= merge_gap => {
+                self.sight = Sight::Clear;
+                Some(object)
+            }
+            _ => None,
+        }
+    }
+
+    /// Takes the beam's level at the frontier for what is seen there.
+    fn turn(&mut self) {
+        self.sight = match (self.sight, self.broken) {
+            (Sight::Clear, true) => Sight::Broken { leading: self.frontier },
+            (Sight::Gap(Object { leading, .. }), true) => Sight::Broken { leading },
+            (Sight::Broken { leading }, false) => Sight::Gap(Object {
+                leading,
+                trailing: self.frontier,
+            }),
+            (sight, _) => sight,
+        };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use std::vec::Vec;
+
+    const GAP: Ticks = Ticks(40);
+
+    /// Rolls tick by tick through `places`, with the beam broken inside `canopies`, and collects the objects.
+    fn objects(canopies: &[(i32, i32)], places: impl IntoIterator<Item = i32>) -> Vec<(i32, i32)> {
+        let broken_at = |place: i32| canopies.iter().any(|&(from, to)| (from..to).contains(&place));
+        let mut places = places.into_iter();
+        let first = places.next().expect("a place to start from");
+        let mut watch = Watch::start(Position::new(first), broken_at(first));
+        let mut found = Vec::new();
+        for place in places {
+            let ground = Position::new(place);
+            found.extend(if broken_at(place) == watch.is_broken() {
+                watch.roll_to(ground, GAP)
+            } else {
+                watch.edge(ground, broken_at(place), GAP)
+            });
+        }
+        found
+            .into_iter()
+            .map(|object| (object.leading.count(), object.trailing.count()))
+            .collect()
+    }
+
+    #[test]
+    fn a_canopy_is_one_object_from_edge_to_edge() {
+        assert_eq!(objects(&[(100, 400)], 0..600), [(100, 400)]);
+    }
+
+    #[test]
+    fn a_ragged_canopy_is_one_object() {
+        assert_eq!(objects(&[(100, 200), (215, 300), (339, 400)], 0..600), [(100, 400)]);
+    }
+
+    #[test]
+    fn two_canopies_a_gap_apart_are_two_objects() {
+        assert_eq!(objects(&[(100, 200), (240, 300)], 0..600), [(100, 200), (240, 300)]);
+    }
+
+    #[test]
+    fn an_object_is_complete_only_once_the_gap_behind_it_has_been_seen() {
+        assert_eq!(objects(&[(100, 200)], 0..240), []);
+        assert_eq!(objects(&[(100, 200)], 0..241), [(100, 200)]);
+    }
+
+    #[test]
+    fn a_plant_passed_three_times_is_one_object() {
+        let there_and_back = (0..350).chain((50..350).rev()).chain(50..600);
+        assert_eq!(objects(&[(100, 400)], there_and_back), [(100, 400)]);
+        let past_it = (0..700).chain((0..700).rev()).chain(0..900);
+        assert_eq!(objects(&[(100, 400)], past_it), [(100, 400)]);
+    }
+
+    #[test]
+    fn a_plant_that_comes_into_the_beam_behind_the_frontier_begins_at_the_frontier() {
+        let mut watch = Watch::start(Position::new(0), false);
+        watch.roll_to(Position::new(500), GAP);
+        watch.edge(Position::new(450), true, GAP);
+        assert_eq!(watch.open(), None);
+        watch.roll_to(Position::new(501), GAP);
+        assert_eq!(watch.open(), Some(Position::new(500)));
+    }
+
+    #[test]
+    fn objects_are_the_same_where_the_counter_wraps() {
+        let base = i32::MAX - 250;
+        let mut watch = Watch::start(Position::new(base), false);
+        let at = |offset: i32| Position::new(base.wrapping_add(offset));
+        assert_eq!(watch.edge(at(100), true, GAP), None);
+        assert_eq!(watch.edge(at(400), false, GAP), None);
+        let object = watch.roll_to(at(440), GAP).expect("the gap has been seen");
+        assert_eq!((object.leading, object.trailing), (at(100), at(400)));
+        assert_eq!(object.width(), Ticks(300));
+    }
+}

@@ -1,0 +1,72 @@
+//! The work switch, freed of its contacts' bouncing.
+//!
+//! Only a change counts: a switch that is on when the machine wakes up starts nothing until it has been off.
+
+use crate::units::{Instant, Interval};
+
+/// Contacts bounce for a few milliseconds; a level that lasts this long is meant.
+const SETTLE: Interval = Interval::from_ms(20);
+
+/// The work switch.
+#[derive(Clone, Debug)]
+pub struct Switch {
+    on: bool,
+    /// Since when the level has differed from `on`.
+    differs_since: Option<Instant>,
+}
+
+impl Switch {
+    /// A switch as it is found at power-up.
+    pub const fn new(on: bool) -> Self {
+        Self {
+            on,
+            differs_since: None,
+        }
+    }
+
+    /// Takes the switch's level; returns its new position when it was thrown.
+    pub fn read(&mut self, now: Instant, on: bool) -> Option<bool> {
+        if on == self.on {
+            self.differs_since = None;
+            return None;
+        }
+        let since = *self.differs_since.get_or_insert(now);
+        if now - since < SETTLE {
+            return None;
+        }
+        self.on = on;
+        self.differs_since = None;
+        Some(on)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at_ms(milliseconds: u32) -> Instant {
+        Instant::default() + Interval::from_ms(milliseconds)
+    }
+
+    #[test]
+    fn a_switch_that_is_on_from_the_start_counts_only_after_it_has_been_off() {
+        let mut switch = Switch::new(true);
+        assert_eq!(switch.read(at_ms(0), true), None);
+        assert_eq!(switch.read(at_ms(1000), true), None);
+        assert_eq!(switch.read(at_ms(1001), false), None);
+        assert_eq!(switch.read(at_ms(1021), false), Some(false));
+        assert_eq!(switch.read(at_ms(1022), true), None);
+        assert_eq!(switch.read(at_ms(1042), true), Some(true));
+    }
+
+    #[test]
+    fn bouncing_contacts_throw_it_once() {
+        let mut switch = Switch::new(false);
+        let mut thrown = 0;
+        for millisecond in 0..100 {
+            let on = millisecond >= 15 || millisecond % 3 == 0;
+            thrown += u8::from(switch.read(at_ms(millisecond), on).is_some());
+        }
+        assert_eq!(thrown, 1);
+    }
+}
