@@ -3,4 +3,11 @@
 //! [`row`] says what stands in the row, [`machine`] how the weeder rolls past it and what its servo makes of the pulses,
 //! [`uno`] runs the firmware's ELF on simavr, and [`trial`] joins them and judges what happened to each plant.
 
+pub mod firmware;
+pub mod machine;
+pub mod motion;
+pub mod planting;
+pub mod row;
+pub mod servo;
 pub mod signal;
+pub mod uno;

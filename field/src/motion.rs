@@ -1,0 +1,352 @@
+//! How the machine rolls: its position in millimetres as an exact function of time.
+//!
+//! A [`Motion`] is a chain of pieces of constant acceleration, put together one manoeuvre after the other: stand, change
+//! speed, roll to a place, stop at a place, roll back. Each piece keeps its direction, so the moment at which a place is
+//! passed follows from one quadratic equation and no time step is involved: the edges of an encoder come out at their
+//! exact times.
+//!
+//! It knows no slip and no machine: what position 0 means is the user's choice.
+
+use std::ops::Range;
+
+/// Walking speed in millimetres a second for a speed in kilometres an hour.
+pub fn mm_s(speed_km_h: f64) -> f64 {
+    speed_km_h / 3.6 * 1000.0
+}
+
+/// A place was passed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Passing {
+    /// When, in seconds since the motion began.
+    pub time_s: f64,
+    /// Whether the machine rolled forward, towards larger positions.
+    pub forward: bool,
+}
+
+/// The machine's position as a function of time, see the module's words.
+#[derive(Clone, Debug)]
+pub struct Motion {
+    start_mm: f64,
+    pieces: Vec<Piece>,
+    end_s: f64,
+    end_mm: f64,
+    end_speed_mm_s: f64,
+}
+
+/// A stretch of constant acceleration in which the direction does not change.
+#[derive(Clone, Copy, Debug)]
+struct Piece {
+    start_s: f64,
+    end_s: f64,
+    start_mm: f64,
+    end_mm: f64,
+    speed_mm_s: f64,
+    acceleration_mm_s2: f64,
+}
+
+impl Piece {
+    fn position_mm(&self, time_s: f64) -> f64 {
+        let t = time_s - self.start_s;
+        self.start_mm + self.speed_mm_s * t + self.acceleration_mm_s2 * t * t / 2.0
+    }
+
+    /// When the piece reaches a place between its ends. The form of the quadratic's root that adds two terms of one sign
+    /// stays exact for small accelerations as well as from standstill.
+    fn time_at(&self, place_mm: f64) -> f64 {
+        let distance_mm = place_mm - self.start_mm;
+        if distance_mm == 0.0 {
+            return self.start_s;
+        }
+        let squared_speed = self.speed_mm_s.powi(2) + 2.0 * self.acceleration_mm_s2 * distance_mm;
+        let speed_there_mm_s = squared_speed.max(0.0).sqrt().copysign(distance_mm);
+        let duration_s = 2.0 * distance_mm / (self.speed_mm_s + speed_there_mm_s);
+        (self.start_s + duration_s).clamp(self.start_s, self.end_s)
+    }
+}
+
+impl Motion {
+    /// The machine stands at `start_mm`.
+    pub fn starting_at(start_mm: f64) -> Self {
+        Self {
+            start_mm,
+            pieces: Vec::new(),
+            end_s: 0.0,
+            end_mm: start_mm,
+            end_speed_mm_s: 0.0,
+        }
+    }
+
+    /// From standstill at `start_mm` with `acceleration_mm_s2` to a constant speed, and on to `end_mm`.
+    pub fn steady(start_mm: f64, acceleration_mm_s2: f64, speed_mm_s: f64, end_mm: f64) -> Self {
+        Self::starting_at(start_mm)
+            .change_speed(speed_mm_s, acceleration_mm_s2)
+            .roll_to(end_mm)
+    }
+
+    /// Goes on at the speed reached for a time: stands, where the machine stood.
+    pub fn go_on_for(self, duration_s: f64) -> Self {
+        let end_mm = self.end_mm + self.end_speed_mm_s * duration_s;
+        let speed_mm_s = self.end_speed_mm_s;
+        self.then(duration_s, 0.0, end_mm, speed_mm_s)
+    }
+
+    /// Changes to a speed, negative for rolling back, with an acceleration whose sign does not matter.
+    ///
+    /// # Panics
+    /// With an acceleration of 0: the speed would never be reached.
+    pub fn change_speed(self, speed_mm_s: f64, acceleration_mm_s2: f64) -> Self {
+        assert!(acceleration_mm_s2 != 0.0, "a change of speed needs an acceleration");
+        if self.end_speed_mm_s * speed_mm_s < 0.0 {
+            return self
+                .change_speed(0.0, acceleration_mm_s2)
+                .change_speed(speed_mm_s, acceleration_mm_s2);
+        }
+        let change_mm_s = speed_mm_s - self.end_speed_mm_s;
+        let acceleration_mm_s2 = acceleration_mm_s2.abs().copysign(change_mm_s);
+        let duration_s = change_mm_s / acceleration_mm_s2;
+        let end_mm = self.end_mm + (self.end_speed_mm_s + speed_mm_s) / 2.0 * duration_s;
+        self.then(duration_s, acceleration_mm_s2, end_mm, speed_mm_s)
+    }
+
+    /// Rolls on at the speed reached until `place_mm`.
+    ///
+    /// # Panics
+    /// Where the machine does not roll towards the place.
+    pub fn roll_to(self, place_mm: f64) -> Self {
+        let duration_s = (place_mm - self.end_mm) / self.end_speed_mm_s;
+        assert!(
+            duration_s.is_finite() && duration_s >= 0.0,
+            "at {} mm with {} mm/s the machine never comes to {place_mm} mm",
+            self.end_mm,
+            self.end_speed_mm_s
+        );
+        let speed_mm_s = self.end_speed_mm_s;
+        self.then(duration_s, 0.0, place_mm, speed_mm_s)
+    }
+
+    /// Rolls on, brakes in time and stands at `place_mm`.
+    ///
+    /// # Panics
+    /// Where the place is nearer than the braking distance.
+    pub fn stop_at(self, place_mm: f64, acceleration_mm_s2: f64) -> Self {
+        let braking_mm = (self.end_speed_mm_s.powi(2) / (2.0 * acceleration_mm_s2.abs())).copysign(self.end_speed_mm_s);
+        self.roll_to(place_mm - braking_mm)
+            .change_speed(0.0, acceleration_mm_s2)
+    }
+
+    fn then(mut self, duration_s: f64, acceleration_mm_s2: f64, end_mm: f64, end_speed_mm_s: f64) -> Self {
+        let piece = Piece {
+            start_s: self.end_s,
+            end_s: self.end_s + duration_s,
+            start_mm: self.end_mm,
+            end_mm,
+            speed_mm_s: self.end_speed_mm_s,
+            acceleration_mm_s2,
+        };
+        if duration_s > 0.0 {
+            self.end_s = piece.end_s;
+            self.end_mm = end_mm;
+            self.pieces.push(piece);
+        }
+        self.end_speed_mm_s = end_speed_mm_s;
+        self
+    }
+
+    /// Where the motion began.
+    pub fn start_mm(&self) -> f64 {
+        self.start_mm
+    }
+
+    /// Where the motion ended.
+    pub fn end_mm(&self) -> f64 {
+        self.end_mm
+    }
+
+    /// How long the motion takes.
+    pub fn duration_s(&self) -> f64 {
+        self.end_s
+    }
+
+    /// The position at a time. Before its beginning and after its end the machine stands.
+    pub fn position_mm(&self, time_s: f64) -> f64 {
+        match self.piece_at(time_s) {
+            Some(piece) => piece.position_mm(time_s),
+            None if time_s < 0.0 => self.start_mm,
+            None => self.end_mm,
+        }
+    }
+
+    /// The speed at a time, negative when rolling back.
+    pub fn speed_mm_s(&self, time_s: f64) -> f64 {
+        self.piece_at(time_s).map_or(0.0, |piece| {
+            piece.speed_mm_s + piece.acceleration_mm_s2 * (time_s - piece.start_s)
+        })
+    }
+
+    /// The stretch that the machine rolled over during a time.
+    pub fn stretch_mm(&self, times_s: &Range<f64>) -> Range<f64> {
+        let turns = self
+            .pieces
+            .iter()
+            .filter(|piece| times_s.contains(&piece.start_s))
+            .map(|piece| piece.start_mm);
+        let end_mm = self.position_mm(times_s.end);
+        let from_mm = self.position_mm(times_s.start);
+        turns.chain([end_mm]).fold(from_mm..from_mm, |stretch, place_mm| {
+            stretch.start.min(place_mm)..stretch.end.max(place_mm)
+        })
+    }
+
+    /// Every passing of a place, in order of time.
+    pub fn passings(&self, place_mm: f64) -> Vec<Passing> {
+        // A place belongs to what lies ahead of it: it is passed forward on arrival and backward on leaving, so that a
+        // machine that stops on it exactly and turns has passed it twice, not once.
+        let is_past = |position_mm: f64| position_mm >= place_mm;
+        self.pieces
+            .iter()
+            .filter(|piece| is_past(piece.start_mm) != is_past(piece.end_mm))
+            .map(|piece| Passing {
+                time_s: piece.time_at(place_mm),
+                forward: is_past(piece.end_mm),
+            })
+            .collect()
+    }
+
+    /// The times during which the position lies within a stretch.
+    pub fn times_within_s(&self, stretch_mm: &Range<f64>) -> Vec<Range<f64>> {
+        let mut times: Vec<f64> = [stretch_mm.start, stretch_mm.end]
+            .iter()
+            .flat_map(|&place_mm| self.passings(place_mm))
+            .map(|passing| passing.time_s)
+            .chain([0.0, self.end_s])
+            .collect();
+        times.sort_by(f64::total_cmp);
+        times
+            .windows(2)
+            .map(|pair| pair[0]..pair[1])
+            .filter(|span| stretch_mm.contains(&self.position_mm((span.start + span.end) / 2.0)))
+            .collect()
+    }
+
+    /// The edges of a wheel that is divided into marks `pitch_mm` apart: each mark's passing, in order of time.
+    ///
+    /// The motion begins half way between two marks.
+    pub fn mark_passings(&self, pitch_mm: f64) -> Vec<Passing> {
+        let marks_to = |position_mm: f64| marks(position_mm - self.start_mm, pitch_mm);
+        let mut passings = Vec::new();
+        for piece in &self.pieces {
+            let (from, to) = (marks_to(piece.start_mm), marks_to(piece.end_mm));
+            let at = |mark: i64| Passing {
+                time_s: piece.time_at(self.start_mm + (mark as f64 - 0.5) * pitch_mm),
+                forward: to > from,
+            };
+            if to > from {
+                passings.extend((from + 1..=to).map(at));
+            } else {
+                passings.extend((to + 1..=from).rev().map(at));
+            }
+        }
+        passings
+    }
+
+    fn piece_at(&self, time_s: f64) -> Option<&Piece> {
+        let index = self.pieces.partition_point(|piece| piece.end_s <= time_s);
+        self.pieces.get(index).filter(|piece| piece.start_s <= time_s)
+    }
+}
+
+/// Marks passed, net, after a distance rolled from half way between two of them: the counts of an ideal encoder.
+pub fn marks(distance_mm: f64, pitch_mm: f64) -> i64 {
+    (distance_mm / pitch_mm + 0.5).floor() as i64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PITCH_MM: f64 = 0.524;
+
+    /// 1 km/h, then 2.5 km/h, a stop, back over 300 mm, and forward again.
+    fn to_and_fro() -> Motion {
+        Motion::starting_at(-100.0)
+            .change_speed(mm_s(1.0), 400.0)
+            .roll_to(500.0)
+            .change_speed(mm_s(2.5), 800.0)
+            .stop_at(2000.0, 1000.0)
+            .go_on_for(1.5)
+            .change_speed(-mm_s(1.0), 400.0)
+            .stop_at(1700.0, 400.0)
+            .change_speed(mm_s(2.5), 800.0)
+            .roll_to(3000.0)
+    }
+
+    #[test]
+    fn position_and_speed_are_continuous() {
+        let motion = to_and_fro();
+        let step_s = 1e-4;
+        let steps = (motion.duration_s() / step_s) as usize;
+        for step in 0..steps {
+            let time_s = step as f64 * step_s;
+            let moved_mm = motion.position_mm(time_s + step_s) - motion.position_mm(time_s);
+            let mean_mm_s = (motion.speed_mm_s(time_s) + motion.speed_mm_s(time_s + step_s)) / 2.0;
+            // The motion ends at full speed, so its very last step is left out.
+            if time_s + 2.0 * step_s < motion.duration_s() {
+                assert!((moved_mm - mean_mm_s * step_s).abs() < 1e-4, "at {time_s} s");
+            }
+        }
+    }
+
+    #[test]
+    fn every_mark_is_passed_at_the_time_when_the_position_says_so() {
+        let motion = to_and_fro();
+        let mut count = 0;
+        let mut last_s = 0.0;
+        for passing in motion.mark_passings(PITCH_MM) {
+            assert!(passing.time_s >= last_s, "marks are in order of time");
+            last_s = passing.time_s;
+            let mark = if passing.forward { count + 1 } else { count };
+            let place_mm = -100.0 + (f64::from(mark) - 0.5) * PITCH_MM;
+            assert!((motion.position_mm(passing.time_s) - place_mm).abs() < 1e-6);
+            count += if passing.forward { 1 } else { -1 };
+        }
+        assert_eq!(i64::from(count), marks(3100.0, PITCH_MM));
+    }
+
+    #[test]
+    fn rolling_back_passes_a_place_three_times() {
+        let passings = to_and_fro().passings(1800.0);
+        let directions: Vec<bool> = passings.iter().map(|passing| passing.forward).collect();
+        assert_eq!(directions, [true, false, true]);
+    }
+
+    #[test]
+    fn a_place_on_which_the_machine_turns_is_passed_there_and_back() {
+        let motion = Motion::starting_at(0.0)
+            .change_speed(100.0, 100.0)
+            .stop_at(200.0, 100.0)
+            .change_speed(-100.0, 100.0)
+            .roll_to(100.0);
+        assert_eq!(motion.position_mm(3.0), 200.0);
+        let directions: Vec<bool> = motion.passings(200.0).iter().map(|passing| passing.forward).collect();
+        assert_eq!(directions, [true, false]);
+    }
+
+    #[test]
+    fn times_within_a_stretch_end_where_the_machine_leaves_it() {
+        let motion = Motion::steady(0.0, 1000.0, 500.0, 1000.0);
+        let times = motion.times_within_s(&(400.0..600.0));
+        assert_eq!(times.len(), 1);
+        assert!((motion.position_mm(times[0].start) - 400.0).abs() < 1e-6);
+        assert!((motion.position_mm(times[0].end) - 600.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn the_stretch_of_a_turn_reaches_to_the_turning_point() {
+        let motion = to_and_fro();
+        let stretch = motion.stretch_mm(&(0.0..motion.duration_s()));
+        assert!((stretch.start - -100.0).abs() < 1e-9 && (stretch.end - 3000.0).abs() < 1e-9);
+        let passings = motion.passings(1900.0);
+        let turn = motion.stretch_mm(&(passings[0].time_s..passings[1].time_s));
+        assert!((turn.start - 1900.0).abs() < 1e-6 && (turn.end - 2000.0).abs() < 1e-6);
+    }
+}

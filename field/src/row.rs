@@ -1,0 +1,457 @@
+//! What stands in a crop row, as the beam sees it: crop plants and tall weeds, each with its place along the row and its
+//! width at the beam's height.
+//!
+//! A [`Row`] comes from a list, from a CSV file of measured plants or, with [`Planting`](crate::planting::Planting), from a
+//! seed. Things in a row
+//! stand apart: where canopies close up, the beam sees one object, and so does the row. Weeds that are too short for the
+//! beam are not in it: they are the ground that the tool works.
+//!
+//! All places are millimetres along the ground, from an origin of the row's own.
+
+use serde::{Deserialize, Serialize};
+use std::fmt;
+use std::fs::File;
+use std::io;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// Widest thing that a row takes. Wider than any crop plant that is weeded between.
+pub const MAX_WIDTH_MM: f64 = 1000.0;
+
+/// What a thing in the row is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kind {
+    /// A crop plant: the tool has to go round it.
+    Plant,
+    /// A weed tall enough to break the beam: the tool should not go round it.
+    Weed,
+}
+
+impl fmt::Display for Kind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Kind::Plant => "plant",
+            Kind::Weed => "weed",
+        })
+    }
+}
+
+/// A plant or a tall weed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Thing {
+    /// Its centre along the row.
+    pub position_mm: f64,
+    /// Its width at the beam's height: for a crop plant the canopy's.
+    pub width_mm: f64,
+    /// What it is.
+    pub kind: Kind,
+    /// Where within its width leaves break the beam, as places along the row in ascending order. Empty for a thing
+    /// without gaps.
+    pub leaves: Vec<Range<f64>>,
+}
+
+impl Thing {
+    /// A crop plant with a closed canopy.
+    pub fn plant(position_mm: f64, width_mm: f64) -> Self {
+        Self {
+            position_mm,
+            width_mm,
+            kind: Kind::Plant,
+            leaves: Vec::new(),
+        }
+    }
+
+    /// A tall weed.
+    pub fn weed(position_mm: f64, width_mm: f64) -> Self {
+        Self {
+            position_mm,
+            width_mm,
+            kind: Kind::Weed,
+            leaves: Vec::new(),
+        }
+    }
+
+    /// The stretch of ground below it.
+    pub fn span_mm(&self) -> Range<f64> {
+        self.position_mm - self.width_mm / 2.0..self.position_mm + self.width_mm / 2.0
+    }
+
+    /// The stretches where it breaks the beam.
+    pub fn blocks_mm(&self) -> Vec<Range<f64>> {
+        if self.leaves.is_empty() {
+            vec![self.span_mm()]
+        } else {
+            self.leaves.clone()
+        }
+    }
+
+    fn check(&self) -> Result<(), Problem> {
+        if !self.position_mm.is_finite() {
+            return Err(Problem::Position(self.position_mm));
+        }
+        if !(self.width_mm > 0.0 && self.width_mm <= MAX_WIDTH_MM) {
+            return Err(Problem::Width(self.width_mm));
+        }
+        Ok(())
+    }
+
+    /// Whether it comes after `before`, and stands apart from it.
+    fn check_after(&self, before: &Thing) -> Result<(), Problem> {
+        if before.span_mm().end < self.span_mm().start {
+            Ok(())
+        } else {
+            Err(Problem::Overlap {
+                kind: self.kind,
+                position_mm: self.position_mm,
+                other: before.kind,
+                other_mm: before.position_mm,
+            })
+        }
+    }
+}
+
+/// What is wrong with a thing or a row, and what would be right.
+#[derive(Debug, Error, PartialEq)]
+pub enum Problem {
+    /// The place is not a number.
+    #[error("position_mm is {0}: it has to be a number of millimetres along the row")]
+    Position(f64),
+    /// The width is none.
+    #[error("width_mm is {0}: it has to be above 0 and at most {MAX_WIDTH_MM} mm")]
+    Width(f64),
+    /// Two things share ground.
+    #[error(
+        "the {kind} at {position_mm} mm and the {other} at {other_mm} mm overlap: \
+         each has to end before the next begins (what has grown together is one line)"
+    )]
+    Overlap {
+        /// The later thing.
+        kind: Kind,
+        /// The later thing's place.
+        position_mm: f64,
+        /// The earlier thing.
+        other: Kind,
+        /// The earlier thing's place.
+        other_mm: f64,
+    },
+    /// The row is empty.
+    #[error("nothing stands in the row: it has to have at least one plant or weed")]
+    Empty,
+}
+
+/// A row's file could not be read or written.
+#[derive(Debug, Error)]
+pub enum FileError {
+    /// The file itself.
+    #[error("{}: {source}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// A line of it.
+    #[error("{}, line {line}: {problem}", path.display())]
+    Line {
+        /// The file.
+        path: PathBuf,
+        /// The line, counted from 1.
+        line: u64,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// The table as a whole.
+    #[error("{}: {problem}", path.display())]
+    Table {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        problem: Problem,
+    },
+}
+
+/// A line of a row's CSV file.
+#[derive(Debug, Serialize, Deserialize)]
+struct Record {
+    position_mm: f64,
+    width_mm: f64,
+    kind: Kind,
+}
+
+/// The columns of a row's CSV file.
+const COLUMNS: [&str; 3] = ["position_mm", "width_mm", "kind"];
+
+/// Plants and tall weeds in the order in which the machine meets them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row {
+    things: Vec<Thing>,
+}
+
+impl Row {
+    /// A row of things, in any order.
+    ///
+    /// # Errors
+    /// Where there are none, one is malformed, or two overlap.
+    pub fn new(mut things: Vec<Thing>) -> Result<Self, Problem> {
+        if things.is_empty() {
+            return Err(Problem::Empty);
+        }
+        things.iter().try_for_each(Thing::check)?;
+        things.sort_by(|a, b| a.position_mm.total_cmp(&b.position_mm));
+        things
+            .windows(2)
+            .try_for_each(|pair| pair[1].check_after(&pair[0]))?;
+        Ok(Self { things })
+    }
+
+    /// Everything that stands in the row, in ascending order of place.
+    pub fn things(&self) -> &[Thing] {
+        &self.things
+    }
+
+    /// The crop plants, in ascending order of place.
+    pub fn plants(&self) -> impl Iterator<Item = &Thing> {
+        self.things.iter().filter(|thing| thing.kind == Kind::Plant)
+    }
+
+    /// The tall weeds, in ascending order of place.
+    pub fn weeds(&self) -> impl Iterator<Item = &Thing> {
+        self.things.iter().filter(|thing| thing.kind == Kind::Weed)
+    }
+
+    /// The stretch of ground that counts as the row: half a mean spacing beyond the outermost plants, so that every plant
+    /// has a spacing's length of its own, and in any case everything that stands in it.
+    pub fn span_mm(&self) -> Range<f64> {
+        let (first, last) = (&self.things[0], &self.things[self.things.len() - 1]);
+        let places: Vec<f64> = self.plants().map(|plant| plant.position_mm).collect();
+        let around = match places.as_slice() {
+            [only] => only - LONE_PLANT_SPACING_MM / 2.0..only + LONE_PLANT_SPACING_MM / 2.0,
+            [start, .., end] => {
+                let half_spacing_mm = (end - start) / (places.len() - 1) as f64 / 2.0;
+                start - half_spacing_mm..end + half_spacing_mm
+            }
+            [] => first.position_mm..last.position_mm,
+        };
+        around.start.min(first.span_mm().start)..around.end.max(last.span_mm().end)
+    }
+
+    /// Reads a row from a CSV file with the columns `position_mm,width_mm,kind`, in any order of columns and lines.
+    /// `kind` is `plant` or `weed`; lines that begin with `#` are comments.
+    ///
+    /// # Errors
+    /// Names the file, the line and what would be right.
+    pub fn read_csv(path: &Path) -> Result<Self, FileError> {
+        let file = File::open(path).map_err(|source| FileError::File {
+            path: path.into(),
+            source,
+        })?;
+        let at = |line: u64, problem: String| FileError::Line {
+            path: path.into(),
+            line,
+            problem,
+        };
+        let from_csv = |error: csv::Error, header: &csv::StringRecord| {
+            let line = error.position().map_or(1, csv::Position::line);
+            at(line, explain(&error, header))
+        };
+
+        let mut reader = csv::ReaderBuilder::new()
+            .trim(csv::Trim::All)
+            .comment(Some(b'#'))
+            .from_reader(file);
+        let no_header = csv::StringRecord::new();
+        let header = reader
+            .headers()
+            .map_err(|error| from_csv(error, &no_header))?
+            .clone();
+        for column in COLUMNS {
+            if !header.iter().any(|name| name == column) {
+                let problem = format!(
+                    "the column `{column}` is missing: the header has to name {}",
+                    COLUMNS.join(",")
+                );
+                return Err(at(1, problem));
+            }
+        }
+
+        let mut lines: Vec<(u64, Thing)> = Vec::new();
+        let mut record = csv::StringRecord::new();
+        while reader
+            .read_record(&mut record)
+            .map_err(|error| from_csv(error, &header))?
+        {
+            let line = record.position().map_or(0, csv::Position::line);
+            let Record {
+                position_mm,
+                width_mm,
+                kind,
+            } = record
+                .deserialize(Some(&header))
+                .map_err(|error| from_csv(error, &header))?;
+            let thing = Thing {
+                position_mm,
+                width_mm,
+                kind,
+                leaves: Vec::new(),
+            };
+            thing
+                .check()
+                .map_err(|problem| at(line, problem.to_string()))?;
+            lines.push((line, thing));
+        }
+        lines.sort_by(|(_, a), (_, b)| a.position_mm.total_cmp(&b.position_mm));
+        for pair in lines.windows(2) {
+            let (line, thing) = &pair[1];
+            thing
+                .check_after(&pair[0].1)
+                .map_err(|problem| at(*line, problem.to_string()))?;
+        }
+        Self::new(lines.into_iter().map(|(_, thing)| thing).collect()).map_err(|problem| {
+            FileError::Table {
+                path: path.into(),
+                problem,
+            }
+        })
+    }
+
+    /// Writes the row as a CSV table that [`Row::read_csv`] reads. Gaps within a ragged canopy are not kept.
+    ///
+    /// # Errors
+    /// Those of the writer.
+    pub fn write_csv(&self, to: impl io::Write) -> Result<(), csv::Error> {
+        let mut writer = csv::Writer::from_writer(to);
+        for thing in &self.things {
+            writer.serialize(Record {
+                position_mm: thing.position_mm,
+                width_mm: thing.width_mm,
+                kind: thing.kind,
+            })?;
+        }
+        writer.flush()?;
+        Ok(())
+    }
+}
+
+/// What a CSV error says about the line, without the record number and byte that nobody asked for.
+fn explain(error: &csv::Error, header: &csv::StringRecord) -> String {
+    match error.kind() {
+        csv::ErrorKind::Deserialize { err, .. } => {
+            match err.field().and_then(|index| header.get(index as usize)) {
+                Some(column) => format!("{column}: {}, where a number is wanted", err.kind()),
+                None => err.kind().to_string(),
+            }
+        }
+        csv::ErrorKind::UnequalLengths {
+            expected_len, len, ..
+        } => {
+            format!(
+                "{len} fields where the header has {expected_len}: each line has one field a column"
+            )
+        }
+        _ => error.to_string(),
+    }
+}
+
+/// The spacing that a plant without neighbours is given, for the figures that are counted per length of row.
+const LONE_PLANT_SPACING_MM: f64 = 500.0;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::planting::Planting;
+    use std::io::Write;
+
+    /// What reading a file with this text says.
+    fn read(text: &str) -> Result<Row, String> {
+        let mut file = tempfile::NamedTempFile::new().unwrap();
+        file.write_all(text.as_bytes()).unwrap();
+        Row::read_csv(file.path()).map_err(|error| {
+            error
+                .to_string()
+                .replace(&file.path().display().to_string(), "row.csv")
+        })
+    }
+
+    #[test]
+    fn each_plant_has_a_spacing_of_row_to_itself() {
+        let row = Row::new(vec![
+            Thing::plant(1000.0, 150.0),
+            Thing::plant(1480.0, 150.0),
+            Thing::plant(2000.0, 150.0),
+        ]);
+        assert_eq!(row.unwrap().span_mm(), 750.0..2250.0);
+    }
+
+    #[test]
+    fn a_written_row_reads_back() {
+        let row = Planting {
+            weeds: 4,
+            ..Planting::default()
+        }
+        .grow(5)
+        .unwrap();
+        let mut text = Vec::new();
+        row.write_csv(&mut text).unwrap();
+        assert_eq!(read(&String::from_utf8(text).unwrap()), Ok(row));
+    }
+
+    #[test]
+    fn columns_lines_and_spaces_may_come_in_any_order() {
+        let row = read(
+            "kind, position_mm, width_mm\n# measured in May\nplant, 900, 150\nweed, 500, 15\n",
+        );
+        let things = vec![Thing::weed(500.0, 15.0), Thing::plant(900.0, 150.0)];
+        assert_eq!(row, Ok(Row { things }));
+    }
+
+    #[test]
+    fn a_bad_line_is_named_with_its_number_and_what_would_be_right() {
+        let header = "position_mm,width_mm,kind\n";
+        for (text, error) in [
+            (
+                "250,150,plant\n750,-5,plant\n",
+                "row.csv, line 3: width_mm is -5: it has to be above 0",
+            ),
+            (
+                "250,wide,plant\n",
+                "row.csv, line 2: width_mm: invalid float literal, where a number is wanted",
+            ),
+            (
+                "250,150,crop\n",
+                "row.csv, line 2: unknown variant `crop`, expected `plant` or `weed`",
+            ),
+            (
+                "250,150\n",
+                "row.csv, line 2: 2 fields where the header has 3",
+            ),
+            ("NaN,150,plant\n", "row.csv, line 2: position_mm is NaN"),
+            (
+                "750,150,plant\n250,150,plant\n700,20,weed\n",
+                "row.csv, line 2: the plant at 750 mm and the weed at 700 mm overlap",
+            ),
+            ("", "row.csv: nothing stands in the row"),
+        ] {
+            let said = read(&format!("{header}{text}")).unwrap_err();
+            assert!(said.starts_with(error), "{said}");
+        }
+    }
+
+    #[test]
+    fn a_missing_column_is_named() {
+        let said = read("position_mm,kind\n250,plant\n").unwrap_err();
+        assert!(
+            said.starts_with("row.csv, line 1: the column `width_mm` is missing"),
+            "{said}"
+        );
+    }
+
+    #[test]
+    fn a_missing_file_is_named() {
+        let said = Row::read_csv(Path::new("no/such/row.csv"))
+            .unwrap_err()
+            .to_string();
+        assert!(said.starts_with("no/such/row.csv: "), "{said}");
+    }
+}
