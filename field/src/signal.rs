@@ -37,6 +37,30 @@ impl Pin {
         Pin::Led,
     ];
 
+    /// The pin's name in a waveform file.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Pin::EncoderA => "encoder_a",
+            Pin::EncoderB => "encoder_b",
+            Pin::WorkSwitch => "work_switch",
+            Pin::EndSwitch => "end_switch",
+            Pin::Beam => "beam",
+            Pin::Servo => "servo",
+            Pin::Led => "led",
+        }
+    }
+
+    /// Whether the firmware drives the pin; the others are driven by the machine.
+    pub const fn is_output(self) -> bool {
+        matches!(self, Pin::Servo | Pin::Led)
+    }
+
+    /// The level before anything has happened: the wheel at a step where both channels are low, the beam clear, the
+    /// switches open on their pull-ups, the outputs not driven yet.
+    pub const fn level_at_rest(self) -> bool {
+        matches!(self, Pin::WorkSwitch | Pin::EndSwitch | Pin::Beam)
+    }
+
     /// The ATmega328P's port letter and bit.
     pub const fn port_and_bit(self) -> (char, u8) {
         match self {

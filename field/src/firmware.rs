@@ -1,0 +1,315 @@
+//! The firmware as a file: building it from this workspace, and reading what an ELF holds.
+//!
+//! [`build`] runs `cargo firmware` once a process, in a target directory of its own, so that a test or a trial always
+//! meets the sources as they stand. [`Image`] is an ELF taken apart as a programmer would: what goes into flash and
+//! EEPROM, how much memory it takes, and where its symbols lie. Nothing here runs the firmware; [`crate::uno`] does.
+
+use std::collections::HashMap;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::sync::OnceLock;
+
+use cargo_metadata::Message;
+use object::read::elf::{ElfFile32, ProgramHeader};
+use object::{Architecture, LittleEndian, Object, ObjectSection, ObjectSymbol, SectionFlags, elf};
+
+/// Flash of the ATmega328P in bytes (data sheet, section 8.2).
+pub const FLASH_BYTES: usize = 32 * 1024;
+
+/// EEPROM of the ATmega328P in bytes (data sheet, section 8.4).
+pub const EEPROM_BYTES: usize = 1024;
+
+/// Where AVR ELF files place SRAM, EEPROM and what follows it in their single address space.
+const SRAM_ORIGIN: u64 = 0x80_0000;
+const EEPROM_ORIGIN: u64 = 0x81_0000;
+const FUSES_ORIGIN: u64 = 0x82_0000;
+
+/// The firmware package, and the name of its binary.
+const PACKAGE: &str = "weeder-firmware";
+
+/// What an outer cargo, or a shell, may have set that would change how the firmware is compiled.
+const FOREIGN_SETTINGS: [&str; 7] = [
+    // Either of the flags replaces the target-cpu of .cargo/config.toml.
+    "RUSTFLAGS",
+    "CARGO_ENCODED_RUSTFLAGS",
+    "CARGO_BUILD_RUSTFLAGS",
+    "CARGO_BUILD_TARGET",
+    // `cargo clippy` sets it, and would check the firmware instead of compiling it.
+    "RUSTC_WORKSPACE_WRAPPER",
+    "RUSTC",
+    // The workspace's rust-toolchain.toml decides.
+    "RUSTUP_TOOLCHAIN",
+];
+
+/// Why the firmware could not be built.
+#[derive(Clone, Debug, thiserror::Error)]
+pub enum BuildError {
+    /// Cargo could not be started.
+    #[error("cargo could not be started ({0}): put it on PATH, ./setup.sh says how")]
+    Start(String),
+    /// Cargo's messages could not be read.
+    #[error("the messages of `cargo firmware` could not be read: {0}")]
+    Messages(String),
+    /// Cargo ran and failed.
+    #[error(
+        "`cargo firmware` failed ({0}): its own messages stand above; where a tool is missing, run ./setup.sh"
+    )]
+    Failed(String),
+    /// Cargo was content, but no ELF came of it.
+    #[error(
+        "`cargo firmware` made no ELF: the package `{PACKAGE}` should have a binary of that name"
+    )]
+    NoElf,
+}
+
+/// Builds the firmware of this workspace and returns the path of its ELF.
+///
+/// Cargo runs at most once a process; later calls return the first one's answer. Its progress and the compiler's
+/// messages go to standard error.
+///
+/// # Errors
+///
+/// Where cargo cannot be started, fails, or makes no ELF.
+pub fn build() -> Result<PathBuf, BuildError> {
+    static BUILT: OnceLock<Result<PathBuf, BuildError>> = OnceLock::new();
+    BUILT.get_or_init(run_cargo).clone()
+}
+
+fn run_cargo() -> Result<PathBuf, BuildError> {
+    let mut command = Command::new("cargo");
+    command
+        .args(["firmware", "--message-format", "json-render-diagnostics"])
+        .arg("--target-dir")
+        .arg(target_directory())
+        .current_dir(workspace_root())
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped());
+    for name in FOREIGN_SETTINGS {
+        command.env_remove(name);
+    }
+    let mut cargo = command
+        .spawn()
+        .map_err(|error| BuildError::Start(error.to_string()))?;
+
+    let mut elf = None;
+    if let Some(messages) = cargo.stdout.take() {
+        for message in Message::parse_stream(BufReader::new(messages)) {
+            match message.map_err(|error| BuildError::Messages(error.to_string()))? {
+                Message::CompilerArtifact(artifact) if artifact.target.name == PACKAGE => {
+                    elf = artifact.executable.map(PathBuf::from).or(elf);
+                }
+                _ => {}
+            }
+        }
+    }
+    let status = cargo
+        .wait()
+        .map_err(|error| BuildError::Start(error.to_string()))?;
+    if !status.success() {
+        return Err(BuildError::Failed(status.to_string()));
+    }
+    elf.ok_or(BuildError::NoElf)
+}
+
+/// The folder of the workspace's Cargo.toml, which is one above this crate's.
+fn workspace_root() -> &'static Path {
+    let this_crate = Path::new(env!("CARGO_MANIFEST_DIR"));
+    this_crate.parent().unwrap_or(this_crate)
+}
+
+/// A target directory of the firmware's own: an outer cargo keeps the usual one locked while it runs a test.
+fn target_directory() -> PathBuf {
+    let usual = std::env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into());
+    workspace_root().join(usual).join("firmware")
+}
+
+/// Memory that a firmware takes, in bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Size {
+    /// Flash: code, constants, and the first values of variables (.text, .data).
+    pub flash: u64,
+    /// SRAM that is taken for good (.data, .bss, .noinit); the stack comes on top.
+    pub sram: u64,
+}
+
+impl Size {
+    /// The memory that the ELF at `path` takes.
+    ///
+    /// # Errors
+    ///
+    /// As [`Image::read`].
+    pub fn read(path: &Path) -> Result<Size, ImageError> {
+        Image::read(path).map(|image| image.size)
+    }
+}
+
+/// Why an ELF could not be read.
+#[derive(Debug, thiserror::Error)]
+pub enum ImageError {
+    /// The file could not be read.
+    #[error("{path} could not be read: {source}")]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// The operating system's answer.
+        source: std::io::Error,
+    },
+    /// The file is no ELF, or a broken one.
+    #[error("{path} is not a readable ELF file ({reason}): `cargo firmware` makes one")]
+    NotElf {
+        /// The file.
+        path: PathBuf,
+        /// What was wrong with it.
+        reason: object::Error,
+    },
+    /// The file was made for another processor.
+    #[error(
+        "{path} was made for {architecture:?}: an ELF for AVR is needed, `cargo firmware` makes one"
+    )]
+    NotAvr {
+        /// The file.
+        path: PathBuf,
+        /// What it was made for.
+        architecture: Architecture,
+    },
+    /// The file holds more than the chip does.
+    #[error("{path} has {end} bytes for the {memory}: the ATmega328P holds {limit}")]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// Which memory.
+        memory: &'static str,
+        /// Address behind the last byte.
+        end: u64,
+        /// The memory's size.
+        limit: usize,
+    },
+}
+
+/// A variable's place in SRAM.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Variable {
+    /// Address in the data space.
+    pub address: u16,
+    /// Size in bytes.
+    pub size: u16,
+}
+
+/// What an ELF holds for the chip.
+#[derive(Clone, Debug)]
+pub struct Image {
+    /// Flash from address 0 to the last byte used.
+    pub flash: Vec<u8>,
+    /// EEPROM from address 0 to the last byte given; usually empty.
+    pub eeprom: Vec<u8>,
+    /// Memory taken.
+    pub size: Size,
+    /// Variables in SRAM by their symbol's name.
+    pub variables: HashMap<String, Variable>,
+}
+
+impl Image {
+    /// Reads the ELF at `path`.
+    ///
+    /// # Errors
+    ///
+    /// Where the file cannot be read, is no ELF for AVR, or holds more than the ATmega328P does.
+    pub fn read(path: &Path) -> Result<Image, ImageError> {
+        let bytes = std::fs::read(path).map_err(|source| ImageError::Read {
+            path: path.into(),
+            source,
+        })?;
+        let not_elf = |reason| ImageError::NotElf {
+            path: path.into(),
+            reason,
+        };
+        let architecture = object::File::parse(&*bytes)
+            .map_err(not_elf)?
+            .architecture();
+        if architecture != Architecture::Avr {
+            return Err(ImageError::NotAvr {
+                path: path.into(),
+                architecture,
+            });
+        }
+        let file = ElfFile32::<LittleEndian>::parse(&*bytes).map_err(not_elf)?;
+
+        let mut flash = Vec::new();
+        let mut eeprom = Vec::new();
+        for header in file.elf_program_headers() {
+            let content = header.data(LittleEndian, &*bytes).unwrap_or_default();
+            if header.p_type(LittleEndian) != elf::PT_LOAD || content.is_empty() {
+                continue;
+            }
+            // The physical address: for .data that is where its first values lie in flash.
+            let (memory, name, start, limit) = match u64::from(header.p_paddr(LittleEndian)) {
+                address @ ..SRAM_ORIGIN => (&mut flash, "flash", address, FLASH_BYTES),
+                address @ EEPROM_ORIGIN..FUSES_ORIGIN => {
+                    (&mut eeprom, "EEPROM", address - EEPROM_ORIGIN, EEPROM_BYTES)
+                }
+                // Fuses and lock bits are not part of what runs.
+                _ => continue,
+            };
+            let end = start + content.len() as u64;
+            if end > limit as u64 {
+                return Err(ImageError::TooLarge {
+                    path: path.into(),
+                    memory: name,
+                    end,
+                    limit,
+                });
+            }
+            let (start, end) = (start as usize, end as usize);
+            if memory.len() < end {
+                // Erased flash and EEPROM read as 0xFF.
+                memory.resize(end, 0xFF);
+            }
+            memory[start..end].copy_from_slice(content);
+        }
+
+        Ok(Image {
+            flash,
+            eeprom,
+            size: size(&file),
+            variables: variables(&file),
+        })
+    }
+}
+
+fn size(file: &ElfFile32<LittleEndian>) -> Size {
+    let mut size = Size { flash: 0, sram: 0 };
+    for section in file.sections() {
+        let SectionFlags::Elf { sh_flags, .. } = section.flags() else {
+            continue;
+        };
+        if !sh_flags.contains(elf::SHF_ALLOC) {
+            continue;
+        }
+        let has_content = section.file_range().is_some_and(|(_, length)| length > 0);
+        match section.address() {
+            ..SRAM_ORIGIN => size.flash += section.size(),
+            SRAM_ORIGIN..EEPROM_ORIGIN => {
+                size.sram += section.size();
+                if has_content {
+                    size.flash += section.size();
+                }
+            }
+            _ => {}
+        }
+    }
+    size
+}
+
+fn variables(file: &ElfFile32<LittleEndian>) -> HashMap<String, Variable> {
+    file.symbols()
+        .filter(|symbol| (SRAM_ORIGIN..EEPROM_ORIGIN).contains(&symbol.address()))
+        .filter_map(|symbol| {
+            let variable = Variable {
+                address: u16::try_from(symbol.address() - SRAM_ORIGIN).ok()?,
+                size: u16::try_from(symbol.size()).ok()?,
+            };
+            Some((symbol.name().ok()?.to_owned(), variable))
+        })
+        .collect()
+}

@@ -1,0 +1,398 @@
+//! The virtual Uno: an ATmega328P at 16 MHz that runs the firmware's real ELF, on simavr.
+//!
+//! [`Uno::boot`] powers it up. [`Uno::set`] and [`Uno::drive`] put levels on its inputs, [`Uno::send`] types into its serial
+//! line, [`Uno::run_until`] lets its clock run; [`Uno::changes`], [`Uno::servo_pulses`] and [`Uno::received`] say what it did. Time
+//! is the chip's own cycle count since the first power-up and goes on over resets; the host's clock plays no part. Every
+//! Uno is by itself, so that several can run in parallel threads.
+//!
+//! # What is set right against simavr
+//!
+//! - Entering an interrupt takes 4 cycles, and 4 more out of sleep (simavr: none).
+//! - A byte on the serial line takes as many bits as it has (simavr: always one of parity), whichever order the firmware
+//!   sets its UART up in.
+//! - A received byte is there when its stop bit ends, and the receiver holds three (simavr: a byte later, and 64); a byte
+//!   too many is lost and sets DOR0.
+//! - An edge of a timer's output carries the cycle in which it was due (simavr: the end of the instruction then running). An
+//!   edge that the firmware makes carries the cycle in which its instruction began.
+//! - An input keeps its level when the firmware writes its port (simavr raises pulled-up pins) and over a reset.
+//! - The clock, and the watchdog's time after its own reset, go on over a reset (simavr starts them from 0 and from the past).
+//! - Sleep advances the cycles and never waits; nothing is printed but simavr's errors; there is no debugger.
+//! - SRAM is not zero at power-up.
+//!
+//! # What is not
+//!
+//! - EEPROM writes finish at once (3.4 ms in truth), and the EEPROM-ready interrupt comes only after a write.
+//! - OCR1A is not double buffered: a new value counts in the running period.
+//! - An edge reaches its interrupt at once; the chip's synchroniser takes two or three cycles more.
+//! - The transmitter has no second buffer: it takes the next byte when the last one has left.
+//! - UBRR is what the clock divides; the crystal is exact.
+
+mod core;
+mod interrupts;
+
+use std::collections::VecDeque;
+use std::path::Path;
+
+use self::core::{Core, Stop};
+pub use self::interrupts::{HandlerCycles, InterruptStatistics};
+use crate::firmware::{EEPROM_BYTES, Image, ImageError, Size};
+use crate::signal::{CYCLES_PER_SECOND, Pin, PinChange, Pulse};
+
+/// The serial line's bits in a second, both ways (README, serial monitor).
+pub const BAUD: u64 = 115_200;
+
+/// Cycles of a byte that a terminal sends: a start bit, eight data bits and a stop bit.
+pub const SENT_BYTE_CYCLES: u64 = (10 * CYCLES_PER_SECOND + BAUD / 2) / BAUD;
+
+/// Why a virtual Uno could not start, or stopped.
+#[derive(Debug, thiserror::Error)]
+pub enum UnoError {
+    /// The ELF cannot be run.
+    #[error(transparent)]
+    Image(#[from] ImageError),
+    /// The EEPROM content does not fit.
+    #[error("{0} bytes of EEPROM content were given: the ATmega328P holds {EEPROM_BYTES}")]
+    EepromTooLarge(usize),
+    /// The firmware met an instruction that does not exist, or ran past the end of its flash.
+    #[error("the firmware crashed at cycle {cycle}, address {program_counter:#06x} of flash")]
+    Crashed {
+        /// When.
+        cycle: u64,
+        /// Where, in bytes.
+        program_counter: u32,
+    },
+    /// The firmware sleeps with interrupts off, so that nothing but a reset can wake it.
+    #[error(
+        "the firmware halted at cycle {cycle}, address {program_counter:#06x} of flash: it sleeps with interrupts off"
+    )]
+    Halted {
+        /// When.
+        cycle: u64,
+        /// Where, in bytes.
+        program_counter: u32,
+    },
+    /// A text that was waited for did not come.
+    #[error(
+        "the firmware did not send {text:?} within {timeout_cycles} cycles; it sent {received:?}"
+    )]
+    NoAnswer {
+        /// What was waited for.
+        text: String,
+        /// How long.
+        timeout_cycles: u64,
+        /// What came instead; it can still be taken by [`Uno::received`].
+        received: String,
+    },
+}
+
+/// Why the chip started anew.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ResetCause {
+    /// Power came back ([`Uno::power_cycle`]).
+    PowerOn,
+    /// The reset pin was pulled ([`Uno::reset`]).
+    External,
+    /// The watchdog ran out.
+    Watchdog,
+}
+
+/// A reset after the first power-up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Reset {
+    /// When.
+    pub cycle: u64,
+    /// Why.
+    pub cause: ResetCause,
+}
+
+/// A byte from the firmware.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ReceivedByte {
+    /// When the firmware handed it to the transmitter.
+    pub cycle: u64,
+    /// The byte.
+    pub byte: u8,
+}
+
+/// An Arduino Uno with a firmware in it.
+pub struct Uno {
+    core: Core,
+    image: Image,
+    /// Levels to come, by cycle.
+    to_drive: VecDeque<PinChange>,
+    /// Bytes to come, and when the first one's stop bit ends.
+    to_send: VecDeque<u8>,
+    next_byte_ends: u64,
+    lost_bytes: u64,
+}
+
+impl Uno {
+    /// Powers up an Uno with the firmware at `elf` and an erased EEPROM. Its inputs are at rest ([`Pin::level_at_rest`]).
+    ///
+    /// # Errors
+    ///
+    /// Where the ELF cannot be read or does not fit the chip.
+    pub fn boot(elf: &Path) -> Result<Uno, UnoError> {
+        Uno::boot_with_eeprom(elf, &[])
+    }
+
+    /// As [`Uno::boot`], with `eeprom` from the EEPROM's address 0; the rest is erased.
+    ///
+    /// # Errors
+    ///
+    /// As [`Uno::boot`], and where `eeprom` is longer than 1024 bytes.
+    pub fn boot_with_eeprom(elf: &Path, eeprom: &[u8]) -> Result<Uno, UnoError> {
+        if eeprom.len() > EEPROM_BYTES {
+            return Err(UnoError::EepromTooLarge(eeprom.len()));
+        }
+        let image = Image::read(elf)?;
+        let mut content = image.eeprom.clone();
+        content.resize(content.len().max(eeprom.len()), 0xFF);
+        content[..eeprom.len()].copy_from_slice(eeprom);
+        let mut uno = Uno {
+            core: Core::new(&image.flash, &content, 0),
+            image,
+            to_drive: VecDeque::new(),
+            to_send: VecDeque::new(),
+            next_byte_ends: 0,
+            lost_bytes: 0,
+        };
+        for pin in Pin::ALL.into_iter().filter(|pin| !pin.is_output()) {
+            uno.core.set_input(pin, pin.level_at_rest());
+        }
+        Ok(uno)
+    }
+
+    /// Pulls the reset pin. EEPROM, SRAM, inputs and the clock stay; the cause is in MCUSR.
+    pub fn reset(&mut self) {
+        self.core.reset();
+    }
+
+    /// Takes the power away and gives it back. EEPROM, inputs and the clock stay; SRAM does not.
+    pub fn power_cycle(&mut self) {
+        self.core.lose_power();
+        let mut fresh = Core::new(&self.image.flash, &self.core.eeprom(), self.core.cycle());
+        fresh.take_over(&mut self.core);
+        self.core = fresh;
+    }
+
+    /// Resets since the first power-up, oldest first.
+    pub fn resets(&self) -> &[Reset] {
+        &self.core.recorder().resets
+    }
+
+    /// The EEPROM's 1024 bytes.
+    pub fn eeprom(&self) -> Vec<u8> {
+        self.core.eeprom()
+    }
+
+    /// Cycles since the first power-up.
+    pub fn cycle(&self) -> u64 {
+        self.core.cycle()
+    }
+
+    /// Memory that the firmware takes.
+    pub fn size(&self) -> Size {
+        self.image.size
+    }
+
+    /// Puts a level on an input pin, now.
+    ///
+    /// # Panics
+    ///
+    /// Where the pin is an output.
+    pub fn set(&mut self, pin: Pin, high: bool) {
+        assert!(!pin.is_output(), "{pin:?} is driven by the firmware");
+        self.core.set_input(pin, high);
+    }
+
+    /// Queues levels for input pins. Each is there at the first instruction boundary at or after its cycle; what lies in the past
+    /// comes at once. Changes of the same cycle keep their order, and so do those of several calls.
+    ///
+    /// # Panics
+    ///
+    /// Where a pin is an output.
+    pub fn drive(&mut self, changes: impl IntoIterator<Item = PinChange>) {
+        self.to_drive.extend(changes.into_iter().inspect(|change| {
+            assert!(
+                !change.pin.is_output(),
+                "{:?} is driven by the firmware",
+                change.pin
+            );
+        }));
+        self.to_drive
+            .make_contiguous()
+            .sort_by_key(|change| change.cycle);
+    }
+
+    /// Runs until the clock has reached `cycle`, or passed it by the last instruction's length.
+    ///
+    /// # Errors
+    ///
+    /// Where the firmware crashed or halted for good.
+    pub fn run_until(&mut self, cycle: u64) -> Result<(), UnoError> {
+        while self.cycle() < cycle {
+            self.step(cycle)?;
+        }
+        Ok(())
+    }
+
+    /// Runs for a time in milliseconds.
+    ///
+    /// # Errors
+    ///
+    /// As [`Uno::run_until`].
+    pub fn run_for_ms(&mut self, time_ms: u64) -> Result<(), UnoError> {
+        self.run_until(self.cycle() + time_ms * (CYCLES_PER_SECOND / 1000))
+    }
+
+    /// Runs until the firmware has sent `text`, and returns all that it sent up to then, `text` included.
+    ///
+    /// # Errors
+    ///
+    /// As [`Uno::run_until`], and where the text has not come after `timeout_cycles`.
+    pub fn run_until_serial(
+        &mut self,
+        text: &str,
+        timeout_cycles: u64,
+    ) -> Result<String, UnoError> {
+        let deadline = self.cycle() + timeout_cycles;
+        let mut seen = 0;
+        loop {
+            let received = &self.core.recorder().received;
+            if received.len() > seen || text.is_empty() {
+                seen = received.len();
+                let bytes: Vec<u8> = received.iter().map(|received| received.byte).collect();
+                if bytes.ends_with(text.as_bytes()) {
+                    return Ok(self.received());
+                }
+            }
+            if self.cycle() >= deadline {
+                let bytes: Vec<u8> = received.iter().map(|received| received.byte).collect();
+                return Err(UnoError::NoAnswer {
+                    text: text.to_owned(),
+                    timeout_cycles,
+                    received: String::from_utf8_lossy(&bytes).into_owned(),
+                });
+            }
+            // No byte can leave faster than this, so that none is passed by.
+            self.step(deadline.min(self.cycle() + 8))?;
+        }
+    }
+
+    /// Runs a step, and what falls due before it.
+    fn step(&mut self, until: u64) -> Result<(), UnoError> {
+        while let Some(change) = self
+            .to_drive
+            .pop_front_if(|change| change.cycle <= self.core.cycle())
+        {
+            self.core.set_input(change.pin, change.high);
+        }
+        while !self.to_send.is_empty() && self.next_byte_ends <= self.cycle() {
+            if let Some(byte) = self.to_send.pop_front()
+                && !self.core.receive(byte)
+            {
+                self.lost_bytes += 1;
+            }
+            self.next_byte_ends += SENT_BYTE_CYCLES;
+        }
+        let next_level = self.to_drive.front().map(|change| change.cycle);
+        let next_byte = (!self.to_send.is_empty()).then_some(self.next_byte_ends);
+        let until = [next_level, next_byte]
+            .into_iter()
+            .flatten()
+            .fold(until, u64::min);
+        self.core.step(until).map_err(|stop| {
+            let (cycle, program_counter) = (self.core.cycle(), self.core.program_counter());
+            match stop {
+                Stop::Crashed => UnoError::Crashed {
+                    cycle,
+                    program_counter,
+                },
+                Stop::Halted => UnoError::Halted {
+                    cycle,
+                    program_counter,
+                },
+            }
+        })
+    }
+
+    /// Types bytes into the serial line, at the pace of the line and behind those that are still on their way.
+    pub fn send(&mut self, bytes: &[u8]) {
+        if self.to_send.is_empty() {
+            self.next_byte_ends = self.next_byte_ends.max(self.cycle() + SENT_BYTE_CYCLES);
+        }
+        self.to_send.extend(bytes);
+    }
+
+    /// Pushes up to 63 bytes into the receiver at once, faster than any line could: simavr keeps them and hands them out one
+    /// by one.
+    pub fn send_at_once(&mut self, bytes: &[u8]) {
+        for &byte in bytes {
+            self.core.flood(byte);
+        }
+    }
+
+    /// Sent bytes that the receiver had no room for, because the firmware did not read in time.
+    pub fn lost_bytes(&self) -> u64 {
+        self.lost_bytes
+    }
+
+    /// Takes the bytes that have come from the firmware, with their cycles.
+    pub fn received_bytes(&mut self) -> Vec<ReceivedByte> {
+        std::mem::take(&mut self.core.recorder_mut().received)
+    }
+
+    /// Takes the text that has come from the firmware; what is not UTF-8 is replaced.
+    pub fn received(&mut self) -> String {
+        let bytes: Vec<u8> = self
+            .received_bytes()
+            .iter()
+            .map(|received| received.byte)
+            .collect();
+        String::from_utf8_lossy(&bytes).into_owned()
+    }
+
+    /// Every edge of the output pins (servo, LED) since the first power-up, oldest first.
+    pub fn changes(&self) -> &[PinChange] {
+        &self.core.recorder().changes
+    }
+
+    /// The complete pulses on the servo's line since the first power-up, oldest first.
+    pub fn servo_pulses(&self) -> Vec<Pulse> {
+        let servo: Vec<_> = self
+            .changes()
+            .iter()
+            .filter(|change| change.pin == Pin::Servo)
+            .collect();
+        servo
+            .windows(2)
+            .filter(|edges| edges[0].high && !edges[1].high)
+            .map(|edges| Pulse {
+                rise: edges[0].cycle,
+                fall: edges[1].cycle,
+            })
+            .collect()
+    }
+
+    /// Counts and times interrupts from now on; a second call starts afresh. The simulation is slower for it.
+    pub fn measure_interrupts(&mut self) {
+        self.core.measure_interrupts();
+    }
+
+    /// What the interrupts have cost since [`Uno::measure_interrupts`]; `None` before it.
+    pub fn interrupt_statistics(&self) -> Option<&InterruptStatistics> {
+        self.core.interrupt_statistics()
+    }
+
+    /// A variable's bytes in SRAM, by its symbol's name in the ELF; `None` where there is no such symbol.
+    pub fn read(&self, symbol: &str) -> Option<&[u8]> {
+        let variable = self.image.variables.get(symbol)?;
+        Some(self.core.sram(variable.address, variable.size))
+    }
+
+    /// The most bytes that the stack has taken since power-up, as far as they were written.
+    pub fn deepest_stack(&self) -> usize {
+        self.core.deepest_stack(self.image.size.sram as u16)
+    }
+}

@@ -1,0 +1,617 @@
+//! The ATmega328P on simavr: the one place that calls C.
+//!
+//! [`Core`] owns a simavr instance and the [`Recorder`] that simavr's callbacks write to, and offers the rest of
+//! [`super`] safe calls: one step, levels in, edges and bytes out. It knows pins by port and bit, cycles and bytes, and
+//! nothing of queues or of a terminal's pace; those are [`super::Uno`]'s.
+//!
+//! # Memory
+//!
+//! Two allocations exist a chip: simavr's `avr_t`, made by `avr_make_mcu_by_name`, and the recorder, a leaked box. Both are
+//! freed by `Drop` and by nothing else. simavr holds the recorder's address as its callbacks' parameter, and calls them only
+//! from inside the functions that this file calls; none of those calls is made while a reference into the recorder or
+//! into `avr_t` is alive. simavr keeps no state outside `avr_t` but its logger, which is never replaced here, so
+//! chips in several threads do not meet.
+
+use std::ffi::{CStr, c_void};
+use std::ptr::{self, NonNull};
+
+use simavr_ffi as simavr;
+
+use super::interrupts::{InterruptRecorder, InterruptStatistics};
+use super::{ReceivedByte, Reset, ResetCause};
+use crate::firmware::EEPROM_BYTES;
+use crate::signal::{CYCLES_PER_SECOND, Pin, PinChange};
+
+unsafe extern "C" {
+    /// Runs the next instruction. It stands in sim_core.h, which simavr-ffi leaves out of its bindings.
+    fn avr_run_one(avr: *mut simavr::avr_t) -> simavr::avr_flashaddr_t;
+}
+
+/// The chip's name for simavr.
+const CHIP: &CStr = c"atmega328p";
+
+/// Highest interrupt vector of the ATmega328P (data sheet, table 12-6, counted from 0).
+const LAST_VECTOR: u8 = 25;
+
+/// Cycles from the end of an instruction to the first one of the vector (data sheet, section 7.7.1).
+const INTERRUPT_ENTRY_CYCLES: u64 = 4;
+
+/// Cycles that the core stays halted when an interrupt wakes it (data sheet, section 7.7.1).
+const WAKE_UP_CYCLES: u64 = 4;
+
+/// Cycles of `reti`; its end is the end of the handler.
+const RETURN_CYCLES: u64 = 4;
+
+/// First and last address of SRAM in the data space (data sheet, figure 8-3).
+const SRAM_START: u16 = 0x0100;
+const SRAM_END: u16 = 0x08FF;
+
+/// What SRAM holds at power-up. A real chip's content is random; a byte that is not zero catches those who count on it,
+/// and shows how deep the stack has been.
+const SRAM_AT_POWER_UP: u8 = 0xC5;
+
+/// Complete bytes that the receiver keeps: two in its buffer and one in the shift register (data sheet, section 20.8.4).
+const RECEIVER_BYTES: u16 = 3;
+
+// Registers by their address in the data space (data sheet, section 36).
+const MCUSR: u16 = 0x54;
+const UCSR0A: u16 = 0xC0;
+const UCSR0B: u16 = 0xC1;
+const UCSR0C: u16 = 0xC2;
+const UBRR0L: u16 = 0xC4;
+const UBRR0H: u16 = 0xC5;
+
+/// MCUSR: the cause was the reset pin.
+const EXTRF: u8 = 1 << 1;
+/// UCSR0A: bytes were lost.
+const DOR0: u8 = 1 << 3;
+/// UCSR0A: double speed.
+const U2X0: u8 = 1 << 1;
+/// UCSR0B: the receiver is on.
+const RXEN0: u8 = 1 << 4;
+/// UCSR0C: two stop bits.
+const USBS0: u8 = 1 << 3;
+/// UCSR0C: parity is on.
+const UPM01: u8 = 1 << 5;
+
+/// A four letter request code of simavr (`AVR_IOCTL_DEF`).
+const fn request(name: &[u8; 4]) -> u32 {
+    u32::from_be_bytes(*name)
+}
+
+/// What stopped a chip.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Stop {
+    /// It met an instruction that does not exist, or ran past the end of its flash.
+    Crashed,
+    /// It sleeps with interrupts off: nothing can wake it.
+    Halted,
+}
+
+/// What simavr's callbacks have seen.
+pub(super) struct Recorder {
+    chip: *mut simavr::avr_t,
+    uart: *mut simavr::avr_uart_t,
+    servo_high: bool,
+    led_high: bool,
+    /// Edges of the output pins, oldest first.
+    pub(super) changes: Vec<PinChange>,
+    /// Bytes that the firmware has handed to its transmitter, oldest first.
+    pub(super) received: Vec<ReceivedByte>,
+    /// Resets since the first power-up, oldest first.
+    pub(super) resets: Vec<Reset>,
+    interrupts: InterruptRecorder,
+    /// Cycle of a reset that simavr is in the middle of.
+    reset_at: Option<u64>,
+}
+
+impl Recorder {
+    fn record_level(&mut self, pin: Pin, high: bool, cycle: u64) {
+        let level = match pin {
+            Pin::Servo => &mut self.servo_high,
+            Pin::Led => &mut self.led_high,
+            _ => return,
+        };
+        if *level != high {
+            *level = high;
+            self.changes.push(PinChange { cycle, pin, high });
+        }
+    }
+}
+
+/// An ATmega328P.
+pub(super) struct Core {
+    chip: NonNull<simavr::avr_t>,
+    recorder: NonNull<Recorder>,
+    input: NonNull<simavr::avr_irq_t>,
+    /// Levels that the inputs are held at from outside, by port (B, D) and bit.
+    held: [Held; 2],
+}
+
+#[derive(Clone, Copy, Default)]
+struct Held {
+    mask: u8,
+    levels: u8,
+}
+
+// SAFETY: a chip touches nothing but its own two allocations (see the module's text) and is tied to no thread; `Core` has no
+// shared access that changes it, so moving it moves the only user.
+unsafe impl Send for Core {}
+
+impl Core {
+    /// A chip that has just been powered up, at `cycle`, with `flash` (from address 0) and `eeprom` (from address 0) in it.
+    /// Both must fit, which [`crate::firmware::Image`] and [`super::Uno`] see to.
+    pub(super) fn new(flash: &[u8], eeprom: &[u8], cycle: u64) -> Core {
+        // SAFETY: the name is a C string that lives for ever. The chip is known to every simavr, so a null pointer means
+        // that memory ran out.
+        let chip = NonNull::new(unsafe { simavr::avr_make_mcu_by_name(CHIP.as_ptr()) })
+            .expect("simavr knows the ATmega328P");
+        let avr = chip.as_ptr();
+
+        // SAFETY: `avr` was just made and nothing else has its address. `avr_init` is called once, with the clock set as it
+        // asks. `data` and `flash` are then simavr's, of `ramend + 1` and `flashend + 1` bytes, and `flash` fits.
+        unsafe {
+            (*avr).frequency = CYCLES_PER_SECOND as u32;
+            simavr::avr_init(avr);
+            ptr::copy_nonoverlapping(flash.as_ptr(), (*avr).flash, flash.len());
+            (*avr).codeend = flash.len() as u32;
+            let sram = (*avr).data.add(SRAM_START.into());
+            ptr::write_bytes(sram, SRAM_AT_POWER_UP, (SRAM_END - SRAM_START + 1).into());
+            (*avr).cycle = cycle;
+        }
+
+        let uart = find_uart(chip);
+        let recorder = NonNull::from(Box::leak(Box::new(Recorder {
+            chip: avr,
+            uart: uart.as_ptr(),
+            servo_high: false,
+            led_high: false,
+            changes: Vec::new(),
+            received: Vec::new(),
+            resets: Vec::new(),
+            interrupts: InterruptRecorder::default(),
+            reset_at: None,
+        })));
+        let parameter = recorder.as_ptr().cast::<c_void>();
+
+        // SAFETY: `avr` and `uart` are valid and initialised. Each `avr_io_getirq` names a peripheral that the chip has, and
+        // simavr ignores a null for a vector that it lacks. The callbacks get the recorder's address, which stays valid until
+        // `Drop` has ended the chip.
+        let input = unsafe {
+            (*avr).custom.data = parameter;
+            (*avr).reset = Some(on_reset);
+            (*uart.as_ptr()).flags = 0;
+            for pin in Pin::ALL.into_iter().filter(|pin| pin.is_output()) {
+                let irq = pin_irq(avr, pin);
+                simavr::avr_irq_register_notify(irq, Some(on_output), parameter);
+            }
+            for vector in 1..=LAST_VECTOR {
+                let irq = simavr::avr_get_interrupt_irq(avr, vector);
+                if !irq.is_null() {
+                    let running = irq.add(simavr::AVR_INT_IRQ_RUNNING as usize);
+                    simavr::avr_irq_register_notify(running, Some(on_interrupt), parameter);
+                }
+            }
+            let output =
+                simavr::avr_io_getirq(avr, request(b"uar0"), simavr::UART_IRQ_OUTPUT as i32);
+            simavr::avr_irq_register_notify(output, Some(on_transmit), parameter);
+            simavr::avr_io_getirq(avr, request(b"uar0"), simavr::UART_IRQ_INPUT as i32)
+        };
+
+        let mut core = Core {
+            chip,
+            recorder,
+            input: NonNull::new(input).expect("the ATmega328P has a UART"),
+            held: [Held::default(); 2],
+        };
+        core.set_eeprom(eeprom);
+        core
+    }
+
+    /// Cycles since the first power-up.
+    pub(super) fn cycle(&self) -> u64 {
+        // SAFETY: the chip is valid for as long as `self` is, and simavr is not running.
+        unsafe { (*self.chip.as_ptr()).cycle }
+    }
+
+    /// Address of the next instruction, in bytes.
+    pub(super) fn program_counter(&self) -> u32 {
+        // SAFETY: as in `cycle`.
+        unsafe { (*self.chip.as_ptr()).pc }
+    }
+
+    /// What the callbacks have seen.
+    pub(super) fn recorder(&self) -> &Recorder {
+        // SAFETY: the recorder is valid for as long as `self` is, and simavr, its only other user, runs only in methods
+        // that borrow `self` mutably.
+        unsafe { self.recorder.as_ref() }
+    }
+
+    /// What the callbacks have seen, to take it out.
+    pub(super) fn recorder_mut(&mut self) -> &mut Recorder {
+        // SAFETY: as in `recorder`.
+        unsafe { self.recorder.as_mut() }
+    }
+
+    /// Starts the interrupts' statistics afresh.
+    pub(super) fn measure_interrupts(&mut self) {
+        self.recorder_mut().interrupts.turn_on();
+    }
+
+    /// The interrupts' statistics since [`Core::measure_interrupts`].
+    pub(super) fn interrupt_statistics(&self) -> Option<&InterruptStatistics> {
+        self.recorder().interrupts.statistics()
+    }
+
+    /// Serves a pending interrupt, runs an instruction or sleeps, and lets the peripherals catch up. Several instructions
+    /// may run in one step, but never past `until`, except by the length of the last one.
+    pub(super) fn step(&mut self, until: u64) -> Result<(), Stop> {
+        let avr = self.chip.as_ptr();
+        let measuring = self.interrupt_statistics().is_some();
+        // SAFETY: the chip is valid, this is the only place that runs it, and no reference into it or into the recorder is alive
+        // while it does. This is `avr_callback_run_raw` without its two waits on the host's clock.
+        unsafe {
+            if (*avr).interrupt_state != 0 {
+                simavr::avr_service_interrupts(avr);
+            }
+            // Between instructions that a measurement must see one by one, the limit is the shortest possible.
+            let limit = match measuring {
+                true => 1,
+                false => until.saturating_sub((*avr).cycle).max(1),
+            };
+            (*avr).run_cycle_limit = limit;
+            (*avr).run_cycle_count = (*avr).run_cycle_count.min(limit);
+
+            let was_asleep = (*avr).state as u32 == simavr::cpu_Sleeping;
+            if (*avr).state as u32 == simavr::cpu_Running {
+                (*avr).pc = avr_run_one(avr);
+            }
+            let until_next_timer = simavr::avr_cycle_timer_process(avr);
+            match (*avr).state as u32 {
+                simavr::cpu_Running => {
+                    if was_asleep {
+                        (*avr).cycle += WAKE_UP_CYCLES;
+                    }
+                }
+                simavr::cpu_Sleeping if (*avr).sreg[simavr::S_I as usize] == 0 => {
+                    return Err(Stop::Halted);
+                }
+                simavr::cpu_Sleeping => {
+                    let rest = until.saturating_sub((*avr).cycle);
+                    (*avr).cycle += until_next_timer.min(rest).max(1);
+                }
+                _ => return Err(Stop::Crashed),
+            }
+        }
+        self.finish_reset(ResetCause::Watchdog);
+        if measuring {
+            let cycle = self.cycle();
+            // SAFETY: as in `cycle`.
+            let enabled = unsafe { (*avr).sreg[simavr::S_I as usize] != 0 };
+            self.recorder_mut()
+                .interrupts
+                .interrupts_enabled(enabled, cycle);
+        }
+        Ok(())
+    }
+
+    /// Pulls the reset pin low for a moment.
+    pub(super) fn reset(&mut self) {
+        let avr = self.chip.as_ptr();
+        // SAFETY: as in `step`; MCUSR is an address inside `data`, and simavr keeps its bits over a reset.
+        unsafe {
+            *(*avr).data.add(MCUSR.into()) |= EXTRF;
+            simavr::avr_reset(avr);
+        }
+        self.finish_reset(ResetCause::External);
+    }
+
+    /// Takes over from the chip that has lost its power: what was recorded, and the levels at its pins.
+    pub(super) fn take_over(&mut self, before: &mut Core) {
+        let old = before.recorder_mut();
+        let new = self.recorder_mut();
+        new.changes = std::mem::take(&mut old.changes);
+        new.received = std::mem::take(&mut old.received);
+        new.resets = std::mem::take(&mut old.resets);
+        new.interrupts = std::mem::take(&mut old.interrupts);
+        new.interrupts.reset();
+        self.held = before.held;
+        self.hold_inputs();
+    }
+
+    /// Records that power has gone: the outputs fall.
+    pub(super) fn lose_power(&mut self) {
+        let cycle = self.cycle();
+        let recorder = self.recorder_mut();
+        recorder.record_level(Pin::Servo, false, cycle);
+        recorder.record_level(Pin::Led, false, cycle);
+        recorder.resets.push(Reset {
+            cycle,
+            cause: ResetCause::PowerOn,
+        });
+    }
+
+    /// Sets right what simavr leaves behind a reset: its clock at 0, and the inputs' levels forgotten.
+    fn finish_reset(&mut self, cause: ResetCause) {
+        let Some(cycle) = self.recorder_mut().reset_at.take() else {
+            return;
+        };
+        // SAFETY: as in `cycle`. The watchdog's timer, the only one that can run now, was set from this cycle.
+        unsafe { (*self.chip.as_ptr()).cycle = cycle };
+        let recorder = self.recorder_mut();
+        recorder.record_level(Pin::Servo, false, cycle);
+        recorder.record_level(Pin::Led, false, cycle);
+        recorder.interrupts.reset();
+        recorder.resets.push(Reset { cycle, cause });
+        self.hold_inputs();
+    }
+
+    /// Puts the levels that the inputs are held at on a chip that has just started.
+    fn hold_inputs(&mut self) {
+        for pin in Pin::ALL.into_iter().filter(|pin| !pin.is_output()) {
+            let (port, bit) = pin.port_and_bit();
+            let held = self.held[port_index(port)];
+            if held.mask & (1 << bit) != 0 {
+                self.set_input(pin, held.levels & (1 << bit) != 0);
+            }
+        }
+    }
+
+    /// Holds an input pin at a level from now on.
+    pub(super) fn set_input(&mut self, pin: Pin, high: bool) {
+        let (port, bit) = pin.port_and_bit();
+        let held = &mut self.held[port_index(port)];
+        held.mask |= 1 << bit;
+        held.levels = held.levels & !(1 << bit) | u8::from(high) << bit;
+        let mut external = simavr::avr_ioport_external_t {
+            _bitfield_align_1: [],
+            _bitfield_1: simavr::avr_ioport_external_t::new_bitfield_1(
+                port.into(),
+                held.mask.into(),
+                held.levels.into(),
+            ),
+            __bindgen_padding_0: [0; 5],
+        };
+        let avr = self.chip.as_ptr();
+        // SAFETY: as in `step`; `external` is what this request takes, and simavr copies it.
+        unsafe {
+            // Told so, simavr raises the pin to this level, not to its pull-up's, when the firmware writes the port.
+            let set_external = request(&[b'i', b'o', b'p', port as u8]);
+            simavr::avr_ioctl(avr, set_external, (&raw mut external).cast());
+            simavr::avr_raise_irq(pin_irq(avr, pin), high.into());
+        }
+    }
+
+    /// Gives the receiver a byte whose stop bit has just ended. Returns whether it had room.
+    pub(super) fn receive(&mut self, byte: u8) -> bool {
+        let uart = self.recorder().uart;
+        let avr = self.chip.as_ptr();
+        // SAFETY: as in `step`; `uart` is part of the chip, and the registers are addresses inside `data`.
+        unsafe {
+            let fifo = &(*uart).input;
+            let waiting = fifo.write.wrapping_sub(fifo.read) % fifo.buffer.len() as u16;
+            let on = *(*avr).data.add(UCSR0B.into()) & RXEN0 != 0;
+            if on && waiting >= RECEIVER_BYTES {
+                *(*avr).data.add(UCSR0A.into()) |= DOR0;
+                return false;
+            }
+            // simavr would raise the flag a whole byte later; it is due now.
+            (*uart).cycles_per_byte = 1;
+            simavr::avr_raise_irq(self.input.as_ptr(), byte.into());
+            (*uart).cycles_per_byte = cycles_per_byte(avr);
+        }
+        true
+    }
+
+    /// Gives the receiver a byte without regard to the line's pace or the receiver's room.
+    pub(super) fn flood(&mut self, byte: u8) {
+        // SAFETY: as in `step`.
+        unsafe { simavr::avr_raise_irq(self.input.as_ptr(), byte.into()) };
+    }
+
+    /// The EEPROM's content.
+    pub(super) fn eeprom(&self) -> Vec<u8> {
+        let mut content = vec![0; EEPROM_BYTES];
+        let mut description = simavr::avr_eeprom_desc_t {
+            ee: content.as_mut_ptr(),
+            offset: 0,
+            size: EEPROM_BYTES as u32,
+        };
+        // SAFETY: `description` names a buffer of the size it gives, and simavr copies into it.
+        unsafe {
+            simavr::avr_ioctl(
+                self.chip.as_ptr(),
+                request(b"eegp"),
+                (&raw mut description).cast(),
+            )
+        };
+        content
+    }
+
+    fn set_eeprom(&mut self, content: &[u8]) {
+        let mut content = content.to_vec();
+        let mut description = simavr::avr_eeprom_desc_t {
+            ee: content.as_mut_ptr(),
+            offset: 0,
+            size: content.len() as u32,
+        };
+        // SAFETY: as in `eeprom`; simavr copies out of it, and refuses what is empty or too long.
+        unsafe {
+            simavr::avr_ioctl(
+                self.chip.as_ptr(),
+                request(b"eesp"),
+                (&raw mut description).cast(),
+            )
+        };
+    }
+
+    /// `length` bytes of SRAM from `address`; what lies outside is left out.
+    pub(super) fn sram(&self, address: u16, length: u16) -> &[u8] {
+        let start = address.clamp(SRAM_START, SRAM_END + 1);
+        let end = address.saturating_add(length).clamp(start, SRAM_END + 1);
+        // SAFETY: start and end lie inside `data`, which simavr owns and changes only in methods that borrow `self` mutably.
+        unsafe {
+            let data = (*self.chip.as_ptr()).data;
+            std::slice::from_raw_parts(data.add(start.into()), (end - start).into())
+        }
+    }
+
+    /// The most bytes that the stack has taken since power-up, where `static_bytes` of SRAM lie below it for good. Bytes that
+    /// were reserved but never written are not seen.
+    pub(super) fn deepest_stack(&self, static_bytes: u16) -> usize {
+        let start = SRAM_START.saturating_add(static_bytes);
+        let above = self.sram(start, (SRAM_END + 1).saturating_sub(start));
+        let untouched = above
+            .iter()
+            .take_while(|&&byte| byte == SRAM_AT_POWER_UP)
+            .count();
+        above.len() - untouched
+    }
+}
+
+impl Drop for Core {
+    fn drop(&mut self) {
+        // SAFETY: both were allocated in `new`, the chip by simavr's malloc, which leaves freeing `avr_t` itself to its
+        // maker; nobody uses them after this.
+        unsafe {
+            simavr::avr_terminate(self.chip.as_ptr());
+            libc::free(self.chip.as_ptr().cast());
+            drop(Box::from_raw(self.recorder.as_ptr()));
+        }
+    }
+}
+
+/// simavr's line of a pin.
+///
+/// # Safety
+///
+/// `avr` must be an initialised chip.
+unsafe fn pin_irq(avr: *mut simavr::avr_t, pin: Pin) -> *mut simavr::avr_irq_t {
+    let (port, bit) = pin.port_and_bit();
+    // SAFETY: the caller vouches for `avr`.
+    unsafe { simavr::avr_io_getirq(avr, request(&[b'i', b'o', b'g', port as u8]), bit.into()) }
+}
+
+fn port_index(port: char) -> usize {
+    usize::from(port == 'D')
+}
+
+/// The UART in the chip's list of peripherals.
+fn find_uart(chip: NonNull<simavr::avr_t>) -> NonNull<simavr::avr_uart_t> {
+    // SAFETY: the chip is initialised: its peripherals form a list that ends in null, each with a C string for its kind.
+    // Every peripheral begins with its `avr_io_t`, and only the UART is called so.
+    unsafe {
+        let mut peripheral = (*chip.as_ptr()).io_port;
+        while !peripheral.is_null() && CStr::from_ptr((*peripheral).kind) != c"uart" {
+            peripheral = (*peripheral).next;
+        }
+        NonNull::new(peripheral.cast()).expect("the ATmega328P has a UART")
+    }
+}
+
+/// Cycles of a byte on the serial line, as the UART's registers stand (data sheet, section 20.3 and table 20-1).
+///
+/// # Safety
+///
+/// `avr` must be an initialised chip.
+unsafe fn cycles_per_byte(avr: *mut simavr::avr_t) -> u64 {
+    // SAFETY: the registers are addresses inside `data`, and the caller vouches for `avr`.
+    let register = |address: u16| unsafe { *(*avr).data.add(address.into()) };
+    let divisor = u64::from(u16::from_le_bytes([
+        register(UBRR0L),
+        register(UBRR0H) & 0x0F,
+    ])) + 1;
+    let cycles_per_bit = match register(UCSR0A) & U2X0 {
+        0 => 16 * divisor,
+        _ => 8 * divisor,
+    };
+    let format = register(UCSR0C);
+    let data_bits = match (register(UCSR0B) & 0b100) | (format >> 1 & 0b11) {
+        size @ 0..=3 => 5 + u64::from(size),
+        _ => 9,
+    };
+    let parity_bits = u64::from(format & UPM01 != 0);
+    let stop_bits = 1 + u64::from(format & USBS0 != 0);
+    cycles_per_bit * (1 + data_bits + parity_bits + stop_bits)
+}
+
+/// When the peripheral that simavr is serving was due. It serves one at the end of the instruction in which it falls due, up
+/// to four cycles late; its slot still says when it was. Without one, an instruction is running, and it began at `cycle`.
+///
+/// # Safety
+///
+/// `avr` must be an initialised chip.
+unsafe fn due_cycle(avr: *mut simavr::avr_t) -> u64 {
+    // SAFETY: the caller vouches for `avr`. Both lists run through the pool's own slots and end in null. The slot being
+    // served is in neither.
+    unsafe {
+        let pool = &raw const (*avr).cycle_timers;
+        let first = (&raw const (*pool).timer_slots).cast::<simavr::avr_cycle_timer_slot_t>();
+        let mut listed = 0_u64;
+        for head in [(*pool).timer, (*pool).timer_free] {
+            let mut slot = head.cast_const();
+            while !slot.is_null() {
+                listed |= 1 << slot.offset_from(first);
+                slot = (*slot).next;
+            }
+        }
+        match listed.trailing_ones() {
+            64.. => (*avr).cycle,
+            served => (*first.add(served as usize)).when,
+        }
+    }
+}
+
+/// simavr's callback for a level on an output pin.
+unsafe extern "C" fn on_output(irq: *mut simavr::avr_irq_t, level: u32, recorder: *mut c_void) {
+    // SAFETY: `recorder` is what `Core::new` registered, alive and not borrowed (see the module's text).
+    let recorder = unsafe { &mut *recorder.cast::<Recorder>() };
+    // SAFETY: simavr passes the line that it raises; the recorder's chip is the one that is running.
+    let (bit, cycle) = unsafe { ((*irq).irq, due_cycle(recorder.chip)) };
+    let pin = if bit == u32::from(Pin::Servo.port_and_bit().1) {
+        Pin::Servo
+    } else {
+        Pin::Led
+    };
+    // A timer's output carries a flag beside the level.
+    recorder.record_level(pin, level & 1 != 0, cycle);
+}
+
+/// simavr's callback for an interrupt handler that begins (1) or has returned (0).
+unsafe extern "C" fn on_interrupt(irq: *mut simavr::avr_irq_t, begins: u32, recorder: *mut c_void) {
+    // SAFETY: as in `on_output`. The chip's clock is simavr's to read only after this callback.
+    unsafe {
+        let recorder = &mut *recorder.cast::<Recorder>();
+        let clock = &raw mut (*recorder.chip).cycle;
+        // simavr numbers a vector's lines from 256 times the vector.
+        let vector = ((*irq).irq >> 8) as u8;
+        if begins != 0 {
+            recorder.interrupts.begins(vector, *clock);
+            *clock += INTERRUPT_ENTRY_CYCLES;
+        } else {
+            recorder.interrupts.ends(vector, *clock + RETURN_CYCLES);
+        }
+    }
+}
+
+/// simavr's callback for a byte that the firmware hands to the transmitter, before simavr decides how long it takes.
+unsafe extern "C" fn on_transmit(_: *mut simavr::avr_irq_t, byte: u32, recorder: *mut c_void) {
+    // SAFETY: as in `on_output`; the UART is part of the chip.
+    unsafe {
+        let recorder = &mut *recorder.cast::<Recorder>();
+        (*recorder.uart).cycles_per_byte = cycles_per_byte(recorder.chip);
+        recorder.received.push(ReceivedByte {
+            cycle: (*recorder.chip).cycle,
+            byte: byte as u8,
+        });
+    }
+}
+
+/// simavr's callback in the middle of a reset, before the peripherals' own resets and before it zeroes its clock.
+unsafe extern "C" fn on_reset(avr: *mut simavr::avr_t) {
+    // SAFETY: simavr passes the chip that it resets, whose `custom.data` is the recorder (see `Core::new`).
+    unsafe {
+        let recorder = &mut *(*avr).custom.data.cast::<Recorder>();
+        recorder.reset_at = Some((*avr).cycle);
+    }
+}

@@ -1,0 +1,100 @@
+//! How long interrupts take: a count and the spread of cycles a vector, and the longest time that interrupts were off.
+//!
+//! The recorder is off until asked for, because watching every instruction makes the simulation slower. It does not see
+//! how long an interrupt waited before it was served; the longest time off bounds that.
+
+use std::collections::BTreeMap;
+
+/// Cycles that the handler of one vector took, from its entry (4 cycles) to the end of its `reti`, with what interrupted it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct HandlerCycles {
+    /// Times it ran.
+    pub count: u64,
+    /// Fewest cycles of a run.
+    pub fewest: u64,
+    /// Most cycles of a run.
+    pub most: u64,
+    /// Cycles of all runs.
+    pub total: u64,
+}
+
+impl HandlerCycles {
+    /// Mean cycles of a run.
+    pub fn mean(&self) -> f64 {
+        self.total as f64 / self.count as f64
+    }
+}
+
+/// What the interrupts have cost since measuring began.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct InterruptStatistics {
+    /// By vector, counted from 0 (reset): INT0 is 1, PCINT0 3, Timer1 overflow 13.
+    pub handlers: BTreeMap<u8, HandlerCycles>,
+    /// Longest stretch of cycles with the interrupt flag of SREG clear, handlers included.
+    pub longest_off: u64,
+}
+
+/// Turns the edges that simavr shows into statistics.
+#[derive(Default)]
+pub(super) struct InterruptRecorder {
+    statistics: Option<InterruptStatistics>,
+    /// Handlers that have begun and not returned: vector and first cycle.
+    running: Vec<(u8, u64)>,
+    off_since: Option<u64>,
+}
+
+impl InterruptRecorder {
+    pub(super) fn turn_on(&mut self) {
+        self.statistics = Some(InterruptStatistics::default());
+        self.off_since = None;
+    }
+
+    pub(super) fn statistics(&self) -> Option<&InterruptStatistics> {
+        self.statistics.as_ref()
+    }
+
+    pub(super) fn begins(&mut self, vector: u8, cycle: u64) {
+        if self.statistics.is_some() {
+            self.running.push((vector, cycle));
+            self.off_since.get_or_insert(cycle);
+        }
+    }
+
+    pub(super) fn ends(&mut self, vector: u8, cycle: u64) {
+        // Measuring may have begun inside a handler.
+        let Some((_, begun)) = self.running.pop_if(|(running, _)| *running == vector) else {
+            return;
+        };
+        let Some(statistics) = &mut self.statistics else {
+            return;
+        };
+        let cycles = cycle - begun;
+        let handler = statistics.handlers.entry(vector).or_insert(HandlerCycles {
+            count: 0,
+            fewest: cycles,
+            most: cycles,
+            total: 0,
+        });
+        handler.count += 1;
+        handler.fewest = handler.fewest.min(cycles);
+        handler.most = handler.most.max(cycles);
+        handler.total += cycles;
+    }
+
+    /// The interrupt flag of SREG after an instruction.
+    pub(super) fn interrupts_enabled(&mut self, enabled: bool, cycle: u64) {
+        if !enabled {
+            self.off_since.get_or_insert(cycle);
+        } else if let (Some(since), Some(statistics)) =
+            (self.off_since.take(), &mut self.statistics)
+        {
+            statistics.longest_off = statistics.longest_off.max(cycle - since);
+        }
+    }
+
+    /// A reset ends every handler without a return.
+    pub(super) fn reset(&mut self) {
+        self.running.clear();
+        self.off_since = None;
+    }
+}
