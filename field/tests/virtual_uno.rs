@@ -1,0 +1,326 @@
+//! The virtual Uno against small C programs, compiled here by avr-gcc, whose timing the data sheet tells.
+//!
+//! Each program stands in `fixtures/` and shows one thing; the firmware itself plays no part here.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use field::signal::{CYCLES_PER_SECOND, Pin, PinChange};
+use field::uno::{ResetCause, SENT_BYTE_CYCLES, Uno, UnoError};
+
+/// Bit of MCUSR a cause of reset, as the fixture `memory` sends it.
+const POWER_ON: char = '1';
+const EXTERNAL: char = '2';
+const WATCHDOG: char = '8';
+
+/// Cycles a bit of a firmware with UBRR 16 and double speed.
+const FIRMWARE_BIT_CYCLES: u64 = 8 * 17;
+
+const MILLISECOND: u64 = CYCLES_PER_SECOND / 1000;
+
+/// Compiles a fixture and returns its ELF.
+fn compile(name: &str) -> PathBuf {
+    let source = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("tests/fixtures")
+        .join(name)
+        .with_extension("c");
+    // Tests run at the same time, and several of them compile the same fixture.
+    let thread = format!("{:?}", std::thread::current().id());
+    let elf = Path::new(env!("CARGO_TARGET_TMPDIR"))
+        .join(format!("{name}-{}-{thread}", std::process::id()))
+        .with_extension("elf");
+    let output = Command::new("avr-gcc")
+        .args([
+            "-mmcu=atmega328p",
+            "-DF_CPU=16000000UL",
+            "-Os",
+            "-Wall",
+            "-Werror",
+            "-o",
+        ])
+        .args([&elf, &source])
+        .output()
+        .unwrap_or_else(|error| panic!("avr-gcc could not be started ({error}): run ./setup.sh"));
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    elf
+}
+
+fn boot(name: &str) -> Uno {
+    Uno::boot(&compile(name)).expect("a fixture boots")
+}
+
+#[test]
+fn a_byte_takes_ten_bits_both_ways() {
+    let mut uno = boot("echo");
+    uno.run_until_serial("ready\n", 5 * MILLISECOND).unwrap();
+    uno.run_for_ms(1).unwrap();
+
+    let sent_at = uno.cycle();
+    uno.send(b"abc");
+    uno.run_for_ms(1).unwrap();
+    let echo = uno.received_bytes();
+    assert_eq!(echo.iter().map(|received| received.byte).collect::<Vec<_>>(), b"abc");
+    for (count, received) in (1..).zip(&echo) {
+        let arrived = sent_at + count * SENT_BYTE_CYCLES;
+        // Waking up, entering the handler, and its first instructions.
+        let delay = received.cycle - arrived;
+        assert!((8..40).contains(&delay), "{delay} cycles after the stop bit");
+    }
+}
+
+#[test]
+fn the_transmitter_keeps_its_own_pace() {
+    let mut uno = boot("echo");
+    uno.run_for_ms(2).unwrap();
+    let cycles: Vec<u64> = uno.received_bytes().iter().map(|received| received.cycle).collect();
+    assert_eq!(cycles.len(), "ready\n".len());
+    for pair in cycles[1..].windows(2) {
+        let gap = pair[1] - pair[0];
+        assert!(gap.abs_diff(10 * FIRMWARE_BIT_CYCLES) <= 4, "{gap} cycles");
+    }
+}
+
+#[test]
+fn the_receiver_keeps_three_bytes_and_loses_the_fourth() {
+    let mut uno = boot("deaf");
+    uno.run_for_ms(1).unwrap();
+    uno.send(b"12345");
+    uno.run_for_ms(1).unwrap();
+    assert_eq!(uno.lost_bytes(), 2);
+    // The work switch tells the fixture to read at last; it adds whether the chip reported the loss.
+    uno.set(Pin::WorkSwitch, false);
+    assert_eq!(uno.run_until_serial("\n", 5 * MILLISECOND).unwrap(), "lost 123\n");
+}
+
+#[test]
+fn entering_an_interrupt_takes_four_cycles() {
+    let mut uno = boot("entry");
+    uno.run_for_ms(1).unwrap();
+    let mut edges = Vec::new();
+    for count in 1..=20 {
+        let cycle = uno.cycle() + 1000 * count;
+        edges.push(cycle);
+        uno.drive([
+            PinChange {
+                cycle,
+                pin: Pin::EncoderA,
+                high: true,
+            },
+            PinChange {
+                cycle: cycle + 500,
+                pin: Pin::EncoderA,
+                high: false,
+            },
+        ]);
+        uno.run_until(cycle + 800).unwrap();
+    }
+    let answers: Vec<u64> = uno
+        .changes()
+        .iter()
+        .filter(|change| change.high)
+        .map(|change| change.cycle)
+        .collect();
+    assert_eq!(answers.len(), edges.len());
+    for (edge, answer) in edges.iter().zip(answers) {
+        // Entry, and the vector's `jmp` of 3 cycles. The main loop's instructions take 1 cycle, and its last one 2.
+        let response = answer - edge;
+        assert!((7..=8).contains(&response), "{response} cycles");
+    }
+}
+
+#[test]
+fn interrupts_are_counted_and_timed_when_asked_for() {
+    let mut uno = boot("entry");
+    uno.run_for_ms(1).unwrap();
+    assert_eq!(uno.interrupt_statistics(), None);
+    uno.measure_interrupts();
+    for _ in 0..3 {
+        uno.set(Pin::EncoderA, true);
+        uno.run_for_ms(1).unwrap();
+        uno.set(Pin::EncoderA, false);
+        uno.run_for_ms(1).unwrap();
+    }
+    let statistics = uno.interrupt_statistics().unwrap();
+    assert_eq!(statistics.handlers.keys().collect::<Vec<_>>(), [&1]);
+    let int0 = &statistics.handlers[&1];
+    // Entry 4, jmp 3, sbi 2, cbi 2, reti 4.
+    assert_eq!((int0.count, int0.fewest, int0.most, int0.mean()), (3, 15, 15, 15.0));
+    assert_eq!(statistics.longest_off, 15);
+}
+
+#[test]
+fn a_timer_pulse_is_exact_and_constant_while_the_core_is_busy() {
+    let mut uno = boot("servo");
+    let edges = (1..20_000).map(|count| PinChange {
+        cycle: count * 799,
+        pin: Pin::EncoderA,
+        high: count % 2 == 1,
+    });
+    uno.drive(edges);
+    uno.run_for_ms(1000).unwrap();
+    let pulses = uno.servo_pulses();
+    assert_eq!(pulses.len(), 50);
+    for pair in pulses[1..].windows(2) {
+        assert_eq!(pair[0].width_us(), 1500.0);
+        assert_eq!(pair[1].rise - pair[0].rise, 20 * MILLISECOND);
+    }
+}
+
+#[test]
+fn every_pin_change_is_counted() {
+    let mut uno = boot("servo");
+    uno.run_for_ms(1).unwrap();
+    let start = uno.cycle();
+    // Handed over in no order: A and B by themselves.
+    for (pin, offset) in [(Pin::EncoderA, 0), (Pin::EncoderB, 250)] {
+        uno.drive((1..=600).map(|count| PinChange {
+            cycle: start + count * 500 + offset,
+            pin,
+            high: count % 2 == 1,
+        }));
+    }
+    uno.run_for_ms(25).unwrap();
+    assert_eq!(uno.read("edges"), Some(&1200_u16.to_le_bytes()[..]));
+    assert_eq!(uno.read("no such variable"), None);
+}
+
+#[test]
+fn eeprom_and_sram_outlive_the_reset_pin_and_eeprom_the_power() {
+    let mut uno = Uno::boot_with_eeprom(&compile("memory"), &[9, 9, 9, 9, 9, 9, 9, 0]).unwrap();
+    assert_eq!(
+        uno.run_until_serial("\n", 10 * MILLISECOND).unwrap(),
+        format!("{POWER_ON}1H\n")
+    );
+    let kept = uno.read("kept").unwrap().to_vec();
+    assert_eq!(uno.read("started"), Some(&[42, 0][..]));
+
+    uno.reset();
+    assert_eq!(
+        uno.run_until_serial("\n", 10 * MILLISECOND).unwrap(),
+        format!("{EXTERNAL}2H\n")
+    );
+    assert_eq!(uno.read("kept").unwrap(), [kept[0] + 1]);
+
+    uno.power_cycle();
+    assert_eq!(
+        uno.run_until_serial("\n", 10 * MILLISECOND).unwrap(),
+        format!("{POWER_ON}3H\n")
+    );
+    assert_eq!(uno.read("kept").unwrap(), kept);
+    assert_eq!(uno.eeprom()[..9], [9, 9, 9, 9, 9, 9, 9, 3, 0xFF]);
+
+    let causes: Vec<_> = uno.resets().iter().map(|reset| reset.cause).collect();
+    assert_eq!(causes, [ResetCause::External, ResetCause::PowerOn]);
+}
+
+#[test]
+fn a_watchdog_reset_is_reported_and_the_firmware_goes_on() {
+    let mut uno = boot("memory");
+    uno.run_until_serial("\n", 10 * MILLISECOND).unwrap();
+    let asked_at = uno.cycle();
+    uno.send(b"w");
+    // EEPROM starts erased: 255 + 1 wraps to 0, and this is the second start.
+    assert_eq!(
+        uno.run_until_serial("\n", 30 * MILLISECOND).unwrap(),
+        format!("{WATCHDOG}1H\n")
+    );
+    let [reset] = uno.resets() else {
+        panic!("one reset, not {:?}", uno.resets());
+    };
+    assert_eq!(reset.cause, ResetCause::Watchdog);
+    let waited = reset.cycle - asked_at;
+    assert!(
+        (16 * MILLISECOND..17 * MILLISECOND).contains(&waited),
+        "{waited} cycles"
+    );
+}
+
+#[test]
+fn a_driven_input_keeps_its_level_over_port_writes_and_resets() {
+    let mut uno = boot("memory");
+    uno.set(Pin::WorkSwitch, false);
+    assert_eq!(
+        uno.run_until_serial("\n", 10 * MILLISECOND).unwrap(),
+        format!("{POWER_ON}0L\n")
+    );
+    uno.reset();
+    assert_eq!(
+        uno.run_until_serial("\n", 10 * MILLISECOND).unwrap(),
+        format!("{EXTERNAL}1L\n")
+    );
+    uno.power_cycle();
+    assert_eq!(
+        uno.run_until_serial("\n", 10 * MILLISECOND).unwrap(),
+        format!("{POWER_ON}2L\n")
+    );
+}
+
+#[test]
+fn a_crash_and_a_halt_are_errors_that_say_where() {
+    let mut uno = boot("memory");
+    uno.run_until_serial("\n", 10 * MILLISECOND).unwrap();
+    uno.send(b"c");
+    assert!(matches!(uno.run_for_ms(5), Err(UnoError::Crashed { .. })));
+
+    let mut uno = boot("memory");
+    uno.run_until_serial("\n", 10 * MILLISECOND).unwrap();
+    uno.send(b"h");
+    let halted = uno.run_for_ms(5).unwrap_err();
+    assert!(matches!(halted, UnoError::Halted { .. }));
+    assert!(halted.to_string().contains("sleeps with interrupts off"), "{halted}");
+}
+
+#[test]
+fn a_missing_answer_is_an_error_that_shows_what_came_instead() {
+    let mut uno = boot("echo");
+    let error = uno.run_until_serial("steady", 5 * MILLISECOND).unwrap_err().to_string();
+    assert!(
+        error.contains("\"steady\"") && error.contains("\"ready\\n\""),
+        "{error}"
+    );
+    assert_eq!(uno.received(), "ready\n");
+}
+
+#[test]
+fn several_unos_run_in_parallel_and_do_not_meet() {
+    let elf = compile("servo");
+    let run = |gap: u64| {
+        let mut uno = Uno::boot(&elf).unwrap();
+        uno.drive((1..=200).map(|count| PinChange {
+            cycle: MILLISECOND + count * gap,
+            pin: Pin::EncoderB,
+            high: count % 2 == 1,
+        }));
+        uno.run_for_ms(100).unwrap();
+        (uno.read("edges").unwrap().to_vec(), uno.servo_pulses(), uno.cycle())
+    };
+    let alone = run(3000);
+    let together: Vec<_> = std::thread::scope(|scope| {
+        let threads: Vec<_> = (0..4).map(|_| scope.spawn(|| run(3000))).collect();
+        threads.into_iter().map(|thread| thread.join().unwrap()).collect()
+    });
+    for result in together {
+        assert_eq!(result, alone);
+    }
+}
+
+#[test]
+fn an_elf_that_is_none_is_refused_by_name() {
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/echo.c");
+    let refused = Uno::boot(&source).err().unwrap().to_string();
+    assert!(refused.contains("echo.c is not a readable ELF file"), "{refused}");
+    let own = std::env::current_exe().unwrap();
+    let refused = Uno::boot(&own).err().unwrap().to_string();
+    assert!(refused.contains("an ELF for AVR is needed"), "{refused}");
+}
+
+#[test]
+fn the_size_is_what_the_sections_add_up_to() {
+    let uno = boot("memory");
+    // .noinit holds `kept`, .data `started`, whose first value takes flash as well.
+    assert_eq!(uno.size().sram, 3);
+    assert!((100..1000).contains(&uno.size().flash), "{:?}", uno.size());
+    let mut uno = uno;
+    uno.run_for_ms(5).unwrap();
+    assert!((2..40).contains(&uno.deepest_stack()), "{}", uno.deepest_stack());
+}
