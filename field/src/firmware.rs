@@ -52,14 +52,10 @@ pub enum BuildError {
     #[error("the messages of `cargo firmware` could not be read: {0}")]
     Messages(String),
     /// Cargo ran and failed.
-    #[error(
-        "`cargo firmware` failed ({0}): its own messages stand above; where a tool is missing, run ./setup.sh"
-    )]
+    #[error("`cargo firmware` failed ({0}): its own messages stand above; where a tool is missing, run ./setup.sh")]
     Failed(String),
     /// Cargo was content, but no ELF came of it.
-    #[error(
-        "`cargo firmware` made no ELF: the package `{PACKAGE}` should have a binary of that name"
-    )]
+    #[error("`cargo firmware` made no ELF: the package `{PACKAGE}` should have a binary of that name")]
     NoElf,
 }
 
@@ -88,9 +84,7 @@ fn run_cargo() -> Result<PathBuf, BuildError> {
     for name in FOREIGN_SETTINGS {
         command.env_remove(name);
     }
-    let mut cargo = command
-        .spawn()
-        .map_err(|error| BuildError::Start(error.to_string()))?;
+    let mut cargo = command.spawn().map_err(|error| BuildError::Start(error.to_string()))?;
 
     let mut elf = None;
     if let Some(messages) = cargo.stdout.take() {
@@ -103,9 +97,7 @@ fn run_cargo() -> Result<PathBuf, BuildError> {
             }
         }
     }
-    let status = cargo
-        .wait()
-        .map_err(|error| BuildError::Start(error.to_string()))?;
+    let status = cargo.wait().map_err(|error| BuildError::Start(error.to_string()))?;
     if !status.success() {
         return Err(BuildError::Failed(status.to_string()));
     }
@@ -164,9 +156,7 @@ pub enum ImageError {
         reason: object::Error,
     },
     /// The file was made for another processor.
-    #[error(
-        "{path} was made for {architecture:?}: an ELF for AVR is needed, `cargo firmware` makes one"
-    )]
+    #[error("{path} was made for {architecture:?}: an ELF for AVR is needed, `cargo firmware` makes one")]
     NotAvr {
         /// The file.
         path: PathBuf,
@@ -224,9 +214,7 @@ impl Image {
             path: path.into(),
             reason,
         };
-        let architecture = object::File::parse(&*bytes)
-            .map_err(not_elf)?
-            .architecture();
+        let architecture = object::File::parse(&*bytes).map_err(not_elf)?.architecture();
         if architecture != Architecture::Avr {
             return Err(ImageError::NotAvr {
                 path: path.into(),
@@ -245,9 +233,7 @@ impl Image {
             // The physical address: for .data that is where its first values lie in flash.
             let (memory, name, start, limit) = match u64::from(header.p_paddr(LittleEndian)) {
                 address @ ..SRAM_ORIGIN => (&mut flash, "flash", address, FLASH_BYTES),
-                address @ EEPROM_ORIGIN..FUSES_ORIGIN => {
-                    (&mut eeprom, "EEPROM", address - EEPROM_ORIGIN, EEPROM_BYTES)
-                }
+                address @ EEPROM_ORIGIN..FUSES_ORIGIN => (&mut eeprom, "EEPROM", address - EEPROM_ORIGIN, EEPROM_BYTES),
                 // Fuses and lock bits are not part of what runs.
                 _ => continue,
             };

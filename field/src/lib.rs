@@ -3,6 +3,7 @@
 //! [`row`] says what stands in the row, [`machine`] how the weeder rolls past it and what its servo makes of the pulses,
 //! [`uno`] runs the firmware's ELF on simavr, and [`trial`] joins them and judges what happened to each plant.
 
+pub mod capture;
 pub mod firmware;
 pub mod machine;
 pub mod motion;
@@ -11,3 +12,4 @@ pub mod row;
 pub mod servo;
 pub mod signal;
 pub mod uno;
+pub mod waveform;

@@ -72,9 +72,7 @@ pub enum UnoError {
         program_counter: u32,
     },
     /// A text that was waited for did not come.
-    #[error(
-        "the firmware did not send {text:?} within {timeout_cycles} cycles; it sent {received:?}"
-    )]
+    #[error("the firmware did not send {text:?} within {timeout_cycles} cycles; it sent {received:?}")]
     NoAnswer {
         /// What was waited for.
         text: String,
@@ -214,15 +212,9 @@ impl Uno {
     /// Where a pin is an output.
     pub fn drive(&mut self, changes: impl IntoIterator<Item = PinChange>) {
         self.to_drive.extend(changes.into_iter().inspect(|change| {
-            assert!(
-                !change.pin.is_output(),
-                "{:?} is driven by the firmware",
-                change.pin
-            );
+            assert!(!change.pin.is_output(), "{:?} is driven by the firmware", change.pin);
         }));
-        self.to_drive
-            .make_contiguous()
-            .sort_by_key(|change| change.cycle);
+        self.to_drive.make_contiguous().sort_by_key(|change| change.cycle);
     }
 
     /// Runs until the clock has reached `cycle`, or passed it by the last instruction's length.
@@ -251,11 +243,7 @@ impl Uno {
     /// # Errors
     ///
     /// As [`Uno::run_until`], and where the text has not come after `timeout_cycles`.
-    pub fn run_until_serial(
-        &mut self,
-        text: &str,
-        timeout_cycles: u64,
-    ) -> Result<String, UnoError> {
+    pub fn run_until_serial(&mut self, text: &str, timeout_cycles: u64) -> Result<String, UnoError> {
         let deadline = self.cycle() + timeout_cycles;
         let mut seen = 0;
         loop {
@@ -282,10 +270,7 @@ impl Uno {
 
     /// Runs a step, and what falls due before it.
     fn step(&mut self, until: u64) -> Result<(), UnoError> {
-        while let Some(change) = self
-            .to_drive
-            .pop_front_if(|change| change.cycle <= self.core.cycle())
-        {
+        while let Some(change) = self.to_drive.pop_front_if(|change| change.cycle <= self.core.cycle()) {
             self.core.set_input(change.pin, change.high);
         }
         while !self.to_send.is_empty() && self.next_byte_ends <= self.cycle() {
@@ -298,21 +283,12 @@ impl Uno {
         }
         let next_level = self.to_drive.front().map(|change| change.cycle);
         let next_byte = (!self.to_send.is_empty()).then_some(self.next_byte_ends);
-        let until = [next_level, next_byte]
-            .into_iter()
-            .flatten()
-            .fold(until, u64::min);
+        let until = [next_level, next_byte].into_iter().flatten().fold(until, u64::min);
         self.core.step(until).map_err(|stop| {
             let (cycle, program_counter) = (self.core.cycle(), self.core.program_counter());
             match stop {
-                Stop::Crashed => UnoError::Crashed {
-                    cycle,
-                    program_counter,
-                },
-                Stop::Halted => UnoError::Halted {
-                    cycle,
-                    program_counter,
-                },
+                Stop::Crashed => UnoError::Crashed { cycle, program_counter },
+                Stop::Halted => UnoError::Halted { cycle, program_counter },
             }
         })
     }
@@ -345,11 +321,7 @@ impl Uno {
 
     /// Takes the text that has come from the firmware; what is not UTF-8 is replaced.
     pub fn received(&mut self) -> String {
-        let bytes: Vec<u8> = self
-            .received_bytes()
-            .iter()
-            .map(|received| received.byte)
-            .collect();
+        let bytes: Vec<u8> = self.received_bytes().iter().map(|received| received.byte).collect();
         String::from_utf8_lossy(&bytes).into_owned()
     }
 

@@ -144,8 +144,8 @@ impl Core {
     pub(super) fn new(flash: &[u8], eeprom: &[u8], cycle: u64) -> Core {
         // SAFETY: the name is a C string that lives for ever. The chip is known to every simavr, so a null pointer means
         // that memory ran out.
-        let chip = NonNull::new(unsafe { simavr::avr_make_mcu_by_name(CHIP.as_ptr()) })
-            .expect("simavr knows the ATmega328P");
+        let chip =
+            NonNull::new(unsafe { simavr::avr_make_mcu_by_name(CHIP.as_ptr()) }).expect("simavr knows the ATmega328P");
         let avr = chip.as_ptr();
 
         // SAFETY: `avr` was just made and nothing else has its address. `avr_init` is called once, with the clock set as it
@@ -192,8 +192,7 @@ impl Core {
                     simavr::avr_irq_register_notify(running, Some(on_interrupt), parameter);
                 }
             }
-            let output =
-                simavr::avr_io_getirq(avr, request(b"uar0"), simavr::UART_IRQ_OUTPUT as i32);
+            let output = simavr::avr_io_getirq(avr, request(b"uar0"), simavr::UART_IRQ_OUTPUT as i32);
             simavr::avr_irq_register_notify(output, Some(on_transmit), parameter);
             simavr::avr_io_getirq(avr, request(b"uar0"), simavr::UART_IRQ_INPUT as i32)
         };
@@ -288,9 +287,7 @@ impl Core {
             let cycle = self.cycle();
             // SAFETY: as in `cycle`.
             let enabled = unsafe { (*avr).sreg[simavr::S_I as usize] != 0 };
-            self.recorder_mut()
-                .interrupts
-                .interrupts_enabled(enabled, cycle);
+            self.recorder_mut().interrupts.interrupts_enabled(enabled, cycle);
         }
         Ok(())
     }
@@ -418,13 +415,7 @@ impl Core {
             size: EEPROM_BYTES as u32,
         };
         // SAFETY: `description` names a buffer of the size it gives, and simavr copies into it.
-        unsafe {
-            simavr::avr_ioctl(
-                self.chip.as_ptr(),
-                request(b"eegp"),
-                (&raw mut description).cast(),
-            )
-        };
+        unsafe { simavr::avr_ioctl(self.chip.as_ptr(), request(b"eegp"), (&raw mut description).cast()) };
         content
     }
 
@@ -436,13 +427,7 @@ impl Core {
             size: content.len() as u32,
         };
         // SAFETY: as in `eeprom`; simavr copies out of it, and refuses what is empty or too long.
-        unsafe {
-            simavr::avr_ioctl(
-                self.chip.as_ptr(),
-                request(b"eesp"),
-                (&raw mut description).cast(),
-            )
-        };
+        unsafe { simavr::avr_ioctl(self.chip.as_ptr(), request(b"eesp"), (&raw mut description).cast()) };
     }
 
     /// `length` bytes of SRAM from `address`; what lies outside is left out.
@@ -461,10 +446,7 @@ impl Core {
     pub(super) fn deepest_stack(&self, static_bytes: u16) -> usize {
         let start = SRAM_START.saturating_add(static_bytes);
         let above = self.sram(start, (SRAM_END + 1).saturating_sub(start));
-        let untouched = above
-            .iter()
-            .take_while(|&&byte| byte == SRAM_AT_POWER_UP)
-            .count();
+        let untouched = above.iter().take_while(|&&byte| byte == SRAM_AT_POWER_UP).count();
         above.len() - untouched
     }
 }
@@ -517,10 +499,7 @@ fn find_uart(chip: NonNull<simavr::avr_t>) -> NonNull<simavr::avr_uart_t> {
 unsafe fn cycles_per_byte(avr: *mut simavr::avr_t) -> u64 {
     // SAFETY: the registers are addresses inside `data`, and the caller vouches for `avr`.
     let register = |address: u16| unsafe { *(*avr).data.add(address.into()) };
-    let divisor = u64::from(u16::from_le_bytes([
-        register(UBRR0L),
-        register(UBRR0H) & 0x0F,
-    ])) + 1;
+    let divisor = u64::from(u16::from_le_bytes([register(UBRR0L), register(UBRR0H) & 0x0F])) + 1;
     let cycles_per_bit = match register(UCSR0A) & U2X0 {
         0 => 16 * divisor,
         _ => 8 * divisor,

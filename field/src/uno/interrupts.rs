@@ -85,9 +85,7 @@ impl InterruptRecorder {
     pub(super) fn interrupts_enabled(&mut self, enabled: bool, cycle: u64) {
         if !enabled {
             self.off_since.get_or_insert(cycle);
-        } else if let (Some(since), Some(statistics)) =
-            (self.off_since.take(), &mut self.statistics)
-        {
+        } else if let (Some(since), Some(statistics)) = (self.off_since.take(), &mut self.statistics) {
             statistics.longest_off = statistics.longest_off.max(cycle - since);
         }
     }

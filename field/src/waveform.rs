@@ -1,0 +1,105 @@
+//! Waveform files: what happened on the Uno's pins, as a VCD for PulseView or GTKWave.
+//!
+//! One file holds every pin of the wiring table by its name ([`Pin::name`]), inputs and outputs together. The file counts in
+//! 100 ps, of which a cycle of 62.5 ns is exactly 625, so that [`crate::capture`] reads back the very cycles.
+
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use vcd::{SimulationCommand, TimescaleUnit, Writer};
+
+use crate::signal::{CYCLES_PER_SECOND, Pin, PinChange};
+
+/// The file's unit of time: 100 ps.
+const UNITS: (u32, TimescaleUnit) = (100, TimescaleUnit::PS);
+
+/// Units of time a cycle.
+const UNITS_PER_CYCLE: u64 = 10_000_000_000 / CYCLES_PER_SECOND;
+
+/// A waveform file that could not be written.
+#[derive(Debug, thiserror::Error)]
+#[error("the waveform {path} could not be written: {source}")]
+pub struct WaveformError {
+    /// The file.
+    pub path: PathBuf,
+    /// The operating system's answer.
+    pub source: io::Error,
+}
+
+/// Writes `changes`, in any order, to a VCD file at `path`. Each pin starts at rest ([`Pin::level_at_rest`]).
+///
+/// # Errors
+///
+/// Where the file cannot be written.
+pub fn write(path: &Path, changes: impl IntoIterator<Item = PinChange>) -> Result<(), WaveformError> {
+    let mut changes: Vec<PinChange> = changes.into_iter().collect();
+    changes.sort_by_key(|change| change.cycle);
+    File::create(path)
+        .and_then(|file| write_to(BufWriter::new(file), &changes))
+        .map_err(|source| WaveformError {
+            path: path.into(),
+            source,
+        })
+}
+
+/// Writes changes, sorted by cycle.
+fn write_to(file: impl Write, changes: &[PinChange]) -> io::Result<()> {
+    let mut writer = Writer::new(file);
+    writer.timescale(UNITS.0, UNITS.1)?;
+    writer.add_module("uno")?;
+    let mut wires = Vec::new();
+    for pin in Pin::ALL {
+        wires.push((pin, writer.add_wire(1, pin.name())?));
+    }
+    writer.upscope()?;
+    writer.enddefinitions()?;
+
+    writer.timestamp(0)?;
+    writer.begin(SimulationCommand::Dumpvars)?;
+    for &(pin, wire) in &wires {
+        writer.change_scalar(wire, pin.level_at_rest())?;
+    }
+    writer.end()?;
+
+    let mut now = 0;
+    for change in changes {
+        if change.cycle != now {
+            now = change.cycle;
+            writer.timestamp(now * UNITS_PER_CYCLE)?;
+        }
+        for &(pin, wire) in &wires {
+            if pin == change.pin {
+                writer.change_scalar(wire, change.high)?;
+            }
+        }
+    }
+    writer.flush()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cycle_is_a_whole_number_of_the_units() {
+        assert_eq!(
+            UNITS_PER_CYCLE * CYCLES_PER_SECOND,
+            UNITS.1.divisor() / u64::from(UNITS.0)
+        );
+    }
+
+    #[test]
+    fn the_file_says_each_pin_by_name_and_each_edge_once() {
+        let mut file = Vec::new();
+        let pin = Pin::Servo;
+        let changes = [(8, true), (24_008, false)].map(|(cycle, high)| PinChange { cycle, pin, high });
+        write_to(&mut file, &changes).unwrap();
+        let file = String::from_utf8(file).unwrap();
+        assert!(file.contains("$timescale 100 ps $end"), "{file}");
+        for pin in Pin::ALL {
+            assert!(file.contains(&format!(" {} $end", pin.name())), "{file}");
+        }
+        assert!(file.ends_with("#5000\n1&\n#15005000\n0&\n"), "{file}");
+    }
+}
