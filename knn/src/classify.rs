@@ -53,7 +53,9 @@ impl core::fmt::Display for ClassifyError {
             Self::KOutOfRange => "k is out of range: choose 1 to 15",
             Self::NoExamples => "there are no examples: add at least k",
             Self::TooFewExamples => "k is above the number of examples: add examples or choose a smaller k",
-            Self::UnknownLabel => "an example's label is not a class: labels run from 0 to the number of classes less 1",
+            Self::UnknownLabel => {
+                "an example's label is not a class: labels run from 0 to the number of classes less 1"
+            }
         })
     }
 }
@@ -98,21 +100,24 @@ pub fn classify<const FEATURES: usize, const CLASSES: usize>(
     if k == 0 || k > MAX_K {
         return Err(ClassifyError::KOutOfRange);
     }
-    let mut nearest = Nearest::<CLASSES>::new(k);
-    examples.for_each_distance(features, &mut |distance, label| {
-        nearest.consider(distance, label)
+    let mut neighbours = [Neighbour::NONE; MAX_K as usize];
+    let (neighbours, _) = neighbours.split_at_mut(usize::from(k));
+    let mut nearest = Nearest::<CLASSES> {
+        neighbours,
+        level: [0; CLASSES],
+        level_unknown: false,
+    };
+    examples.visit_near(features, DISTANCE_LIMIT, &mut |distance, label| {
+        nearest.admit(Neighbour::new(distance, label)).distance()
     });
     nearest.vote(radius)
 }
 
 /// The k nearest examples so far.
-struct Nearest<const CLASSES: usize> {
-    /// The first `k` are in use, nearest first.
-    neighbours: [Neighbour; MAX_K as usize],
-    k: u8,
-    /// The k-th of `neighbours`, which each example is compared with.
-    last: Neighbour,
-    /// Votes of the examples that are as far as `last` but are not among the neighbours.
+struct Nearest<'a, const CLASSES: usize> {
+    /// k of them, nearest first.
+    neighbours: &'a mut [Neighbour],
+    /// Votes of the examples that are as far as the last neighbour and found no room.
     level: [usize; CLASSES],
     /// Whether one of these examples has a label that is not a class.
     level_unknown: bool,
@@ -124,7 +129,7 @@ struct Neighbour(u32);
 
 impl Neighbour {
     /// Farther than every example.
-    const NONE: Self = Self(u32::MAX);
+    const NONE: Self = Self::new(DISTANCE_LIMIT - 1, 0);
 
     const fn new(distance: u32, label: u8) -> Self {
         Self((distance << 8) | label as u32)
@@ -139,91 +144,80 @@ impl Neighbour {
     }
 }
 
-const _: () = assert!(Neighbour::NONE.distance() == DISTANCE_LIMIT - 1);
-
-impl<const CLASSES: usize> Nearest<CLASSES> {
-    const fn new(k: u8) -> Self {
-        Self {
-            neighbours: [Neighbour::NONE; MAX_K as usize],
-            k,
-            last: Neighbour::NONE,
-            level: [0; CLASSES],
-            level_unknown: false,
-        }
-    }
-
-    #[inline(always)]
-    fn consider(&mut self, distance: u32, label: u8) {
-        if distance <= self.last.distance() {
-            self.admit(Neighbour::new(distance, label));
-        }
-    }
-
-    #[inline(never)]
-    fn admit(&mut self, candidate: Neighbour) {
+impl<const CLASSES: usize> Nearest<'_, CLASSES> {
+    /// Gives an example that is not farther than the last neighbour its place, and returns the new last neighbour.
+    fn admit(&mut self, candidate: Neighbour) -> Neighbour {
         // The candidate takes its place, and each farther neighbour the next one; the last falls out.
         let mut carried = candidate;
-        for neighbour in self.neighbours.iter_mut().take(usize::from(self.k)) {
-            if carried < *neighbour {
-                core::mem::swap(&mut carried, neighbour);
+        let mut last = Neighbour::NONE;
+        for neighbour in self.neighbours.iter_mut() {
+            last = *neighbour;
+            if carried < last {
+                *neighbour = carried;
+                core::mem::swap(&mut carried, &mut last);
             }
-            self.last = *neighbour;
         }
-        if carried.distance() > self.last.distance() {
+        if carried.distance() != last.distance() {
             self.level = [0; CLASSES];
             self.level_unknown = false;
         } else if carried != Neighbour::NONE {
             match self.level.get_mut(usize::from(carried.label())) {
-                Some(votes) => *votes = votes.saturating_add(1),
+                Some(votes) => *votes = votes.wrapping_add(1),
                 None => self.level_unknown = true,
             }
         }
+        last
     }
 
-    fn vote(&self, radius: u32) -> Result<Answer<CLASSES>, ClassifyError> {
-        let nearest = self.neighbours[0];
+    fn vote(self, radius: u32) -> Result<Answer<CLASSES>, ClassifyError> {
+        let (Some(&nearest), Some(&last)) = (self.neighbours.first(), self.neighbours.last()) else {
+            return Err(ClassifyError::KOutOfRange);
+        };
         if nearest == Neighbour::NONE {
             return Err(ClassifyError::NoExamples);
         }
-        if self.last == Neighbour::NONE {
+        if last == Neighbour::NONE {
             return Err(ClassifyError::TooFewExamples);
         }
         if self.level_unknown {
             return Err(ClassifyError::UnknownLabel);
         }
         let mut votes = self.level;
-        for neighbour in self.voters() {
-            match votes.get_mut(usize::from(neighbour.label())) {
-                Some(votes) => *votes = votes.saturating_add(1),
-                None => return Err(ClassifyError::UnknownLabel),
+        for neighbour in self.neighbours.iter() {
+            let Some(votes) = votes.get_mut(usize::from(neighbour.label())) else {
+                return Err(ClassifyError::UnknownLabel);
+            };
+            *votes = votes.wrapping_add(1);
+        }
+        let mut most = 0;
+        let mut label = 0;
+        let mut tie = false;
+        for (class, &votes) in (0..=u8::MAX).zip(&votes) {
+            if votes > most {
+                (most, label, tie) = (votes, class, false);
+            } else if votes == most {
+                tie = true;
             }
         }
-        let most = votes.iter().copied().max().unwrap_or(0);
-        let leads = |label: u8| votes.get(usize::from(label)) == Some(&most);
-        // Neighbours are sorted by distance and then by label, and those that found no room come after them by the
-        // same order: the first leading class met this way is the nearest, and the smallest among equals.
-        let label = self
-            .voters()
-            .map(Neighbour::label)
-            .find(|&label| leads(label));
-        let mut leaders = (0..=u8::MAX).take(CLASSES).filter(|&label| leads(label));
-        let smallest = leaders.next().unwrap_or(0);
-        let kind = if nearest.distance() > radius {
-            Kind::Stranger
-        } else if leaders.next().is_some() {
-            Kind::Tie
-        } else {
-            Kind::Known
+        if tie {
+            // Neighbours are sorted by distance and then by label, and the examples that found no room come after
+            // them in the same order: the first leading class met this way is the nearest, and the smallest among
+            // equals. Where none is met, `label` is the smallest already.
+            let mut labels = self.neighbours.iter().map(|neighbour| neighbour.label());
+            label = labels
+                .find(|&label| votes.get(usize::from(label)) == Some(&most))
+                .unwrap_or(label);
+        }
+        let kind = match (nearest.distance() > radius, tie) {
+            (true, _) => Kind::Stranger,
+            (false, true) => Kind::Tie,
+            (false, false) => Kind::Known,
         };
         Ok(Answer {
-            label: label.unwrap_or(smallest),
+            label,
             votes,
             nearest: nearest.distance(),
             kind,
         })
-    }
-
-    fn voters(&self) -> impl Iterator<Item = Neighbour> {
-        self.neighbours.iter().copied().take(usize::from(self.k))
     }
 }

@@ -1,8 +1,9 @@
 //! Labelled examples, and the trait by which they are searched wherever they lie.
 //!
-//! Examples may lie in flash, EEPROM or SRAM. The classifier asks a store for one thing only: the distance of each of
-//! its examples to the query. A store that can hand out an example has that for nothing; one with a faster way, such as
-//! an assembly loop that reads flash, overrides [`Examples::for_each_distance`]. A pair of stores is a store.
+//! Examples may lie in flash, EEPROM or SRAM. The classifier asks a store for one thing only: the examples within a
+//! reach that shrinks as near ones are found. A store that can hand out an example has that for nothing; one with a
+//! faster way, such as an assembly loop that reads flash, overrides [`Examples::visit_near`]. A pair of stores is a
+//! store.
 
 use crate::squared_distance;
 
@@ -45,16 +46,21 @@ pub trait Examples<const FEATURES: usize> {
     /// The example at `index`, or `None` from [`len`](Self::len) on.
     fn example(&self, index: usize) -> Option<Example<FEATURES>>;
 
-    /// Calls `visit` with the squared distance to `query` and the label, once for each example, in any order.
+    /// Calls `visit` with the squared distance to `query` and the label of each example that is not farther than
+    /// `reach`, in any order. `visit` returns the reach that holds from there on, and the last one is returned.
     ///
-    /// Distances must equal those of [`squared_distance`]; they are then below 2^24.
+    /// Distances must equal those of [`squared_distance`]. The reach never grows.
     #[inline]
-    fn for_each_distance(&self, query: &[u8; FEATURES], visit: &mut impl FnMut(u32, u8)) {
+    fn visit_near(&self, query: &[u8; FEATURES], mut reach: u32, visit: &mut impl FnMut(u32, u8) -> u32) -> u32 {
         for index in 0..self.len() {
             if let Some(example) = self.example(index) {
-                visit(squared_distance(query, &example.features), example.label);
+                let distance = squared_distance(query, &example.features);
+                if distance <= reach {
+                    reach = visit(distance, example.label);
+                }
             }
         }
+        reach
     }
 
     /// Whether there are no examples.
@@ -81,10 +87,14 @@ impl<const FEATURES: usize> Examples<FEATURES> for [Example<FEATURES>] {
     }
 
     #[inline]
-    fn for_each_distance(&self, query: &[u8; FEATURES], visit: &mut impl FnMut(u32, u8)) {
+    fn visit_near(&self, query: &[u8; FEATURES], mut reach: u32, visit: &mut impl FnMut(u32, u8) -> u32) -> u32 {
         for example in self {
-            visit(squared_distance(query, &example.features), example.label);
+            let distance = squared_distance(query, &example.features);
+            if distance <= reach {
+                reach = visit(distance, example.label);
+            }
         }
+        reach
     }
 }
 
@@ -98,8 +108,8 @@ impl<const FEATURES: usize, const N: usize> Examples<FEATURES> for [Example<FEAT
     }
 
     #[inline]
-    fn for_each_distance(&self, query: &[u8; FEATURES], visit: &mut impl FnMut(u32, u8)) {
-        self.as_slice().for_each_distance(query, visit);
+    fn visit_near(&self, query: &[u8; FEATURES], reach: u32, visit: &mut impl FnMut(u32, u8) -> u32) -> u32 {
+        self.as_slice().visit_near(query, reach, visit)
     }
 }
 
@@ -113,14 +123,14 @@ impl<const FEATURES: usize, Store: Examples<FEATURES> + ?Sized> Examples<FEATURE
     }
 
     #[inline]
-    fn for_each_distance(&self, query: &[u8; FEATURES], visit: &mut impl FnMut(u32, u8)) {
-        (**self).for_each_distance(query, visit);
+    fn visit_near(&self, query: &[u8; FEATURES], reach: u32, visit: &mut impl FnMut(u32, u8) -> u32) -> u32 {
+        (**self).visit_near(query, reach, visit)
     }
 }
 
 /// Two stores searched as one set; the second's examples are counted after the first's.
-impl<const FEATURES: usize, First: Examples<FEATURES>, Second: Examples<FEATURES>>
-    Examples<FEATURES> for (First, Second)
+impl<const FEATURES: usize, First: Examples<FEATURES>, Second: Examples<FEATURES>> Examples<FEATURES>
+    for (First, Second)
 {
     fn len(&self) -> usize {
         self.0.len() + self.1.len()
@@ -134,8 +144,8 @@ impl<const FEATURES: usize, First: Examples<FEATURES>, Second: Examples<FEATURES
     }
 
     #[inline]
-    fn for_each_distance(&self, query: &[u8; FEATURES], visit: &mut impl FnMut(u32, u8)) {
-        self.0.for_each_distance(query, visit);
-        self.1.for_each_distance(query, visit);
+    fn visit_near(&self, query: &[u8; FEATURES], reach: u32, visit: &mut impl FnMut(u32, u8) -> u32) -> u32 {
+        let reach = self.0.visit_near(query, reach, visit);
+        self.1.visit_near(query, reach, visit)
     }
 }

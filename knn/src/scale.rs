@@ -59,10 +59,7 @@ impl<const FEATURES: usize> Scale<FEATURES> {
         let Some((first, others)) = rows.split_first() else {
             return None;
         };
-        let mut ranges = [Range {
-            lowest: 0,
-            highest: 0,
-        }; FEATURES];
+        let mut ranges = [Range { lowest: 0, highest: 0 }; FEATURES];
         let mut feature = 0;
         while feature < FEATURES {
             let mut smallest = first[feature];

@@ -74,9 +74,7 @@ impl<const FEATURES: usize, const CAPACITY: usize> Default for Table<FEATURES, C
     }
 }
 
-impl<const FEATURES: usize, const CAPACITY: usize> Examples<FEATURES>
-    for Table<FEATURES, CAPACITY>
-{
+impl<const FEATURES: usize, const CAPACITY: usize> Examples<FEATURES> for Table<FEATURES, CAPACITY> {
     fn len(&self) -> usize {
         self.len
     }
@@ -86,7 +84,7 @@ impl<const FEATURES: usize, const CAPACITY: usize> Examples<FEATURES>
     }
 
     #[inline]
-    fn for_each_distance(&self, query: &[u8; FEATURES], visit: &mut impl FnMut(u32, u8)) {
-        self.as_slice().for_each_distance(query, visit);
+    fn visit_near(&self, query: &[u8; FEATURES], reach: u32, visit: &mut impl FnMut(u32, u8) -> u32) -> u32 {
+        self.as_slice().visit_near(query, reach, visit)
     }
 }
