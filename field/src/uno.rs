@@ -11,7 +11,7 @@
 //! - A byte on the serial line takes as many bits as it has (simavr: always one of parity), whichever order the firmware
 //!   sets its UART up in.
 //! - A received byte is there when its stop bit ends, and the receiver holds three (simavr: a byte later, and 64); a byte
-//!   too many is lost and sets DOR0.
+//!   too many is lost and sets DOR0. The interrupt is asked for as long as one waits (simavr: once a byte's time).
 //! - An edge of a timer's output carries the cycle in which it was due (simavr: the end of the instruction then running). An
 //!   edge that the firmware makes carries the cycle in which its instruction began.
 //! - An input keeps its level when the firmware writes its port (simavr raises pulled-up pins) and over a reset.
@@ -238,33 +238,30 @@ impl Uno {
         self.run_until(self.cycle() + time_ms * (CYCLES_PER_SECOND / 1000))
     }
 
-    /// Runs until the firmware has sent `text`, and returns all that it sent up to then, `text` included.
+    /// Runs until the firmware has sent `text`, and takes all that it sent up to the text's end.
     ///
     /// # Errors
     ///
     /// As [`Uno::run_until`], and where the text has not come after `timeout_cycles`.
     pub fn run_until_serial(&mut self, text: &str, timeout_cycles: u64) -> Result<String, UnoError> {
         let deadline = self.cycle() + timeout_cycles;
-        let mut seen = 0;
         loop {
-            let received = &self.core.recorder().received;
-            if received.len() > seen || text.is_empty() {
-                seen = received.len();
-                let bytes: Vec<u8> = received.iter().map(|received| received.byte).collect();
-                if bytes.ends_with(text.as_bytes()) {
-                    return Ok(self.received());
-                }
+            let bytes = to_bytes(&self.core.recorder().received);
+            if let Some(start) = find(&bytes, text.as_bytes()) {
+                let end = start + text.len();
+                self.core.recorder_mut().received.drain(..end);
+                return Ok(String::from_utf8_lossy(&bytes[..end]).into_owned());
             }
             if self.cycle() >= deadline {
-                let bytes: Vec<u8> = received.iter().map(|received| received.byte).collect();
                 return Err(UnoError::NoAnswer {
                     text: text.to_owned(),
                     timeout_cycles,
                     received: String::from_utf8_lossy(&bytes).into_owned(),
                 });
             }
-            // No byte can leave faster than this, so that none is passed by.
-            self.step(deadline.min(self.cycle() + 8))?;
+            while self.core.recorder().received.len() == bytes.len() && self.cycle() < deadline {
+                self.step(deadline)?;
+            }
         }
     }
 
@@ -321,7 +318,7 @@ impl Uno {
 
     /// Takes the text that has come from the firmware; what is not UTF-8 is replaced.
     pub fn received(&mut self) -> String {
-        let bytes: Vec<u8> = self.received_bytes().iter().map(|received| received.byte).collect();
+        let bytes = to_bytes(&self.received_bytes());
         String::from_utf8_lossy(&bytes).into_owned()
     }
 
@@ -367,4 +364,13 @@ impl Uno {
     pub fn deepest_stack(&self) -> usize {
         self.core.deepest_stack(self.image.size.sram as u16)
     }
+}
+
+fn to_bytes(received: &[ReceivedByte]) -> Vec<u8> {
+    received.iter().map(|received| received.byte).collect()
+}
+
+/// Where `text` begins in `bytes`.
+fn find(bytes: &[u8], text: &[u8]) -> Option<usize> {
+    (0..=bytes.len()).find(|&start| bytes[start..].starts_with(text))
 }

@@ -63,6 +63,8 @@ const UBRR0H: u16 = 0xC5;
 
 /// MCUSR: the cause was the reset pin.
 const EXTRF: u8 = 1 << 1;
+/// UCSR0A: a byte waits.
+const RXC0: u8 = 1 << 7;
 /// UCSR0A: bytes were lost.
 const DOR0: u8 = 1 << 3;
 /// UCSR0A: double speed.
@@ -126,6 +128,8 @@ pub(super) struct Core {
     input: NonNull<simavr::avr_irq_t>,
     /// Levels that the inputs are held at from outside, by port (B, D) and bit.
     held: [Held; 2],
+    /// The last step left the chip asleep.
+    asleep: bool,
 }
 
 #[derive(Clone, Copy, Default)]
@@ -202,6 +206,7 @@ impl Core {
             recorder,
             input: NonNull::new(input).expect("the ATmega328P has a UART"),
             held: [Held::default(); 2],
+            asleep: false,
         };
         core.set_eeprom(eeprom);
         core
@@ -246,10 +251,15 @@ impl Core {
     /// may run in one step, but never past `until`, except by the length of the last one.
     pub(super) fn step(&mut self, until: u64) -> Result<(), Stop> {
         let avr = self.chip.as_ptr();
+        let uart = self.recorder().uart;
         let measuring = self.interrupt_statistics().is_some();
         // SAFETY: the chip is valid, this is the only place that runs it, and no reference into it or into the recorder is alive
         // while it does. This is `avr_callback_run_raw` without its two waits on the host's clock.
         unsafe {
+            if self.asleep && (*avr).state as u32 == simavr::cpu_Running {
+                (*avr).cycle += WAKE_UP_CYCLES;
+            }
+            hand_over_received(avr, uart);
             if (*avr).interrupt_state != 0 {
                 simavr::avr_service_interrupts(avr);
             }
@@ -261,21 +271,17 @@ impl Core {
             (*avr).run_cycle_limit = limit;
             (*avr).run_cycle_count = (*avr).run_cycle_count.min(limit);
 
-            let was_asleep = (*avr).state as u32 == simavr::cpu_Sleeping;
             if (*avr).state as u32 == simavr::cpu_Running {
                 (*avr).pc = avr_run_one(avr);
             }
             let until_next_timer = simavr::avr_cycle_timer_process(avr);
             match (*avr).state as u32 {
-                simavr::cpu_Running => {
-                    if was_asleep {
-                        (*avr).cycle += WAKE_UP_CYCLES;
-                    }
-                }
+                simavr::cpu_Running => self.asleep = false,
                 simavr::cpu_Sleeping if (*avr).sreg[simavr::S_I as usize] == 0 => {
                     return Err(Stop::Halted);
                 }
                 simavr::cpu_Sleeping => {
+                    self.asleep = true;
                     let rest = until.saturating_sub((*avr).cycle);
                     (*avr).cycle += until_next_timer.min(rest).max(1);
                 }
@@ -512,6 +518,24 @@ unsafe fn cycles_per_byte(avr: *mut simavr::avr_t) -> u64 {
     let parity_bits = u64::from(format & UPM01 != 0);
     let stop_bits = 1 + u64::from(format & USBS0 != 0);
     cycles_per_bit * (1 + data_bits + parity_bits + stop_bits)
+}
+
+/// Keeps the receiver's interrupt asked for while bytes wait in it, as the chip does; simavr asks once a byte's time, and
+/// holds back a firmware that reads faster.
+///
+/// # Safety
+///
+/// `avr` must be an initialised chip, and `uart` its UART.
+unsafe fn hand_over_received(avr: *mut simavr::avr_t, uart: *mut simavr::avr_uart_t) {
+    // SAFETY: the caller vouches for both; UCSR0A is an address inside `data`.
+    unsafe {
+        if (*uart).input.read != (*uart).input.write {
+            (*uart).rx_cnt = 0;
+            if *(*avr).data.add(UCSR0A.into()) & RXC0 != 0 && (*uart).rxc.pending() == 0 {
+                simavr::avr_raise_interrupt(avr, &raw mut (*uart).rxc);
+            }
+        }
+    }
 }
 
 /// When the peripheral that simavr is serving was due. It serves one at the end of the instruction in which it falls due, up
