@@ -5,6 +5,7 @@
 
 pub mod capture;
 pub mod firmware;
+pub mod ground;
 pub mod machine;
 pub mod motion;
 pub mod planting;
@@ -12,4 +13,5 @@ pub mod row;
 pub mod servo;
 pub mod signal;
 pub mod uno;
+pub mod verdict;
 pub mod waveform;

@@ -67,18 +67,12 @@ impl Machine {
 
     /// Encoder counts, net, from the beginning of a motion to a time.
     pub fn ticks(&self, motion: &Motion, time_s: f64) -> i64 {
-        marks(
-            motion.position_mm(time_s) - motion.start_mm(),
-            self.tick_mm(),
-        )
+        marks(motion.position_mm(time_s) - motion.start_mm(), self.tick_mm())
     }
 
     /// Angle from which on the tool no longer works the row's line.
     pub fn line_degrees(&self) -> f64 {
-        (self.tool_width_mm / 2.0 / self.arm_mm)
-            .min(1.0)
-            .asin()
-            .to_degrees()
+        (self.tool_width_mm / 2.0 / self.arm_mm).min(1.0).asin().to_degrees()
     }
 
     /// Share of a stroke during which the tool does not work the row's line.
@@ -98,21 +92,10 @@ impl Machine {
 
     /// What the encoder and the beam do to their pins while the machine rolls past the row, in order of time.
     ///
-    /// The motion begins at `start_cycle`; the pins have the levels that belong to its beginning from power-up on.
+    /// The motion begins at `start_cycle`; the encoder begins at rest, and the beam has the level that belongs to the motion's
+    /// beginning from power-up on.
     pub fn pin_changes(&self, row: &Row, motion: &Motion, start_cycle: u64) -> Vec<PinChange> {
-        let mut changes = vec![
-            PinChange {
-                cycle: 0,
-                pin: Pin::EncoderA,
-                high: false,
-            },
-            PinChange {
-                cycle: 0,
-                pin: Pin::EncoderB,
-                high: false,
-            },
-        ];
-        changes.extend(self.encoder_changes(motion, start_cycle));
+        let mut changes = self.encoder_changes(motion, start_cycle);
         changes.extend(self.beam_changes(row, motion, start_cycle));
         changes.sort_by_key(|change| change.cycle);
         changes
@@ -126,11 +109,7 @@ impl Machine {
             .into_iter()
             .map(|passing| {
                 let before = phase;
-                phase = if passing.forward {
-                    phase + 1
-                } else {
-                    phase + 3
-                } % 4;
+                phase = if passing.forward { phase + 1 } else { phase + 3 } % 4;
                 let cycle = cycle_at(start_cycle, passing.time_s);
                 if channel_a(before) == channel_a(phase) {
                     PinChange {
@@ -152,14 +131,8 @@ impl Machine {
     /// The beam's line, low while the beam is broken, later than the leaves by the sensor's response.
     fn beam_changes(&self, row: &Row, motion: &Motion, start_cycle: u64) -> Vec<PinChange> {
         let response_s = self.beam_response_ms / 1000.0;
-        let blocks: Vec<Range<f64>> = row
-            .things()
-            .iter()
-            .flat_map(|thing| thing.blocks_mm())
-            .collect();
-        let blocked_at_start = blocks
-            .iter()
-            .any(|block| block.contains(&motion.start_mm()));
+        let blocks: Vec<Range<f64>> = row.things().iter().flat_map(|thing| thing.blocks_mm()).collect();
+        let blocked_at_start = blocks.iter().any(|block| block.contains(&motion.start_mm()));
 
         // Each end of a leaf that is passed toggles the beam, in whatever direction.
         let mut toggles_s: Vec<f64> = blocks
@@ -185,14 +158,11 @@ impl Machine {
             pin: Pin::Beam,
             high: !blocked_at_start,
         };
-        let toggled = reported_s
-            .into_iter()
-            .enumerate()
-            .map(|(index, time_s)| PinChange {
-                cycle: cycle_at(start_cycle, time_s + response_s),
-                pin: Pin::Beam,
-                high: blocked_at_start == (index % 2 == 0),
-            });
+        let toggled = reported_s.into_iter().enumerate().map(|(index, time_s)| PinChange {
+            cycle: cycle_at(start_cycle, time_s + response_s),
+            pin: Pin::Beam,
+            high: blocked_at_start == (index % 2 == 0),
+        });
         std::iter::once(first).chain(toggled).collect()
     }
 }
@@ -227,8 +197,7 @@ mod tests {
 
     /// Counts of a decoder that takes each pair of levels as they come.
     fn decode(changes: &[PinChange]) -> i64 {
-        const FORWARD: [(bool, bool); 4] =
-            [(false, false), (true, false), (true, true), (false, true)];
+        const FORWARD: [(bool, bool); 4] = [(false, false), (true, false), (true, true), (false, true)];
         let phase = |levels| FORWARD.iter().position(|&pair| pair == levels).unwrap();
         let (mut levels, mut count) = ((false, false), 0);
         for change in changes {
@@ -288,10 +257,7 @@ mod tests {
         assert_eq!(levels, [true, false, true, false, true]);
         for (change, place_mm) in beam[1..].iter().zip([425.0, 575.0, 792.5, 807.5]) {
             let time_s = time_at_s(START_CYCLE, change.cycle) - 0.001;
-            assert!(
-                (motion.position_mm(time_s) - place_mm).abs() < 0.001,
-                "{place_mm} mm"
-            );
+            assert!((motion.position_mm(time_s) - place_mm).abs() < 0.001, "{place_mm} mm");
         }
     }
 

@@ -111,11 +111,7 @@ impl Planting {
     }
 
     /// Spreads the weeds over the gaps between neighbouring plants, a second one to a gap only when each has one.
-    fn weeds_between(
-        &self,
-        plants: &[Thing],
-        rng: &mut impl Rng,
-    ) -> Result<Vec<Thing>, PlantingError> {
+    fn weeds_between(&self, plants: &[Thing], rng: &mut impl Rng) -> Result<Vec<Thing>, PlantingError> {
         let mut gaps: Vec<Range<f64>> = plants
             .windows(2)
             .map(|pair| pair[0].span_mm().end..pair[1].span_mm().start)
@@ -124,9 +120,7 @@ impl Planting {
         let mut weeds = Vec::with_capacity(self.weeds);
         while weeds.len() < self.weeds {
             // Each weed halves its gap; the halves go to the end of the queue.
-            let room = gaps
-                .iter()
-                .position(|gap| gap.end - gap.start > NARROWEST_GAP_MM);
+            let room = gaps.iter().position(|gap| gap.end - gap.start > NARROWEST_GAP_MM);
             let gap = room
                 .map(|index| gaps.remove(index))
                 .ok_or(PlantingError::NoRoomForWeeds(self.weeds))?;
@@ -196,14 +190,8 @@ mod tests {
                 .windows(2)
                 .all(|pair| (460.0..=540.0).contains(&(pair[1] - pair[0])))
         );
-        assert!(
-            row.plants()
-                .all(|plant| (125.0..=175.0).contains(&plant.width_mm))
-        );
-        assert!(
-            row.weeds()
-                .all(|weed| (12.0..20.0).contains(&weed.width_mm))
-        );
+        assert!(row.plants().all(|plant| (125.0..=175.0).contains(&plant.width_mm)));
+        assert!(row.weeds().all(|weed| (12.0..20.0).contains(&weed.width_mm)));
         for pair in row.things().windows(2) {
             if pair.iter().any(|thing| thing.kind == Kind::Weed) {
                 let gap_mm = pair[1].span_mm().start - pair[0].span_mm().end;
@@ -234,10 +222,7 @@ mod tests {
             let span = plant.span_mm();
             let leaves = plant.blocks_mm();
             assert!(leaves.len() > 1);
-            assert_eq!(
-                (leaves[0].start, leaves[leaves.len() - 1].end),
-                (span.start, span.end)
-            );
+            assert_eq!((leaves[0].start, leaves[leaves.len() - 1].end), (span.start, span.end));
             for pair in leaves.windows(2) {
                 assert!(LEAF_GAPS_MM.contains(&(pair[1].start - pair[0].end)));
             }

@@ -200,9 +200,7 @@ impl Row {
         }
         things.iter().try_for_each(Thing::check)?;
         things.sort_by(|a, b| a.position_mm.total_cmp(&b.position_mm));
-        things
-            .windows(2)
-            .try_for_each(|pair| pair[1].check_after(&pair[0]))?;
+        things.windows(2).try_for_each(|pair| pair[1].check_after(&pair[0]))?;
         Ok(Self { things })
     }
 
@@ -262,10 +260,7 @@ impl Row {
             .comment(Some(b'#'))
             .from_reader(file);
         let no_header = csv::StringRecord::new();
-        let header = reader
-            .headers()
-            .map_err(|error| from_csv(error, &no_header))?
-            .clone();
+        let header = reader.headers().map_err(|error| from_csv(error, &no_header))?.clone();
         for column in COLUMNS {
             if !header.iter().any(|name| name == column) {
                 let problem = format!(
@@ -296,9 +291,7 @@ impl Row {
                 kind,
                 leaves: Vec::new(),
             };
-            thing
-                .check()
-                .map_err(|problem| at(line, problem.to_string()))?;
+            thing.check().map_err(|problem| at(line, problem.to_string()))?;
             lines.push((line, thing));
         }
         lines.sort_by(|(_, a), (_, b)| a.position_mm.total_cmp(&b.position_mm));
@@ -308,11 +301,9 @@ impl Row {
                 .check_after(&pair[0].1)
                 .map_err(|problem| at(*line, problem.to_string()))?;
         }
-        Self::new(lines.into_iter().map(|(_, thing)| thing).collect()).map_err(|problem| {
-            FileError::Table {
-                path: path.into(),
-                problem,
-            }
+        Self::new(lines.into_iter().map(|(_, thing)| thing).collect()).map_err(|problem| FileError::Table {
+            path: path.into(),
+            problem,
         })
     }
 
@@ -337,18 +328,12 @@ impl Row {
 /// What a CSV error says about the line, without the record number and byte that nobody asked for.
 fn explain(error: &csv::Error, header: &csv::StringRecord) -> String {
     match error.kind() {
-        csv::ErrorKind::Deserialize { err, .. } => {
-            match err.field().and_then(|index| header.get(index as usize)) {
-                Some(column) => format!("{column}: {}, where a number is wanted", err.kind()),
-                None => err.kind().to_string(),
-            }
-        }
-        csv::ErrorKind::UnequalLengths {
-            expected_len, len, ..
-        } => {
-            format!(
-                "{len} fields where the header has {expected_len}: each line has one field a column"
-            )
+        csv::ErrorKind::Deserialize { err, .. } => match err.field().and_then(|index| header.get(index as usize)) {
+            Some(column) => format!("{column}: {}, where a number is wanted", err.kind()),
+            None => err.kind().to_string(),
+        },
+        csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
+            format!("{len} fields where the header has {expected_len}: each line has one field a column")
         }
         _ => error.to_string(),
     }
@@ -367,11 +352,8 @@ mod tests {
     fn read(text: &str) -> Result<Row, String> {
         let mut file = tempfile::NamedTempFile::new().unwrap();
         file.write_all(text.as_bytes()).unwrap();
-        Row::read_csv(file.path()).map_err(|error| {
-            error
-                .to_string()
-                .replace(&file.path().display().to_string(), "row.csv")
-        })
+        Row::read_csv(file.path())
+            .map_err(|error| error.to_string().replace(&file.path().display().to_string(), "row.csv"))
     }
 
     #[test]
@@ -399,9 +381,7 @@ mod tests {
 
     #[test]
     fn columns_lines_and_spaces_may_come_in_any_order() {
-        let row = read(
-            "kind, position_mm, width_mm\n# measured in May\nplant, 900, 150\nweed, 500, 15\n",
-        );
+        let row = read("kind, position_mm, width_mm\n# measured in May\nplant, 900, 150\nweed, 500, 15\n");
         let things = vec![Thing::weed(500.0, 15.0), Thing::plant(900.0, 150.0)];
         assert_eq!(row, Ok(Row { things }));
     }
@@ -422,10 +402,7 @@ mod tests {
                 "250,150,crop\n",
                 "row.csv, line 2: unknown variant `crop`, expected `plant` or `weed`",
             ),
-            (
-                "250,150\n",
-                "row.csv, line 2: 2 fields where the header has 3",
-            ),
+            ("250,150\n", "row.csv, line 2: 2 fields where the header has 3"),
             ("NaN,150,plant\n", "row.csv, line 2: position_mm is NaN"),
             (
                 "750,150,plant\n250,150,plant\n700,20,weed\n",
@@ -449,9 +426,7 @@ mod tests {
 
     #[test]
     fn a_missing_file_is_named() {
-        let said = Row::read_csv(Path::new("no/such/row.csv"))
-            .unwrap_err()
-            .to_string();
+        let said = Row::read_csv(Path::new("no/such/row.csv")).unwrap_err().to_string();
         assert!(said.starts_with("no/such/row.csv: "), "{said}");
     }
 }

@@ -29,6 +29,9 @@ pub const OUT_DEGREES: f64 = 45.0;
 /// Pulse widths that differ by less than this ask for the same angle: the dead band of a digital servo.
 const DEAD_BAND_US: f64 = 2.0;
 
+/// Commands for more than this count as commands out of the row.
+const OUT_COMMAND_DEGREES: f64 = OUT_DEGREES / 2.0;
+
 /// A change of the angle asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Command {
@@ -38,6 +41,13 @@ pub struct Command {
     pub fall_cycle: u64,
     /// The angle asked for; 0 is in the row.
     pub degrees: f64,
+}
+
+impl Command {
+    /// Whether it asks for the tool to leave the row.
+    pub fn is_out(&self) -> bool {
+        self.degrees > OUT_COMMAND_DEGREES
+    }
 }
 
 impl Default for Servo {
@@ -147,6 +157,14 @@ impl Stroke {
     /// The angle at a time in seconds; 0 is in the row.
     pub fn degrees(&self, time_s: f64) -> f64 {
         angle(&self.corners, time_s, self.end_degrees)
+    }
+
+    /// The times at which the servo begins or ends to turn. Between two of them the angle follows a straight line.
+    pub fn turns_s(&self) -> impl Iterator<Item = f64> {
+        self.corners
+            .iter()
+            .map(|corner| corner.time_s)
+            .filter(|time_s| time_s.is_finite())
     }
 
     /// The times within `during_s` at which the angle is below `degrees`.

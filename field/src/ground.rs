@@ -1,0 +1,44 @@
+//! Stretches of ground: their union, and how much of a row they cover.
+
+use std::ops::Range;
+
+/// The union of stretches, in ascending order and without overlaps.
+pub fn union(mut stretches: Vec<Range<f64>>) -> Vec<Range<f64>> {
+    stretches.sort_by(|a, b| a.start.total_cmp(&b.start));
+    let mut union: Vec<Range<f64>> = Vec::with_capacity(stretches.len());
+    for stretch in stretches {
+        match union.last_mut() {
+            Some(last) if stretch.start <= last.end => last.end = last.end.max(stretch.end),
+            _ => union.push(stretch),
+        }
+    }
+    union
+}
+
+/// The share of `row` that the stretches of a [`union`] cover, from 0 to 1.
+pub fn share_of(row: &Range<f64>, union: &[Range<f64>]) -> f64 {
+    let covered: f64 = union
+        .iter()
+        .map(|stretch| stretch.end.min(row.end) - stretch.start.max(row.start))
+        .filter(|length| *length > 0.0)
+        .sum();
+    covered / (row.end - row.start)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ground_covered_twice_counts_once() {
+        let union = union(vec![50.0..70.0, 0.0..20.0, 10.0..30.0, 60.0..65.0]);
+        assert_eq!(union, [0.0..30.0, 50.0..70.0]);
+        assert_eq!(share_of(&(0.0..100.0), &union), 0.5);
+    }
+
+    #[test]
+    fn ground_beyond_the_row_does_not_count() {
+        let stretches = [0.0..30.0, 50.0..70.0, 90.0..95.0];
+        assert_eq!(share_of(&(20.0..60.0), &stretches), 0.5);
+    }
+}
