@@ -93,39 +93,66 @@ fn the_receiver_keeps_three_bytes_and_loses_the_fourth() {
 }
 
 #[test]
-fn entering_an_interrupt_takes_four_cycles() {
-    let mut uno = boot("entry");
+fn bytes_that_waited_interrupt_one_right_after_the_other() {
+    let mut uno = boot("backlog");
     uno.run_for_ms(1).unwrap();
-    let mut edges = Vec::new();
-    for count in 1..=20 {
-        let cycle = uno.cycle() + 1000 * count;
-        edges.push(cycle);
-        uno.drive([
-            PinChange {
-                cycle,
-                pin: Pin::EncoderA,
-                high: true,
-            },
-            PinChange {
-                cycle: cycle + 500,
-                pin: Pin::EncoderA,
-                high: false,
-            },
-        ]);
-        uno.run_until(cycle + 800).unwrap();
+    uno.send(b"123");
+    uno.run_for_ms(1).unwrap();
+    assert_eq!(uno.read("taken"), Some(&[0][..]));
+    uno.set(Pin::WorkSwitch, false);
+    // Three handlers of some 30 cycles; a byte's time is 1389.
+    uno.run_until(uno.cycle() + 200).unwrap();
+    assert_eq!(uno.read("taken"), Some(&[3][..]));
+    assert_eq!(uno.read("last"), Some(&b"3"[..]));
+}
+
+#[test]
+fn a_flood_reaches_the_firmware_to_the_last_byte() {
+    let mut uno = boot("backlog");
+    uno.set(Pin::WorkSwitch, false);
+    uno.run_for_ms(1).unwrap();
+    let flood: Vec<u8> = (1..=63).collect();
+    uno.send_at_once(&flood);
+    uno.run_for_ms(1).unwrap();
+    assert_eq!(uno.read("taken"), Some(&[63][..]));
+    assert_eq!(uno.read("last"), Some(&[63][..]));
+}
+
+/// Cycles from each of 20 edges on INT0 to the first instruction of its handler.
+fn responses(uno: &mut Uno) -> Vec<u64> {
+    uno.run_for_ms(1).unwrap();
+    let edges: Vec<u64> = (1..=20).map(|count| uno.cycle() + 1013 * count).collect();
+    for &cycle in &edges {
+        let pin = Pin::EncoderA;
+        uno.drive([(cycle, true), (cycle + 500, false)].map(|(cycle, high)| PinChange { cycle, pin, high }));
     }
-    let answers: Vec<u64> = uno
-        .changes()
+    uno.run_for_ms(2).unwrap();
+    let answers = uno.changes().iter().filter(|change| change.high);
+    let responses: Vec<u64> = edges
         .iter()
-        .filter(|change| change.high)
-        .map(|change| change.cycle)
+        .zip(answers)
+        .map(|(edge, answer)| answer.cycle - edge)
         .collect();
-    assert_eq!(answers.len(), edges.len());
-    for (edge, answer) in edges.iter().zip(answers) {
-        // Entry, and the vector's `jmp` of 3 cycles. The main loop's instructions take 1 cycle, and its last one 2.
-        let response = answer - edge;
-        assert!((7..=8).contains(&response), "{response} cycles");
-    }
+    assert_eq!(responses.len(), edges.len());
+    responses
+}
+
+#[test]
+fn entering_an_interrupt_takes_four_cycles() {
+    // Entry, and the vector's `jmp` of 3 cycles. The main loop's instructions take 1 cycle, and its last one 2.
+    let responses = responses(&mut boot("entry"));
+    assert!(responses.contains(&7), "{responses:?}");
+    assert!(
+        responses.iter().all(|response| (7..=8).contains(response)),
+        "{responses:?}"
+    );
+}
+
+#[test]
+fn waking_up_takes_four_cycles_more() {
+    let mut uno = boot("entry");
+    uno.set(Pin::WorkSwitch, false);
+    assert_eq!(responses(&mut uno), [11; 20]);
 }
 
 #[test]
