@@ -29,6 +29,7 @@
 
 mod core;
 mod interrupts;
+mod recorder;
 
 use std::collections::VecDeque;
 use std::path::Path;

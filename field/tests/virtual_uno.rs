@@ -263,6 +263,20 @@ fn a_watchdog_reset_is_reported_and_the_firmware_goes_on() {
 }
 
 #[test]
+fn a_watchdog_that_nobody_turns_off_bites_again_after_sixteen_milliseconds() {
+    let mut uno = boot("careless");
+    uno.run_for_ms(200).unwrap();
+    let cycles: Vec<u64> = uno.resets().iter().map(|reset| reset.cycle).collect();
+    assert!(cycles[0] > 60 * MILLISECOND);
+    assert_eq!(cycles.len(), 9);
+    for pair in cycles.windows(2) {
+        // 2048 cycles of the watchdog's 128 kHz.
+        let gap = pair[1] - pair[0];
+        assert!(gap.abs_diff(16 * MILLISECOND) < 10, "{gap} cycles");
+    }
+}
+
+#[test]
 fn a_driven_input_keeps_its_level_over_port_writes_and_resets() {
     let mut uno = boot("memory");
     uno.set(Pin::WorkSwitch, false);

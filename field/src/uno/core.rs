@@ -1,4 +1,4 @@
-//! The ATmega328P on simavr: the one place that calls C.
+//! The ATmega328P on simavr: the one place that calls C. What C calls back is in [`super::recorder`].
 //!
 //! [`Core`] owns a simavr instance and the [`Recorder`] that simavr's callbacks write to, and offers the rest of
 //! [`super`] safe calls: one step, levels in, edges and bytes out. It knows pins by port and bit, cycles and bytes, and
@@ -18,9 +18,10 @@ use std::ptr::{self, NonNull};
 use simavr_ffi as simavr;
 
 use super::interrupts::{InterruptRecorder, InterruptStatistics};
-use super::{ReceivedByte, Reset, ResetCause};
+use super::recorder::{Recorder, cycles_per_byte, on_interrupt, on_output, on_reset, on_transmit};
+use super::{Reset, ResetCause};
 use crate::firmware::EEPROM_BYTES;
-use crate::signal::{CYCLES_PER_SECOND, Pin, PinChange};
+use crate::signal::{CYCLES_PER_SECOND, Pin};
 
 unsafe extern "C" {
     /// Runs the next instruction. It stands in sim_core.h, which simavr-ffi leaves out of its bindings.
@@ -33,14 +34,8 @@ const CHIP: &CStr = c"atmega328p";
 /// Highest interrupt vector of the ATmega328P (data sheet, table 12-6, counted from 0).
 const LAST_VECTOR: u8 = 25;
 
-/// Cycles from the end of an instruction to the first one of the vector (data sheet, section 7.7.1).
-const INTERRUPT_ENTRY_CYCLES: u64 = 4;
-
 /// Cycles that the core stays halted when an interrupt wakes it (data sheet, section 7.7.1).
 const WAKE_UP_CYCLES: u64 = 4;
-
-/// Cycles of `reti`; its end is the end of the handler.
-const RETURN_CYCLES: u64 = 4;
 
 /// First and last address of SRAM in the data space (data sheet, figure 8-3).
 const SRAM_START: u16 = 0x0100;
@@ -55,11 +50,8 @@ const RECEIVER_BYTES: u16 = 3;
 
 // Registers by their address in the data space (data sheet, section 36).
 const MCUSR: u16 = 0x54;
-const UCSR0A: u16 = 0xC0;
-const UCSR0B: u16 = 0xC1;
-const UCSR0C: u16 = 0xC2;
-const UBRR0L: u16 = 0xC4;
-const UBRR0H: u16 = 0xC5;
+pub(super) const UCSR0A: u16 = 0xC0;
+pub(super) const UCSR0B: u16 = 0xC1;
 
 /// MCUSR: the cause was the reset pin.
 const EXTRF: u8 = 1 << 1;
@@ -67,15 +59,8 @@ const EXTRF: u8 = 1 << 1;
 const RXC0: u8 = 1 << 7;
 /// UCSR0A: bytes were lost.
 const DOR0: u8 = 1 << 3;
-/// UCSR0A: double speed.
-const U2X0: u8 = 1 << 1;
 /// UCSR0B: the receiver is on.
 const RXEN0: u8 = 1 << 4;
-/// UCSR0C: two stop bits.
-const USBS0: u8 = 1 << 3;
-/// UCSR0C: parity is on.
-const UPM01: u8 = 1 << 5;
-
 /// A four letter request code of simavr (`AVR_IOCTL_DEF`).
 const fn request(name: &[u8; 4]) -> u32 {
     u32::from_be_bytes(*name)
@@ -88,37 +73,6 @@ pub(super) enum Stop {
     Crashed,
     /// It sleeps with interrupts off: nothing can wake it.
     Halted,
-}
-
-/// What simavr's callbacks have seen.
-pub(super) struct Recorder {
-    chip: *mut simavr::avr_t,
-    uart: *mut simavr::avr_uart_t,
-    servo_high: bool,
-    led_high: bool,
-    /// Edges of the output pins, oldest first.
-    pub(super) changes: Vec<PinChange>,
-    /// Bytes that the firmware has handed to its transmitter, oldest first.
-    pub(super) received: Vec<ReceivedByte>,
-    /// Resets since the first power-up, oldest first.
-    pub(super) resets: Vec<Reset>,
-    interrupts: InterruptRecorder,
-    /// Cycle of a reset that simavr is in the middle of.
-    reset_at: Option<u64>,
-}
-
-impl Recorder {
-    fn record_level(&mut self, pin: Pin, high: bool, cycle: u64) {
-        let level = match pin {
-            Pin::Servo => &mut self.servo_high,
-            Pin::Led => &mut self.led_high,
-            _ => return,
-        };
-        if *level != high {
-            *level = high;
-            self.changes.push(PinChange { cycle, pin, high });
-        }
-    }
 }
 
 /// An ATmega328P.
@@ -339,6 +293,7 @@ impl Core {
         let Some(cycle) = self.recorder_mut().reset_at.take() else {
             return;
         };
+        self.asleep = false;
         // SAFETY: as in `cycle`. The watchdog's timer, the only one that can run now, was set from this cycle.
         unsafe { (*self.chip.as_ptr()).cycle = cycle };
         let recorder = self.recorder_mut();
@@ -497,29 +452,6 @@ fn find_uart(chip: NonNull<simavr::avr_t>) -> NonNull<simavr::avr_uart_t> {
     }
 }
 
-/// Cycles of a byte on the serial line, as the UART's registers stand (data sheet, section 20.3 and table 20-1).
-///
-/// # Safety
-///
-/// `avr` must be an initialised chip.
-unsafe fn cycles_per_byte(avr: *mut simavr::avr_t) -> u64 {
-    // SAFETY: the registers are addresses inside `data`, and the caller vouches for `avr`.
-    let register = |address: u16| unsafe { *(*avr).data.add(address.into()) };
-    let divisor = u64::from(u16::from_le_bytes([register(UBRR0L), register(UBRR0H) & 0x0F])) + 1;
-    let cycles_per_bit = match register(UCSR0A) & U2X0 {
-        0 => 16 * divisor,
-        _ => 8 * divisor,
-    };
-    let format = register(UCSR0C);
-    let data_bits = match (register(UCSR0B) & 0b100) | (format >> 1 & 0b11) {
-        size @ 0..=3 => 5 + u64::from(size),
-        _ => 9,
-    };
-    let parity_bits = u64::from(format & UPM01 != 0);
-    let stop_bits = 1 + u64::from(format & USBS0 != 0);
-    cycles_per_bit * (1 + data_bits + parity_bits + stop_bits)
-}
-
 /// Keeps the receiver's interrupt asked for while bytes wait in it, as the chip does; simavr asks once a byte's time, and
 /// holds back a firmware that reads faster.
 ///
@@ -535,86 +467,5 @@ unsafe fn hand_over_received(avr: *mut simavr::avr_t, uart: *mut simavr::avr_uar
                 simavr::avr_raise_interrupt(avr, &raw mut (*uart).rxc);
             }
         }
-    }
-}
-
-/// When the peripheral that simavr is serving was due. It serves one at the end of the instruction in which it falls due, up
-/// to four cycles late; its slot still says when it was. Without one, an instruction is running, and it began at `cycle`.
-///
-/// # Safety
-///
-/// `avr` must be an initialised chip.
-unsafe fn due_cycle(avr: *mut simavr::avr_t) -> u64 {
-    // SAFETY: the caller vouches for `avr`. Both lists run through the pool's own slots and end in null. The slot being
-    // served is in neither.
-    unsafe {
-        let pool = &raw const (*avr).cycle_timers;
-        let first = (&raw const (*pool).timer_slots).cast::<simavr::avr_cycle_timer_slot_t>();
-        let mut listed = 0_u64;
-        for head in [(*pool).timer, (*pool).timer_free] {
-            let mut slot = head.cast_const();
-            while !slot.is_null() {
-                listed |= 1 << slot.offset_from(first);
-                slot = (*slot).next;
-            }
-        }
-        match listed.trailing_ones() {
-            64.. => (*avr).cycle,
-            served => (*first.add(served as usize)).when,
-        }
-    }
-}
-
-/// simavr's callback for a level on an output pin.
-unsafe extern "C" fn on_output(irq: *mut simavr::avr_irq_t, level: u32, recorder: *mut c_void) {
-    // SAFETY: `recorder` is what `Core::new` registered, alive and not borrowed (see the module's text).
-    let recorder = unsafe { &mut *recorder.cast::<Recorder>() };
-    // SAFETY: simavr passes the line that it raises; the recorder's chip is the one that is running.
-    let (bit, cycle) = unsafe { ((*irq).irq, due_cycle(recorder.chip)) };
-    let pin = if bit == u32::from(Pin::Servo.port_and_bit().1) {
-        Pin::Servo
-    } else {
-        Pin::Led
-    };
-    // A timer's output carries a flag beside the level.
-    recorder.record_level(pin, level & 1 != 0, cycle);
-}
-
-/// simavr's callback for an interrupt handler that begins (1) or has returned (0).
-unsafe extern "C" fn on_interrupt(irq: *mut simavr::avr_irq_t, begins: u32, recorder: *mut c_void) {
-    // SAFETY: as in `on_output`. The chip's clock is simavr's to read only after this callback.
-    unsafe {
-        let recorder = &mut *recorder.cast::<Recorder>();
-        let clock = &raw mut (*recorder.chip).cycle;
-        // simavr numbers a vector's lines from 256 times the vector.
-        let vector = ((*irq).irq >> 8) as u8;
-        if begins != 0 {
-            recorder.interrupts.begins(vector, *clock);
-            *clock += INTERRUPT_ENTRY_CYCLES;
-        } else {
-            recorder.interrupts.ends(vector, *clock + RETURN_CYCLES);
-        }
-    }
-}
-
-/// simavr's callback for a byte that the firmware hands to the transmitter, before simavr decides how long it takes.
-unsafe extern "C" fn on_transmit(_: *mut simavr::avr_irq_t, byte: u32, recorder: *mut c_void) {
-    // SAFETY: as in `on_output`; the UART is part of the chip.
-    unsafe {
-        let recorder = &mut *recorder.cast::<Recorder>();
-        (*recorder.uart).cycles_per_byte = cycles_per_byte(recorder.chip);
-        recorder.received.push(ReceivedByte {
-            cycle: (*recorder.chip).cycle,
-            byte: byte as u8,
-        });
-    }
-}
-
-/// simavr's callback in the middle of a reset, before the peripherals' own resets and before it zeroes its clock.
-unsafe extern "C" fn on_reset(avr: *mut simavr::avr_t) {
-    // SAFETY: simavr passes the chip that it resets, whose `custom.data` is the recorder (see `Core::new`).
-    unsafe {
-        let recorder = &mut *(*avr).custom.data.cast::<Recorder>();
-        recorder.reset_at = Some((*avr).cycle);
     }
 }
