@@ -1,16 +1,147 @@
-//! firmware
+//! The weeder's firmware: wiring, the interrupts, and the loop that reads, decides and applies.
+//!
+//! Interrupts only count, stamp and move bytes; the crate `control` decides, and each file beside this one knows one
+//! peripheral. This is the only file that knows them all. The loop never waits for anything: a turn takes well below a
+//! millisecond, whatever the serial line and the field are doing.
+
 #![no_std]
 #![no_main]
-#![feature(abi_avr_interrupt)]
+#![feature(abi_avr_interrupt, asm_experimental_arch)]
+#![allow(missing_docs, reason = "the interrupt attribute leaves no place for a handler's doc comment")]
 
-#[panic_handler]
-fn panic(_: &core::panic::PanicInfo) -> ! { loop {} }
+mod beam;
+mod board;
+mod clock;
+mod encoder;
+mod examples;
+mod handover;
+mod serial;
+mod servo;
+mod watchdog;
+
+use avr_device::{
+    atmega328p::Peripherals,
+    interrupt::{self, CriticalSection},
+};
+use control::{
+    classifier::Nearest,
+    console::LineBuffer,
+    controller::{Controller, Readings},
+    lamp,
+    reply::{self, Answer},
+    settings::{Setting, Settings},
+    units::Position,
+};
+use embedded_hal::digital::{InputPin, OutputPin};
+use embedded_hal_nb::serial::Read;
+use static_cell::{ConstStaticCell, StaticCell};
 
 #[avr_device::entry]
 fn main() -> ! {
-    let dp = avr_device::atmega328p::Peripherals::take().unwrap();
-    struct W(avr_device::atmega328p::USART0);
-    impl ufmt::uWrite for W { type Error = (); fn write_str(&mut self, s: &str) -> Result<(), ()> { for b in s.bytes() { self.0.udr0().write(|w| w.set(b)); } Ok(()) } }
-    let mut w = W(dp.USART0);
-    loop { control::hello(&mut w, 3).ok(); }
+    static EDGES: ConstStaticCell<beam::EdgeQueue> = ConstStaticCell::new(beam::EdgeQueue::new());
+    static RECEIVED: ConstStaticCell<serial::ReceiveQueue> = ConstStaticCell::new(serial::ReceiveQueue::new());
+    static CONTROLLER: StaticCell<Controller<Nearest<examples::InFlash>>> = StaticCell::new();
+    static TO_SEND: ConstStaticCell<serial::SendQueue> = ConstStaticCell::new(serial::SendQueue::new());
+
+    // SAFETY: the entry point is the first code to run and runs once, so nobody else holds the peripherals.
+    let peripherals = unsafe { Peripherals::steal() };
+    let out = control::servo::from_us(Settings::new().get(Setting::ServoOutUs));
+    let mut servo = servo::Servo::new(peripherals.TC1, &peripherals.PORTB, out);
+    let (mut lamp, mut work_switch) = board::pins(&peripherals.PORTB, &peripherals.PORTD);
+    let clock = clock::Clock::new(peripherals.TC0);
+    encoder::watch(&peripherals.EXINT, &peripherals.PORTD);
+    let mut beam = beam::Beam::new(&peripherals.EXINT, &peripherals.PORTB, EDGES.take());
+    let mut serial = serial::Serial::new(peripherals.USART0, RECEIVED.take(), TO_SEND.take());
+    // SAFETY: every interrupt's state has been handed over above, and no critical section is open.
+    unsafe { interrupt::enable() };
+
+    let mut read = move || {
+        let now = clock.now();
+        let (position, lost) = encoder::position_and_lost();
+        let Ok(switch_on) = work_switch.is_low();
+        Readings {
+            now,
+            position: Position::new(position),
+            switch_on,
+            lost,
+        }
+    };
+    let controller = CONTROLLER.init(Controller::new(Nearest(examples::InFlash), read(), beam.is_broken()));
+    let mut line = LineBuffer::new();
+    let mut answer = Answer::Greeting;
+    loop {
+        // The readings come first: an edge that is still in the queue is then never farther than the next readings.
+        let readings = read();
+        while let Some((position, broken)) = beam.next_edge() {
+            controller.beam_edge(Position::new(position), broken);
+        }
+        if beam.take_lost() {
+            controller.beam_edges_lost();
+        }
+        let orders = controller.step(readings);
+        servo.command(orders.pulse, orders.gap_ms);
+        let Ok(()) = lamp.set_state(lamp::is_lit(controller.state(), readings.now).into());
+
+        // A line is carried out only when the one before it has been answered in full; until then the bytes wait.
+        if answer.is_done() {
+            if serial.take_lost() {
+                line.characters_lost();
+            }
+            if let Ok(byte) = serial.read()
+                && let Some(command) = line.take(byte)
+            {
+                answer = reply::answer(command, controller);
+            }
+        }
+        if serial.room() >= reply::LINE {
+            if !answer.is_done() {
+                let Ok(()) = answer.write_line(controller, &mut serial);
+            } else if let Some(event) = controller.next_event() {
+                let Ok(()) = reply::write_event(&event, &mut serial);
+            }
+        }
+    }
+}
+
+// Both encoder channels: a level changed.
+#[avr_device::interrupt(atmega328p)]
+fn PCINT2() {
+    // SAFETY: interrupts are off while a handler runs.
+    encoder::on_change(unsafe { CriticalSection::new() });
+}
+
+// The beam: its level changed.
+#[avr_device::interrupt(atmega328p)]
+fn PCINT0() {
+    // SAFETY: interrupts are off while a handler runs.
+    let position = encoder::position(unsafe { CriticalSection::new() });
+    // SAFETY: this is the handler that owns the beam's end of the queue.
+    unsafe { beam::on_change(position) };
+}
+
+// The clock's counter ran over.
+#[avr_device::interrupt(atmega328p)]
+fn TIMER0_OVF() {
+    // SAFETY: interrupts are off while a handler runs.
+    clock::on_overflow(unsafe { CriticalSection::new() });
+}
+
+// A byte has come in.
+#[avr_device::interrupt(atmega328p)]
+fn USART_RX() {
+    // SAFETY: this is the handler that owns the receiving end.
+    unsafe { serial::on_received() };
+}
+
+// The line can take a byte.
+#[avr_device::interrupt(atmega328p)]
+fn USART_UDRE() {
+    // SAFETY: this is the handler that owns the sending end.
+    unsafe { serial::on_ready_to_send() };
+}
+
+/// A panic is a fault like any other: the watchdog resets the machine, which wakes up in HOLD with the tool out.
+#[panic_handler]
+fn panic(_: &core::panic::PanicInfo) -> ! {
+    watchdog::reset()
 }

@@ -7,7 +7,7 @@ use crate::text::words;
 
 words! {
     /// A latched fault, in the order of the LED's codes.
-    pub enum Alarm, ALARM_NAMES: 16 {
+    pub enum Alarm {
         /// The beam was broken over more ground than any plant covers: something hangs in it, or it is out of line.
         BeamBlocked = "beam_blocked",
         /// More plants stand between beam and tool than the schedule can hold.

@@ -12,7 +12,7 @@ pub const LINE_LENGTH: usize = 80;
 
 words! {
     /// The first word of a command.
-    pub enum Word, WORDS: 8 {
+    pub enum Word {
         /// Lists the commands, or explains a setting.
         Help = "help",
         /// One line of figures.

@@ -16,8 +16,8 @@ pub const SPEED_CLASSES_MM_S: [i16; 4] = [278, 417, 556, 694];
 mod reference {
     pub const BEAM_TO_TOOL_MM: i32 = 400;
     pub const MARGIN_MM: i32 = 50;
-    pub const LEAD_OUT_MS: i32 = 180;
-    pub const LEAD_IN_MS: i32 = 40;
+    pub const LEAD_OUT_MS: u32 = 180;
+    pub const LEAD_IN_MS: u32 = 40;
 }
 
 /// The feature vector of an object.
@@ -47,15 +47,15 @@ impl Features {
 
     /// Describes an object of `width_mm`, `spacing_mm` behind the last plant, in one of the speed classes.
     pub const fn describe(speed_class_mm_s: i16, spacing_mm: i16, width_mm: i16) -> Self {
-        let speed = speed_class_mm_s as i32;
+        let speed = speed_class_mm_s as u16 as u32;
         let delay = reference::BEAM_TO_TOOL_MM - reference::MARGIN_MM;
         let hold = width_mm as i32 + 2 * reference::MARGIN_MM;
         Self {
             speed_mm_s: speed_class_mm_s,
             spacing_mm,
-            delay_mm: limited(delay - speed * reference::LEAD_OUT_MS / 1000),
+            delay_mm: limited(delay - (speed * reference::LEAD_OUT_MS / 1000) as i32),
             hold_mm: limited(hold),
-            actuation_mm: limited(delay + hold - speed * reference::LEAD_IN_MS / 1000),
+            actuation_mm: limited(delay + hold - (speed * reference::LEAD_IN_MS / 1000) as i32),
         }
     }
 

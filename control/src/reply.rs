@@ -11,27 +11,27 @@ use crate::{
     controller::{Controller, Refusal, State},
     event::Event,
     settings::Setting,
-    text::Text,
+    text::{Text, text},
 };
-use avr_progmem::progmem_display as flash;
 use ufmt::{uWrite, uwrite};
 
 /// Room that a line needs, its end included.
 pub const LINE: usize = 127;
 
-avr_progmem::progmem! {
-    /// What each command does, in the order of [`Word`].
-    static progmem HELP: [Text<72>; Word::COUNT as usize] = [
-        Text::new("help [name]        this list, or what a setting is"),
-        Text::new("status             state, position, speed and windows in one line"),
-        Text::new("get [name]         one setting, or all"),
-        Text::new("set name value     change a setting, until the next reset"),
-        Text::new("start [now]        weed; now: at once, over ground the beam has not seen"),
-        Text::new("hold               take the tool out of the row"),
-        Text::new("clear              clear an alarm"),
-        Text::new("events on|off      tell of plants, swings and alarms as they come"),
-        Text::new("version            name the firmware"),
-    ];
+/// A command with its words, and what it does.
+#[inline(never)]
+fn help(word: Word) -> (Text, Text) {
+    match word {
+        Word::Help => (text!("help [name]"), text!("this list, or what a setting is")),
+        Word::Status => (text!("status"), text!("state, position, speed and windows in one line")),
+        Word::Get => (text!("get [name]"), text!("one setting, or all")),
+        Word::Set => (text!("set name value"), text!("change a setting, until the next reset")),
+        Word::Start => (text!("start [now]"), text!("weed; now, at once over ground the beam has not seen")),
+        Word::Hold => (text!("hold"), text!("take the tool out of the row")),
+        Word::Clear => (text!("clear"), text!("clear an alarm")),
+        Word::Events => (text!("events on|off"), text!("tell of plants, swings and alarms as they come")),
+        Word::Version => (text!("version"), text!("name the firmware")),
+    }
 }
 
 /// The part of an answer that has not been written yet.
@@ -116,12 +116,15 @@ impl Answer {
         *self = match *self {
             Self::Done => return Ok(()),
             Self::Greeting => {
-                uwrite!(out, "{}{}", flash!("weeder "), Version)?;
-                uwrite!(out, "{}", flash!(" in hold, tool out; help lists the commands"))?;
+                uwrite!(out, "{}{}", text!("weeder "), Version)?;
+                uwrite!(out, "{}", text!(" in hold, tool out; help lists the commands"))?;
                 Self::Done
             }
             Self::Help(place) => {
-                uwrite!(out, "{}", HELP.load_at(usize::from(place)))?;
+                if let Some(word) = Word::from_index(place) {
+                    let (usage, explanation) = help(word);
+                    uwrite!(out, "{}{}{}", usage, text!(" - "), explanation)?;
+                }
                 if place + 1 < Word::COUNT {
                     Self::Help(place + 1)
                 } else {
@@ -129,7 +132,7 @@ impl Answer {
                 }
             }
             Self::Explain(setting) => {
-                uwrite!(out, "{} {}", setting.text(), setting.description().help)?;
+                uwrite!(out, "{}{}{}", setting.text(), text!(" - "), setting.help())?;
                 Self::Ok
             }
             Self::Status => {
@@ -151,11 +154,11 @@ impl Answer {
                 }
             }
             Self::Version => {
-                uwrite!(out, "{}{}", flash!("weeder "), Version)?;
+                uwrite!(out, "{}{}", text!("weeder "), Version)?;
                 Self::Ok
             }
             Self::Ok => {
-                uwrite!(out, "{}", flash!("ok"))?;
+                uwrite!(out, "{}", text!("ok"))?;
                 Self::Done
             }
             Self::Wrong(mistake) => {
@@ -184,48 +187,48 @@ pub fn write_event<W: uWrite + ?Sized>(event: &Event, out: &mut W) -> Result<(),
             plan,
         } => {
             match vote.class {
-                Class::Plant => uwrite!(out, "{}", flash!("plant"))?,
-                Class::Weed => uwrite!(out, "{}", flash!("weed"))?,
-                Class::Unknown => uwrite!(out, "{}", flash!("unknown"))?,
+                Class::Plant => uwrite!(out, "{}", text!("plant"))?,
+                Class::Weed => uwrite!(out, "{}", text!("weed"))?,
+                Class::Unknown => uwrite!(out, "{}", text!("unknown"))?,
             }
-            uwrite!(out, "{}{}", flash!(" pos="), leading.count())?;
+            uwrite!(out, "{}{}", text!(" pos="), leading.count())?;
             uwrite!(
                 out,
                 "{}{}{}{}",
-                flash!(" votes="),
+                text!(" votes="),
                 vote.votes,
-                flash!(" spacing="),
+                text!(" spacing="),
                 spacing.0
             )?;
             uwrite!(
                 out,
                 "{}{}{}{}",
-                flash!(" delay="),
+                text!(" delay="),
                 plan.delay.0,
-                flash!(" hold="),
+                text!(" hold="),
                 plan.hold.0
             )?;
-            uwrite!(out, "{}{}", flash!(" actuation="), plan.actuation().0)?;
+            uwrite!(out, "{}{}", text!(" actuation="), plan.actuation().0)?;
         }
         Event::Swing { out: leaves, position } => {
-            uwrite!(out, "{}", flash!("swing tool="))?;
+            uwrite!(out, "{}", text!("swing tool="))?;
             write_place(leaves, out)?;
-            uwrite!(out, "{}{}", flash!(" pos="), position.count())?;
+            uwrite!(out, "{}{}", text!(" pos="), position.count())?;
         }
         Event::State(state) => {
-            uwrite!(out, "{}", flash!("state is="))?;
+            uwrite!(out, "{}", text!("state is="))?;
             write_state(state, out)?;
         }
         Event::Alarm { alarm, position } => {
             uwrite!(
                 out,
                 "{}{}{}{}",
-                flash!("alarm name="),
+                text!("alarm name="),
                 alarm.text(),
-                flash!(" code="),
+                text!(" code="),
                 alarm.code()
             )?;
-            uwrite!(out, "{}{}", flash!(" pos="), position.count())?;
+            uwrite!(out, "{}{}", text!(" pos="), position.count())?;
         }
     }
     end_line(out)
@@ -233,17 +236,17 @@ pub fn write_event<W: uWrite + ?Sized>(event: &Event, out: &mut W) -> Result<(),
 
 fn write_state<W: uWrite + ?Sized>(state: State, out: &mut W) -> Result<(), W::Error> {
     match state {
-        State::Hold => uwrite!(out, "{}", flash!("hold")),
-        State::Work => uwrite!(out, "{}", flash!("work")),
-        State::Alarm(_) => uwrite!(out, "{}", flash!("alarm")),
+        State::Hold => uwrite!(out, "{}", text!("hold")),
+        State::Work => uwrite!(out, "{}", text!("work")),
+        State::Alarm(_) => uwrite!(out, "{}", text!("alarm")),
     }
 }
 
 fn write_place<W: uWrite + ?Sized>(tool_out: bool, out: &mut W) -> Result<(), W::Error> {
     if tool_out {
-        uwrite!(out, "{}", flash!("out"))
+        uwrite!(out, "{}", text!("out"))
     } else {
-        uwrite!(out, "{}", flash!("in"))
+        uwrite!(out, "{}", text!("in"))
     }
 }
 
@@ -253,25 +256,25 @@ where
     W: uWrite + ?Sized,
 {
     let readings = controller.readings();
-    uwrite!(out, "{}", flash!("state="))?;
+    uwrite!(out, "{}", text!("state="))?;
     write_state(controller.state(), out)?;
     if let State::Alarm(alarm) = controller.state() {
-        uwrite!(out, "{}{}", flash!(" alarm="), alarm.text())?;
+        uwrite!(out, "{}{}", text!(" alarm="), alarm.text())?;
     }
-    uwrite!(out, "{}", flash!(" tool="))?;
+    uwrite!(out, "{}", text!(" tool="))?;
     write_place(controller.tool_out(), out)?;
-    uwrite!(out, "{}{}", flash!(" pos="), readings.position.count())?;
-    uwrite!(out, "{}{}", flash!(" speed_mm_s="), controller.speed_mm_s())?;
+    uwrite!(out, "{}{}", text!(" pos="), readings.position.count())?;
+    uwrite!(out, "{}{}", text!(" speed_mm_s="), controller.speed_mm_s())?;
     uwrite!(
         out,
         "{}{}{}{}",
-        flash!(" windows="),
+        text!(" windows="),
         controller.windows(),
-        flash!(" lost="),
+        text!(" lost="),
         readings.lost
     )?;
-    uwrite!(out, "{}{}", flash!(" unseen_mm="), controller.unseen_mm())?;
-    uwrite!(out, "{}{}", flash!(" missed="), controller.events_missed())
+    uwrite!(out, "{}{}", text!(" unseen_mm="), controller.unseen_mm())?;
+    uwrite!(out, "{}{}", text!(" missed="), controller.events_missed())
 }
 
 fn write_setting<C, W>(controller: &Controller<C>, setting: Setting, out: &mut W) -> Result<(), W::Error>
@@ -282,32 +285,32 @@ where
     let description = setting.description();
     uwrite!(out, "{}={}", setting.text(), controller.settings().get(setting))?;
     write_range(description.least, description.greatest, out)?;
-    uwrite!(out, "{}{}", flash!(", default "), description.default)
+    uwrite!(out, "{}{}", text!(", default "), description.default)
 }
 
 fn write_range<W: uWrite + ?Sized>(least: u16, greatest: u16, out: &mut W) -> Result<(), W::Error> {
-    uwrite!(out, "{}{}{}{}", flash!(" from "), least, flash!(" to "), greatest)
+    uwrite!(out, "{}{}{}{}", text!(" from "), least, text!(" to "), greatest)
 }
 
 fn write_mistake<W: uWrite + ?Sized>(mistake: Mistake, out: &mut W) -> Result<(), W::Error> {
-    uwrite!(out, "{}", flash!("error: "))?;
+    uwrite!(out, "{}", text!("error: "))?;
     match mistake {
         Mistake::TooLong => uwrite!(
             out,
             "{}",
-            flash!("the line is longer than 80 characters, send a shorter one")
+            text!("the line is longer than 80 characters, send a shorter one")
         ),
         Mistake::NotText => uwrite!(
             out,
             "{}",
-            flash!("the line is not plain text, send letters, digits and blanks only")
+            text!("the line is not plain text, send letters, digits and blanks only")
         ),
-        Mistake::CharactersLost => uwrite!(out, "{}", flash!("characters of this line were lost, send it again")),
-        Mistake::UnknownCommand => uwrite!(out, "{}", flash!("no such command, help lists them all")),
-        Mistake::UnknownSetting => uwrite!(out, "{}", flash!("no such setting, get lists them all")),
+        Mistake::CharactersLost => uwrite!(out, "{}", text!("characters of this line were lost, send it again")),
+        Mistake::UnknownCommand => uwrite!(out, "{}", text!("no such command, help lists them all")),
+        Mistake::UnknownSetting => uwrite!(out, "{}", text!("no such setting, get lists them all")),
         Mistake::Usage(word) => {
-            uwrite!(out, "{}", flash!("the words do not fit, the command is "))?;
-            write_usage(word, out)
+            let (usage, _) = help(word);
+            uwrite!(out, "{}{}", text!("the words do not fit, the command is "), usage)
         }
         Mistake::Value(setting) => write_allowed(setting, out),
     }
@@ -317,7 +320,7 @@ fn write_refusal<W>(refusal: Refusal, setting: Option<Setting>, out: &mut W) -> 
 where
     W: uWrite + ?Sized,
 {
-    uwrite!(out, "{}", flash!("error: "))?;
+    uwrite!(out, "{}", text!("error: "))?;
     match (refusal, setting) {
         (Refusal::OutOfRange, Some(setting)) => write_allowed(setting, out),
         (Refusal::NotInHold, Some(setting)) => {
@@ -325,40 +328,21 @@ where
                 out,
                 "{}{}",
                 setting.text(),
-                flash!(" moves the machine's geometry, hold first")
+                text!(" moves the machine's geometry, hold first")
             )
         }
-        _ => uwrite!(out, "{}", flash!("an alarm is latched, see status, then clear it")),
+        _ => uwrite!(out, "{}", text!("an alarm is latched, see status, then clear it")),
     }
 }
 
 fn write_allowed<W: uWrite + ?Sized>(setting: Setting, out: &mut W) -> Result<(), W::Error> {
     let description = setting.description();
-    uwrite!(out, "{}{}", setting.text(), flash!(" takes a whole number"))?;
+    uwrite!(out, "{}{}", setting.text(), text!(" takes a whole number"))?;
     write_range(description.least, description.greatest, out)
 }
 
-/// A command with its words: the help line up to the two blanks before its explanation.
-fn write_usage<W: uWrite + ?Sized>(word: Word, out: &mut W) -> Result<(), W::Error> {
-    let help = HELP.load_at(word as usize);
-    let mut blank = false;
-    for byte in help.bytes() {
-        if blank && byte == b' ' {
-            break;
-        }
-        if blank {
-            out.write_char(' ')?;
-        }
-        blank = byte == b' ';
-        if !blank {
-            out.write_char(char::from(byte))?;
-        }
-    }
-    Ok(())
-}
-
 fn end_line<W: uWrite + ?Sized>(out: &mut W) -> Result<(), W::Error> {
-    uwrite!(out, "{}", flash!("\r\n"))
+    uwrite!(out, "{}", text!("\r\n"))
 }
 
 /// The package's version.
@@ -366,7 +350,7 @@ struct Version;
 
 impl ufmt::uDisplay for Version {
     fn fmt<W: uWrite + ?Sized>(&self, f: &mut ufmt::Formatter<'_, W>) -> Result<(), W::Error> {
-        uwrite!(f, "{}", flash!(env!("CARGO_PKG_VERSION")))
+        uwrite!(f, "{}", text!(env!("CARGO_PKG_VERSION")))
     }
 }
 

@@ -4,11 +4,11 @@
 //! whole number in 16 bits whose name carries its unit.
 
 use crate::{
-    text::{Text, words},
+    text::{Text, text, words},
     units::{Ticks, Wheel},
 };
 
-/// What the table says of a setting.
+/// The numbers that the table gives for a setting.
 #[derive(Clone, Copy)]
 pub struct Description {
     /// Least value.
@@ -19,8 +19,6 @@ pub struct Description {
     pub default: u16,
     /// Whether it moves the machine's geometry, so that it may be set in HOLD only.
     pub geometry: bool,
-    /// What it is, for the operator.
-    pub help: Text<72>,
 }
 
 /// The one table from which everything else about the settings is made.
@@ -28,7 +26,7 @@ macro_rules! settings {
     ($($(#[$doc:meta])* $Variant:ident $name:literal: $least:literal to $greatest:literal, $default:literal, $geometry:literal, $help:literal;)*) => {
         words! {
             /// A setting.
-            pub enum Setting, SETTING_NAMES: 18 {
+            pub enum Setting {
                 $($(#[$doc])* $Variant = $name,)*
             }
         }
@@ -40,9 +38,18 @@ macro_rules! settings {
                     greatest: $greatest,
                     default: $default,
                     geometry: $geometry,
-                    help: Text::new($help),
                 },)*
             ];
+        }
+
+        impl Setting {
+            /// What it is, for the operator.
+            #[inline(never)]
+            pub fn help(self) -> Text {
+                match self {
+                    $(Self::$Variant => text!($help),)*
+                }
+            }
         }
 
         $(const _: () = assert!($least <= $default && $default <= $greatest, $name);)*
@@ -92,7 +99,8 @@ settings! {
 }
 
 impl Setting {
-    /// What the table says of it.
+    /// The numbers that the table gives for it.
+    #[inline(never)]
     pub fn description(self) -> Description {
         DESCRIPTIONS.load_at(self as usize)
     }

@@ -1,7 +1,7 @@
 //! The machine's speed, from the encoder's position and the time at which it was read.
 //!
 //! The meter remembers the places and times of a few position changes, at least [`SPACING`] apart, and divides the
-//! distance since the oldest by the time it took: a window of about 60 ms at walking speed, and of six ticks when the
+//! distance since the oldest by the time it took: a window of about 80 ms at walking speed, and of six ticks when the
 //! machine creeps. A wheel that has fallen silent for longer than it should is slower than one tick in that silence; after
 //! [`STANDSTILL`] it stands. A single tick backwards, as vibration gives, moves the answer by its share and no more.
 
@@ -11,8 +11,8 @@ use crate::units::{Instant, Interval, Position, TicksPerSecond};
 /// grain of a tick and of the main loop stays below half a percent at 1 km/h, short enough to follow a walking person.
 const SPACING: Interval = Interval::from_ms(10);
 
-/// Places remembered.
-const SAMPLES: usize = 7;
+/// Places remembered; a power of two keeps the ring's arithmetic short.
+const SAMPLES: u8 = 8;
 
 /// Silence after which the machine is said to stand.
 const STANDSTILL: Interval = Interval::from_ms(500);
@@ -26,9 +26,10 @@ struct Sample {
 /// Measures the speed from readings of position and time.
 #[derive(Clone, Debug)]
 pub struct SpeedMeter {
-    /// The oldest first; `count` of them are valid.
-    samples: [Sample; SAMPLES],
+    /// A ring: `count` of them are valid, and the next one goes to `next`.
+    samples: [Sample; SAMPLES as usize],
     count: u8,
+    next: u8,
     /// The last reading at which the position had changed.
     last: Sample,
     /// Silence that the present speed explains.
@@ -41,8 +42,9 @@ impl SpeedMeter {
     pub fn new(position: Position, now: Instant) -> Self {
         let last = Sample { position, time: now };
         Self {
-            samples: [last; SAMPLES],
+            samples: [last; SAMPLES as usize],
             count: 0,
+            next: 0,
             last,
             patience: STANDSTILL,
             speed: TicksPerSecond(0),
@@ -69,27 +71,21 @@ impl SpeedMeter {
 
     fn moved(&mut self, reading: Sample) {
         self.last = reading;
-        let count = usize::from(self.count);
-        let Some(newest) = self.samples.get(count.wrapping_sub(1)) else {
-            self.samples[0] = reading;
-            self.count = 1;
+        if self.count == 0 {
+            self.remember(reading);
             return;
-        };
+        }
+        let newest = self.samples[usize::from((self.next + SAMPLES - 1) % SAMPLES)];
         if reading.time - newest.time < SPACING {
             return;
         }
-        let oldest = self.samples[0];
-        if count < SAMPLES {
-            self.samples[count] = reading;
-            self.count += 1;
-        } else {
-            self.samples.copy_within(1.., 0);
-            self.samples[SAMPLES - 1] = reading;
-        }
+        let oldest = self.samples[usize::from((self.next + SAMPLES - self.count) % SAMPLES)];
+        self.remember(reading);
         let distance = (reading.position - oldest.position).0;
-        // A window lasts at most SAMPLES silences, so its steps fit; the product does up to 8,589 ticks a window.
-        let time = (reading.time - oldest.time).steps() as i32;
-        self.speed = TicksPerSecond(distance.wrapping_mul(Interval::STEPS_PER_SECOND as i32) / time);
+        // A window lasts at most SAMPLES silences, so its steps fit; the product does up to 17,179 ticks a window.
+        let time = (reading.time - oldest.time).steps();
+        let speed = (distance.unsigned_abs().wrapping_mul(Interval::STEPS_PER_SECOND) / time) as i32;
+        self.speed = TicksPerSecond(if distance < 0 { -speed } else { speed });
         // Two ticks' time: encoders do not space their edges evenly.
         self.patience = match self.speed.0.unsigned_abs() {
             0 => STANDSTILL,
@@ -97,6 +93,12 @@ impl SpeedMeter {
                 .max(SPACING)
                 .min(STANDSTILL),
         };
+    }
+
+    fn remember(&mut self, reading: Sample) {
+        self.samples[usize::from(self.next)] = reading;
+        self.next = (self.next + 1) % SAMPLES;
+        self.count = (self.count + 1).min(SAMPLES);
     }
 
     fn silent(&mut self, silence: Interval) {

@@ -1,58 +1,65 @@
 //! Text that lies in flash.
 //!
-//! An AVR keeps Rust's string literals in SRAM, of which there are 2 KiB. Names and help therefore stand in tables of
-//! fixed-width [`Text`]s behind `avr_progmem`, from which one entry at a time is copied to the stack. [`words!`] makes
-//! such a table together with the enum that it names.
+//! An AVR keeps Rust's string literals in SRAM, of which there are 2 KiB. [`text!`] lays a literal into flash instead and
+//! gives a [`Text`], which is no more than its address and length: all texts share one piece of code that writes them.
+//! [`words!`] makes an enum whose variants are words.
 
+use avr_progmem::wrapper::ProgMem;
 use ufmt::{Formatter, uDisplay, uWrite};
 
-/// At most `WIDTH` ASCII characters, padded with zeros.
+/// A text in flash, ASCII.
 #[derive(Clone, Copy)]
-pub struct Text<const WIDTH: usize>([u8; WIDTH]);
+pub struct Text(ProgMem<[u8]>);
 
-impl<const WIDTH: usize> Text<WIDTH> {
-    /// The text, at compile time.
-    ///
-    /// # Panics
-    /// When it does not fit or is not ASCII, which in a constant stops the compiler.
-    pub const fn new(text: &str) -> Self {
-        let bytes = text.as_bytes();
-        assert!(bytes.len() <= WIDTH, "this text is longer than its table is wide");
-        let mut padded = [0; WIDTH];
-        let mut index = 0;
-        while index < bytes.len() {
-            assert!(
-                bytes[index].is_ascii(),
-                "a serial monitor can only be trusted with ASCII"
-            );
-            padded[index] = bytes[index];
-            index += 1;
-        }
-        Self(padded)
+impl Text {
+    /// The text whose characters lie in `flash`; made by [`text!`].
+    pub(crate) const fn new(flash: ProgMem<[u8]>) -> Self {
+        Self(flash)
     }
 
-    /// The characters, without the padding.
-    pub fn bytes(&self) -> impl Iterator<Item = u8> + '_ {
-        self.0.iter().copied().take_while(|&byte| byte != 0)
+    /// The characters.
+    pub fn bytes(self) -> impl Iterator<Item = u8> {
+        self.0.wrapper_iter().map(|byte| byte.load())
     }
 
     /// Whether the text reads as `word`.
-    pub fn is(&self, word: &[u8]) -> bool {
+    #[inline(never)]
+    pub fn is(self, word: &[u8]) -> bool {
         self.bytes().eq(word.iter().copied())
     }
 }
 
-impl<const WIDTH: usize> uDisplay for Text<WIDTH> {
+impl uDisplay for Text {
+    #[inline(never)]
     fn fmt<W: uWrite + ?Sized>(&self, f: &mut Formatter<'_, W>) -> Result<(), W::Error> {
         self.bytes().try_for_each(|byte| f.write_char(char::from(byte)))
     }
 }
 
-/// An enum whose variants are words, with the words in flash: `text` writes one, `find` reads one.
+/// A literal's characters; stops the compiler unless they are ASCII, which is all a serial monitor can be trusted with.
+pub(crate) const fn ascii<const LENGTH: usize>(literal: &str) -> [u8; LENGTH] {
+    assert!(literal.is_ascii());
+    let mut bytes = [0; LENGTH];
+    bytes.copy_from_slice(literal.as_bytes());
+    bytes
+}
+
+/// A literal as a [`Text`].
+macro_rules! text {
+    ($literal:expr) => {{
+        avr_progmem::progmem! {
+            static progmem CHARACTERS: [u8; $literal.len()] = $crate::text::ascii($literal);
+        }
+        $crate::text::Text::new(CHARACTERS.as_slice())
+    }};
+}
+pub(crate) use text;
+
+/// An enum whose variants are words: `text` writes one, `find` reads one.
 macro_rules! words {
     (
         $(#[$enum_doc:meta])*
-        $visibility:vis enum $Name:ident, $TABLE:ident: $width:literal {
+        $visibility:vis enum $Name:ident {
             $($(#[$doc:meta])* $Variant:ident = $word:literal,)*
         }
     ) => {
@@ -61,11 +68,6 @@ macro_rules! words {
         #[repr(u8)]
         $visibility enum $Name {
             $($(#[$doc])* $Variant,)*
-        }
-
-        avr_progmem::progmem! {
-            static progmem $TABLE: [$crate::text::Text<$width>; [$($word),*].len()] =
-                [$($crate::text::Text::new($word)),*];
         }
 
         impl $Name {
@@ -81,8 +83,11 @@ macro_rules! words {
             }
 
             /// The word for it.
-            pub fn text(self) -> $crate::text::Text<$width> {
-                $TABLE.load_at(self as usize)
+            #[inline(never)]
+            pub fn text(self) -> $crate::text::Text {
+                match self {
+                    $(Self::$Variant => $crate::text::text!($word),)*
+                }
             }
 
             /// The one that `word` stands for.

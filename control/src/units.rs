@@ -143,7 +143,9 @@ impl TicksPerSecond {
     ///
     /// Right while speed times milliseconds stays below 2^31: up to 2.1 million ticks a second over a whole second.
     pub fn distance_in_ms(self, milliseconds: u16) -> Ticks {
-        Ticks(self.0.wrapping_mul(i32::from(milliseconds)) / 1000)
+        // Divided without its sign: the chip has one division routine then, the shorter.
+        let magnitude = (self.0.unsigned_abs().wrapping_mul(u32::from(milliseconds)) / 1000) as i32;
+        Ticks(if self.0 < 0 { -magnitude } else { magnitude })
     }
 }
 
