@@ -357,11 +357,10 @@ fn an_elf_that_is_none_is_refused_by_name() {
 
 #[test]
 fn the_size_is_what_the_sections_add_up_to() {
-    let uno = boot("memory");
+    let mut uno = boot("memory");
     // .noinit holds `kept`, .data `started`, whose first value takes flash as well.
     assert_eq!(uno.size().sram, 3);
     assert!((100..1000).contains(&uno.size().flash), "{:?}", uno.size());
-    let mut uno = uno;
     uno.run_for_ms(5).unwrap();
     assert!((2..40).contains(&uno.deepest_stack()), "{}", uno.deepest_stack());
 }

@@ -45,10 +45,10 @@ const SRAM_END: u16 = 0x08FF;
 /// and shows how deep the stack has been.
 const SRAM_AT_POWER_UP: u8 = 0xC5;
 
-/// Complete bytes that the receiver keeps: two in its buffer and one in the shift register (data sheet, section 20.8.4).
+/// Complete bytes that the receiver keeps: two in its buffer and one in the shift register (data sheet, USART0, receiver error flags).
 const RECEIVER_BYTES: u16 = 3;
 
-// Registers by their address in the data space (data sheet, section 36).
+// Registers by their address in the data space (data sheet, register summary).
 const MCUSR: u16 = 0x54;
 pub(super) const UCSR0A: u16 = 0xC0;
 pub(super) const UCSR0B: u16 = 0xC1;
@@ -61,6 +61,7 @@ const RXC0: u8 = 1 << 7;
 const DOR0: u8 = 1 << 3;
 /// UCSR0B: the receiver is on.
 const RXEN0: u8 = 1 << 4;
+
 /// A four letter request code of simavr (`AVR_IOCTL_DEF`).
 const fn request(name: &[u8; 4]) -> u32 {
     u32::from_be_bytes(*name)

@@ -19,7 +19,7 @@ const INTERRUPT_ENTRY_CYCLES: u64 = 4;
 /// Cycles of `reti`; its end is the end of the handler.
 const RETURN_CYCLES: u64 = 4;
 
-// Registers by their address in the data space (data sheet, section 36).
+// Registers by their address in the data space (data sheet, register summary).
 const UCSR0C: u16 = 0xC2;
 const UBRR0L: u16 = 0xC4;
 const UBRR0H: u16 = 0xC5;
@@ -63,7 +63,7 @@ impl Recorder {
     }
 }
 
-/// Cycles of a byte on the serial line, as the UART's registers stand (data sheet, section 20.3 and table 20-1).
+/// Cycles of a byte on the serial line, as the UART's registers stand (data sheet, USART0, clock generation and frame formats).
 ///
 /// # Safety
 ///
