@@ -49,7 +49,7 @@ fn main() -> ! {
     let mut servo = servo::Servo::new(peripherals.TC1, &peripherals.PORTB, out);
     let (mut lamp, mut work_switch) = board::pins(&peripherals.PORTB, &peripherals.PORTD);
     let clock = clock::Clock::new(peripherals.TC0);
-    encoder::watch(&peripherals.EXINT, &peripherals.PORTD);
+    encoder::watch(&peripherals.EXINT, &peripherals.PORTD, &peripherals.CPU);
     let mut beam = beam::Beam::new(&peripherals.EXINT, &peripherals.PORTB, EDGES.take());
     let mut serial = serial::Serial::new(peripherals.USART0, RECEIVED.take(), TO_SEND.take());
     // SAFETY: every interrupt's state has been handed over above, and no critical section is open.
@@ -101,13 +101,6 @@ fn main() -> ! {
             }
         }
     }
-}
-
-// Both encoder channels: a level changed.
-#[avr_device::interrupt(atmega328p)]
-fn PCINT2() {
-    // SAFETY: interrupts are off while a handler runs.
-    encoder::on_change(unsafe { CriticalSection::new() });
 }
 
 // The beam: its level changed.

@@ -4,7 +4,7 @@
 //! jump of two. It is taken to go on in the direction of the last step, which is right as long as the wheel did not turn
 //! round within those two edges; with no step before it, its direction is unknown and it is counted as lost.
 //!
-//! The firmware's interrupt does the same in a few instructions; this is the decoder it is compared with.
+//! The firmware's interrupt looks its steps up in a table that the compiler makes of this decoder.
 
 /// Both channels' levels: A in bit 1, B in bit 0; values 0 to 3.
 pub type Channels = u8;
@@ -33,6 +33,16 @@ impl Quadrature {
             phase: phase(channels),
             direction: 0,
         }
+    }
+
+    /// A decoder whose channels stand at `channels` and whose last step was `direction`: 1, -1, or 0 for none.
+    pub const fn moving(channels: Channels, direction: i8) -> Self {
+        Self { phase: phase(channels), direction }
+    }
+
+    /// The last step: 1, -1, or 0 before the first.
+    pub const fn direction(&self) -> i8 {
+        self.direction
     }
 
     /// Takes the channels' levels and tells how far the wheel turned since the last look.
