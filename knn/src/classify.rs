@@ -146,6 +146,9 @@ impl Neighbour {
 
 impl<const CLASSES: usize> Nearest<'_, CLASSES> {
     /// Gives an example that is not farther than the last neighbour its place, and returns the new last neighbour.
+    ///
+    /// Called for few examples: out of line, it leaves the registers to the loop over all of them.
+    #[inline(never)]
     fn admit(&mut self, candidate: Neighbour) -> Neighbour {
         // The candidate takes its place, and each farther neighbour the next one; the last falls out.
         let mut carried = candidate;

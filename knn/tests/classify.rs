@@ -1,0 +1,249 @@
+//! The classifier against a plain one in floats, against smartcore's, and against itself with the examples reordered.
+//!
+//! Features come from few values, or from the extremes, as often as from all bytes: level distances, on which the rules
+//! for ties rest, are then common.
+
+use knn::{Answer, ClassifyError, Example, Examples, Kind, MAX_K, Table, classify};
+use proptest::prelude::*;
+use smartcore::{
+    linalg::basic::matrix::DenseMatrix,
+    metrics::distance::Distances,
+    neighbors::knn_classifier::{KNNClassifier, KNNClassifierParameters},
+};
+
+/// The documented rules over floats: sort all, take those up to the k-th distance, count.
+fn reference<const FEATURES: usize, const CLASSES: usize>(
+    examples: &[Example<FEATURES>],
+    query: &[u8; FEATURES],
+    k: u8,
+    radius: u32,
+) -> Result<Answer<CLASSES>, ClassifyError> {
+    let k = usize::from(k);
+    if !(1..=15).contains(&k) {
+        return Err(ClassifyError::KOutOfRange);
+    }
+    if examples.is_empty() {
+        return Err(ClassifyError::NoExamples);
+    }
+    if examples.len() < k {
+        return Err(ClassifyError::TooFewExamples);
+    }
+    let mut sorted: Vec<(f64, u8)> = examples
+        .iter()
+        .map(|example| (float_distance(example, query), example.label))
+        .collect();
+    sorted.sort_by(|left, right| left.partial_cmp(right).expect("distances are numbers"));
+    let kth = sorted[k - 1].0;
+    let voters: Vec<(f64, u8)> = sorted.into_iter().filter(|&(distance, _)| distance <= kth).collect();
+    if voters.iter().any(|&(_, label)| usize::from(label) >= CLASSES) {
+        return Err(ClassifyError::UnknownLabel);
+    }
+    let votes: [usize; CLASSES] =
+        std::array::from_fn(|class| voters.iter().filter(|&&(_, label)| usize::from(label) == class).count());
+    let most = votes.into_iter().max().expect("there are classes");
+    let leads = |label: u8| votes[usize::from(label)] == most;
+    let label = voters
+        .iter()
+        .map(|&(_, label)| label)
+        .find(|&label| leads(label))
+        .expect("a class leads");
+    let kind = if voters[0].0 > f64::from(radius) {
+        Kind::Stranger
+    } else if votes.into_iter().filter(|&votes| votes == most).count() > 1 {
+        Kind::Tie
+    } else {
+        Kind::Known
+    };
+    Ok(Answer {
+        label,
+        votes,
+        nearest: voters[0].0 as u32,
+        kind,
+    })
+}
+
+fn float_distance<const FEATURES: usize>(example: &Example<FEATURES>, query: &[u8; FEATURES]) -> f64 {
+    example
+        .features
+        .iter()
+        .zip(query)
+        .map(|(&left, &right)| (f64::from(left) - f64::from(right)).powi(2))
+        .sum()
+}
+
+fn features<const FEATURES: usize>() -> impl Strategy<Value = [u8; FEATURES]> {
+    prop_oneof![
+        proptest::array::uniform(any::<u8>()),
+        proptest::array::uniform(100_u8..104),
+        proptest::array::uniform(prop_oneof![Just(0_u8), Just(255)]),
+    ]
+}
+
+/// Examples whose labels are mostly, but not always, below 4.
+fn examples<const FEATURES: usize>() -> impl Strategy<Value = Vec<Example<FEATURES>>> {
+    let label = prop_oneof![60 => 0_u8..2, 20 => 0_u8..4, 1 => any::<u8>()];
+    proptest::collection::vec(
+        (features(), label).prop_map(|(features, label)| Example::new(features, label)),
+        0..60,
+    )
+}
+
+fn radius() -> impl Strategy<Value = u32> {
+    prop_oneof![0_u32..30, 0_u32..600_000, Just(u32::MAX)]
+}
+
+/// The tests that hold for each number of features, as a module each.
+macro_rules! for_features {
+    ($($name:ident: $features:literal),*) => {$(
+        mod $name {
+            use super::*;
+
+            proptest! {
+                #[test]
+                fn the_answer_is_that_of_a_plain_float_classifier(
+                    examples in examples::<$features>(), query in features(), k in 0_u8..18, radius in radius(),
+                ) {
+                    let examples = examples.as_slice();
+                    prop_assert_eq!(classify::<$features, 2>(examples, &query, k, radius), reference(examples, &query, k, radius));
+                    prop_assert_eq!(classify::<$features, 3>(examples, &query, k, radius), reference(examples, &query, k, radius));
+                    prop_assert_eq!(classify::<$features, 4>(examples, &query, k, radius), reference(examples, &query, k, radius));
+                }
+
+                #[test]
+                fn neither_order_nor_store_changes_the_answer(
+                    (first, shuffled) in examples::<$features>()
+                        .prop_flat_map(|examples| (Just(examples.clone()), Just(examples).prop_shuffle())),
+                    split in any::<prop::sample::Index>(), query in features(), k in 1_u8..=MAX_K, radius in radius(),
+                ) {
+                    let answer = classify::<$features, 3>(first.as_slice(), &query, k, radius);
+                    prop_assert_eq!(classify(shuffled.as_slice(), &query, k, radius), answer);
+                    let (left, right) = shuffled.split_at(split.index(shuffled.len() + 1));
+                    prop_assert_eq!(classify(&(left, right), &query, k, radius), answer);
+                    let mut table: Table<$features, 60> = Table::new();
+                    for &example in right {
+                        prop_assert_eq!(table.add_example(example), Ok(()));
+                    }
+                    prop_assert_eq!(classify(&(&table, left), &query, k, radius), answer);
+                    prop_assert_eq!(classify(&OneByOne(&shuffled), &query, k, radius), answer);
+                }
+            }
+        }
+    )*};
+}
+for_features!(f1: 1, f2: 2, f3: 3, f4: 4, f5: 5, f6: 6, f7: 7, f8: 8);
+
+/// A store that only hands examples out, so that the trait's own search is used.
+struct OneByOne<'a, const FEATURES: usize>(&'a [Example<FEATURES>]);
+
+impl<const FEATURES: usize> Examples<FEATURES> for OneByOne<'_, FEATURES> {
+    fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    fn example(&self, index: usize) -> Option<Example<FEATURES>> {
+        self.0.get(index).copied()
+    }
+}
+
+/// smartcore's class for `query`.
+fn smartcore_class(examples: &[Example<5>], query: &[u8; 5], k: u8) -> u32 {
+    let floats = |features: &[u8; 5]| features.iter().copied().map(f64::from).collect::<Vec<_>>();
+    let rows: Vec<Vec<f64>> = examples.iter().map(|example| floats(&example.features)).collect();
+    let labels: Vec<u32> = examples.iter().map(|example| u32::from(example.label)).collect();
+    let rows = DenseMatrix::from_2d_vec(&rows).expect("rows of one length");
+    let parameters = KNNClassifierParameters::default()
+        .with_k(usize::from(k))
+        .with_distance(Distances::euclidian::<f64>());
+    let classifier = KNNClassifier::fit(&rows, &labels, parameters).expect("rows and labels match");
+    classifier
+        .predict(&DenseMatrix::from_2d_vec(&vec![floats(query)]).expect("one row"))
+        .expect("five columns")[0]
+}
+
+proptest! {
+    #[test]
+    fn smartcore_gives_the_same_class_where_no_tie_leaves_it_open(
+        examples in proptest::collection::vec(
+            (any::<[u8; 5]>(), 0_u8..3).prop_map(|(features, label)| Example::new(features, label)), 15..60),
+        query in any::<[u8; 5]>(), k in 3_u8..=MAX_K,
+    ) {
+        let answer: Answer<3> = classify(examples.as_slice(), &query, k, u32::MAX).expect("k examples or more");
+        prop_assume!(answer.kind == Kind::Known && answer.votes.iter().sum::<usize>() == usize::from(k));
+        prop_assert_eq!(u32::from(answer.label), smartcore_class(&examples, &query, k));
+    }
+}
+
+#[test]
+fn all_examples_level_with_the_last_neighbour_vote() {
+    let level = [[1, 0], [0, 1]].map(|features| Example::new(features, 1));
+    let near = [Example::new([0, 0], 0)];
+    let answer: Answer<2> = classify(&(&near, &level), &[0, 0], 2, 0).unwrap();
+    assert_eq!(
+        answer,
+        Answer {
+            label: 1,
+            votes: [1, 2],
+            nearest: 0,
+            kind: Kind::Known
+        }
+    );
+}
+
+#[test]
+fn a_tie_names_the_class_of_the_nearest_example() {
+    let examples = [Example::new([9], 0), Example::new([12], 1)];
+    let answer: Answer<2> = classify(&examples, &[11], 2, u32::MAX).unwrap();
+    assert_eq!(
+        answer,
+        Answer {
+            label: 1,
+            votes: [1, 1],
+            nearest: 1,
+            kind: Kind::Tie
+        }
+    );
+}
+
+#[test]
+fn a_tie_of_level_examples_names_the_smallest_label() {
+    let examples = [Example::new([12], 2), Example::new([10], 1)];
+    let answer: Answer<3> = classify(&examples, &[11], 1, u32::MAX).unwrap();
+    assert_eq!(
+        answer,
+        Answer {
+            label: 1,
+            votes: [0, 1, 1],
+            nearest: 1,
+            kind: Kind::Tie
+        }
+    );
+}
+
+#[test]
+fn a_stranger_is_one_beyond_the_radius_and_not_at_it() {
+    let examples = [Example::new([10], 0)];
+    let kind = |radius| classify::<1, 1>(&examples, &[13], 1, radius).unwrap().kind;
+    assert_eq!(kind(9), Kind::Known);
+    assert_eq!(kind(8), Kind::Stranger);
+}
+
+#[test]
+fn the_farthest_of_258_features_is_still_a_neighbour() {
+    let examples = [Example::new([255; 258], 0)];
+    let answer: Answer<1> = classify(&examples, &[0; 258], 1, u32::MAX).unwrap();
+    assert_eq!(answer.nearest, 258 * 255 * 255);
+}
+
+#[test]
+fn what_cannot_be_answered_is_an_error_and_not_a_class() {
+    let one = [Example::new([1], 0)];
+    assert_eq!(classify::<1, 2>(&one, &[1], 0, 0), Err(ClassifyError::KOutOfRange));
+    assert_eq!(classify::<1, 2>(&one, &[1], 16, 0), Err(ClassifyError::KOutOfRange));
+    assert_eq!(classify::<1, 2>(&one, &[1], 2, 0), Err(ClassifyError::TooFewExamples));
+    assert_eq!(classify::<1, 2>(&one[..0], &[1], 1, 0), Err(ClassifyError::NoExamples));
+    let erased = [Example::new([1], 255)];
+    assert_eq!(
+        classify::<1, 2>(&(&one, &erased), &[1], 1, 0),
+        Err(ClassifyError::UnknownLabel)
+    );
+}

@@ -1,0 +1,74 @@
+//! What a scale promises for every `i32`: it saturates, keeps order, and makes features comparable.
+
+use knn::{Range, Scale};
+use proptest::prelude::*;
+
+fn value() -> impl Strategy<Value = i32> {
+    prop_oneof![-600_i32..600, any::<i32>(), Just(i32::MIN), Just(i32::MAX)]
+}
+
+proptest! {
+    #[test]
+    fn a_larger_value_is_never_a_smaller_byte(lowest in value(), highest in value(), left in value(), right in value()) {
+        let scale = Scale::new([Range { lowest, highest }]);
+        let [smaller] = scale.quantise(&[left.min(right)]);
+        let [larger] = scale.quantise(&[left.max(right)]);
+        prop_assert!(smaller <= larger);
+    }
+
+    #[test]
+    fn outside_its_range_a_value_saturates(lowest in value(), highest in value(), value in value()) {
+        prop_assume!(lowest < highest);
+        let [byte] = Scale::new([Range { lowest, highest }]).quantise(&[value]);
+        if value <= lowest {
+            prop_assert_eq!(byte, 0);
+        }
+        if value >= highest {
+            prop_assert_eq!(byte, 255);
+        }
+    }
+
+    #[test]
+    fn inside_its_range_a_value_is_within_two_of_the_exact_byte(lowest in value(), highest in value(), part in 0.0..1.0) {
+        prop_assume!(lowest < highest);
+        let width = f64::from(highest) - f64::from(lowest);
+        let value = (f64::from(lowest) + part * width) as i32;
+        let exact = (f64::from(value) - f64::from(lowest)) / width * 255.0;
+        let [byte] = Scale::new([Range { lowest, highest }]).quantise(&[value]);
+        prop_assert!((f64::from(byte) - exact).abs() <= 2.0, "{byte} is not {exact}");
+    }
+
+    #[test]
+    fn a_learned_scale_gives_every_feature_the_same_weight(
+        rows in proptest::collection::vec([-500_000_000..500_000_000, -1000..1000, 0..100_i32], 2..40),
+    ) {
+        let scale = Scale::learn(&rows).expect("there are rows");
+        for feature in 0..3 {
+            let smallest = *rows.iter().min_by_key(|row| row[feature]).expect("there are rows");
+            let largest = *rows.iter().max_by_key(|row| row[feature]).expect("there are rows");
+            prop_assume!(largest[feature] - smallest[feature] >= 50);
+            let spread = scale.quantise(&largest)[feature] - scale.quantise(&smallest)[feature];
+            prop_assert!((124..=130).contains(&spread), "feature {feature} spreads over {spread}");
+        }
+    }
+}
+
+#[test]
+fn a_feature_that_never_changes_tells_nothing() {
+    let scale = Scale::learn(&[[7, 1], [7, 2]]).unwrap();
+    assert_eq!([-1000, 7, 1000].map(|value| scale.quantise(&[value, 1])[0]), [0; 3]);
+}
+
+#[test]
+fn even_two_neighbouring_values_keep_room_for_strangers() {
+    let scale = Scale::learn(&[[0], [1]]).unwrap();
+    assert_eq!(
+        [-1, 0, 1, 2].map(|value| scale.quantise(&[value])[0]),
+        [0, 85, 170, 255]
+    );
+}
+
+#[test]
+fn nothing_is_learned_from_no_rows() {
+    assert_eq!(Scale::<2>::learn(&[]), None);
+}
