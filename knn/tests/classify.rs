@@ -3,9 +3,10 @@
 //! Features come from few values, or from the extremes, as often as from all bytes: level distances, on which the rules
 //! for ties rest, are then common.
 
-use knn::{Answer, ClassifyError, Example, Examples, Kind, MAX_K, Table, classify};
+use knn::{Answer, ClassifyError, Example, Examples, Kind, MAX_K, Scale, Table, classify};
 use proptest::prelude::*;
 use smartcore::{
+    dataset::iris,
     linalg::basic::matrix::DenseMatrix,
     metrics::distance::Distances,
     neighbors::knn_classifier::{KNNClassifier, KNNClassifierParameters},
@@ -146,8 +147,8 @@ impl<const FEATURES: usize> Examples<FEATURES> for OneByOne<'_, FEATURES> {
 }
 
 /// smartcore's class for `query`.
-fn smartcore_class(examples: &[Example<5>], query: &[u8; 5], k: u8) -> u32 {
-    let floats = |features: &[u8; 5]| features.iter().copied().map(f64::from).collect::<Vec<_>>();
+fn smartcore_class<const FEATURES: usize>(examples: &[Example<FEATURES>], query: &[u8; FEATURES], k: u8) -> u32 {
+    let floats = |features: &[u8; FEATURES]| features.iter().copied().map(f64::from).collect::<Vec<_>>();
     let rows: Vec<Vec<f64>> = examples.iter().map(|example| floats(&example.features)).collect();
     let labels: Vec<u32> = examples.iter().map(|example| u32::from(example.label)).collect();
     let rows = DenseMatrix::from_2d_vec(&rows).expect("rows of one length");
@@ -155,9 +156,42 @@ fn smartcore_class(examples: &[Example<5>], query: &[u8; 5], k: u8) -> u32 {
         .with_k(usize::from(k))
         .with_distance(Distances::euclidian::<f64>());
     let classifier = KNNClassifier::fit(&rows, &labels, parameters).expect("rows and labels match");
-    classifier
-        .predict(&DenseMatrix::from_2d_vec(&vec![floats(query)]).expect("one row"))
-        .expect("five columns")[0]
+    let query = DenseMatrix::from_2d_vec(&vec![floats(query)]).expect("one row");
+    classifier.predict(&query).expect("as many columns as the rows")[0]
+}
+
+#[test]
+fn on_fishers_irises_smartcore_gives_the_same_classes_and_few_are_wrong() {
+    let irises = iris::load_dataset();
+    let rows: Vec<[i32; 4]> = irises
+        .data
+        .chunks_exact(4)
+        .map(|row| std::array::from_fn(|feature| (f64::from(row[feature]) * 10.0).round() as i32))
+        .collect();
+    let scale = Scale::learn(&rows).expect("there are rows");
+    let examples: Vec<Example<4>> = rows
+        .iter()
+        .zip(&irises.target)
+        .map(|(row, &label)| Example::new(scale.quantise(row), label as u8))
+        .collect();
+    assert_eq!(examples.len(), 150);
+    let mut compared = 0;
+    let mut wrong = 0;
+    for left_out in 0..examples.len() {
+        let mut others = examples.clone();
+        let query = others.remove(left_out);
+        let answer: Answer<3> = classify(others.as_slice(), &query.features, 5, u32::MAX).unwrap();
+        if answer.kind == Kind::Known && answer.votes.iter().sum::<usize>() == 5 {
+            assert_eq!(u32::from(answer.label), smartcore_class(&others, &query.features, 5));
+            compared += 1;
+        }
+        wrong += usize::from(answer.label != query.label);
+    }
+    assert!(
+        compared > 100,
+        "{compared} of 150 had neither a tie nor level neighbours"
+    );
+    assert!(wrong <= 9, "{wrong} of 150 irises were taken for another kind");
 }
 
 proptest! {
