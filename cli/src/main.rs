@@ -1,1 +1,62 @@
-fn main(){}
+//! The `weeder` command: tries the firmware on a simulated field, and puts it on an Arduino Uno.
+//!
+//! `weeder sim` ends with status 0 where no plant was damaged and 1 where one was; whatever else goes wrong, here and in
+//! the other commands, ends with status 2 and a message that says what would be right.
+
+mod flash;
+mod progress;
+mod sim;
+
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+
+/// Tries the intra-row weeder's firmware on a simulated field, and puts it on an Arduino Uno.
+#[derive(Parser)]
+#[command(name = "weeder", version, disable_help_subcommand = true)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Weed a simulated row with the real firmware on a virtual Uno, and say how it went.
+    Sim(Box<sim::Arguments>),
+    /// Build the firmware and put it on the Uno at a USB port.
+    Flash(flash::Arguments),
+}
+
+/// Whether the plants are alive.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Harm {
+    /// No plant was damaged.
+    None,
+    /// At least one was.
+    Done,
+}
+
+fn main() -> ExitCode {
+    let result = match Arguments::parse().command {
+        Command::Sim(arguments) => sim::run(&arguments),
+        Command::Flash(arguments) => flash::run(&arguments).map(|()| Harm::None),
+    };
+    match result {
+        Ok(Harm::None) => ExitCode::SUCCESS,
+        Ok(Harm::Done) => ExitCode::from(1),
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_arguments_are_well_formed() {
+        Arguments::command().debug_assert();
+    }
+}

@@ -90,10 +90,23 @@ impl Machine {
         stroke.times_below_s(self.line_degrees(), during_s)
     }
 
+    /// The beam's level at power-up, before the motion begins.
+    pub fn beam_before(&self, row: &Row, motion: &Motion) -> PinChange {
+        let broken = row
+            .things()
+            .iter()
+            .flat_map(|thing| thing.blocks_mm())
+            .any(|block| block.contains(&motion.start_mm()));
+        PinChange {
+            cycle: 0,
+            pin: Pin::Beam,
+            high: !broken,
+        }
+    }
+
     /// What the encoder and the beam do to their pins while the machine rolls past the row, in order of time.
     ///
-    /// The motion begins at `start_cycle`; the encoder begins at rest, and the beam has the level that belongs to the motion's
-    /// beginning from power-up on.
+    /// The motion begins at `start_cycle`, with the encoder at rest and the beam as [`Machine::beam_before`] says.
     pub fn pin_changes(&self, row: &Row, motion: &Motion, start_cycle: u64) -> Vec<PinChange> {
         let mut changes = self.encoder_changes(motion, start_cycle);
         changes.extend(self.beam_changes(row, motion, start_cycle));
@@ -132,7 +145,6 @@ impl Machine {
     fn beam_changes(&self, row: &Row, motion: &Motion, start_cycle: u64) -> Vec<PinChange> {
         let response_s = self.beam_response_ms / 1000.0;
         let blocks: Vec<Range<f64>> = row.things().iter().flat_map(|thing| thing.blocks_mm()).collect();
-        let blocked_at_start = blocks.iter().any(|block| block.contains(&motion.start_mm()));
 
         // Each end of a leaf that is passed toggles the beam, in whatever direction.
         let mut toggles_s: Vec<f64> = blocks
@@ -153,17 +165,16 @@ impl Machine {
             }
         }
 
-        let first = PinChange {
-            cycle: 0,
-            pin: Pin::Beam,
-            high: !blocked_at_start,
-        };
-        let toggled = reported_s.into_iter().enumerate().map(|(index, time_s)| PinChange {
-            cycle: cycle_at(start_cycle, time_s + response_s),
-            pin: Pin::Beam,
-            high: blocked_at_start == (index % 2 == 0),
-        });
-        std::iter::once(first).chain(toggled).collect()
+        let high_before = self.beam_before(row, motion).high;
+        reported_s
+            .into_iter()
+            .enumerate()
+            .map(|(index, time_s)| PinChange {
+                cycle: cycle_at(start_cycle, time_s + response_s),
+                pin: Pin::Beam,
+                high: high_before == (index % 2 == 1),
+            })
+            .collect()
     }
 }
 
@@ -254,8 +265,8 @@ mod tests {
         let motion = Motion::steady(0.0, 1000.0, mm_s(2.0), 1200.0);
         let beam = beam(&Machine::default().pin_changes(&row(), &motion, START_CYCLE));
         let levels: Vec<bool> = beam.iter().map(|change| change.high).collect();
-        assert_eq!(levels, [true, false, true, false, true]);
-        for (change, place_mm) in beam[1..].iter().zip([425.0, 575.0, 792.5, 807.5]) {
+        assert_eq!(levels, [false, true, false, true]);
+        for (change, place_mm) in beam.iter().zip([425.0, 575.0, 792.5, 807.5]) {
             let time_s = time_at_s(START_CYCLE, change.cycle) - 0.001;
             assert!((motion.position_mm(time_s) - place_mm).abs() < 0.001, "{place_mm} mm");
         }
@@ -264,9 +275,10 @@ mod tests {
     #[test]
     fn a_beam_that_is_broken_at_the_start_is_low_from_power_up_on() {
         let motion = Motion::steady(500.0, 1000.0, mm_s(2.0), 700.0);
-        let beam = beam(&Machine::default().pin_changes(&row(), &motion, START_CYCLE));
-        let levels: Vec<bool> = beam.iter().map(|change| change.high).collect();
-        assert_eq!(levels, [false, true]);
+        let machine = Machine::default();
+        let beam = beam(&machine.pin_changes(&row(), &motion, START_CYCLE));
+        assert!(!machine.beam_before(&row(), &motion).high);
+        assert!(beam.len() == 1 && beam[0].high);
     }
 
     #[test]
@@ -277,7 +289,7 @@ mod tests {
         let row = Row::new(vec![plant]).unwrap();
         let motion = Motion::steady(0.0, 1000.0, mm_s(1.0), 1000.0);
         let beam = beam(&Machine::default().pin_changes(&row, &motion, START_CYCLE));
-        assert_eq!(beam.len(), 5, "one gap of two, and the level at power-up");
+        assert_eq!(beam.len(), 4, "the plant and one gap of two");
     }
 
     #[test]

@@ -1,0 +1,148 @@
+//! The firmware's console, as a patient operator uses it: one command, then all of its answer.
+//!
+//! The firmware answers a command by its lines and then exactly one `ok` or `error: ...` (the README's console chapter).
+
+use crate::uno::{Uno, UnoError};
+use thiserror::Error;
+
+/// Longest time that an answer may take. `help` and `get` write some thousand characters in a tenth of a second.
+const TIMEOUT_MS: u64 = 1000;
+
+/// Why a command had no good answer.
+#[derive(Debug, Error)]
+pub enum ConsoleError {
+    /// The virtual Uno stopped.
+    #[error(transparent)]
+    Uno(#[from] UnoError),
+    /// The firmware refused.
+    #[error("the firmware answers `{command}` by `{answer}`")]
+    Refused {
+        /// The command.
+        command: String,
+        /// The line that begins with `error:`.
+        answer: String,
+    },
+    /// The firmware went silent.
+    #[error("the firmware does not finish its answer to `{command}`: it sent {received:?}")]
+    Silent {
+        /// The command.
+        command: String,
+        /// What came.
+        received: String,
+    },
+    /// A status line without a figure that it should have.
+    #[error("the firmware's status has no `{key}=`: {line:?}")]
+    Status {
+        /// The missing key.
+        key: &'static str,
+        /// The line.
+        line: String,
+    },
+}
+
+/// Types a command and returns the lines of its answer, the `ok` left out.
+///
+/// The Uno's clock runs until the answer is complete. What the firmware had sent before is dropped.
+///
+/// # Errors
+/// Where the firmware refuses, goes silent or stops.
+pub fn ask(uno: &mut Uno, command: &str) -> Result<Vec<String>, ConsoleError> {
+    uno.received();
+    uno.send(format!("{command}\n").as_bytes());
+    let mut received = String::new();
+    for _ in 0..TIMEOUT_MS {
+        uno.run_for_ms(1)?;
+        received += &uno.received();
+        // Only lines that are complete count.
+        let complete = received.rfind('\n').map_or("", |end| &received[..end]);
+        let mut lines: Vec<String> = complete.lines().map(str::to_owned).collect();
+        match lines.last().map(String::as_str) {
+            Some("ok") => {
+                lines.pop();
+                return Ok(lines);
+            }
+            Some(answer) if answer.starts_with("error") => {
+                return Err(ConsoleError::Refused {
+                    command: command.to_owned(),
+                    answer: answer.to_owned(),
+                });
+            }
+            _ => {}
+        }
+    }
+    Err(ConsoleError::Silent {
+        command: command.to_owned(),
+        received,
+    })
+}
+
+/// What the firmware says of itself on `status`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Status {
+    /// `hold`, `work` or `alarm`.
+    pub state: String,
+    /// Encoder counts, net, since power-up.
+    pub position_ticks: i64,
+    /// Encoder counts that the firmware knows to have lost.
+    pub lost_ticks: u64,
+}
+
+impl Status {
+    /// Asks for it.
+    ///
+    /// # Errors
+    /// As [`ask`], and where the answer lacks one of the figures.
+    pub fn ask(uno: &mut Uno) -> Result<Self, ConsoleError> {
+        Self::parse(&ask(uno, "status")?.join(" "))
+    }
+
+    fn parse(line: &str) -> Result<Self, ConsoleError> {
+        let value = |key: &'static str| {
+            line.split_whitespace()
+                .find_map(|word| word.strip_prefix(key)?.strip_prefix('='))
+                .ok_or(ConsoleError::Status {
+                    key,
+                    line: line.to_owned(),
+                })
+        };
+        let not_a_number = |key| ConsoleError::Status {
+            key,
+            line: line.to_owned(),
+        };
+        Ok(Self {
+            state: value("state")?.to_owned(),
+            position_ticks: value("pos")?.parse().map_err(|_| not_a_number("pos"))?,
+            lost_ticks: value("lost")?.parse().map_err(|_| not_a_number("lost"))?,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_status_line_is_read_by_its_keys() {
+        let status = Status::parse("state=work tool=in pos=-12 speed_mm_s=0 windows=0 lost=3 unseen_mm=0");
+        let expected = Status {
+            state: "work".to_owned(),
+            position_ticks: -12,
+            lost_ticks: 3,
+        };
+        assert_eq!(status.unwrap(), expected);
+    }
+
+    #[test]
+    fn a_status_line_without_a_figure_is_refused_by_its_name() {
+        let error = Status::parse("state=work pos=many lost=0").unwrap_err();
+        assert!(
+            error.to_string().starts_with("the firmware's status has no `pos=`"),
+            "{error}"
+        );
+        let error = Status::parse("state=work pos=1").unwrap_err();
+        assert!(
+            error.to_string().starts_with("the firmware's status has no `lost=`"),
+            "{error}"
+        );
+    }
+}

@@ -1,0 +1,207 @@
+//! A picture of the row along the ground: what stood there, what the beam saw, and where the tool was.
+//!
+//! The row is broken into lanes, to be read like lines of a text. The picture brings its own light background, so that it
+//! reads the same on a light page and on a dark one.
+
+use crate::row::{Kind, Thing};
+use crate::trial::{Outcome, Trial};
+use crate::verdict::Verdict;
+use std::ops::Range;
+use svg::Document;
+use svg::node::element::{ClipPath, Definitions, Ellipse, Group, Line, Polyline, Rectangle, Text};
+
+/// Ground in a lane, and the picture's pixels for a millimetre of it.
+const LANE_MM: f64 = 2500.0;
+const PIXELS_PER_MM: f64 = 0.4;
+
+const LANE_WIDTH: f64 = LANE_MM * PIXELS_PER_MM;
+const SIDE: f64 = 86.0;
+const HEAD: f64 = 58.0;
+const LANE_HEIGHT: f64 = 168.0;
+
+/// Heights within a lane, downwards.
+const CANOPY_Y: f64 = 30.0;
+const CANOPY_HALF_HEIGHT: f64 = 19.0;
+const BEAM_Y: f64 = 58.0;
+const TOOL_Y: f64 = 72.0;
+const TOOL_HEIGHT: f64 = 12.0;
+const IN_Y: f64 = 132.0;
+const OUT_Y: f64 = 96.0;
+const SCALE_Y: f64 = 140.0;
+
+const PAPER: &str = "#fbfaf6";
+const INK: &str = "#33312c";
+const PALE_INK: &str = "#8a857a";
+const PLANT: &str = "#4c9a50";
+const MARGIN_CUT: &str = "#e0a526";
+const DAMAGED: &str = "#cf3a32";
+const WEED: &str = "#a0672c";
+const BEAM: &str = "#6a6fb5";
+const WEEDED: &str = "#b99a72";
+const OUT: &str = "#dfe7ee";
+const CURVE: &str = "#2a6f97";
+
+/// Draws a trial's outcome.
+pub fn draw(trial: &Trial, outcome: &Outcome) -> Document {
+    let span = trial.row.span_mm();
+    let lanes = ((span.end - span.start) / LANE_MM).ceil().max(1.0) as usize;
+    let (width, height) = (LANE_WIDTH + 2.0 * SIDE, HEAD + lanes as f64 * LANE_HEIGHT + 8.0);
+    let clip = ClipPath::new()
+        .set("id", "lane")
+        .add(rectangle(0.0, 0.0, LANE_WIDTH, LANE_HEIGHT, "#000"));
+    let mut document = Document::new()
+        .set("viewBox", (0, 0, width.round() as i32, height.round() as i32))
+        .set("font-family", "system-ui, sans-serif")
+        .set("font-size", 12)
+        .add(Definitions::new().add(clip))
+        .add(rectangle(0.0, 0.0, width, height, PAPER).set("rx", 10))
+        .add(legend());
+    for lane in 0..lanes {
+        let start_mm = span.start + lane as f64 * LANE_MM;
+        let ground = start_mm..(start_mm + LANE_MM).min(span.end);
+        let top = HEAD + lane as f64 * LANE_HEIGHT;
+        document =
+            document.add(draw_lane(trial, outcome, &ground).set("transform", format!("translate({SIDE} {top})")));
+    }
+    document
+}
+
+/// The part of the row in a lane, in a coordinate system that begins at its left end.
+fn draw_lane(trial: &Trial, outcome: &Outcome, ground: &Range<f64>) -> Group {
+    let x = |place_mm: f64| (place_mm - ground.start) * PIXELS_PER_MM;
+    let is_here = |stretch: &Range<f64>| stretch.start < ground.end && ground.start < stretch.end;
+    let length = x(ground.end);
+
+    let mut drawn = Group::new().set("clip-path", "url(#lane)");
+    drawn = drawn.add(rectangle(0.0, TOOL_Y, length, TOOL_HEIGHT, WEEDED));
+    for clear in outcome.judgement.clear_mm.iter().filter(|clear| is_here(clear)) {
+        let (from, to) = (clear.start.max(ground.start), clear.end.min(ground.end));
+        drawn = drawn.add(rectangle(x(from), TOOL_Y, x(to) - x(from), TOOL_HEIGHT, OUT));
+    }
+    for thing in trial.row.things().iter().filter(|thing| is_here(&thing.span_mm())) {
+        for block in thing.blocks_mm() {
+            let width = (x(block.end) - x(block.start)).max(2.0);
+            drawn = drawn.add(rectangle(x(block.start), BEAM_Y, width, 4.0, BEAM));
+        }
+        if thing.kind == Kind::Weed {
+            drawn = drawn.add(weed(x(thing.position_mm)));
+        }
+    }
+    for plant in outcome
+        .judgement
+        .plants
+        .iter()
+        .filter(|plant| is_here(&plant.plant.span_mm()))
+    {
+        drawn = drawn.add(canopy(&plant.plant, x(plant.plant.position_mm), plant.verdict));
+    }
+    let points: Vec<String> = outcome
+        .judgement
+        .path
+        .iter()
+        .map(|&(place_mm, degrees)| format!("{:.1},{:.1}", x(place_mm), angle_y(degrees)))
+        .collect();
+    drawn = drawn.add(
+        Polyline::new()
+            .set("points", points.join(" "))
+            .set("fill", "none")
+            .set("stroke", CURVE)
+            .set("stroke-width", 1.6)
+            .set("stroke-linejoin", "round"),
+    );
+
+    Group::new()
+        .add(words(-8.0, BEAM_Y + 6.0, "beam", PALE_INK).set("text-anchor", "end"))
+        .add(words(-8.0, TOOL_Y + 10.0, "tool", PALE_INK).set("text-anchor", "end"))
+        .add(words(-8.0, OUT_Y + 4.0, "out 45°", PALE_INK).set("text-anchor", "end"))
+        .add(words(-8.0, IN_Y + 4.0, "in 0°", PALE_INK).set("text-anchor", "end"))
+        .add(drawn)
+        .add(scale(ground))
+}
+
+fn canopy(plant: &Thing, x: f64, verdict: Verdict) -> Ellipse {
+    let colour = match verdict {
+        Verdict::Kept => PLANT,
+        Verdict::MarginCut => MARGIN_CUT,
+        Verdict::Damaged => DAMAGED,
+    };
+    Ellipse::new()
+        .set("cx", tenth(x))
+        .set("cy", CANOPY_Y)
+        .set("rx", tenth(plant.width_mm / 2.0 * PIXELS_PER_MM))
+        .set("ry", CANOPY_HALF_HEIGHT)
+        .set("fill", colour)
+}
+
+fn weed(x: f64) -> Line {
+    line(x, CANOPY_Y - 10.0, x, CANOPY_Y + CANOPY_HALF_HEIGHT, WEED).set("stroke-width", 4)
+}
+
+/// The ground with a mark every half metre.
+fn scale(ground: &Range<f64>) -> Group {
+    const STEP_MM: f64 = 500.0;
+    let end = (ground.end - ground.start) * PIXELS_PER_MM;
+    let mut scale = Group::new().add(line(0.0, SCALE_Y, end, SCALE_Y, PALE_INK));
+    let first = (ground.start / STEP_MM).ceil() as i64;
+    let last = (ground.end / STEP_MM).floor() as i64;
+    for mark in first..=last {
+        let place_mm = mark as f64 * STEP_MM;
+        let x = (place_mm - ground.start) * PIXELS_PER_MM;
+        scale = scale.add(line(x, SCALE_Y, x, SCALE_Y + 4.0, PALE_INK)).add(
+            words(x, SCALE_Y + 16.0, &format!("{:.1} m", place_mm / 1000.0), PALE_INK).set("text-anchor", "middle"),
+        );
+    }
+    scale
+}
+
+fn legend() -> Group {
+    let entries = [
+        (PLANT, "plant kept"),
+        (MARGIN_CUT, "margin cut"),
+        (DAMAGED, "plant damaged"),
+        (WEED, "tall weed"),
+        (BEAM, "beam broken"),
+        (WEEDED, "tool in the row or swinging"),
+        (OUT, "tool clear of the row"),
+        (CURVE, "tool's angle"),
+    ];
+    let mut legend = Group::new();
+    let mut x = SIDE;
+    for (colour, meaning) in entries {
+        legend = legend
+            .add(rectangle(x, 22.0, 12.0, 12.0, colour).set("rx", 2))
+            .add(words(x + 17.0, 32.0, meaning, INK));
+        x += 42.0 + 6.4 * meaning.len() as f64;
+    }
+    legend
+}
+
+fn angle_y(degrees: f64) -> f64 {
+    IN_Y + (OUT_Y - IN_Y) * degrees / crate::servo::OUT_DEGREES
+}
+
+fn tenth(value: f64) -> f64 {
+    (value * 10.0).round() / 10.0
+}
+
+fn rectangle(x: f64, y: f64, width: f64, height: f64, fill: &str) -> Rectangle {
+    Rectangle::new()
+        .set("x", tenth(x))
+        .set("y", tenth(y))
+        .set("width", tenth(width))
+        .set("height", tenth(height))
+        .set("fill", fill)
+}
+
+fn line(x1: f64, y1: f64, x2: f64, y2: f64, stroke: &str) -> Line {
+    Line::new()
+        .set("x1", tenth(x1))
+        .set("y1", tenth(y1))
+        .set("x2", tenth(x2))
+        .set("y2", tenth(y2))
+        .set("stroke", stroke)
+}
+
+fn words(x: f64, y: f64, words: &str, fill: &str) -> Text {
+    Text::new(words).set("x", tenth(x)).set("y", tenth(y)).set("fill", fill)
+}

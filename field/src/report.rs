@@ -1,0 +1,252 @@
+//! A trial's outcome for people: a table with a line per plant, the totals in plain words, and CSV tables.
+//!
+//! The picture of the row is in [`crate::picture`].
+
+use crate::firmware::Size;
+use crate::machine::Machine;
+use crate::motion::Motion;
+use crate::row::Row;
+use crate::trial::{Outcome, Trial};
+use crate::verdict::{PlantOutcome, Verdict};
+use comfy_table::{Attribute, Cell, CellAlignment, Color, Table, presets};
+use serde::Serialize;
+use std::fmt::Write;
+use std::io;
+
+/// Width that the machine weeds with its inter-row tools (the paper's chapter on the tines: 40 cm).
+const WORKING_WIDTH_MM: f64 = 400.0;
+
+/// Flash that the bootloader leaves, and SRAM, of the ATmega328P (its data sheet, section 8).
+const FLASH_BYTES: u64 = 32_768 - 512;
+const SRAM_BYTES: u64 = 2048;
+
+/// One line per plant: where it stood, where the tool was clear of the row and where it came back, and the verdict.
+pub fn table(outcome: &Outcome) -> Table {
+    let mut table = Table::new();
+    table.load_style(presets::UTF8_BORDERS_ONLY).set_header([
+        "plant",
+        "place\nmm",
+        "canopy\nmm",
+        "tool clear\nfrom mm",
+        "tool clear\nto mm",
+        "clearance\nbefore mm",
+        "clearance\nbehind mm",
+        "out late\nticks",
+        "in late\nticks",
+        "swings",
+        "verdict",
+    ]);
+    for (index, plant) in outcome.judgement.plants.iter().enumerate() {
+        let whole = |value: Option<f64>, none: &str| value.map_or(none.to_owned(), |value| format!("{value:.0}"));
+        let tenths = |value: Option<f64>| value.map_or("shared".to_owned(), |value| format!("{value:+.1}"));
+        table.add_row([
+            Cell::new(index + 1),
+            Cell::new(format!("{:.0}", plant.plant.position_mm)),
+            Cell::new(format!("{:.0}", plant.plant.width_mm)),
+            Cell::new(whole(plant.clear_mm(), "start")),
+            Cell::new(whole(plant.back_mm(), "end")),
+            Cell::new(whole(plant.clearance_before_mm, "-")),
+            Cell::new(whole(plant.clearance_behind_mm, "-")),
+            Cell::new(tenths(plant.out_error_ticks)),
+            Cell::new(tenths(plant.in_error_ticks)),
+            Cell::new(plant.swings),
+            verdict_cell(plant.verdict),
+        ]);
+    }
+    let columns = table.column_iter_mut();
+    for column in columns.take(10) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    table
+}
+
+fn verdict_cell(verdict: Verdict) -> Cell {
+    let cell = Cell::new(verdict);
+    match verdict {
+        Verdict::Kept => cell.fg(Color::Green),
+        Verdict::MarginCut => cell.fg(Color::Yellow),
+        Verdict::Damaged => cell.fg(Color::Red).add_attribute(Attribute::Bold),
+    }
+}
+
+/// The totals, a paragraph in plain words.
+pub fn totals(trial: &Trial, outcome: &Outcome) -> String {
+    let Outcome { judgement, status, .. } = outcome;
+    let plants = judgement.plants.len();
+    let mut text = String::new();
+    // Writing to a String cannot fail.
+    let mut line = |label: &str, words: String| {
+        let _ = writeln!(text, "{label:<12}{words}");
+    };
+
+    line(
+        "Plants",
+        format!(
+            "{plants}: {} damaged, {} with the margin cut, {} kept",
+            judgement.count(Verdict::Damaged),
+            judgement.count(Verdict::MarginCut),
+            judgement.count(Verdict::Kept),
+        ),
+    );
+    if judgement.idle_swings > 0 {
+        line(
+            "",
+            format!("the tool swung out {} times for no plant", judgement.idle_swings),
+        );
+    }
+    if !judgement.weeds.is_empty() {
+        let cut = judgement.weeds.iter().filter(|weed| weed.cut).count();
+        let left = match judgement.weeds.len() - cut {
+            0 => String::new(),
+            left => format!("; the tool was aside over the other {left}"),
+        };
+        line("Tall weeds", format!("{cut} of {} cut{left}", judgement.weeds.len()));
+    }
+    let span = trial.row.span_mm();
+    line(
+        "Row weeded",
+        format!(
+            "{:.1} % of the row's {:.2} m; {:.1} % is the most this servo allows here",
+            judgement.weeded_share * 100.0,
+            (span.end - span.start) / 1000.0,
+            judgement.weedable_share * 100.0,
+        ),
+    );
+    line(
+        "",
+        format!(
+            "({:.1} % of the {WORKING_WIDTH_MM:.0} mm strip that the inter-row tools weed along with it)",
+            strip_share(&trial.machine, judgement.weeded_share) * 100.0,
+        ),
+    );
+    line("Swings", swing_words(&judgement.plants, &trial.machine));
+    line("Encoder", count_words(outcome));
+    if status.state != "work" {
+        line("Firmware", format!("ended in `{}`, not at work", status.state));
+    }
+    let Size { flash, sram } = outcome.size;
+    line(
+        "Memory",
+        format!("{flash} of {FLASH_BYTES} bytes of flash, {sram} of {SRAM_BYTES} bytes of SRAM"),
+    );
+    text
+}
+
+/// The share weeded of the whole strip, as weeds were counted in the paper: all that is beside the row, and of the tool's
+/// own width what it weeded.
+fn strip_share(machine: &Machine, weeded_share: f64) -> f64 {
+    1.0 - (1.0 - weeded_share) * machine.tool_width_mm / WORKING_WIDTH_MM
+}
+
+fn swing_words(plants: &[PlantOutcome], machine: &Machine) -> String {
+    let errors: Vec<f64> = plants
+        .iter()
+        .flat_map(|plant| [plant.out_error_ticks, plant.in_error_ticks])
+        .flatten()
+        .map(f64::abs)
+        .collect();
+    if errors.is_empty() {
+        return "none was commanded for a plant".to_owned();
+    }
+    let worst = errors.iter().copied().fold(0.0, f64::max);
+    let mean = errors.iter().sum::<f64>() / errors.len() as f64;
+    format!(
+        "{} commands, off their ideal place by {mean:.1} ticks ({:.1} mm) in the mean, {worst:.1} ticks ({:.1} mm) at worst",
+        errors.len(),
+        mean * machine.tick_mm(),
+        worst * machine.tick_mm(),
+    )
+}
+
+fn count_words(outcome: &Outcome) -> String {
+    let off = outcome.status.position_ticks - outcome.true_ticks;
+    let place = match off {
+        0 => "exactly where the machine is".to_owned(),
+        off => format!("{off:+} from where the machine is"),
+    };
+    format!(
+        "position {} ticks, {place}; {} counts lost",
+        outcome.status.position_ticks, outcome.status.lost_ticks
+    )
+}
+
+/// A line of the plants' CSV table.
+#[derive(Serialize)]
+struct PlantRecord {
+    position_mm: f64,
+    width_mm: f64,
+    clear_from_mm: Option<f64>,
+    clear_to_mm: Option<f64>,
+    clearance_before_mm: Option<f64>,
+    clearance_behind_mm: Option<f64>,
+    out_error_ticks: Option<f64>,
+    in_error_ticks: Option<f64>,
+    swings: usize,
+    verdict: &'static str,
+}
+
+/// A line of the weeds' CSV table.
+#[derive(Serialize)]
+struct WeedRecord {
+    position_mm: f64,
+    width_mm: f64,
+    cut: bool,
+}
+
+/// Writes a CSV table with a line per plant. An empty field is what [`PlantOutcome`] calls `None`.
+///
+/// # Errors
+/// Those of the writer.
+pub fn write_plants_csv(outcome: &Outcome, to: impl io::Write) -> Result<(), csv::Error> {
+    let mut writer = csv::Writer::from_writer(to);
+    for plant in &outcome.judgement.plants {
+        writer.serialize(PlantRecord {
+            position_mm: plant.plant.position_mm,
+            width_mm: plant.plant.width_mm,
+            clear_from_mm: plant.clear_mm(),
+            clear_to_mm: plant.back_mm(),
+            clearance_before_mm: plant.clearance_before_mm,
+            clearance_behind_mm: plant.clearance_behind_mm,
+            out_error_ticks: plant.out_error_ticks,
+            in_error_ticks: plant.in_error_ticks,
+            swings: plant.swings,
+            verdict: match plant.verdict {
+                Verdict::Kept => "kept",
+                Verdict::MarginCut => "margin_cut",
+                Verdict::Damaged => "damaged",
+            },
+        })?;
+    }
+    writer.flush()?;
+    Ok(())
+}
+
+/// Writes a CSV table with a line per tall weed.
+///
+/// # Errors
+/// Those of the writer.
+pub fn write_weeds_csv(outcome: &Outcome, to: impl io::Write) -> Result<(), csv::Error> {
+    let mut writer = csv::Writer::from_writer(to);
+    for weed in &outcome.judgement.weeds {
+        writer.serialize(WeedRecord {
+            position_mm: weed.weed.position_mm,
+            width_mm: weed.weed.width_mm,
+            cut: weed.cut,
+        })?;
+    }
+    writer.flush()?;
+    Ok(())
+}
+
+/// What is about to be tried, in a line.
+pub fn introduction(row: &Row, machine: &Machine, motion: &Motion) -> String {
+    let span = row.span_mm();
+    format!(
+        "{} plants and {} tall weeds on {:.2} m of row, beam {:.0} mm ahead of the tool, {:.0} s on the field",
+        row.plants().count(),
+        row.weeds().count(),
+        (span.end - span.start) / 1000.0,
+        machine.beam_to_tool_mm,
+        motion.duration_s(),
+    )
+}

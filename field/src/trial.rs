@@ -1,0 +1,220 @@
+//! A trial: the real firmware in the virtual Uno weeds a row.
+//!
+//! The machine's motion does not depend on the firmware, so a trial runs in one direction: motion and row give the levels
+//! on the firmware's inputs, the virtual Uno plays them, and its servo pulses tell what happened to the row
+//! ([`crate::verdict`]). Before that the firmware is set up over its console, as an operator would: settings, then the
+//! start.
+
+use crate::console::{ConsoleError, Status, ask};
+use crate::firmware::Size;
+use crate::machine::Machine;
+use crate::motion::Motion;
+use crate::row::Row;
+use crate::signal::{CYCLES_PER_SECOND, Pin, PinChange, Pulse};
+use crate::uno::{Uno, UnoError};
+use crate::verdict::{Judgement, Timing, judge};
+use std::path::Path;
+use thiserror::Error;
+
+/// How the firmware is put to work.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Start {
+    /// By the command `start`: the tool enters the row when ground that the beam has seen reaches it.
+    Command,
+    /// By the command `start now`: the tool enters the row at once.
+    Now,
+    /// By the work switch, from high to low.
+    Switch,
+}
+
+/// Everything that makes a trial.
+#[derive(Clone, Debug)]
+pub struct Trial {
+    /// What stands in the row.
+    pub row: Row,
+    /// The machine.
+    pub machine: Machine,
+    /// How it rolls.
+    pub motion: Motion,
+    /// Margin and leads that the firmware is set to.
+    pub timing: Timing,
+    /// How the firmware is put to work.
+    pub start: Start,
+}
+
+/// Why a trial had no outcome.
+#[derive(Debug, Error)]
+pub enum TrialError {
+    /// The virtual Uno stopped.
+    #[error(transparent)]
+    Uno(#[from] UnoError),
+    /// The firmware's console did not answer as it should.
+    #[error(transparent)]
+    Console(#[from] ConsoleError),
+    /// The firmware started anew on the way.
+    #[error("the firmware restarted {0} times during the trial, so that its position means nothing")]
+    Restarted(usize),
+}
+
+/// What came of a trial.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// What happened to the row.
+    pub judgement: Judgement,
+    /// What the firmware said at the end.
+    pub status: Status,
+    /// Encoder counts, net, that a perfect counter would have at the end.
+    pub true_ticks: i64,
+    /// Memory that the firmware takes.
+    pub size: Size,
+    /// The servo's pulses.
+    pub pulses: Vec<Pulse>,
+    /// Every level on every pin, inputs first.
+    pub changes: Vec<PinChange>,
+    /// The cycle at which the motion began.
+    pub start_cycle: u64,
+}
+
+/// Distance that the machine rolls ahead of the row, so that it has its speed and the tool is in the row when the row
+/// begins; and the time in which it has to swing in, which adds to it at speed.
+const RUN_UP_MM: f64 = 200.0;
+const SWING_IN_S: f64 = 0.6;
+
+/// How fast the machine gains its speed.
+const ACCELERATION_MM_S2: f64 = 1000.0;
+
+/// Distance that the tool rolls on behind the row.
+const RUN_OUT_MM: f64 = 100.0;
+
+/// Longest time that the firmware takes from power-up to its first line, a bootloader's wait included.
+const BOOT_CYCLES: u64 = 3 * CYCLES_PER_SECOND;
+
+/// Time for the firmware to see that a switch has stopped bouncing.
+const SWITCH_MS: u64 = 100;
+
+/// Time between the start and the first movement, and between the last one and the final question.
+const STILL_MS: u64 = 50;
+
+/// Simulated time between two reports of progress.
+const PROGRESS_CYCLES: u64 = CYCLES_PER_SECOND / 20;
+
+/// Powers up the firmware with these levels on its inputs, and waits for the line by which it says that it is there.
+///
+/// # Errors
+/// Where the ELF cannot be run, or no line comes.
+pub fn boot(elf: &Path, levels: &[PinChange]) -> Result<Uno, UnoError> {
+    let mut uno = Uno::boot(elf)?;
+    for level in levels {
+        uno.set(level.pin, level.high);
+    }
+    uno.run_until_serial("\n", BOOT_CYCLES)?;
+    Ok(uno)
+}
+
+impl Trial {
+    /// The whole row at one speed, from standstill far enough ahead until the tool has passed its end.
+    pub fn at_speed(row: Row, machine: Machine, timing: Timing, speed_mm_s: f64) -> Self {
+        let span = row.span_mm();
+        let run_up_mm = RUN_UP_MM + SWING_IN_S * speed_mm_s + speed_mm_s.powi(2) / (2.0 * ACCELERATION_MM_S2);
+        let motion = Motion::steady(
+            span.start - run_up_mm,
+            ACCELERATION_MM_S2,
+            speed_mm_s,
+            span.end + machine.beam_to_tool_mm + RUN_OUT_MM,
+        );
+        Self {
+            row,
+            machine,
+            motion,
+            timing,
+            start: Start::Command,
+        }
+    }
+
+    /// Runs the firmware at `elf`. `progress` is told the share of the motion done, from 0 to 1.
+    ///
+    /// # Errors
+    /// Where the firmware cannot be run or does not answer.
+    pub fn run(&self, elf: &Path, mut progress: impl FnMut(f64)) -> Result<Outcome, TrialError> {
+        let mut inputs = vec![self.machine.beam_before(&self.row, &self.motion)];
+        let mut uno = boot(elf, &inputs)?;
+        for (name, value) in self.settings() {
+            ask(&mut uno, &format!("set {name} {value}"))?;
+        }
+        match self.start {
+            Start::Command => {
+                ask(&mut uno, "start")?;
+            }
+            Start::Now => {
+                ask(&mut uno, "start now")?;
+            }
+            Start::Switch => {
+                let work = PinChange {
+                    cycle: uno.cycle(),
+                    pin: Pin::WorkSwitch,
+                    high: false,
+                };
+                inputs.push(work);
+                uno.drive([work]);
+                uno.run_for_ms(SWITCH_MS)?;
+            }
+        }
+        uno.run_for_ms(STILL_MS)?;
+
+        let start_cycle = uno.cycle();
+        let rolling = self.machine.pin_changes(&self.row, &self.motion, start_cycle);
+        uno.drive(rolling.iter().copied());
+        inputs.extend(rolling);
+        let cycles = (self.motion.duration_s() * CYCLES_PER_SECOND as f64) as u64;
+        while uno.cycle() < start_cycle + cycles {
+            let next = (uno.cycle() + PROGRESS_CYCLES).min(start_cycle + cycles);
+            uno.run_until(next)?;
+            progress((uno.cycle() - start_cycle) as f64 / cycles as f64);
+        }
+        uno.run_for_ms(STILL_MS)?;
+        let status = Status::ask(&mut uno)?;
+        if !uno.resets().is_empty() {
+            return Err(TrialError::Restarted(uno.resets().len()));
+        }
+
+        let pulses = uno.servo_pulses();
+        inputs.extend_from_slice(uno.changes());
+        Ok(Outcome {
+            judgement: judge(
+                &self.row,
+                &self.machine,
+                &self.motion,
+                self.timing,
+                &pulses,
+                start_cycle,
+            ),
+            status,
+            true_ticks: self.machine.ticks(&self.motion, self.motion.duration_s()),
+            size: uno.size(),
+            pulses,
+            changes: inputs,
+            start_cycle,
+        })
+    }
+
+    /// The settings by which the firmware knows machine and timing.
+    fn settings(&self) -> [(&'static str, u32); 8] {
+        let Machine {
+            wheel_mm,
+            ticks_per_rev,
+            beam_to_tool_mm,
+            servo,
+            ..
+        } = self.machine;
+        [
+            ("ticks_per_rev", ticks_per_rev),
+            ("wheel_mm", wheel_mm.round() as u32),
+            ("beam_to_tool_mm", beam_to_tool_mm.round() as u32),
+            ("margin_mm", self.timing.margin_mm),
+            ("lead_out_ms", self.timing.lead_out_ms),
+            ("lead_in_ms", self.timing.lead_in_ms),
+            ("servo_in_us", servo.in_us.round() as u32),
+            ("servo_out_us", servo.out_us.round() as u32),
+        ]
+    }
+}
