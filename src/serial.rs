@@ -104,6 +104,12 @@ impl Write for Serial {
 impl ufmt::uWrite for Serial {
     type Error = Infallible;
 
+    fn write_char(&mut self, character: char) -> Result<(), Infallible> {
+        // The console speaks ASCII.
+        let _ = self.write(character as u8);
+        Ok(())
+    }
+
     fn write_str(&mut self, text: &str) -> Result<(), Infallible> {
         for byte in text.bytes() {
             let _ = self.write(byte);

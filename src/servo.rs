@@ -27,7 +27,7 @@ impl Servo {
     pub fn new(timer: TC1, port: &PORTB, width: HalfMicros) -> Self {
         // ICR1 before the mode: the counter never runs without a top.
         timer.icr1().write(|w| w.set(FRAME - 1));
-        timer.ocr1a().write(|w| w.set(width));
+        timer.ocr1a().write(|w| w.set(compare(width)));
         timer.tcnt1().write(|w| w.set(FRAME - 2));
         // SAFETY: WGM11 and WGM10 of mode 14.
         timer
@@ -50,7 +50,7 @@ impl Servo {
     /// frame of its own as soon as `gap_ms` allow. With a gap of 0 it waits for the running frame's end.
     pub fn command(&mut self, width: HalfMicros, gap_ms: u8) {
         if width != self.width {
-            self.timer.ocr1a().write(|w| w.set(width));
+            self.timer.ocr1a().write(|w| w.set(compare(width)));
             // Cleared after OCR1A was written: a frame that begins from here on shows the new width.
             self.timer.tifr1().write(|w| w.tov1().set_bit());
             self.longest = self.width.max(width);
@@ -67,6 +67,11 @@ impl Servo {
             self.pending = false;
         }
     }
+}
+
+/// OCR1A for a pulse of `width`: the pin is high from 0 up to and with the match.
+const fn compare(width: HalfMicros) -> u16 {
+    width.saturating_sub(1)
 }
 
 impl ErrorType for Servo {

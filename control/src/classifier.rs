@@ -1,6 +1,6 @@
 //! What an object is: the vote of the nearest labelled examples.
 //!
-//! The examples are feature vectors in bytes, scaled by [`examples::SCALE`](crate::examples::SCALE) and searched by the
+//! The examples are feature vectors in bytes, scaled by [`examples::scale`] and searched by the
 //! crate `knn` wherever they lie. Whatever the answer leaves open, a tie, a stranger, a table with fewer examples than
 //! are to vote, is [`Class::Unknown`], which everyone treats as a plant.
 
@@ -52,7 +52,7 @@ pub struct Nearest<E>(pub E);
 
 impl<E: Examples<{ features::COUNT }>> Classifier for Nearest<E> {
     fn classify(&self, features: &Features, k: u8) -> Vote {
-        let query = examples::SCALE.quantise(&features.values());
+        let query = examples::scale().quantise(&features.values());
         let answer = knn::classify::<{ features::COUNT }, { label::COUNT }>(&self.0, &query, k, examples::RADIUS);
         let Ok(Answer { label, votes, kind, .. }) = answer else {
             return Vote {

@@ -10,6 +10,15 @@ use crate::{
 };
 use knn::{Example, Range, Scale};
 
+avr_progmem::progmem! {
+    static progmem SCALE_IN_FLASH: Scale<{ features::COUNT }> = SCALE;
+}
+
+/// [`SCALE`], from where it costs no SRAM.
+pub fn scale() -> Scale<{ features::COUNT }> {
+    SCALE_IN_FLASH.load()
+}
+
 /// From a feature's value to a byte. A width counts most, through hold and actuation; the ranges leave room for beams
 /// broken far longer than by any example.
 pub const SCALE: Scale<{ features::COUNT }> = Scale::new([

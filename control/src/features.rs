@@ -80,14 +80,13 @@ const fn limited(millimetres: i32) -> i16 {
 }
 
 /// The nearest of the paper's speed classes, in mm/s; faster than the fastest is the fastest.
-pub fn speed_class(speed_mm_s: i16) -> i16 {
-    let mut class = SPEED_CLASSES_MM_S[0];
-    for pair in SPEED_CLASSES_MM_S.windows(2) {
-        if speed_mm_s > (pair[0] + pair[1]) / 2 {
-            class = pair[1];
-        }
+pub const fn speed_class(speed_mm_s: i16) -> i16 {
+    match speed_mm_s {
+        ..348 => 278,
+        348..487 => 417,
+        487..626 => 556,
+        626.. => 694,
     }
-    class
 }
 
 #[cfg(test)]

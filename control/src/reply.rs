@@ -10,7 +10,7 @@ use crate::{
     console::{Command, Mistake, Word},
     controller::{Controller, Refusal, State},
     event::Event,
-    settings::Setting,
+    settings::{Description, Setting},
     text::{Text, text},
 };
 use ufmt::{uWrite, uwrite};
@@ -116,23 +116,19 @@ impl Answer {
         *self = match *self {
             Self::Done => return Ok(()),
             Self::Greeting => {
-                uwrite!(out, "{}{}", text!("weeder "), Version)?;
-                uwrite!(out, "{}", text!(" in hold, tool out; help lists the commands"))?;
+                write_version(out)?;
+                say(out, text!(" in hold, tool out; help lists the commands"))?;
                 Self::Done
             }
             Self::Help(place) => {
                 if let Some(word) = Word::from_index(place) {
                     let (usage, explanation) = help(word);
-                    uwrite!(out, "{}{}{}", usage, text!(" - "), explanation)?;
+                    explain(out, usage, explanation)?;
                 }
-                if place + 1 < Word::COUNT {
-                    Self::Help(place + 1)
-                } else {
-                    Self::Ok
-                }
+                if place + 1 < Word::COUNT { Self::Help(place + 1) } else { Self::Ok }
             }
             Self::Explain(setting) => {
-                uwrite!(out, "{}{}{}", setting.text(), text!(" - "), setting.help())?;
+                explain(out, setting.text(), setting.help())?;
                 Self::Ok
             }
             Self::Status => {
@@ -147,18 +143,14 @@ impl Answer {
                 if let Some(setting) = Setting::from_index(place) {
                     write_setting(controller, setting, out)?;
                 }
-                if place + 1 < Setting::COUNT {
-                    Self::GetAll(place + 1)
-                } else {
-                    Self::Ok
-                }
+                if place + 1 < Setting::COUNT { Self::GetAll(place + 1) } else { Self::Ok }
             }
             Self::Version => {
-                uwrite!(out, "{}{}", text!("weeder "), Version)?;
+                write_version(out)?;
                 Self::Ok
             }
             Self::Ok => {
-                uwrite!(out, "{}", text!("ok"))?;
+                say(out, text!("ok"))?;
                 Self::Done
             }
             Self::Wrong(mistake) => {
@@ -170,7 +162,7 @@ impl Answer {
                 Self::Done
             }
         };
-        end_line(out)
+        say(out, text!("\r\n"))
     }
 }
 
@@ -180,74 +172,32 @@ impl Answer {
 /// What `out` reports.
 pub fn write_event<W: uWrite + ?Sized>(event: &Event, out: &mut W) -> Result<(), W::Error> {
     match *event {
-        Event::Object {
-            vote,
-            leading,
-            spacing,
-            plan,
-        } => {
-            match vote.class {
-                Class::Plant => uwrite!(out, "{}", text!("plant"))?,
-                Class::Weed => uwrite!(out, "{}", text!("weed"))?,
-                Class::Unknown => uwrite!(out, "{}", text!("unknown"))?,
-            }
-            uwrite!(out, "{}{}", text!(" pos="), leading.count())?;
-            uwrite!(
-                out,
-                "{}{}{}{}",
-                text!(" votes="),
-                vote.votes,
-                text!(" spacing="),
-                spacing.0
-            )?;
-            uwrite!(
-                out,
-                "{}{}{}{}",
-                text!(" delay="),
-                plan.delay.0,
-                text!(" hold="),
-                plan.hold.0
-            )?;
-            uwrite!(out, "{}{}", text!(" actuation="), plan.actuation().0)?;
+        Event::Object { vote, leading, spacing, plan } => {
+            say(out, class_name(vote.class))?;
+            say_number(out, text!(" pos="), leading.count())?;
+            say_number(out, text!(" votes="), vote.votes.into())?;
+            say_number(out, text!(" spacing="), spacing.0)?;
+            say_number(out, text!(" delay="), plan.delay.0)?;
+            say_number(out, text!(" hold="), plan.hold.0)?;
+            say_number(out, text!(" actuation="), plan.actuation().0)?;
         }
         Event::Swing { out: leaves, position } => {
-            uwrite!(out, "{}", text!("swing tool="))?;
-            write_place(leaves, out)?;
-            uwrite!(out, "{}{}", text!(" pos="), position.count())?;
+            say(out, text!("swing tool="))?;
+            say(out, place_name(leaves))?;
+            say_number(out, text!(" pos="), position.count())?;
         }
         Event::State(state) => {
-            uwrite!(out, "{}", text!("state is="))?;
-            write_state(state, out)?;
+            say(out, text!("state is="))?;
+            say(out, state_name(state))?;
         }
         Event::Alarm { alarm, position } => {
-            uwrite!(
-                out,
-                "{}{}{}{}",
-                text!("alarm name="),
-                alarm.text(),
-                text!(" code="),
-                alarm.code()
-            )?;
-            uwrite!(out, "{}{}", text!(" pos="), position.count())?;
+            say(out, text!("alarm name="))?;
+            say(out, alarm.text())?;
+            say_number(out, text!(" code="), alarm.code().into())?;
+            say_number(out, text!(" pos="), position.count())?;
         }
     }
-    end_line(out)
-}
-
-fn write_state<W: uWrite + ?Sized>(state: State, out: &mut W) -> Result<(), W::Error> {
-    match state {
-        State::Hold => uwrite!(out, "{}", text!("hold")),
-        State::Work => uwrite!(out, "{}", text!("work")),
-        State::Alarm(_) => uwrite!(out, "{}", text!("alarm")),
-    }
-}
-
-fn write_place<W: uWrite + ?Sized>(tool_out: bool, out: &mut W) -> Result<(), W::Error> {
-    if tool_out {
-        uwrite!(out, "{}", text!("out"))
-    } else {
-        uwrite!(out, "{}", text!("in"))
-    }
+    say(out, text!("\r\n"))
 }
 
 fn write_status<C, W>(controller: &Controller<C>, out: &mut W) -> Result<(), W::Error>
@@ -256,25 +206,20 @@ where
     W: uWrite + ?Sized,
 {
     let readings = controller.readings();
-    uwrite!(out, "{}", text!("state="))?;
-    write_state(controller.state(), out)?;
+    say(out, text!("state="))?;
+    say(out, state_name(controller.state()))?;
     if let State::Alarm(alarm) = controller.state() {
-        uwrite!(out, "{}{}", text!(" alarm="), alarm.text())?;
+        say(out, text!(" alarm="))?;
+        say(out, alarm.text())?;
     }
-    uwrite!(out, "{}", text!(" tool="))?;
-    write_place(controller.tool_out(), out)?;
-    uwrite!(out, "{}{}", text!(" pos="), readings.position.count())?;
-    uwrite!(out, "{}{}", text!(" speed_mm_s="), controller.speed_mm_s())?;
-    uwrite!(
-        out,
-        "{}{}{}{}",
-        text!(" windows="),
-        controller.windows(),
-        text!(" lost="),
-        readings.lost
-    )?;
-    uwrite!(out, "{}{}", text!(" unseen_mm="), controller.unseen_mm())?;
-    uwrite!(out, "{}{}", text!(" missed="), controller.events_missed())
+    say(out, text!(" tool="))?;
+    say(out, place_name(controller.tool_out()))?;
+    say_number(out, text!(" pos="), readings.position.count())?;
+    say_number(out, text!(" speed_mm_s="), controller.speed_mm_s().into())?;
+    say_number(out, text!(" windows="), controller.windows().into())?;
+    say_number(out, text!(" lost="), readings.lost.into())?;
+    say_number(out, text!(" unseen_mm="), controller.unseen_mm().into())?;
+    say_number(out, text!(" missed="), controller.events_missed().into())
 }
 
 fn write_setting<C, W>(controller: &Controller<C>, setting: Setting, out: &mut W) -> Result<(), W::Error>
@@ -283,78 +228,98 @@ where
     W: uWrite + ?Sized,
 {
     let description = setting.description();
-    uwrite!(out, "{}={}", setting.text(), controller.settings().get(setting))?;
-    write_range(description.least, description.greatest, out)?;
-    uwrite!(out, "{}{}", text!(", default "), description.default)
+    say(out, setting.text())?;
+    say_number(out, text!("="), controller.settings().get(setting).into())?;
+    write_range(description, out)?;
+    say_number(out, text!(", default "), description.default.into())
 }
 
-fn write_range<W: uWrite + ?Sized>(least: u16, greatest: u16, out: &mut W) -> Result<(), W::Error> {
-    uwrite!(out, "{}{}{}{}", text!(" from "), least, text!(" to "), greatest)
+fn write_range<W: uWrite + ?Sized>(description: Description, out: &mut W) -> Result<(), W::Error> {
+    say_number(out, text!(" from "), description.least.into())?;
+    say_number(out, text!(" to "), description.greatest.into())
 }
 
 fn write_mistake<W: uWrite + ?Sized>(mistake: Mistake, out: &mut W) -> Result<(), W::Error> {
-    uwrite!(out, "{}", text!("error: "))?;
-    match mistake {
-        Mistake::TooLong => uwrite!(
-            out,
-            "{}",
-            text!("the line is longer than 80 characters, send a shorter one")
-        ),
-        Mistake::NotText => uwrite!(
-            out,
-            "{}",
-            text!("the line is not plain text, send letters, digits and blanks only")
-        ),
-        Mistake::CharactersLost => uwrite!(out, "{}", text!("characters of this line were lost, send it again")),
-        Mistake::UnknownCommand => uwrite!(out, "{}", text!("no such command, help lists them all")),
-        Mistake::UnknownSetting => uwrite!(out, "{}", text!("no such setting, get lists them all")),
+    say(out, text!("error: "))?;
+    let what = match mistake {
+        Mistake::TooLong => text!("the line is longer than 80 characters, send a shorter one"),
+        Mistake::NotText => text!("the line is not plain text, send letters, digits and blanks only"),
+        Mistake::CharactersLost => text!("characters of this line were lost, send it again"),
+        Mistake::UnknownCommand => text!("no such command, help lists them all"),
+        Mistake::UnknownSetting => text!("no such setting, get lists them all"),
         Mistake::Usage(word) => {
-            let (usage, _) = help(word);
-            uwrite!(out, "{}{}", text!("the words do not fit, the command is "), usage)
+            say(out, text!("the words do not fit, the command is "))?;
+            help(word).0
         }
-        Mistake::Value(setting) => write_allowed(setting, out),
-    }
+        Mistake::Value(setting) => return write_allowed(setting, out),
+    };
+    say(out, what)
 }
 
 fn write_refusal<W>(refusal: Refusal, setting: Option<Setting>, out: &mut W) -> Result<(), W::Error>
 where
     W: uWrite + ?Sized,
 {
-    uwrite!(out, "{}", text!("error: "))?;
+    say(out, text!("error: "))?;
     match (refusal, setting) {
         (Refusal::OutOfRange, Some(setting)) => write_allowed(setting, out),
         (Refusal::NotInHold, Some(setting)) => {
-            uwrite!(
-                out,
-                "{}{}",
-                setting.text(),
-                text!(" moves the machine's geometry, hold first")
-            )
+            say(out, setting.text())?;
+            say(out, text!(" moves the machine's geometry, hold first"))
         }
-        _ => uwrite!(out, "{}", text!("an alarm is latched, see status, then clear it")),
+        _ => say(out, text!("an alarm is latched, see status, then clear it")),
     }
 }
 
 fn write_allowed<W: uWrite + ?Sized>(setting: Setting, out: &mut W) -> Result<(), W::Error> {
-    let description = setting.description();
-    uwrite!(out, "{}{}", setting.text(), text!(" takes a whole number"))?;
-    write_range(description.least, description.greatest, out)
+    say(out, setting.text())?;
+    say(out, text!(" takes a whole number"))?;
+    write_range(setting.description(), out)
 }
 
-fn end_line<W: uWrite + ?Sized>(out: &mut W) -> Result<(), W::Error> {
-    uwrite!(out, "{}", text!("\r\n"))
+fn write_version<W: uWrite + ?Sized>(out: &mut W) -> Result<(), W::Error> {
+    say(out, text!("weeder "))?;
+    say(out, text!(env!("CARGO_PKG_VERSION")))
 }
 
-/// The package's version.
-struct Version;
+/// A name and what it stands for.
+fn explain<W: uWrite + ?Sized>(out: &mut W, name: Text, explanation: Text) -> Result<(), W::Error> {
+    say(out, name)?;
+    say(out, text!(" - "))?;
+    say(out, explanation)
+}
 
-impl ufmt::uDisplay for Version {
-    fn fmt<W: uWrite + ?Sized>(&self, f: &mut ufmt::Formatter<'_, W>) -> Result<(), W::Error> {
-        uwrite!(f, "{}", text!(env!("CARGO_PKG_VERSION")))
+/// A text and a number after it: in one place, and in one width, which costs the least flash.
+#[inline(never)]
+fn say_number<W: uWrite + ?Sized>(out: &mut W, text: Text, number: i32) -> Result<(), W::Error> {
+    say(out, text)?;
+    uwrite!(out, "{}", number)
+}
+
+/// A text.
+#[inline(never)]
+fn say<W: uWrite + ?Sized>(out: &mut W, text: Text) -> Result<(), W::Error> {
+    text.bytes().try_for_each(|byte| out.write_char(char::from(byte)))
+}
+
+fn state_name(state: State) -> Text {
+    match state {
+        State::Hold => text!("hold"),
+        State::Work => text!("work"),
+        State::Alarm(_) => text!("alarm"),
     }
 }
 
-const _: () = assert!(
-    Alarm::COUNT < 10,
-    "a code of more flashes could not be counted in the field"
-);
+fn place_name(tool_out: bool) -> Text {
+    if tool_out { text!("out") } else { text!("in") }
+}
+
+fn class_name(class: Class) -> Text {
+    match class {
+        Class::Plant => text!("plant"),
+        Class::Weed => text!("weed"),
+        Class::Unknown => text!("unknown"),
+    }
+}
+
+const _: () = assert!(Alarm::COUNT < 10, "a code of more flashes could not be counted in the field");

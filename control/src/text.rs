@@ -5,7 +5,6 @@
 //! [`words!`] makes an enum whose variants are words.
 
 use avr_progmem::wrapper::ProgMem;
-use ufmt::{Formatter, uDisplay, uWrite};
 
 /// A text in flash, ASCII.
 #[derive(Clone, Copy)]
@@ -26,13 +25,6 @@ impl Text {
     #[inline(never)]
     pub fn is(self, word: &[u8]) -> bool {
         self.bytes().eq(word.iter().copied())
-    }
-}
-
-impl uDisplay for Text {
-    #[inline(never)]
-    fn fmt<W: uWrite + ?Sized>(&self, f: &mut Formatter<'_, W>) -> Result<(), W::Error> {
-        self.bytes().try_for_each(|byte| f.write_char(char::from(byte)))
     }
 }
 
