@@ -54,7 +54,7 @@ pub fn ask(uno: &mut Uno, command: &str) -> Result<Vec<String>, ConsoleError> {
         uno.run_for_ms(1)?;
         received += &uno.received();
         // Only lines that are complete count.
-        let complete = received.rfind('\n').map_or("", |end| &received[..end]);
+        let complete = received.rfind('\n').map_or("", |end| &received[..=end]);
         let mut lines: Vec<String> = complete.lines().map(str::to_owned).collect();
         match lines.last().map(String::as_str) {
             Some("ok") => {

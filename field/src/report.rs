@@ -120,6 +120,15 @@ pub fn totals(trial: &Trial, outcome: &Outcome) -> String {
         ),
     );
     line("Swings", swing_words(&judgement.plants, &trial.machine));
+    if outcome.stray_pulses > 0 {
+        line(
+            "",
+            format!(
+                "{} pulses on the line had no servo's width and were ignored",
+                outcome.stray_pulses
+            ),
+        );
+    }
     line("Encoder", count_words(outcome));
     if status.state != "work" {
         line("Firmware", format!("ended in `{}`, not at work", status.state));

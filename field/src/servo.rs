@@ -5,10 +5,10 @@
 //! comes during a stroke takes the same dead time; then the servo turns from wherever it is. Widths between the two ends
 //! ask for angles between them.
 //!
-//! There is no load, no overshoot and no acceleration here: dead and travel time stand for all of them.
+//! Widths that are no servo's are ignored. There is no load, no overshoot and no acceleration here: dead and travel time stand for all of them.
 
 use crate::signal::{CYCLES_PER_SECOND, Pulse};
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 
 /// A hobby servo and how it is set up.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,6 +28,9 @@ pub const OUT_DEGREES: f64 = 45.0;
 
 /// Pulse widths that differ by less than this ask for the same angle: the dead band of a digital servo.
 const DEAD_BAND_US: f64 = 2.0;
+
+/// Widths that a servo takes for a command. It ignores whatever else comes along its line, and so does this one.
+pub const WIDTHS_US: RangeInclusive<f64> = 400.0..=2600.0;
 
 /// Commands for more than this count as commands out of the row.
 const OUT_COMMAND_DEGREES: f64 = OUT_DEGREES / 2.0;
@@ -68,11 +71,12 @@ impl Servo {
         (pulse.width_us() - self.in_us) / (self.out_us - self.in_us) * OUT_DEGREES
     }
 
-    /// The pulses that asked for another angle than the one before them; the first pulse is the first command.
+    /// The pulses that asked for another angle than the one before them; the first pulse is the first command. Pulses
+    /// outside of [`WIDTHS_US`] are passed over.
     pub fn commands(&self, pulses: &[Pulse]) -> Vec<Command> {
         let mut commands = Vec::new();
         let mut width_us = f64::NEG_INFINITY;
-        for &pulse in pulses {
+        for &pulse in pulses.iter().filter(|pulse| WIDTHS_US.contains(&pulse.width_us())) {
             if (pulse.width_us() - width_us).abs() >= DEAD_BAND_US {
                 width_us = pulse.width_us();
                 commands.push(Command {
@@ -247,6 +251,12 @@ mod tests {
         let degrees: Vec<f64> = commands.iter().map(|command| command.degrees).collect();
         assert_eq!(degrees, [45.0, 0.0, 45.0]);
         assert_eq!(commands[1].rise_cycle, 5 * 320_000);
+    }
+
+    #[test]
+    fn a_pulse_of_no_servos_width_is_no_command() {
+        let commands = Servo::default().commands(&frames(&[(5, 2000), (1, 3), (5, 2000), (1, 19_900), (5, 2000)]));
+        assert_eq!(commands.len(), 1);
     }
 
     #[test]

@@ -10,6 +10,7 @@ use crate::firmware::Size;
 use crate::machine::Machine;
 use crate::motion::Motion;
 use crate::row::Row;
+use crate::servo::WIDTHS_US;
 use crate::signal::{CYCLES_PER_SECOND, Pin, PinChange, Pulse};
 use crate::uno::{Uno, UnoError};
 use crate::verdict::{Judgement, Timing, judge};
@@ -69,6 +70,8 @@ pub struct Outcome {
     pub size: Size,
     /// The servo's pulses.
     pub pulses: Vec<Pulse>,
+    /// How many of them have no width that a servo knows.
+    pub stray_pulses: usize,
     /// Every level on every pin, inputs first.
     pub changes: Vec<PinChange>,
     /// The cycle at which the motion began.
@@ -191,6 +194,10 @@ impl Trial {
             status,
             true_ticks: self.machine.ticks(&self.motion, self.motion.duration_s()),
             size: uno.size(),
+            stray_pulses: pulses
+                .iter()
+                .filter(|pulse| !WIDTHS_US.contains(&pulse.width_us()))
+                .count(),
             pulses,
             changes: inputs,
             start_cycle,
