@@ -205,3 +205,28 @@ fn line(x1: f64, y1: f64, x2: f64, y2: f64, stroke: &str) -> Line {
 fn words(x: f64, y: f64, words: &str, fill: &str) -> Text {
     Text::new(words).set("x", tenth(x)).set("y", tenth(y)).set("fill", fill)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::tests::ruined_row;
+
+    #[test]
+    fn the_picture_shows_each_plant_in_the_colour_of_its_verdict() {
+        let (trial, outcome) = ruined_row();
+        let drawn = draw(&trial, &outcome).to_string();
+        assert_eq!(drawn.matches("<ellipse").count(), 2);
+        // Both plants, and the legend.
+        assert_eq!(drawn.matches(DAMAGED).count(), 3);
+        assert_eq!(drawn.matches(PLANT).count(), 1);
+    }
+
+    #[test]
+    fn a_long_row_is_broken_into_lanes() {
+        let (mut trial, outcome) = ruined_row();
+        trial.row = crate::row::Row::new(vec![Thing::plant(0.0, 100.0), Thing::plant(6000.0, 100.0)]).unwrap();
+        let drawn = draw(&trial, &outcome).to_string();
+        // 12 m of row: half a spacing beyond either plant.
+        assert_eq!(drawn.matches("out 45°").count(), 5);
+    }
+}

@@ -88,6 +88,12 @@ pub fn totals(trial: &Trial, outcome: &Outcome) -> String {
             judgement.count(Verdict::Kept),
         ),
     );
+    if let Some(depth_mm) = deepest_mm(&judgement.plants) {
+        line(
+            "",
+            format!("the tool reached {depth_mm:.0} mm into the canopy that was hit worst"),
+        );
+    }
     if judgement.idle_swings > 0 {
         line(
             "",
@@ -139,6 +145,17 @@ pub fn totals(trial: &Trial, outcome: &Outcome) -> String {
         format!("{flash} of {FLASH_BYTES} bytes of flash, {sram} of {SRAM_BYTES} bytes of SRAM"),
     );
     text
+}
+
+/// How far the tool came into a canopy, at worst; `None` where it never did.
+fn deepest_mm(plants: &[PlantOutcome]) -> Option<f64> {
+    plants
+        .iter()
+        .flat_map(|plant| [plant.clearance_before_mm, plant.clearance_behind_mm])
+        .flatten()
+        .filter(|clearance_mm| *clearance_mm < 0.0)
+        .map(f64::abs)
+        .max_by(f64::total_cmp)
 }
 
 /// The share weeded of the whole strip, as weeds were counted in the paper: all that is beside the row, and of the tool's
@@ -258,4 +275,87 @@ pub fn introduction(row: &Row, machine: &Machine, motion: &Motion) -> String {
         machine.beam_to_tool_mm,
         motion.duration_s(),
     )
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use crate::console::Status;
+    use crate::motion::mm_s;
+    use crate::row::Thing;
+    use crate::signal::{CYCLES_PER_SECOND, Pulse};
+    use crate::verdict::{Timing, judge};
+
+    /// A trial in which the tool stayed in the row from one second on, and what came of it.
+    pub fn ruined_row() -> (Trial, Outcome) {
+        let row = Row::new(vec![
+            Thing::plant(500.0, 150.0),
+            Thing::weed(750.0, 15.0),
+            Thing::plant(1000.0, 150.0),
+        ])
+        .unwrap();
+        let trial = Trial::at_speed(row, Machine::default(), Timing::default(), mm_s(1.0));
+        let frame = |rise, width_us: u64| Pulse {
+            rise,
+            fall: rise + width_us * CYCLES_PER_SECOND / 1_000_000,
+        };
+        let pulses = vec![frame(0, 2000), frame(CYCLES_PER_SECOND, 1500)];
+        let outcome = Outcome {
+            judgement: judge(&trial.row, &trial.machine, &trial.motion, trial.timing, &pulses, 0),
+            status: Status {
+                state: "work".to_owned(),
+                position_ticks: 99,
+                lost_ticks: 2,
+            },
+            true_ticks: 101,
+            size: Size {
+                flash: 20_000,
+                sram: 800,
+            },
+            pulses,
+            stray_pulses: 0,
+            changes: Vec::new(),
+            start_cycle: 0,
+        };
+        (trial, outcome)
+    }
+
+    #[test]
+    fn the_totals_tell_what_happened_in_plain_words() {
+        let (trial, outcome) = ruined_row();
+        let totals = totals(&trial, &outcome);
+        for words in [
+            "2: 2 damaged, 0 with the margin cut, 0 kept",
+            "the tool reached 150 mm into the canopy that was hit worst",
+            "1 of 1 cut",
+            "100.0 % of the row's 1.00 m",
+            "none was commanded for a plant",
+            "position 99 ticks, -2 from where the machine is; 2 counts lost",
+            "20000 of 32256 bytes of flash, 800 of 2048 bytes of SRAM",
+        ] {
+            assert!(totals.contains(words), "{words:?} is not in\n{totals}");
+        }
+    }
+
+    #[test]
+    fn the_table_has_a_line_for_each_plant_with_its_verdict() {
+        let (_, outcome) = ruined_row();
+        let text = table(&outcome).to_string();
+        assert_eq!(text.matches("DAMAGED").count(), 2, "{text}");
+    }
+
+    #[test]
+    fn the_csv_tables_have_a_header_and_a_line_each() {
+        let (_, outcome) = ruined_row();
+        let (mut plants, mut weeds) = (Vec::new(), Vec::new());
+        write_plants_csv(&outcome, &mut plants).unwrap();
+        write_weeds_csv(&outcome, &mut weeds).unwrap();
+        let plants = String::from_utf8(plants).unwrap();
+        assert_eq!(plants.lines().count(), 3);
+        assert!(plants.lines().nth(1).unwrap().starts_with("500.0,150.0,"), "{plants}");
+        assert_eq!(
+            String::from_utf8(weeds).unwrap(),
+            "position_mm,width_mm,cut\n750.0,15.0,true\n"
+        );
+    }
 }
