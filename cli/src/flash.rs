@@ -51,17 +51,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let elf = firmware::build()?;
     println!("Writing {} to the Uno at {port}", elf.display());
     let status = Command::new("avrdude")
-        .args([
-            "-c",
-            "arduino",
-            "-p",
-            "atmega328p",
-            "-D",
-            "-b",
-            &baud.to_string(),
-            "-P",
-            &port,
-        ])
+        .args(["-c", "arduino", "-p", "atmega328p", "-D", "-b", &baud.to_string(), "-P", &port])
         .arg("-U")
         .arg(format!("flash:w:{}:e", elf.display()))
         .status()
@@ -77,12 +67,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 
 /// The only Uno among the ports.
 fn find_uno(ports: &[SerialPortInfo]) -> Result<String> {
-    let is_uno = |port: &&SerialPortInfo| matches!(&port.port_type, SerialPortType::UsbPort(UsbPortInfo { vid, pid, .. }) if UNOS.contains(&(*vid, *pid)));
-    let unos: Vec<&str> = ports
-        .iter()
-        .filter(is_uno)
-        .map(|port| port.port_name.as_str())
-        .collect();
+    let is_uno = |port: &&SerialPortInfo| match &port.port_type {
+        SerialPortType::UsbPort(UsbPortInfo { vid, pid, .. }) => UNOS.contains(&(*vid, *pid)),
+        _ => false,
+    };
+    let unos: Vec<&str> = ports.iter().filter(is_uno).map(|port| port.port_name.as_str()).collect();
     match unos.as_slice() {
         [only] => Ok((*only).to_owned()),
         [] if ports.is_empty() => {
@@ -95,10 +84,7 @@ fn find_uno(ports: &[SerialPortInfo]) -> Result<String> {
                 names.join(", ")
             )
         }
-        several => bail!(
-            "there are several Unos: choose one by --port, of {}",
-            several.join(", ")
-        ),
+        several => bail!("there are several Unos: choose one by --port, of {}", several.join(", ")),
     }
 }
 
@@ -151,10 +137,7 @@ mod tests {
 
     #[test]
     fn two_unos_have_to_be_told_apart() {
-        let ports = [
-            port("ttyACM0", Some((0x2341, 0x0043))),
-            port("ttyUSB0", Some((0x1A86, 0x7523))),
-        ];
+        let ports = [port("ttyACM0", Some((0x2341, 0x0043))), port("ttyUSB0", Some((0x1A86, 0x7523)))];
         let error = find_uno(&ports).unwrap_err().to_string();
         assert!(error.ends_with("choose one by --port, of ttyACM0, ttyUSB0"), "{error}");
     }
@@ -164,10 +147,7 @@ mod tests {
         let error = find_uno(&[port("ttyS0", None)]).unwrap_err().to_string();
         assert!(error.ends_with("there is ttyS0"), "{error}");
         let error = find_uno(&[]).unwrap_err().to_string();
-        assert!(
-            error.starts_with("there is no Uno at any USB port: plug it in"),
-            "{error}"
-        );
+        assert!(error.starts_with("there is no Uno at any USB port: plug it in"), "{error}");
     }
 
     #[test]

@@ -137,27 +137,12 @@ impl Arguments {
 }
 
 fn weed(arguments: &Arguments, row: Row) -> Result<Harm> {
-    let machine = Machine {
-        beam_to_tool_mm: f64::from(arguments.beam_to_tool),
-        ..Machine::default()
-    };
-    let timing = if arguments.paper {
-        Timing::as_in_the_paper()
-    } else {
-        Timing::default()
-    };
+    let machine = Machine { beam_to_tool_mm: f64::from(arguments.beam_to_tool), ..Machine::default() };
+    let timing = if arguments.paper { Timing::as_in_the_paper() } else { Timing::default() };
     let trial = Trial::at_speed(row, machine, timing, mm_s(arguments.speed));
     let elf = arguments.firmware()?;
-    let manner = if arguments.paper {
-        ", swings as in the paper"
-    } else {
-        ""
-    };
-    println!(
-        "{} at {} km/h{manner}",
-        report::introduction(&trial.row, &trial.machine, &trial.motion),
-        arguments.speed
-    );
+    let manner = if arguments.paper { ", swings as in the paper" } else { "" };
+    println!("{} at {} km/h{manner}", report::introduction(&trial.row, &trial.machine, &trial.motion), arguments.speed);
     let bar = Progress::new("weeding");
     let outcome = trial.run(&elf, |share| bar.show(share))?;
     bar.finish();
@@ -171,11 +156,7 @@ fn weed(arguments: &Arguments, row: Row) -> Result<Harm> {
         waveform::write(path, outcome.changes.iter().copied())?;
         println!("Waveform    {}", path.display());
     }
-    if outcome.judgement.count(Verdict::Damaged) == 0 {
-        Ok(Harm::None)
-    } else {
-        Ok(Harm::Done)
-    }
+    if outcome.judgement.count(Verdict::Damaged) == 0 { Ok(Harm::None) } else { Ok(Harm::Done) }
 }
 
 fn write_folder(folder: &Path, trial: &Trial, outcome: &Outcome) -> Result<()> {
@@ -188,10 +169,7 @@ fn write_folder(folder: &Path, trial: &Trial, outcome: &Outcome) -> Result<()> {
     report::write_plants_csv(outcome, create("plants.csv")?)?;
     report::write_weeds_csv(outcome, create("weeds.csv")?)?;
     svg::write(create("row.svg")?, &picture::draw(trial, outcome))?;
-    println!(
-        "Written     row.svg, row.csv, plants.csv and weeds.csv in {}",
-        folder.display()
-    );
+    println!("Written     row.svg, row.csv, plants.csv and weeds.csv in {}", folder.display());
     Ok(())
 }
 

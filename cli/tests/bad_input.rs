@@ -4,10 +4,7 @@ use std::process::{Command, Output};
 
 /// Runs `weeder` with these arguments.
 fn weeder(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_weeder"))
-        .args(arguments)
-        .output()
-        .expect("cargo has built the command")
+    Command::new(env!("CARGO_BIN_EXE_weeder")).args(arguments).output().expect("cargo has built the command")
 }
 
 /// Asserts status 2 and a message that contains `words`.
@@ -28,32 +25,18 @@ fn a_speed_that_no_machine_walks_is_refused_with_its_range() {
 
 #[test]
 fn canopies_wider_than_their_spacing_are_refused() {
-    assert_refused(
-        &["sim", "--spacing", "100", "--canopy", "150"],
-        "--spacing has to exceed --canopy",
-    );
+    assert_refused(&["sim", "--spacing", "100", "--canopy", "150"], "--spacing has to exceed --canopy");
 }
 
 #[test]
 fn more_weeds_than_there_is_room_for_are_refused() {
-    assert_refused(
-        &["sim", "--plants", "2", "--weeds", "50"],
-        "50 tall weeds do not fit between the plants",
-    );
+    assert_refused(&["sim", "--plants", "2", "--weeds", "50"], "50 tall weeds do not fit between the plants");
 }
 
 #[test]
 fn a_row_and_a_recording_that_do_not_exist_are_named() {
     assert_refused(&["sim", "--row", "no-such-row.csv"], "no-such-row.csv");
-    let recording = [
-        "sim",
-        "--capture",
-        "no-such.vcd",
-        "--channel-a",
-        "A",
-        "--channel-b",
-        "B",
-    ];
+    let recording = ["sim", "--capture", "no-such.vcd", "--channel-a", "A", "--channel-b", "B"];
     assert_refused(&recording, "no-such.vcd");
 }
 

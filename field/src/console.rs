@@ -62,18 +62,12 @@ pub fn ask(uno: &mut Uno, command: &str) -> Result<Vec<String>, ConsoleError> {
                 return Ok(lines);
             }
             Some(answer) if answer.starts_with("error") => {
-                return Err(ConsoleError::Refused {
-                    command: command.to_owned(),
-                    answer: answer.to_owned(),
-                });
+                return Err(ConsoleError::Refused { command: command.to_owned(), answer: answer.to_owned() });
             }
             _ => {}
         }
     }
-    Err(ConsoleError::Silent {
-        command: command.to_owned(),
-        received,
-    })
+    Err(ConsoleError::Silent { command: command.to_owned(), received })
 }
 
 /// What the firmware says of itself on `status`.
@@ -100,15 +94,9 @@ impl Status {
         let value = |key: &'static str| {
             line.split_whitespace()
                 .find_map(|word| word.strip_prefix(key)?.strip_prefix('='))
-                .ok_or(ConsoleError::Status {
-                    key,
-                    line: line.to_owned(),
-                })
+                .ok_or(ConsoleError::Status { key, line: line.to_owned() })
         };
-        let not_a_number = |key| ConsoleError::Status {
-            key,
-            line: line.to_owned(),
-        };
+        let not_a_number = |key| ConsoleError::Status { key, line: line.to_owned() };
         Ok(Self {
             state: value("state")?.to_owned(),
             position_ticks: value("pos")?.parse().map_err(|_| not_a_number("pos"))?,
@@ -124,25 +112,15 @@ mod tests {
     #[test]
     fn a_status_line_is_read_by_its_keys() {
         let status = Status::parse("state=work tool=in pos=-12 speed_mm_s=0 windows=0 lost=3 unseen_mm=0");
-        let expected = Status {
-            state: "work".to_owned(),
-            position_ticks: -12,
-            lost_ticks: 3,
-        };
+        let expected = Status { state: "work".to_owned(), position_ticks: -12, lost_ticks: 3 };
         assert_eq!(status.unwrap(), expected);
     }
 
     #[test]
     fn a_status_line_without_a_figure_is_refused_by_its_name() {
         let error = Status::parse("state=work pos=many lost=0").unwrap_err();
-        assert!(
-            error.to_string().starts_with("the firmware's status has no `pos=`"),
-            "{error}"
-        );
+        assert!(error.to_string().starts_with("the firmware's status has no `pos=`"), "{error}");
         let error = Status::parse("state=work pos=1").unwrap_err();
-        assert!(
-            error.to_string().starts_with("the firmware's status has no `lost=`"),
-            "{error}"
-        );
+        assert!(error.to_string().starts_with("the firmware's status has no `lost=`"), "{error}");
     }
 }

@@ -92,16 +92,9 @@ impl Machine {
 
     /// The beam's level at power-up, before the motion begins.
     pub fn beam_before(&self, row: &Row, motion: &Motion) -> PinChange {
-        let broken = row
-            .things()
-            .iter()
-            .flat_map(|thing| thing.blocks_mm())
-            .any(|block| block.contains(&motion.start_mm()));
-        PinChange {
-            cycle: 0,
-            pin: Pin::Beam,
-            high: !broken,
-        }
+        let broken =
+            row.things().iter().flat_map(|thing| thing.blocks_mm()).any(|block| block.contains(&motion.start_mm()));
+        PinChange { cycle: 0, pin: Pin::Beam, high: !broken }
     }
 
     /// What the encoder and the beam do to their pins while the machine rolls past the row, in order of time.
@@ -125,17 +118,9 @@ impl Machine {
                 phase = if passing.forward { phase + 1 } else { phase + 3 } % 4;
                 let cycle = cycle_at(start_cycle, passing.time_s);
                 if channel_a(before) == channel_a(phase) {
-                    PinChange {
-                        cycle,
-                        pin: Pin::EncoderB,
-                        high: channel_b(phase),
-                    }
+                    PinChange { cycle, pin: Pin::EncoderB, high: channel_b(phase) }
                 } else {
-                    PinChange {
-                        cycle,
-                        pin: Pin::EncoderA,
-                        high: channel_a(phase),
-                    }
+                    PinChange { cycle, pin: Pin::EncoderA, high: channel_a(phase) }
                 }
             })
             .collect()
@@ -229,11 +214,7 @@ mod tests {
     }
 
     fn beam(changes: &[PinChange]) -> Vec<PinChange> {
-        changes
-            .iter()
-            .copied()
-            .filter(|change| change.pin == Pin::Beam)
-            .collect()
+        changes.iter().copied().filter(|change| change.pin == Pin::Beam).collect()
     }
 
     fn row() -> Row {

@@ -67,20 +67,12 @@ impl Piece {
 impl Motion {
     /// The machine stands at `start_mm`.
     pub fn starting_at(start_mm: f64) -> Self {
-        Self {
-            start_mm,
-            pieces: Vec::new(),
-            end_s: 0.0,
-            end_mm: start_mm,
-            end_speed_mm_s: 0.0,
-        }
+        Self { start_mm, pieces: Vec::new(), end_s: 0.0, end_mm: start_mm, end_speed_mm_s: 0.0 }
     }
 
     /// From standstill at `start_mm` with `acceleration_mm_s2` to a constant speed, and on to `end_mm`.
     pub fn steady(start_mm: f64, acceleration_mm_s2: f64, speed_mm_s: f64, end_mm: f64) -> Self {
-        Self::starting_at(start_mm)
-            .change_speed(speed_mm_s, acceleration_mm_s2)
-            .roll_to(end_mm)
+        Self::starting_at(start_mm).change_speed(speed_mm_s, acceleration_mm_s2).roll_to(end_mm)
     }
 
     /// Goes on at the speed reached for a time: stands, where the machine stood.
@@ -97,9 +89,7 @@ impl Motion {
     pub fn change_speed(self, speed_mm_s: f64, acceleration_mm_s2: f64) -> Self {
         assert!(acceleration_mm_s2 != 0.0, "a change of speed needs an acceleration");
         if self.end_speed_mm_s * speed_mm_s < 0.0 {
-            return self
-                .change_speed(0.0, acceleration_mm_s2)
-                .change_speed(speed_mm_s, acceleration_mm_s2);
+            return self.change_speed(0.0, acceleration_mm_s2).change_speed(speed_mm_s, acceleration_mm_s2);
         }
         let change_mm_s = speed_mm_s - self.end_speed_mm_s;
         let acceleration_mm_s2 = acceleration_mm_s2.abs().copysign(change_mm_s);
@@ -130,8 +120,7 @@ impl Motion {
     /// Where the place is nearer than the braking distance.
     pub fn stop_at(self, place_mm: f64, acceleration_mm_s2: f64) -> Self {
         let braking_mm = (self.end_speed_mm_s.powi(2) / (2.0 * acceleration_mm_s2.abs())).copysign(self.end_speed_mm_s);
-        self.roll_to(place_mm - braking_mm)
-            .change_speed(0.0, acceleration_mm_s2)
+        self.roll_to(place_mm - braking_mm).change_speed(0.0, acceleration_mm_s2)
     }
 
     fn then(mut self, duration_s: f64, acceleration_mm_s2: f64, end_mm: f64, end_speed_mm_s: f64) -> Self {
@@ -178,23 +167,18 @@ impl Motion {
 
     /// The speed at a time, negative when rolling back.
     pub fn speed_mm_s(&self, time_s: f64) -> f64 {
-        self.piece_at(time_s).map_or(0.0, |piece| {
-            piece.speed_mm_s + piece.acceleration_mm_s2 * (time_s - piece.start_s)
-        })
+        self.piece_at(time_s)
+            .map_or(0.0, |piece| piece.speed_mm_s + piece.acceleration_mm_s2 * (time_s - piece.start_s))
     }
 
     /// The stretch that the machine rolled over during a time.
     pub fn stretch_mm(&self, times_s: &Range<f64>) -> Range<f64> {
-        let turns = self
-            .pieces
-            .iter()
-            .filter(|piece| times_s.contains(&piece.start_s))
-            .map(|piece| piece.start_mm);
+        let turns = self.pieces.iter().filter(|piece| times_s.contains(&piece.start_s)).map(|piece| piece.start_mm);
         let end_mm = self.position_mm(times_s.end);
         let from_mm = self.position_mm(times_s.start);
-        turns.chain([end_mm]).fold(from_mm..from_mm, |stretch, place_mm| {
-            stretch.start.min(place_mm)..stretch.end.max(place_mm)
-        })
+        turns
+            .chain([end_mm])
+            .fold(from_mm..from_mm, |stretch, place_mm| stretch.start.min(place_mm)..stretch.end.max(place_mm))
     }
 
     /// Every passing of a place, in order of time.
@@ -205,10 +189,7 @@ impl Motion {
         self.pieces
             .iter()
             .filter(|piece| is_past(piece.start_mm) != is_past(piece.end_mm))
-            .map(|piece| Passing {
-                time_s: piece.time_at(place_mm),
-                forward: is_past(piece.end_mm),
-            })
+            .map(|piece| Passing { time_s: piece.time_at(place_mm), forward: is_past(piece.end_mm) })
             .collect()
     }
 

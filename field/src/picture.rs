@@ -46,9 +46,7 @@ pub fn draw(trial: &Trial, outcome: &Outcome) -> Document {
     let span = trial.row.span_mm();
     let lanes = ((span.end - span.start) / LANE_MM).ceil().max(1.0) as usize;
     let (width, height) = (LANE_WIDTH + 2.0 * SIDE, HEAD + lanes as f64 * LANE_HEIGHT + 8.0);
-    let clip = ClipPath::new()
-        .set("id", "lane")
-        .add(rectangle(0.0, 0.0, LANE_WIDTH, LANE_HEIGHT, "#000"));
+    let clip = ClipPath::new().set("id", "lane").add(rectangle(0.0, 0.0, LANE_WIDTH, LANE_HEIGHT, "#000"));
     let mut document = Document::new()
         .set("viewBox", (0, 0, width.round() as i32, height.round() as i32))
         .set("font-family", "system-ui, sans-serif")
@@ -87,12 +85,7 @@ fn draw_lane(trial: &Trial, outcome: &Outcome, ground: &Range<f64>) -> Group {
             drawn = drawn.add(weed(x(thing.position_mm)));
         }
     }
-    for plant in outcome
-        .judgement
-        .plants
-        .iter()
-        .filter(|plant| is_here(&plant.plant.span_mm()))
-    {
+    for plant in outcome.judgement.plants.iter().filter(|plant| is_here(&plant.plant.span_mm())) {
         drawn = drawn.add(canopy(&plant.plant, x(plant.plant.position_mm), plant.verdict));
     }
     let points: Vec<String> = outcome
@@ -168,9 +161,8 @@ fn legend() -> Group {
     let mut legend = Group::new();
     let mut x = SIDE;
     for (colour, meaning) in entries {
-        legend = legend
-            .add(rectangle(x, 22.0, 12.0, 12.0, colour).set("rx", 2))
-            .add(words(x + 17.0, 32.0, meaning, INK));
+        legend =
+            legend.add(rectangle(x, 22.0, 12.0, 12.0, colour).set("rx", 2)).add(words(x + 17.0, 32.0, meaning, INK));
         x += 42.0 + 6.4 * meaning.len() as f64;
     }
     legend

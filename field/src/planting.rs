@@ -88,10 +88,7 @@ impl Planting {
         let tightest_mm = self.spacing_mm - self.spacing_scatter_mm;
         let widest_mm = self.canopy_mm + self.canopy_scatter_mm;
         if tightest_mm <= widest_mm {
-            return Err(PlantingError::NoRoomForPlants {
-                spacing_mm: self.spacing_mm,
-                canopy_mm: self.canopy_mm,
-            });
+            return Err(PlantingError::NoRoomForPlants { spacing_mm: self.spacing_mm, canopy_mm: self.canopy_mm });
         }
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut things = Vec::with_capacity(self.plants + self.weeds);
@@ -112,18 +109,14 @@ impl Planting {
 
     /// Spreads the weeds over the gaps between neighbouring plants, a second one to a gap only when each has one.
     fn weeds_between(&self, plants: &[Thing], rng: &mut impl Rng) -> Result<Vec<Thing>, PlantingError> {
-        let mut gaps: Vec<Range<f64>> = plants
-            .windows(2)
-            .map(|pair| pair[0].span_mm().end..pair[1].span_mm().start)
-            .collect();
+        let mut gaps: Vec<Range<f64>> =
+            plants.windows(2).map(|pair| pair[0].span_mm().end..pair[1].span_mm().start).collect();
         gaps.shuffle(rng);
         let mut weeds = Vec::with_capacity(self.weeds);
         while weeds.len() < self.weeds {
             // Each weed halves its gap; the halves go to the end of the queue.
             let room = gaps.iter().position(|gap| gap.end - gap.start > NARROWEST_GAP_MM);
-            let gap = room
-                .map(|index| gaps.remove(index))
-                .ok_or(PlantingError::NoRoomForWeeds(self.weeds))?;
+            let gap = room.map(|index| gaps.remove(index)).ok_or(PlantingError::NoRoomForWeeds(self.weeds))?;
             let width_mm = rng.random_range(WEED_WIDTHS_MM);
             let clear_mm = WEED_MARGIN_MM + width_mm / 2.0;
             let position_mm = rng.random_range(gap.start + clear_mm..gap.end - clear_mm);
@@ -166,30 +159,18 @@ mod tests {
 
     #[test]
     fn the_same_seed_grows_the_same_row_and_another_seed_another() {
-        let planting = Planting {
-            weeds: 6,
-            ragged: true,
-            ..Planting::default()
-        };
+        let planting = Planting { weeds: 6, ragged: true, ..Planting::default() };
         assert_eq!(planting.grow(7), planting.grow(7));
         assert_ne!(planting.grow(7), planting.grow(8));
     }
 
     #[test]
     fn plants_and_weeds_keep_their_spacing_widths_and_margins() {
-        let planting = Planting {
-            plants: 200,
-            weeds: 150,
-            ..Planting::default()
-        };
+        let planting = Planting { plants: 200, weeds: 150, ..Planting::default() };
         let row = planting.grow(3).unwrap();
         assert_eq!((row.plants().count(), row.weeds().count()), (200, 150));
         let places: Vec<f64> = row.plants().map(|plant| plant.position_mm).collect();
-        assert!(
-            places
-                .windows(2)
-                .all(|pair| (460.0..=540.0).contains(&(pair[1] - pair[0])))
-        );
+        assert!(places.windows(2).all(|pair| (460.0..=540.0).contains(&(pair[1] - pair[0]))));
         assert!(row.plants().all(|plant| (125.0..=175.0).contains(&plant.width_mm)));
         assert!(row.weeds().all(|weed| (12.0..20.0).contains(&weed.width_mm)));
         for pair in row.things().windows(2) {
@@ -202,22 +183,13 @@ mod tests {
 
     #[test]
     fn weeds_that_find_no_room_are_refused() {
-        let planting = Planting {
-            plants: 3,
-            weeds: 40,
-            ..Planting::default()
-        };
+        let planting = Planting { plants: 3, weeds: 40, ..Planting::default() };
         assert_eq!(planting.grow(1), Err(PlantingError::NoRoomForWeeds(40)));
     }
 
     #[test]
     fn a_ragged_canopy_has_gaps_and_keeps_its_ends() {
-        let row = Planting {
-            ragged: true,
-            ..Planting::default()
-        }
-        .grow(1)
-        .unwrap();
+        let row = Planting { ragged: true, ..Planting::default() }.grow(1).unwrap();
         for plant in row.plants() {
             let span = plant.span_mm();
             let leaves = plant.blocks_mm();

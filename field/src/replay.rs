@@ -47,10 +47,7 @@ const PROGRESS_CYCLES: u64 = CYCLES_PER_SECOND / 20;
 pub fn replay(capture: &Capture, elf: &Path, mut progress: impl FnMut(f64)) -> Result<Replay, TrialError> {
     let (first_levels, edges) = split_first_levels(&capture.changes);
     let mut uno = boot(elf, &first_levels)?;
-    let mut played: Vec<PinChange> = first_levels
-        .iter()
-        .map(|change| PinChange { cycle: 0, ..*change })
-        .collect();
+    let mut played: Vec<PinChange> = first_levels.iter().map(|change| PinChange { cycle: 0, ..*change }).collect();
     let begin = Status::ask(&mut uno)?;
 
     let mut at_pauses = vec![begin.position_ticks];
@@ -63,13 +60,8 @@ pub fn replay(capture: &Capture, elf: &Path, mut progress: impl FnMut(f64)) -> R
         };
         let (start, end) = (start.cycle, end.cycle);
         let from = uno.cycle();
-        let moved: Vec<PinChange> = stretch
-            .iter()
-            .map(|change| PinChange {
-                cycle: change.cycle - start + from,
-                ..*change
-            })
-            .collect();
+        let moved: Vec<PinChange> =
+            stretch.iter().map(|change| PinChange { cycle: change.cycle - start + from, ..*change }).collect();
         uno.drive(moved.iter().copied());
         played.extend(moved);
         while uno.cycle() < from + (end - start) {
@@ -158,25 +150,15 @@ mod tests {
     fn edges(steps: &[i32]) -> Vec<PinChange> {
         const FORWARD: [(bool, bool); 4] = [(false, false), (true, false), (true, true), (false, true)];
         let mut count = 0_i32;
-        let directions = steps
-            .iter()
-            .flat_map(|&steps| (0..steps.abs()).map(move |_| steps.signum()));
+        let directions = steps.iter().flat_map(|&steps| (0..steps.abs()).map(move |_| steps.signum()));
         directions
             .enumerate()
             .map(|(index, direction)| {
                 let before = FORWARD[count.rem_euclid(4) as usize];
                 count += direction;
                 let (a, b) = FORWARD[count.rem_euclid(4) as usize];
-                let (pin, high) = if a == before.0 {
-                    (Pin::EncoderB, b)
-                } else {
-                    (Pin::EncoderA, a)
-                };
-                PinChange {
-                    cycle: index as u64 * 1000,
-                    pin,
-                    high,
-                }
+                let (pin, high) = if a == before.0 { (Pin::EncoderB, b) } else { (Pin::EncoderA, a) };
+                PinChange { cycle: index as u64 * 1000, pin, high }
             })
             .collect()
     }
@@ -194,21 +176,9 @@ mod tests {
     #[test]
     fn the_first_level_of_each_pin_is_no_edge() {
         let recorded = [
-            PinChange {
-                cycle: 0,
-                pin: Pin::EncoderA,
-                high: true,
-            },
-            PinChange {
-                cycle: 0,
-                pin: Pin::EncoderB,
-                high: false,
-            },
-            PinChange {
-                cycle: 9,
-                pin: Pin::EncoderB,
-                high: true,
-            },
+            PinChange { cycle: 0, pin: Pin::EncoderA, high: true },
+            PinChange { cycle: 0, pin: Pin::EncoderB, high: false },
+            PinChange { cycle: 9, pin: Pin::EncoderB, high: true },
         ];
         let (first_levels, edges) = split_first_levels(&recorded);
         assert_eq!(first_levels, recorded[..2]);

@@ -89,16 +89,10 @@ pub fn totals(trial: &Trial, outcome: &Outcome) -> String {
         ),
     );
     if let Some(depth_mm) = deepest_mm(&judgement.plants) {
-        line(
-            "",
-            format!("the tool reached {depth_mm:.0} mm into the canopy that was hit worst"),
-        );
+        line("", format!("the tool reached {depth_mm:.0} mm into the canopy that was hit worst"));
     }
     if judgement.idle_swings > 0 {
-        line(
-            "",
-            format!("the tool swung out {} times for no plant", judgement.idle_swings),
-        );
+        line("", format!("the tool swung out {} times for no plant", judgement.idle_swings));
     }
     if !judgement.weeds.is_empty() {
         let cut = judgement.weeds.iter().filter(|weed| weed.cut).count();
@@ -127,23 +121,14 @@ pub fn totals(trial: &Trial, outcome: &Outcome) -> String {
     );
     line("Swings", swing_words(&judgement.plants, &trial.machine));
     if outcome.stray_pulses > 0 {
-        line(
-            "",
-            format!(
-                "{} pulses on the line had no servo's width and were ignored",
-                outcome.stray_pulses
-            ),
-        );
+        line("", format!("{} pulses on the line had no servo's width and were ignored", outcome.stray_pulses));
     }
     line("Encoder", count_words(outcome));
     if status.state != "work" {
         line("Firmware", format!("ended in `{}`, not at work", status.state));
     }
     let Size { flash, sram } = outcome.size;
-    line(
-        "Memory",
-        format!("{flash} of {FLASH_BYTES} bytes of flash, {sram} of {SRAM_BYTES} bytes of SRAM"),
-    );
+    line("Memory", format!("{flash} of {FLASH_BYTES} bytes of flash, {sram} of {SRAM_BYTES} bytes of SRAM"));
     text
 }
 
@@ -165,12 +150,8 @@ fn strip_share(machine: &Machine, weeded_share: f64) -> f64 {
 }
 
 fn swing_words(plants: &[PlantOutcome], machine: &Machine) -> String {
-    let errors: Vec<f64> = plants
-        .iter()
-        .flat_map(|plant| [plant.out_error_ticks, plant.in_error_ticks])
-        .flatten()
-        .map(f64::abs)
-        .collect();
+    let errors: Vec<f64> =
+        plants.iter().flat_map(|plant| [plant.out_error_ticks, plant.in_error_ticks]).flatten().map(f64::abs).collect();
     if errors.is_empty() {
         return "none was commanded for a plant".to_owned();
     }
@@ -190,10 +171,7 @@ fn count_words(outcome: &Outcome) -> String {
         0 => "exactly where the machine is".to_owned(),
         off => format!("{off:+} from where the machine is"),
     };
-    format!(
-        "position {} ticks, {place}; {} counts lost",
-        outcome.status.position_ticks, outcome.status.lost_ticks
-    )
+    format!("position {} ticks, {place}; {} counts lost", outcome.status.position_ticks, outcome.status.lost_ticks)
 }
 
 /// A line of the plants' CSV table.
@@ -288,30 +266,16 @@ pub(crate) mod tests {
 
     /// A trial in which the tool stayed in the row from one second on, and what came of it.
     pub fn ruined_row() -> (Trial, Outcome) {
-        let row = Row::new(vec![
-            Thing::plant(500.0, 150.0),
-            Thing::weed(750.0, 15.0),
-            Thing::plant(1000.0, 150.0),
-        ])
-        .unwrap();
+        let row =
+            Row::new(vec![Thing::plant(500.0, 150.0), Thing::weed(750.0, 15.0), Thing::plant(1000.0, 150.0)]).unwrap();
         let trial = Trial::at_speed(row, Machine::default(), Timing::default(), mm_s(1.0));
-        let frame = |rise, width_us: u64| Pulse {
-            rise,
-            fall: rise + width_us * CYCLES_PER_SECOND / 1_000_000,
-        };
+        let frame = |rise, width_us: u64| Pulse { rise, fall: rise + width_us * CYCLES_PER_SECOND / 1_000_000 };
         let pulses = vec![frame(0, 2000), frame(CYCLES_PER_SECOND, 1500)];
         let outcome = Outcome {
             judgement: judge(&trial.row, &trial.machine, &trial.motion, trial.timing, &pulses, 0),
-            status: Status {
-                state: "work".to_owned(),
-                position_ticks: 99,
-                lost_ticks: 2,
-            },
+            status: Status { state: "work".to_owned(), position_ticks: 99, lost_ticks: 2 },
             true_ticks: 101,
-            size: Size {
-                flash: 20_000,
-                sram: 800,
-            },
+            size: Size { flash: 20_000, sram: 800 },
             pulses,
             stray_pulses: 0,
             changes: Vec::new(),
@@ -353,9 +317,6 @@ pub(crate) mod tests {
         let plants = String::from_utf8(plants).unwrap();
         assert_eq!(plants.lines().count(), 3);
         assert!(plants.lines().nth(1).unwrap().starts_with("500.0,150.0,"), "{plants}");
-        assert_eq!(
-            String::from_utf8(weeds).unwrap(),
-            "position_mm,width_mm,cut\n750.0,15.0,true\n"
-        );
+        assert_eq!(String::from_utf8(weeds).unwrap(), "position_mm,width_mm,cut\n750.0,15.0,true\n");
     }
 }

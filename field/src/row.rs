@@ -55,22 +55,12 @@ pub struct Thing {
 impl Thing {
     /// A crop plant with a closed canopy.
     pub fn plant(position_mm: f64, width_mm: f64) -> Self {
-        Self {
-            position_mm,
-            width_mm,
-            kind: Kind::Plant,
-            leaves: Vec::new(),
-        }
+        Self { position_mm, width_mm, kind: Kind::Plant, leaves: Vec::new() }
     }
 
     /// A tall weed.
     pub fn weed(position_mm: f64, width_mm: f64) -> Self {
-        Self {
-            position_mm,
-            width_mm,
-            kind: Kind::Weed,
-            leaves: Vec::new(),
-        }
+        Self { position_mm, width_mm, kind: Kind::Weed, leaves: Vec::new() }
     }
 
     /// The stretch of ground below it.
@@ -80,11 +70,7 @@ impl Thing {
 
     /// The stretches where it breaks the beam.
     pub fn blocks_mm(&self) -> Vec<Range<f64>> {
-        if self.leaves.is_empty() {
-            vec![self.span_mm()]
-        } else {
-            self.leaves.clone()
-        }
+        if self.leaves.is_empty() { vec![self.span_mm()] } else { self.leaves.clone() }
     }
 
     fn check(&self) -> Result<(), Problem> {
@@ -241,70 +227,40 @@ impl Row {
     /// # Errors
     /// Names the file, the line and what would be right.
     pub fn read_csv(path: &Path) -> Result<Self, FileError> {
-        let file = File::open(path).map_err(|source| FileError::File {
-            path: path.into(),
-            source,
-        })?;
-        let at = |line: u64, problem: String| FileError::Line {
-            path: path.into(),
-            line,
-            problem,
-        };
+        let file = File::open(path).map_err(|source| FileError::File { path: path.into(), source })?;
+        let at = |line: u64, problem: String| FileError::Line { path: path.into(), line, problem };
         let from_csv = |error: csv::Error, header: &csv::StringRecord| {
             let line = error.position().map_or(1, csv::Position::line);
             at(line, explain(&error, header))
         };
 
-        let mut reader = csv::ReaderBuilder::new()
-            .trim(csv::Trim::All)
-            .comment(Some(b'#'))
-            .from_reader(file);
+        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(file);
         let no_header = csv::StringRecord::new();
         let header = reader.headers().map_err(|error| from_csv(error, &no_header))?.clone();
         for column in COLUMNS {
             if !header.iter().any(|name| name == column) {
-                let problem = format!(
-                    "the column `{column}` is missing: the header has to name {}",
-                    COLUMNS.join(",")
-                );
+                let problem = format!("the column `{column}` is missing: the header has to name {}", COLUMNS.join(","));
                 return Err(at(1, problem));
             }
         }
 
         let mut lines: Vec<(u64, Thing)> = Vec::new();
         let mut record = csv::StringRecord::new();
-        while reader
-            .read_record(&mut record)
-            .map_err(|error| from_csv(error, &header))?
-        {
+        while reader.read_record(&mut record).map_err(|error| from_csv(error, &header))? {
             let line = record.position().map_or(0, csv::Position::line);
-            let Record {
-                position_mm,
-                width_mm,
-                kind,
-            } = record
-                .deserialize(Some(&header))
-                .map_err(|error| from_csv(error, &header))?;
-            let thing = Thing {
-                position_mm,
-                width_mm,
-                kind,
-                leaves: Vec::new(),
-            };
+            let Record { position_mm, width_mm, kind } =
+                record.deserialize(Some(&header)).map_err(|error| from_csv(error, &header))?;
+            let thing = Thing { position_mm, width_mm, kind, leaves: Vec::new() };
             thing.check().map_err(|problem| at(line, problem.to_string()))?;
             lines.push((line, thing));
         }
         lines.sort_by(|(_, a), (_, b)| a.position_mm.total_cmp(&b.position_mm));
         for pair in lines.windows(2) {
             let (line, thing) = &pair[1];
-            thing
-                .check_after(&pair[0].1)
-                .map_err(|problem| at(*line, problem.to_string()))?;
+            thing.check_after(&pair[0].1).map_err(|problem| at(*line, problem.to_string()))?;
         }
-        Self::new(lines.into_iter().map(|(_, thing)| thing).collect()).map_err(|problem| FileError::Table {
-            path: path.into(),
-            problem,
-        })
+        Self::new(lines.into_iter().map(|(_, thing)| thing).collect())
+            .map_err(|problem| FileError::Table { path: path.into(), problem })
     }
 
     /// Writes the row as a CSV table that [`Row::read_csv`] reads. Gaps within a ragged canopy are not kept.
@@ -314,11 +270,7 @@ impl Row {
     pub fn write_csv(&self, to: impl io::Write) -> Result<(), csv::Error> {
         let mut writer = csv::Writer::from_writer(to);
         for thing in &self.things {
-            writer.serialize(Record {
-                position_mm: thing.position_mm,
-                width_mm: thing.width_mm,
-                kind: thing.kind,
-            })?;
+            writer.serialize(Record { position_mm: thing.position_mm, width_mm: thing.width_mm, kind: thing.kind })?;
         }
         writer.flush()?;
         Ok(())
@@ -358,22 +310,13 @@ mod tests {
 
     #[test]
     fn each_plant_has_a_spacing_of_row_to_itself() {
-        let row = Row::new(vec![
-            Thing::plant(1000.0, 150.0),
-            Thing::plant(1480.0, 150.0),
-            Thing::plant(2000.0, 150.0),
-        ]);
+        let row = Row::new(vec![Thing::plant(1000.0, 150.0), Thing::plant(1480.0, 150.0), Thing::plant(2000.0, 150.0)]);
         assert_eq!(row.unwrap().span_mm(), 750.0..2250.0);
     }
 
     #[test]
     fn a_written_row_reads_back() {
-        let row = Planting {
-            weeds: 4,
-            ..Planting::default()
-        }
-        .grow(5)
-        .unwrap();
+        let row = Planting { weeds: 4, ..Planting::default() }.grow(5).unwrap();
         let mut text = Vec::new();
         row.write_csv(&mut text).unwrap();
         assert_eq!(read(&String::from_utf8(text).unwrap()), Ok(row));
@@ -390,18 +333,9 @@ mod tests {
     fn a_bad_line_is_named_with_its_number_and_what_would_be_right() {
         let header = "position_mm,width_mm,kind\n";
         for (text, error) in [
-            (
-                "250,150,plant\n750,-5,plant\n",
-                "row.csv, line 3: width_mm is -5: it has to be above 0",
-            ),
-            (
-                "250,wide,plant\n",
-                "row.csv, line 2: width_mm: invalid float literal, where a number is wanted",
-            ),
-            (
-                "250,150,crop\n",
-                "row.csv, line 2: unknown variant `crop`, expected `plant` or `weed`",
-            ),
+            ("250,150,plant\n750,-5,plant\n", "row.csv, line 3: width_mm is -5: it has to be above 0"),
+            ("250,wide,plant\n", "row.csv, line 2: width_mm: invalid float literal, where a number is wanted"),
+            ("250,150,crop\n", "row.csv, line 2: unknown variant `crop`, expected `plant` or `weed`"),
             ("250,150\n", "row.csv, line 2: 2 fields where the header has 3"),
             ("NaN,150,plant\n", "row.csv, line 2: position_mm is NaN"),
             (
@@ -418,10 +352,7 @@ mod tests {
     #[test]
     fn a_missing_column_is_named() {
         let said = read("position_mm,kind\n250,plant\n").unwrap_err();
-        assert!(
-            said.starts_with("row.csv, line 1: the column `width_mm` is missing"),
-            "{said}"
-        );
+        assert!(said.starts_with("row.csv, line 1: the column `width_mm` is missing"), "{said}");
     }
 
     #[test]

@@ -56,12 +56,7 @@ impl Command {
 impl Default for Servo {
     /// A 60 kg cm hobby servo unloaded: 60 ms of dead time, 120 ms for 45 degrees.
     fn default() -> Self {
-        Self {
-            in_us: 1500.0,
-            out_us: 2000.0,
-            dead_time_ms: 60.0,
-            travel_ms: 120.0,
-        }
+        Self { in_us: 1500.0, out_us: 2000.0, dead_time_ms: 60.0, travel_ms: 120.0 }
     }
 }
 
@@ -79,11 +74,7 @@ impl Servo {
         for &pulse in pulses.iter().filter(|pulse| WIDTHS_US.contains(&pulse.width_us())) {
             if (pulse.width_us() - width_us).abs() >= DEAD_BAND_US {
                 width_us = pulse.width_us();
-                commands.push(Command {
-                    rise_cycle: pulse.rise,
-                    fall_cycle: pulse.fall,
-                    degrees: self.degrees(pulse),
-                });
+                commands.push(Command { rise_cycle: pulse.rise, fall_cycle: pulse.fall, degrees: self.degrees(pulse) });
             }
         }
         commands
@@ -96,37 +87,22 @@ impl Servo {
     pub fn stroke(&self, commands: &[Command], start_cycle: u64) -> Stroke {
         let degrees_per_s = OUT_DEGREES / (self.travel_ms / 1000.0);
         let rest_degrees = commands.first().map_or(OUT_DEGREES, |command| command.degrees);
-        let mut corners = vec![Corner {
-            time_s: f64::NEG_INFINITY,
-            degrees: rest_degrees,
-        }];
+        let mut corners = vec![Corner { time_s: f64::NEG_INFINITY, degrees: rest_degrees }];
         let mut target_degrees = rest_degrees;
         for (index, command) in commands.iter().enumerate() {
             let heard_s = (command.fall_cycle as f64 - start_cycle as f64) / CYCLES_PER_SECOND as f64;
-            let begin = Corner {
-                time_s: heard_s + self.dead_time_ms / 1000.0,
-                degrees: 0.0,
-            };
-            let begin = Corner {
-                degrees: angle(&corners, begin.time_s, target_degrees),
-                ..begin
-            };
+            let begin = Corner { time_s: heard_s + self.dead_time_ms / 1000.0, degrees: 0.0 };
+            let begin = Corner { degrees: angle(&corners, begin.time_s, target_degrees), ..begin };
             // A corner that the stroke had planned beyond this moment is not reached any more.
             corners.retain(|corner| corner.time_s < begin.time_s);
             corners.push(begin);
             target_degrees = command.degrees;
             if index > 0 {
                 let travel_s = (target_degrees - begin.degrees).abs() / degrees_per_s;
-                corners.push(Corner {
-                    time_s: begin.time_s + travel_s,
-                    degrees: target_degrees,
-                });
+                corners.push(Corner { time_s: begin.time_s + travel_s, degrees: target_degrees });
             }
         }
-        Stroke {
-            corners,
-            end_degrees: target_degrees,
-        }
+        Stroke { corners, end_degrees: target_degrees }
     }
 }
 
@@ -165,10 +141,7 @@ impl Stroke {
 
     /// The times at which the servo begins or ends to turn. Between two of them the angle follows a straight line.
     pub fn turns_s(&self) -> impl Iterator<Item = f64> {
-        self.corners
-            .iter()
-            .map(|corner| corner.time_s)
-            .filter(|time_s| time_s.is_finite())
+        self.corners.iter().map(|corner| corner.time_s).filter(|time_s| time_s.is_finite())
     }
 
     /// The times within `during_s` at which the angle is below `degrees`.
@@ -205,10 +178,7 @@ mod tests {
             .enumerate()
             .map(|(frame, width_us)| {
                 let rise = frame as u64 * 20_000 * cycles_per_us;
-                Pulse {
-                    rise,
-                    fall: rise + width_us * cycles_per_us,
-                }
+                Pulse { rise, fall: rise + width_us * cycles_per_us }
             })
             .collect()
     }

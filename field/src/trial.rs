@@ -125,13 +125,7 @@ impl Trial {
             speed_mm_s,
             span.end + machine.beam_to_tool_mm + RUN_OUT_MM,
         );
-        Self {
-            row,
-            machine,
-            motion,
-            timing,
-            start: Start::Command,
-        }
+        Self { row, machine, motion, timing, start: Start::Command }
     }
 
     /// Runs the firmware at `elf`. `progress` is told the share of the motion done, from 0 to 1.
@@ -152,11 +146,7 @@ impl Trial {
                 ask(&mut uno, "start now")?;
             }
             Start::Switch => {
-                let work = PinChange {
-                    cycle: uno.cycle(),
-                    pin: Pin::WorkSwitch,
-                    high: false,
-                };
+                let work = PinChange { cycle: uno.cycle(), pin: Pin::WorkSwitch, high: false };
                 inputs.push(work);
                 uno.drive([work]);
                 uno.run_for_ms(SWITCH_MS)?;
@@ -183,21 +173,11 @@ impl Trial {
         let pulses = uno.servo_pulses();
         inputs.extend_from_slice(uno.changes());
         Ok(Outcome {
-            judgement: judge(
-                &self.row,
-                &self.machine,
-                &self.motion,
-                self.timing,
-                &pulses,
-                start_cycle,
-            ),
+            judgement: judge(&self.row, &self.machine, &self.motion, self.timing, &pulses, start_cycle),
             status,
             true_ticks: self.machine.ticks(&self.motion, self.motion.duration_s()),
             size: uno.size(),
-            stray_pulses: pulses
-                .iter()
-                .filter(|pulse| !WIDTHS_US.contains(&pulse.width_us()))
-                .count(),
+            stray_pulses: pulses.iter().filter(|pulse| !WIDTHS_US.contains(&pulse.width_us())).count(),
             pulses,
             changes: inputs,
             start_cycle,
@@ -206,13 +186,7 @@ impl Trial {
 
     /// The settings by which the firmware knows machine and timing.
     fn settings(&self) -> [(&'static str, u32); 8] {
-        let Machine {
-            wheel_mm,
-            ticks_per_rev,
-            beam_to_tool_mm,
-            servo,
-            ..
-        } = self.machine;
+        let Machine { wheel_mm, ticks_per_rev, beam_to_tool_mm, servo, .. } = self.machine;
         [
             ("ticks_per_rev", ticks_per_rev),
             ("wheel_mm", wheel_mm.round() as u32),

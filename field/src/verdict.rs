@@ -35,22 +35,14 @@ pub struct Timing {
 
 impl Default for Timing {
     fn default() -> Self {
-        Self {
-            margin_mm: 50,
-            lead_out_ms: 180,
-            lead_in_ms: 40,
-        }
+        Self { margin_mm: 50, lead_out_ms: 180, lead_in_ms: 40 }
     }
 }
 
 impl Timing {
     /// The paper's schedule: swings are commanded where they should be done (Eq. 1 to 3).
     pub fn as_in_the_paper() -> Self {
-        Self {
-            lead_out_ms: 0,
-            lead_in_ms: 0,
-            ..Self::default()
-        }
+        Self { lead_out_ms: 0, lead_in_ms: 0, ..Self::default() }
     }
 }
 
@@ -100,14 +92,12 @@ pub struct PlantOutcome {
 impl PlantOutcome {
     /// Where along the row the tool was fully out before the plant.
     pub fn clear_mm(&self) -> Option<f64> {
-        self.clearance_before_mm
-            .map(|clearance_mm| self.plant.span_mm().start - clearance_mm)
+        self.clearance_before_mm.map(|clearance_mm| self.plant.span_mm().start - clearance_mm)
     }
 
     /// Where along the row the tool began to come back behind the plant.
     pub fn back_mm(&self) -> Option<f64> {
-        self.clearance_behind_mm
-            .map(|clearance_mm| self.plant.span_mm().end + clearance_mm)
+        self.clearance_behind_mm.map(|clearance_mm| self.plant.span_mm().end + clearance_mm)
     }
 }
 
@@ -147,11 +137,7 @@ impl Judgement {
 
     /// Every swing's error in counts, late above 0.
     pub fn swing_errors_ticks(&self) -> Vec<f64> {
-        self.plants
-            .iter()
-            .flat_map(|plant| [plant.out_error_ticks, plant.in_error_ticks])
-            .flatten()
-            .collect()
+        self.plants.iter().flat_map(|plant| [plant.out_error_ticks, plant.in_error_ticks]).flatten().collect()
     }
 }
 
@@ -167,10 +153,7 @@ pub fn weedable_share(row: &Row, machine: &Machine, motion: &Motion, timing: Tim
         let span = plant.span_mm();
         let swing_mm = |ground_mm: f64| {
             let first = motion.passings(ground_mm + machine.beam_to_tool_mm);
-            first
-                .first()
-                .map_or(0.0, |passing| motion.speed_mm_s(passing.time_s).abs())
-                * swing_s
+            first.first().map_or(0.0, |passing| motion.speed_mm_s(passing.time_s).abs()) * swing_s
         };
         let (start_mm, end_mm) = (span.start - margin_mm, span.end + margin_mm);
         start_mm - swing_mm(start_mm)..end_mm + swing_mm(end_mm)
@@ -203,10 +186,7 @@ pub fn judge(
     let run = machine.tool_mm(run.start)..machine.tool_mm(run.end);
     let swings = Swing::all(&commands, motion, start_cycle);
 
-    let mut plants: Vec<PlantOutcome> = row
-        .plants()
-        .map(|plant| plant_outcome(plant, &closed, timing))
-        .collect();
+    let mut plants: Vec<PlantOutcome> = row.plants().map(|plant| plant_outcome(plant, &closed, timing)).collect();
     let mut idle_swings = 0;
     for swing in &swings {
         let covers = |plant: &PlantOutcome| swing.covers(&plant.plant.span_mm(), machine, motion);
@@ -215,17 +195,10 @@ pub fn judge(
             plants[index].swings += 1;
         }
         if let (Some(&first), Some(&last)) = (covered.first(), covered.last()) {
-            let error = SwingError {
-                machine,
-                motion,
-                timing,
-            };
-            plants[first].out_error_ticks = swing
-                .out_s
-                .and_then(|time_s| error.out_ticks(time_s, &plants[first].plant));
-            plants[last].in_error_ticks = swing
-                .in_s
-                .and_then(|time_s| error.in_ticks(time_s, &plants[last].plant));
+            let error = SwingError { machine, motion, timing };
+            plants[first].out_error_ticks =
+                swing.out_s.and_then(|time_s| error.out_ticks(time_s, &plants[first].plant));
+            plants[last].in_error_ticks = swing.in_s.and_then(|time_s| error.in_ticks(time_s, &plants[last].plant));
         } else if swing.out_s.is_some() {
             idle_swings += 1;
         }
@@ -233,10 +206,7 @@ pub fn judge(
 
     Judgement {
         plants,
-        weeds: row
-            .weeds()
-            .map(|weed| weed_outcome(weed, machine, motion, &stroke))
-            .collect(),
+        weeds: row.weeds().map(|weed| weed_outcome(weed, machine, motion, &stroke)).collect(),
         clear_mm: between(&closed, &run),
         path: path(machine, motion, &stroke),
         idle_swings,
@@ -263,22 +233,14 @@ impl Swing {
             match (command.is_out(), out) {
                 (true, None) => out = Some((index > 0).then_some(time_s)),
                 (false, Some(out_s)) => {
-                    swings.push(Self {
-                        out_s,
-                        in_s: Some(time_s),
-                        during_s: out_s.unwrap_or(0.0)..time_s,
-                    });
+                    swings.push(Self { out_s, in_s: Some(time_s), during_s: out_s.unwrap_or(0.0)..time_s });
                     out = None;
                 }
                 _ => {}
             }
         }
         if let Some(out_s) = out {
-            swings.push(Self {
-                out_s,
-                in_s: None,
-                during_s: out_s.unwrap_or(0.0)..motion.duration_s(),
-            });
+            swings.push(Self { out_s, in_s: None, during_s: out_s.unwrap_or(0.0)..motion.duration_s() });
         }
         swings
     }
@@ -332,14 +294,9 @@ fn plant_outcome(plant: &Thing, closed: &[Range<f64>], timing: Timing) -> PlantO
         .rev()
         .find(|ground| ground.start < parting_mm)
         .map(|ground| span.start - ground.end.min(span.end));
-    let clearance_behind_mm = closed
-        .iter()
-        .find(|ground| ground.end > parting_mm)
-        .map(|ground| ground.start.max(span.start) - span.end);
-    let narrowest_mm = [clearance_before_mm, clearance_behind_mm]
-        .into_iter()
-        .flatten()
-        .fold(f64::INFINITY, f64::min);
+    let clearance_behind_mm =
+        closed.iter().find(|ground| ground.end > parting_mm).map(|ground| ground.start.max(span.start) - span.end);
+    let narrowest_mm = [clearance_before_mm, clearance_behind_mm].into_iter().flatten().fold(f64::INFINITY, f64::min);
     let verdict = if narrowest_mm < 0.0 {
         Verdict::Damaged
     } else if narrowest_mm < f64::from(timing.margin_mm) - MARGIN_TOLERANCE_MM {
@@ -362,9 +319,7 @@ fn weed_outcome(weed: &Thing, machine: &Machine, motion: &Motion, stroke: &Strok
     let passings = motion.passings(weed.position_mm + machine.beam_to_tool_mm);
     WeedOutcome {
         weed: weed.clone(),
-        cut: passings
-            .iter()
-            .any(|passing| stroke.degrees(passing.time_s) < machine.line_degrees()),
+        cut: passings.iter().any(|passing| stroke.degrees(passing.time_s) < machine.line_degrees()),
     }
 }
 
@@ -372,11 +327,7 @@ fn weed_outcome(weed: &Thing, machine: &Machine, motion: &Motion, stroke: &Strok
 fn between(union: &[Range<f64>], whole: &Range<f64>) -> Vec<Range<f64>> {
     let starts = std::iter::once(whole.start).chain(union.iter().map(|stretch| stretch.end));
     let ends = union.iter().map(|stretch| stretch.start).chain([whole.end]);
-    starts
-        .zip(ends)
-        .map(|(start, end)| start..end)
-        .filter(|stretch| stretch.start < stretch.end)
-        .collect()
+    starts.zip(ends).map(|(start, end)| start..end).filter(|stretch| stretch.start < stretch.end).collect()
 }
 
 fn path(machine: &Machine, motion: &Motion, stroke: &Stroke) -> Vec<(f64, f64)> {
@@ -403,12 +354,7 @@ mod tests {
 
     /// Two plants and a weed between them, passed at 2.5 km/h.
     fn row() -> Row {
-        Row::new(vec![
-            Thing::plant(1000.0, 150.0),
-            Thing::weed(1300.0, 15.0),
-            Thing::plant(1600.0, 150.0),
-        ])
-        .unwrap()
+        Row::new(vec![Thing::plant(1000.0, 150.0), Thing::weed(1300.0, 15.0), Thing::plant(1600.0, 150.0)]).unwrap()
     }
 
     fn motion() -> Motion {
@@ -464,10 +410,7 @@ mod tests {
             let behind_mm = plant.clearance_behind_mm.unwrap();
             assert!((behind_mm - 64.9).abs() < 0.2, "{behind_mm} mm behind");
         }
-        let worst = judgement
-            .swing_errors_ticks()
-            .into_iter()
-            .fold(0.0, |worst: f64, error| worst.max(error.abs()));
+        let worst = judgement.swing_errors_ticks().into_iter().fold(0.0, |worst: f64, error| worst.max(error.abs()));
         assert_eq!(judgement.swing_errors_ticks().len(), 4);
         assert!(worst < 0.01, "{worst} ticks");
         assert!(judgement.weeds[0].cut);
@@ -493,10 +436,7 @@ mod tests {
         assert_eq!(judgement.plants[0].verdict, Verdict::MarginCut);
         assert_eq!(judgement.plants[1].verdict, Verdict::Kept);
         let error = judgement.plants[0].out_error_ticks.unwrap();
-        assert!(
-            (error - 30.0 / Machine::default().tick_mm()).abs() < 0.01,
-            "{error} ticks"
-        );
+        assert!((error - 30.0 / Machine::default().tick_mm()).abs() < 0.01, "{error} ticks");
     }
 
     #[test]
@@ -544,14 +484,7 @@ mod tests {
         let there = motion();
         let pulses = pulses(&there, &places);
         let back = motion().change_speed(-mm_s(1.0), 1000.0).roll_to(1000.0);
-        let judgement = judge(
-            &row(),
-            &Machine::default(),
-            &back,
-            Timing::default(),
-            &pulses,
-            START_CYCLE,
-        );
+        let judgement = judge(&row(), &Machine::default(), &back, Timing::default(), &pulses, START_CYCLE);
         assert_eq!(judgement.count(Verdict::Damaged), 2);
     }
 
