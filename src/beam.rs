@@ -35,9 +35,7 @@ impl<'a> Beam<'a> {
         // SAFETY: this is the mask bit of PCINT0.
         interrupts.pcmsk0().write(|w| unsafe { w.pcint().bits(1) });
         // SAFETY: bit 0 is PCIE0; the other bits are kept.
-        interrupts
-            .pcicr()
-            .modify(|r, w| unsafe { w.pcie().bits(r.pcie().bits() | 1) });
+        interrupts.pcicr().modify(|r, w| unsafe { w.pcie().bits(r.pcie().bits() | 1) });
         Self { port, edges }
     }
 

@@ -59,12 +59,7 @@ fn main() -> ! {
         let now = clock.now();
         let (position, lost) = encoder::position_and_lost();
         let Ok(switch_on) = work_switch.is_low();
-        Readings {
-            now,
-            position: Position::new(position),
-            switch_on,
-            lost,
-        }
+        Readings { now, position: Position::new(position), switch_on, lost }
     };
     let controller = CONTROLLER.init(Controller::new(Nearest(examples::InFlash), read(), beam.is_broken()));
     let mut line = LineBuffer::new();

@@ -48,14 +48,8 @@ impl Serial {
         usart.ubrr0().write(|w| w.set(BAUD_DIVISOR));
         usart.ucsr0a().write(|w| w.u2x0().set_bit());
         usart.ucsr0c().write(|w| w.ucsz0().chr8());
-        usart
-            .ucsr0b()
-            .write(|w| w.rxen0().set_bit().txen0().set_bit().rxcie0().set_bit());
-        Self {
-            usart,
-            received,
-            to_send,
-        }
+        usart.ucsr0b().write(|w| w.rxen0().set_bit().txen0().set_bit().rxcie0().set_bit());
+        Self { usart, received, to_send }
     }
 
     /// Bytes that can be written now.
@@ -92,11 +86,7 @@ impl Write for Serial {
     }
 
     fn flush(&mut self) -> nb::Result<(), Infallible> {
-        if self.to_send.len() == 0 {
-            Ok(())
-        } else {
-            Err(nb::Error::WouldBlock)
-        }
+        if self.to_send.len() == 0 { Ok(()) } else { Err(nb::Error::WouldBlock) }
     }
 }
 

@@ -55,10 +55,7 @@ impl<E: Examples<{ features::COUNT }>> Classifier for Nearest<E> {
         let query = examples::scale().quantise(&features.values());
         let answer = knn::classify::<{ features::COUNT }, { label::COUNT }>(&self.0, &query, k, examples::RADIUS);
         let Ok(Answer { label, votes, kind, .. }) = answer else {
-            return Vote {
-                class: Class::Unknown,
-                votes: 0,
-            };
+            return Vote { class: Class::Unknown, votes: 0 };
         };
         let class = match (kind, label) {
             (Kind::Known, label::PLANT) => Class::Plant,
@@ -66,9 +63,6 @@ impl<E: Examples<{ features::COUNT }>> Classifier for Nearest<E> {
             _ => Class::Unknown,
         };
         let votes = votes.get(usize::from(label)).copied().unwrap_or(0);
-        Vote {
-            class,
-            votes: votes.min(usize::from(u8::MAX)) as u8,
-        }
+        Vote { class, votes: votes.min(usize::from(u8::MAX)) as u8 }
     }
 }

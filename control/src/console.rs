@@ -88,9 +88,7 @@ pub enum Mistake {
 /// # Errors
 /// A [`Mistake`] that says what would have been right.
 pub fn parse(line: &[u8]) -> Result<Command, Mistake> {
-    let mut words = line
-        .split(|&byte| byte == b' ' || byte == b'\t')
-        .filter(|word| !word.is_empty());
+    let mut words = line.split(|&byte| byte == b' ' || byte == b'\t').filter(|word| !word.is_empty());
     let word = words.next().and_then(Word::find).ok_or(Mistake::UnknownCommand)?;
     let (first, second) = (words.next(), words.next());
     if words.next().is_some() {
@@ -138,10 +136,7 @@ pub struct LineBuffer {
 impl LineBuffer {
     /// An empty line.
     pub const fn new() -> Self {
-        Self {
-            characters: Vec::new(),
-            mistake: None,
-        }
+        Self { characters: Vec::new(), mistake: None }
     }
 
     /// Takes a byte. At a line's end, returns what the line says; an empty line says nothing.
@@ -238,22 +233,14 @@ mod tests {
     #[test]
     fn carriage_return_line_feed_or_both_end_a_line() {
         let twice = [Ok(Command::Hold), Ok(Command::Clear)];
-        for text in [
-            &b"hold\rclear\r"[..],
-            b"hold\nclear\n",
-            b"hold\r\nclear\r\n",
-            b"\n\nhold\r\r\n \nclear\n",
-        ] {
+        for text in [&b"hold\rclear\r"[..], b"hold\nclear\n", b"hold\r\nclear\r\n", b"\n\nhold\r\r\n \nclear\n"] {
             assert_eq!(answers(text), twice, "{}", text.escape_ascii());
         }
     }
 
     #[test]
     fn backspace_takes_back_the_last_character() {
-        assert_eq!(
-            answers(b"hole\x08d\n\x7F\x7Fclear\n"),
-            [Ok(Command::Hold), Ok(Command::Clear)]
-        );
+        assert_eq!(answers(b"hole\x08d\n\x7F\x7Fclear\n"), [Ok(Command::Hold), Ok(Command::Clear)]);
     }
 
     #[test]
@@ -261,10 +248,7 @@ mod tests {
         let mut text = [b'x'; 300].to_vec();
         text.extend(b"\nstatus\n");
         assert_eq!(answers(&text), [Err(Mistake::TooLong), Ok(Command::Status)]);
-        assert_eq!(
-            answers(b"\xFF\0\x1Bhold\nhold\n"),
-            [Err(Mistake::NotText), Ok(Command::Hold)]
-        );
+        assert_eq!(answers(b"\xFF\0\x1Bhold\nhold\n"), [Err(Mistake::NotText), Ok(Command::Hold)]);
     }
 
     #[test]

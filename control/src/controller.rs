@@ -168,16 +168,10 @@ impl<C: Classifier> Controller<C> {
         let out = self.state != State::Work || self.must_be_out(tool);
         if out != self.tool_out {
             self.tool_out = out;
-            self.tell(Event::Swing {
-                out,
-                position: readings.position,
-            });
+            self.tell(Event::Swing { out, position: readings.position });
         }
         let pulse = if out { Setting::ServoOutUs } else { Setting::ServoInUs };
-        Orders {
-            pulse: servo::from_us(self.settings.get(pulse)),
-            gap_ms: self.settings.get(Setting::ServoGapMs) as u8,
-        }
+        Orders { pulse: servo::from_us(self.settings.get(pulse)), gap_ms: self.settings.get(Setting::ServoGapMs) as u8 }
     }
 
     /// Goes to work; with `now`, at once and over ground that the beam has not seen.
@@ -287,20 +281,17 @@ impl<C: Classifier> Controller<C> {
         let one = Ticks(if out < Ticks::ZERO { -1 } else { 1 });
         // The stretch of ground that must be open for the tool to be in the row when this decision shows.
         let (near, far) = if self.tool_out {
-            // Coming back pays only if there is time to leave again before the next window: a second lead. It also keeps
-            // the tool out for the window it left for, should the speed falter. The tick on either side is for an
-            // encoder that trembles on an edge.
-            (back - one, out + out + one)
+            // Coming back pays only if the tool can stay for as long as its stroke takes, the difference of the leads.
+            // That also keeps it out for the window that it left for, should the speed falter. The tick on either side
+            // is for an encoder that trembles on an edge.
+            (back - one, out + (out - back) + one)
         } else {
             // A window once left stays left while the measured speed wavers by less than a quarter.
             (back + Ticks(back.0 / 4), out)
         };
         let margin = self.geometry.margin;
         self.schedule.is_closed(tool + near, tool + far, margin)
-            || self
-                .watch
-                .open()
-                .is_some_and(|leading| (tool + far.max(near)) - leading >= -margin)
+            || self.watch.open().is_some_and(|leading| (tool + far.max(near)) - leading >= -margin)
             || self.outruns_the_beam(tool)
     }
 
@@ -319,12 +310,7 @@ impl<C: Classifier> Controller<C> {
         let features = Features::new(wheel, self.speed_mm_s(), spacing, object.width());
         let vote = self.classifier.classify(&features, self.settings.get(Setting::K) as u8);
         let plan = Plan::new(self.geometry.beam_to_tool, object.width(), self.geometry.margin);
-        self.tell(Event::Object {
-            vote,
-            leading: object.leading,
-            spacing,
-            plan,
-        });
+        self.tell(Event::Object { vote, leading: object.leading, spacing, plan });
         if vote.class == Class::Weed {
             return;
         }
@@ -342,10 +328,7 @@ impl<C: Classifier> Controller<C> {
         if let State::Alarm(_) = self.state {
             return;
         }
-        self.tell(Event::Alarm {
-            alarm,
-            position: self.readings.position,
-        });
+        self.tell(Event::Alarm { alarm, position: self.readings.position });
         self.enter(State::Alarm(alarm));
     }
 

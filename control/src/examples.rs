@@ -22,26 +22,11 @@ pub fn scale() -> Scale<{ features::COUNT }> {
 /// From a feature's value to a byte. A width counts most, through hold and actuation; the ranges leave room for beams
 /// broken far longer than by any example.
 pub const SCALE: Scale<{ features::COUNT }> = Scale::new([
-    Range {
-        lowest: 0,
-        highest: 1000,
-    },
-    Range {
-        lowest: 0,
-        highest: 1800,
-    },
-    Range {
-        lowest: 0,
-        highest: 500,
-    },
-    Range {
-        lowest: 80,
-        highest: 400,
-    },
-    Range {
-        lowest: 400,
-        highest: 800,
-    },
+    Range { lowest: 0, highest: 1000 },
+    Range { lowest: 0, highest: 1800 },
+    Range { lowest: 0, highest: 500 },
+    Range { lowest: 80, highest: 400 },
+    Range { lowest: 400, highest: 800 },
 ]);
 
 /// Squared distance beyond which an object is like no example: about 20 mm of width with nothing else changed.
@@ -90,9 +75,7 @@ mod tests {
     use crate::classifier::{Class, Classifier, Nearest};
 
     fn class(speed: i16, spacing_mm: i16, width_mm: i16) -> Class {
-        Nearest(EXAMPLES)
-            .classify(&Features::describe(speed, spacing_mm, width_mm), 3)
-            .class
+        Nearest(EXAMPLES).classify(&Features::describe(speed, spacing_mm, width_mm), 3).class
     }
 
     #[test]
@@ -100,11 +83,7 @@ mod tests {
         for speed in SPEED_CLASSES_MM_S {
             for width_mm in 95..=190 {
                 for spacing_mm in (470..=1240).step_by(10) {
-                    assert_ne!(
-                        class(speed, spacing_mm, width_mm),
-                        Class::Weed,
-                        "{speed} {spacing_mm} {width_mm}"
-                    );
+                    assert_ne!(class(speed, spacing_mm, width_mm), Class::Weed, "{speed} {spacing_mm} {width_mm}");
                 }
             }
         }
@@ -115,11 +94,7 @@ mod tests {
         for speed in SPEED_CLASSES_MM_S {
             for width_mm in 12..=20 {
                 for spacing_mm in 60..=700 {
-                    assert_eq!(
-                        class(speed, spacing_mm, width_mm),
-                        Class::Weed,
-                        "{speed} {spacing_mm} {width_mm}"
-                    );
+                    assert_eq!(class(speed, spacing_mm, width_mm), Class::Weed, "{speed} {spacing_mm} {width_mm}");
                 }
             }
         }
@@ -130,11 +105,7 @@ mod tests {
         for speed in SPEED_CLASSES_MM_S {
             for width_mm in (50..=90).chain([250, 400, 1000, 30_000]) {
                 for spacing_mm in (0..=2000).step_by(10) {
-                    assert_ne!(
-                        class(speed, spacing_mm, width_mm),
-                        Class::Weed,
-                        "{speed} {spacing_mm} {width_mm}"
-                    );
+                    assert_ne!(class(speed, spacing_mm, width_mm), Class::Weed, "{speed} {spacing_mm} {width_mm}");
                 }
             }
         }

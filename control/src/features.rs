@@ -38,11 +38,7 @@ pub struct Features {
 impl Features {
     /// Describes an object of `width`, `spacing` behind the last plant, seen at `speed_mm_s`.
     pub fn new(wheel: Wheel, speed_mm_s: i16, spacing: Ticks, width: Ticks) -> Self {
-        Self::describe(
-            speed_class(speed_mm_s),
-            wheel.millimetres(spacing),
-            wheel.millimetres(width),
-        )
+        Self::describe(speed_class(speed_mm_s), wheel.millimetres(spacing), wheel.millimetres(width))
     }
 
     /// Describes an object of `width_mm`, `spacing_mm` behind the last plant, in one of the speed classes.
@@ -72,11 +68,7 @@ impl Features {
 }
 
 const fn limited(millimetres: i32) -> i16 {
-    if millimetres > i16::MAX as i32 {
-        i16::MAX
-    } else {
-        millimetres as i16
-    }
+    if millimetres > i16::MAX as i32 { i16::MAX } else { millimetres as i16 }
 }
 
 /// The nearest of the paper's speed classes, in mm/s; faster than the fastest is the fastest.
@@ -93,23 +85,13 @@ pub const fn speed_class(speed_mm_s: i16) -> i16 {
 mod tests {
     use super::*;
 
-    const WHEEL: Wheel = Wheel {
-        ticks_per_rev: 2400,
-        diameter_mm: 400,
-    };
+    const WHEEL: Wheel = Wheel { ticks_per_rev: 2400, diameter_mm: 400 };
 
     #[test]
     fn a_speed_belongs_to_the_nearest_of_the_papers_classes() {
-        for (speed, class) in [
-            (-50, 278),
-            (0, 278),
-            (347, 278),
-            (348, 417),
-            (486, 417),
-            (487, 556),
-            (694, 694),
-            (2778, 694),
-        ] {
+        for (speed, class) in
+            [(-50, 278), (0, 278), (347, 278), (348, 417), (486, 417), (487, 556), (694, 694), (2778, 694)]
+        {
             assert_eq!(speed_class(speed), class, "{speed}");
         }
     }
@@ -123,10 +105,7 @@ mod tests {
 
     #[test]
     fn another_wheel_gives_the_same_features() {
-        let small = Wheel {
-            ticks_per_rev: 1000,
-            diameter_mm: 250,
-        };
+        let small = Wheel { ticks_per_rev: 1000, diameter_mm: 250 };
         assert_eq!(
             Features::new(small, 700, small.ticks(501), small.ticks(151)),
             Features::new(WHEEL, 700, WHEEL.ticks(501), WHEEL.ticks(151)),

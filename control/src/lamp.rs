@@ -29,12 +29,7 @@ mod tests {
         for index in 0..Alarm::COUNT {
             let alarm = Alarm::from_index(index).expect("an alarm");
             let length = u32::from(2 * alarm.code() + PAUSE);
-            let lit = |step: u32| {
-                is_lit(
-                    State::Alarm(alarm),
-                    Instant::default() + Interval::from_steps(step << 16),
-                )
-            };
+            let lit = |step: u32| is_lit(State::Alarm(alarm), Instant::default() + Interval::from_steps(step << 16));
             let flashes = (0..length).filter(|&step| lit(step) && !lit(step + 1)).count();
             assert_eq!(flashes, usize::from(alarm.code()));
         }

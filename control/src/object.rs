@@ -49,16 +49,8 @@ pub struct Watch {
 impl Watch {
     /// Begins to watch at `ground`, with the beam broken or not.
     pub fn start(ground: Position, broken: bool) -> Self {
-        let sight = if broken {
-            Sight::Broken { leading: ground }
-        } else {
-            Sight::Clear
-        };
-        Self {
-            frontier: ground,
-            broken,
-            sight,
-        }
+        let sight = if broken { Sight::Broken { leading: ground } } else { Sight::Clear };
+        Self { frontier: ground, broken, sight }
     }
 
     /// The farthest ground seen.
@@ -111,10 +103,7 @@ impl Watch {
         self.sight = match (self.sight, self.broken) {
             (Sight::Clear, true) => Sight::Broken { leading: self.frontier },
             (Sight::Gap(Object { leading, .. }), true) => Sight::Broken { leading },
-            (Sight::Broken { leading }, false) => Sight::Gap(Object {
-                leading,
-                trailing: self.frontier,
-            }),
+            (Sight::Broken { leading }, false) => Sight::Gap(Object { leading, trailing: self.frontier }),
             (sight, _) => sight,
         };
     }
@@ -143,10 +132,7 @@ mod tests {
                 watch.edge(ground, broken_at(place), GAP)
             });
         }
-        found
-            .into_iter()
-            .map(|object| (object.leading.count(), object.trailing.count()))
-            .collect()
+        found.into_iter().map(|object| (object.leading.count(), object.trailing.count())).collect()
     }
 
     #[test]

@@ -29,10 +29,7 @@ pub enum Step {
 impl Quadrature {
     /// A decoder whose channels now stand at `channels`.
     pub const fn new(channels: Channels) -> Self {
-        Self {
-            phase: phase(channels),
-            direction: 0,
-        }
+        Self { phase: phase(channels), direction: 0 }
     }
 
     /// A decoder whose channels stand at `channels` and whose last step was `direction`: 1, -1, or 0 for none.
@@ -85,10 +82,7 @@ mod tests {
         for from in 0..4 {
             for jump in 0..4 {
                 for direction in [-1, 0, 1] {
-                    let mut decoder = Quadrature {
-                        phase: from as u8,
-                        direction,
-                    };
+                    let mut decoder = Quadrature { phase: from as u8, direction };
                     let expected = match (jump, direction) {
                         (0, _) => Step::Ticks(0),
                         (1, _) => Step::Ticks(1),
@@ -96,11 +90,7 @@ mod tests {
                         (_, 0) => Step::Lost,
                         (_, direction) => Step::Ticks(2 * direction),
                     };
-                    assert_eq!(
-                        decoder.step(FORWARD[(from + jump) % 4]),
-                        expected,
-                        "{from} {jump} {direction}"
-                    );
+                    assert_eq!(decoder.step(FORWARD[(from + jump) % 4]), expected, "{from} {jump} {direction}");
                     assert_eq!(decoder.phase as usize, (from + jump) % 4);
                 }
             }

@@ -37,10 +37,7 @@ pub struct Full;
 impl Schedule {
     /// An empty schedule that knows the ground from `known_from` on.
     pub const fn new(known_from: Position) -> Self {
-        Self {
-            canopies: Deque::new(),
-            known_from,
-        }
+        Self { canopies: Deque::new(), known_from }
     }
 
     /// The place from which on the ground is known.
@@ -78,11 +75,7 @@ impl Schedule {
         let horizon = tool - MEMORY;
         if horizon.is_ahead_of(self.known_from) {
             self.known_from = horizon;
-            while self
-                .canopies
-                .front()
-                .is_some_and(|canopy| horizon.is_ahead_of(canopy.trailing))
-            {
+            while self.canopies.front().is_some_and(|canopy| horizon.is_ahead_of(canopy.trailing)) {
                 self.canopies.pop_front();
             }
         }
@@ -90,27 +83,18 @@ impl Schedule {
 
     /// Whether any of the ground between two places is closed: unknown, or within `margin` of a canopy.
     pub fn is_closed(&self, one: Position, other: Position, margin: Ticks) -> bool {
-        let (near, far) = if one.is_ahead_of(other) {
-            (other, one)
-        } else {
-            (one, other)
-        };
+        let (near, far) = if one.is_ahead_of(other) { (other, one) } else { (one, other) };
         if self.known_from.is_ahead_of(near) {
             return true;
         }
         // Compared by distance from the near end, the counter's wrapping does no harm.
         let length = (far - near) + margin;
-        self.canopies
-            .iter()
-            .any(|canopy| (canopy.leading - near) <= length && (canopy.trailing - near) >= -margin)
+        self.canopies.iter().any(|canopy| (canopy.leading - near) <= length && (canopy.trailing - near) >= -margin)
     }
 
     /// Windows at the tool or ahead of it.
     pub fn ahead(&self, tool: Position, margin: Ticks) -> u8 {
-        self.canopies
-            .iter()
-            .filter(|canopy| !tool.is_ahead_of(canopy.trailing + margin))
-            .count() as u8
+        self.canopies.iter().filter(|canopy| !tool.is_ahead_of(canopy.trailing + margin)).count() as u8
     }
 }
 
@@ -126,10 +110,7 @@ pub struct Plan {
 impl Plan {
     /// The schedule of a canopy of `width`, `distance` from beam to tool.
     pub fn new(distance: Ticks, width: Ticks, margin: Ticks) -> Self {
-        Self {
-            delay: distance - margin,
-            hold: width + margin + margin,
-        }
+        Self { delay: distance - margin, hold: width + margin + margin }
     }
 
     /// R: the tool is back in the row (Eq. 3).
@@ -145,10 +126,7 @@ mod tests {
     const MARGIN: Ticks = Ticks(95);
 
     fn canopy(leading: i32, trailing: i32) -> Object {
-        Object {
-            leading: Position::new(leading),
-            trailing: Position::new(trailing),
-        }
+        Object { leading: Position::new(leading), trailing: Position::new(trailing) }
     }
 
     fn closed(schedule: &Schedule, from: i32, to: i32) -> bool {
@@ -181,18 +159,10 @@ mod tests {
     fn a_full_schedule_forgets_only_what_lies_behind_the_tool() {
         let mut schedule = Schedule::new(Position::new(0));
         for plant in 0..CAPACITY as i32 {
-            schedule
-                .push(canopy(plant * 1000, plant * 1000 + 200), Position::new(0), MARGIN)
-                .unwrap();
+            schedule.push(canopy(plant * 1000, plant * 1000 + 200), Position::new(0), MARGIN).unwrap();
         }
-        assert_eq!(
-            schedule.push(canopy(20_000, 20_200), Position::new(295), MARGIN),
-            Err(Full)
-        );
-        assert_eq!(
-            schedule.push(canopy(20_000, 20_200), Position::new(296), MARGIN),
-            Ok(())
-        );
+        assert_eq!(schedule.push(canopy(20_000, 20_200), Position::new(295), MARGIN), Err(Full));
+        assert_eq!(schedule.push(canopy(20_000, 20_200), Position::new(296), MARGIN), Ok(()));
         assert!(closed(&schedule, 294, 294), "what was forgotten is unknown");
         assert!(!closed(&schedule, 295, 295));
         assert!(closed(&schedule, 20_000, 20_000));
@@ -226,10 +196,7 @@ mod tests {
         let base = i32::MAX - 1100;
         let at = |offset: i32| Position::new(base.wrapping_add(offset));
         let mut schedule = Schedule::new(at(0));
-        let canopy = Object {
-            leading: at(1000),
-            trailing: at(1300),
-        };
+        let canopy = Object { leading: at(1000), trailing: at(1300) };
         schedule.push(canopy, at(0), MARGIN).unwrap();
         for (offset, closed) in [(904, false), (905, true), (1150, true), (1395, true), (1396, false)] {
             assert_eq!(schedule.is_closed(at(offset), at(offset), MARGIN), closed, "{offset}");

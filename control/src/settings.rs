@@ -119,9 +119,7 @@ pub struct OutOfRange;
 impl Settings {
     /// The defaults.
     pub fn new() -> Self {
-        let mut settings = Self {
-            values: [0; Setting::COUNT as usize],
-        };
+        let mut settings = Self { values: [0; Setting::COUNT as usize] };
         for (value, setting) in settings.values.iter_mut().zip((0..).map_while(Setting::from_index)) {
             *value = setting.description().default;
         }
@@ -148,10 +146,7 @@ impl Settings {
 
     /// The ground wheel with its encoder.
     pub fn wheel(&self) -> Wheel {
-        Wheel {
-            ticks_per_rev: self.get(Setting::TicksPerRev),
-            diameter_mm: self.get(Setting::WheelMm),
-        }
+        Wheel { ticks_per_rev: self.get(Setting::TicksPerRev), diameter_mm: self.get(Setting::WheelMm) }
     }
 
     /// A setting in millimetres as ticks of the present wheel.

@@ -89,9 +89,7 @@ impl SpeedMeter {
         // Two ticks' time: encoders do not space their edges evenly.
         self.patience = match self.speed.0.unsigned_abs() {
             0 => STANDSTILL,
-            speed => Interval::from_steps(2 * Interval::STEPS_PER_SECOND / speed)
-                .max(SPACING)
-                .min(STANDSTILL),
+            speed => Interval::from_steps(2 * Interval::STEPS_PER_SECOND / speed).max(SPACING).min(STANDSTILL),
         };
     }
 

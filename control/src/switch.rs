@@ -18,10 +18,7 @@ pub struct Switch {
 impl Switch {
     /// A switch as it is found at power-up.
     pub const fn new(on: bool) -> Self {
-        Self {
-            on,
-            differs_since: None,
-        }
+        Self { on, differs_since: None }
     }
 
     /// Takes the switch's level; returns its new position when it was thrown.

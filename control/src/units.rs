@@ -179,11 +179,7 @@ impl Wheel {
         let tick = circumference / u32::from(self.ticks_per_rev);
         let limit = ((i16::MAX as u32) << 16) / tick;
         let magnitude = distance.0.unsigned_abs();
-        let millimetres = if magnitude >= limit {
-            i16::MAX
-        } else {
-            ((magnitude * tick) >> 16) as i16
-        };
+        let millimetres = if magnitude >= limit { i16::MAX } else { ((magnitude * tick) >> 16) as i16 };
         if distance.0 < 0 { -millimetres } else { millimetres }
     }
 }

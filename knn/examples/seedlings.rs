@@ -24,11 +24,8 @@ const MEASURED: [([i32; 3], u8); 12] = [
     ([17, 11, 8], 2),
 ];
 
-const SCALE: Scale<3> = Scale::new([
-    Range { lowest: 0, highest: 90 },
-    Range { lowest: 0, highest: 50 },
-    Range { lowest: 0, highest: 50 },
-]);
+const SCALE: Scale<3> =
+    Scale::new([Range { lowest: 0, highest: 90 }, Range { lowest: 0, highest: 50 }, Range { lowest: 0, highest: 50 }]);
 
 /// Farther than this from every example (squared), and a plant is none of the three.
 const RADIUS: u32 = 1_000;
@@ -39,24 +36,15 @@ fn main() -> Result<(), ClassifyError> {
 
     println!("Twelve built-in examples:");
     for plant in [[50, 28, 24], [16, 9, 7], [33, 23, 16], [22, 15, 40]] {
-        report(
-            plant,
-            &classify(&(&built_in, &from_the_field), &SCALE.quantise(&plant), 3, RADIUS)?,
-        );
+        report(plant, &classify(&(&built_in, &from_the_field), &SCALE.quantise(&plant), 3, RADIUS)?);
     }
 
     println!("The last is labelled by hand as fat hen that grew in the shade; k = 1:");
-    if from_the_field
-        .add_example(Example::new(SCALE.quantise(&[22, 15, 40]), 1))
-        .is_err()
-    {
+    if from_the_field.add_example(Example::new(SCALE.quantise(&[22, 15, 40]), 1)).is_err() {
         println!("the table is full");
     }
     let plant = [23, 15, 38];
-    report(
-        plant,
-        &classify(&(&built_in, &from_the_field), &SCALE.quantise(&plant), 1, RADIUS)?,
-    );
+    report(plant, &classify(&(&built_in, &from_the_field), &SCALE.quantise(&plant), 1, RADIUS)?);
     Ok(())
 }
 

@@ -102,11 +102,7 @@ pub fn classify<const FEATURES: usize, const CLASSES: usize>(
     }
     let mut neighbours = [Neighbour::NONE; MAX_K as usize];
     let (neighbours, _) = neighbours.split_at_mut(usize::from(k));
-    let mut nearest = Nearest::<CLASSES> {
-        neighbours,
-        level: [0; CLASSES],
-        level_unknown: false,
-    };
+    let mut nearest = Nearest::<CLASSES> { neighbours, level: [0; CLASSES], level_unknown: false };
     examples.visit_near(features, DISTANCE_LIMIT, &mut |distance, label| {
         nearest.admit(Neighbour::new(distance, label)).distance()
     });
@@ -207,20 +203,13 @@ impl<const CLASSES: usize> Nearest<'_, CLASSES> {
             // them in the same order: the first leading class met this way is the nearest, and the smallest among
             // equals. Where none is met, `label` is the smallest already.
             let mut labels = self.neighbours.iter().map(|neighbour| neighbour.label());
-            label = labels
-                .find(|&label| votes.get(usize::from(label)) == Some(&most))
-                .unwrap_or(label);
+            label = labels.find(|&label| votes.get(usize::from(label)) == Some(&most)).unwrap_or(label);
         }
         let kind = match (nearest.distance() > radius, tie) {
             (true, _) => Kind::Stranger,
             (false, true) => Kind::Tie,
             (false, false) => Kind::Known,
         };
-        Ok(Answer {
-            label,
-            votes,
-            nearest: nearest.distance(),
-            kind,
-        })
+        Ok(Answer { label, votes, nearest: nearest.distance(), kind })
     }
 }

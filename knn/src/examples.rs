@@ -70,10 +70,7 @@ pub trait Examples<const FEATURES: usize> {
 
     /// The number of examples of one class.
     fn count(&self, label: u8) -> usize {
-        (0..self.len())
-            .filter_map(|index| self.example(index))
-            .filter(|example| example.label == label)
-            .count()
+        (0..self.len()).filter_map(|index| self.example(index)).filter(|example| example.label == label).count()
     }
 }
 

@@ -35,11 +35,7 @@ impl<const FEATURES: usize> Scale<FEATURES> {
     /// ```
     #[must_use]
     pub const fn new(ranges: [Range; FEATURES]) -> Self {
-        let mut features = [FeatureScale {
-            offset: 0,
-            shift: 0,
-            factor: 0,
-        }; FEATURES];
+        let mut features = [FeatureScale { offset: 0, shift: 0, factor: 0 }; FEATURES];
         let mut feature = 0;
         while feature < FEATURES {
             features[feature] = FeatureScale::new(ranges[feature]);
@@ -75,11 +71,7 @@ impl<const FEATURES: usize> Scale<FEATURES> {
                 }
                 row += 1;
             }
-            ranges[feature] = Range {
-                lowest: smallest,
-                highest: largest,
-            }
-            .with_room();
+            ranges[feature] = Range { lowest: smallest, highest: largest }.with_room();
             feature += 1;
         }
         Some(ranges)
@@ -122,10 +114,7 @@ impl Range {
         let width = self.highest.abs_diff(self.lowest);
         // Rounded up, so that even two neighbouring values keep room; a width of 0 stays 0.
         let room = width.div_ceil(2);
-        Self {
-            lowest: self.lowest.saturating_sub_unsigned(room),
-            highest: self.highest.saturating_add_unsigned(room),
-        }
+        Self { lowest: self.lowest.saturating_sub_unsigned(room), highest: self.highest.saturating_add_unsigned(room) }
     }
 }
 
@@ -142,22 +131,14 @@ struct FeatureScale {
 impl FeatureScale {
     const fn new(range: Range) -> Self {
         if range.highest <= range.lowest {
-            return Self {
-                offset: range.lowest,
-                shift: 0,
-                factor: 0,
-            };
+            return Self { offset: range.lowest, shift: 0, factor: 0 };
         }
         let width = range.highest.abs_diff(range.lowest);
         // At most 23, as the width has 32 bits and 9 are kept.
         let shift = 23_u32.saturating_sub(width.leading_zeros());
         // From 1 to 511, so the factor is from 128 to 65,280 and fits. Rounded up, it takes `highest` to 255.
         let steps = width >> shift;
-        Self {
-            offset: range.lowest,
-            shift: shift as u8,
-            factor: (255_u32 * 256).div_ceil(steps) as u16,
-        }
+        Self { offset: range.lowest, shift: shift as u8, factor: (255_u32 * 256).div_ceil(steps) as u16 }
     }
 
     const fn quantise(self, value: i32) -> u8 {
@@ -167,11 +148,7 @@ impl FeatureScale {
         let steps = value.abs_diff(self.offset) >> self.shift;
         // 511 steps of the smallest factor, 128, are already 255: holding the steps to 16 bits changes nothing, and
         // the product of two 16-bit numbers fits 32 bits.
-        let steps = if steps > u16::MAX as u32 {
-            u16::MAX as u32
-        } else {
-            steps
-        };
+        let steps = if steps > u16::MAX as u32 { u16::MAX as u32 } else { steps };
         let byte = (steps * self.factor as u32) >> 8;
         if byte > 255 { 255 } else { byte as u8 }
     }

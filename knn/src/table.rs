@@ -26,10 +26,7 @@ impl<const FEATURES: usize, const CAPACITY: usize> Table<FEATURES, CAPACITY> {
     #[must_use]
     pub const fn new() -> Self {
         const { assert!(CAPACITY > 0, "a table holds at least one example") };
-        Self {
-            examples: [Example::new([0; FEATURES], 0); CAPACITY],
-            len: 0,
-        }
+        Self { examples: [Example::new([0; FEATURES], 0); CAPACITY], len: 0 }
     }
 
     /// Adds an example behind the others.

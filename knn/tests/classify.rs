@@ -29,10 +29,8 @@ fn reference<const FEATURES: usize, const CLASSES: usize>(
     if examples.len() < k {
         return Err(ClassifyError::TooFewExamples);
     }
-    let mut sorted: Vec<(f64, u8)> = examples
-        .iter()
-        .map(|example| (float_distance(example, query), example.label))
-        .collect();
+    let mut sorted: Vec<(f64, u8)> =
+        examples.iter().map(|example| (float_distance(example, query), example.label)).collect();
     sorted.sort_by(|left, right| left.partial_cmp(right).expect("distances are numbers"));
     let kth = sorted[k - 1].0;
     let voters: Vec<(f64, u8)> = sorted.into_iter().filter(|&(distance, _)| distance <= kth).collect();
@@ -43,11 +41,7 @@ fn reference<const FEATURES: usize, const CLASSES: usize>(
         std::array::from_fn(|class| voters.iter().filter(|&&(_, label)| usize::from(label) == class).count());
     let most = votes.into_iter().max().expect("there are classes");
     let leads = |label: u8| votes[usize::from(label)] == most;
-    let label = voters
-        .iter()
-        .map(|&(_, label)| label)
-        .find(|&label| leads(label))
-        .expect("a class leads");
+    let label = voters.iter().map(|&(_, label)| label).find(|&label| leads(label)).expect("a class leads");
     let kind = if voters[0].0 > f64::from(radius) {
         Kind::Stranger
     } else if votes.into_iter().filter(|&votes| votes == most).count() > 1 {
@@ -55,21 +49,11 @@ fn reference<const FEATURES: usize, const CLASSES: usize>(
     } else {
         Kind::Known
     };
-    Ok(Answer {
-        label,
-        votes,
-        nearest: voters[0].0 as u32,
-        kind,
-    })
+    Ok(Answer { label, votes, nearest: voters[0].0 as u32, kind })
 }
 
 fn float_distance<const FEATURES: usize>(example: &Example<FEATURES>, query: &[u8; FEATURES]) -> f64 {
-    example
-        .features
-        .iter()
-        .zip(query)
-        .map(|(&left, &right)| (f64::from(left) - f64::from(right)).powi(2))
-        .sum()
+    example.features.iter().zip(query).map(|(&left, &right)| (f64::from(left) - f64::from(right)).powi(2)).sum()
 }
 
 fn features<const FEATURES: usize>() -> impl Strategy<Value = [u8; FEATURES]> {
@@ -83,10 +67,7 @@ fn features<const FEATURES: usize>() -> impl Strategy<Value = [u8; FEATURES]> {
 /// Examples whose labels are mostly, but not always, below 4.
 fn examples<const FEATURES: usize>() -> impl Strategy<Value = Vec<Example<FEATURES>>> {
     let label = prop_oneof![60 => 0_u8..2, 20 => 0_u8..4, 1 => any::<u8>()];
-    proptest::collection::vec(
-        (features(), label).prop_map(|(features, label)| Example::new(features, label)),
-        0..60,
-    )
+    proptest::collection::vec((features(), label).prop_map(|(features, label)| Example::new(features, label)), 0..60)
 }
 
 fn radius() -> impl Strategy<Value = u32> {
@@ -152,9 +133,8 @@ fn smartcore_class<const FEATURES: usize>(examples: &[Example<FEATURES>], query:
     let rows: Vec<Vec<f64>> = examples.iter().map(|example| floats(&example.features)).collect();
     let labels: Vec<u32> = examples.iter().map(|example| u32::from(example.label)).collect();
     let rows = DenseMatrix::from_2d_vec(&rows).expect("rows of one length");
-    let parameters = KNNClassifierParameters::default()
-        .with_k(usize::from(k))
-        .with_distance(Distances::euclidian::<f64>());
+    let parameters =
+        KNNClassifierParameters::default().with_k(usize::from(k)).with_distance(Distances::euclidian::<f64>());
     let classifier = KNNClassifier::fit(&rows, &labels, parameters).expect("rows and labels match");
     let query = DenseMatrix::from_2d_vec(&vec![floats(query)]).expect("one row");
     classifier.predict(&query).expect("as many columns as the rows")[0]
@@ -169,11 +149,8 @@ fn on_fishers_irises_smartcore_gives_the_same_classes_and_few_are_wrong() {
         .map(|row| std::array::from_fn(|feature| (f64::from(row[feature]) * 10.0).round() as i32))
         .collect();
     let scale = Scale::learn(&rows).expect("there are rows");
-    let examples: Vec<Example<4>> = rows
-        .iter()
-        .zip(&irises.target)
-        .map(|(row, &label)| Example::new(scale.quantise(row), label as u8))
-        .collect();
+    let examples: Vec<Example<4>> =
+        rows.iter().zip(&irises.target).map(|(row, &label)| Example::new(scale.quantise(row), label as u8)).collect();
     assert_eq!(examples.len(), 150);
     let mut compared = 0;
     let mut wrong = 0;
@@ -187,10 +164,7 @@ fn on_fishers_irises_smartcore_gives_the_same_classes_and_few_are_wrong() {
         }
         wrong += usize::from(answer.label != query.label);
     }
-    assert!(
-        compared > 100,
-        "{compared} of 150 had neither a tie nor level neighbours"
-    );
+    assert!(compared > 100, "{compared} of 150 had neither a tie nor level neighbours");
     assert!(wrong <= 9, "{wrong} of 150 irises were taken for another kind");
 }
 
@@ -212,45 +186,21 @@ fn all_examples_level_with_the_last_neighbour_vote() {
     let level = [[1, 0], [0, 1]].map(|features| Example::new(features, 1));
     let near = [Example::new([0, 0], 0)];
     let answer: Answer<2> = classify(&(&near, &level), &[0, 0], 2, 0).unwrap();
-    assert_eq!(
-        answer,
-        Answer {
-            label: 1,
-            votes: [1, 2],
-            nearest: 0,
-            kind: Kind::Known
-        }
-    );
+    assert_eq!(answer, Answer { label: 1, votes: [1, 2], nearest: 0, kind: Kind::Known });
 }
 
 #[test]
 fn a_tie_names_the_class_of_the_nearest_example() {
     let examples = [Example::new([9], 0), Example::new([12], 1)];
     let answer: Answer<2> = classify(&examples, &[11], 2, u32::MAX).unwrap();
-    assert_eq!(
-        answer,
-        Answer {
-            label: 1,
-            votes: [1, 1],
-            nearest: 1,
-            kind: Kind::Tie
-        }
-    );
+    assert_eq!(answer, Answer { label: 1, votes: [1, 1], nearest: 1, kind: Kind::Tie });
 }
 
 #[test]
 fn a_tie_of_level_examples_names_the_smallest_label() {
     let examples = [Example::new([12], 2), Example::new([10], 1)];
     let answer: Answer<3> = classify(&examples, &[11], 1, u32::MAX).unwrap();
-    assert_eq!(
-        answer,
-        Answer {
-            label: 1,
-            votes: [0, 1, 1],
-            nearest: 1,
-            kind: Kind::Tie
-        }
-    );
+    assert_eq!(answer, Answer { label: 1, votes: [0, 1, 1], nearest: 1, kind: Kind::Tie });
 }
 
 #[test]
@@ -276,8 +226,5 @@ fn what_cannot_be_answered_is_an_error_and_not_a_class() {
     assert_eq!(classify::<1, 2>(&one, &[1], 2, 0), Err(ClassifyError::TooFewExamples));
     assert_eq!(classify::<1, 2>(&one[..0], &[1], 1, 0), Err(ClassifyError::NoExamples));
     let erased = [Example::new([1], 255)];
-    assert_eq!(
-        classify::<1, 2>(&(&one, &erased), &[1], 1, 0),
-        Err(ClassifyError::UnknownLabel)
-    );
+    assert_eq!(classify::<1, 2>(&(&one, &erased), &[1], 1, 0), Err(ClassifyError::UnknownLabel));
 }

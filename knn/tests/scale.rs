@@ -62,10 +62,7 @@ fn a_feature_that_never_changes_tells_nothing() {
 #[test]
 fn even_two_neighbouring_values_keep_room_for_strangers() {
     let scale = Scale::learn(&[[0], [1]]).unwrap();
-    assert_eq!(
-        [-1, 0, 1, 2].map(|value| scale.quantise(&[value])[0]),
-        [0, 85, 170, 255]
-    );
+    assert_eq!([-1, 0, 1, 2].map(|value| scale.quantise(&[value])[0]), [0, 85, 170, 255]);
 }
 
 #[test]
