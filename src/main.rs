@@ -64,7 +64,9 @@ fn main() -> ! {
     let controller = CONTROLLER.init(Controller::new(Nearest(examples::InFlash), read(), beam.is_broken()));
     let mut line = LineBuffer::new();
     let mut answer = Answer::Greeting;
+    watchdog::start();
     loop {
+        watchdog::feed();
         // The readings come first: an edge that is still in the queue is then never farther than the next readings.
         let readings = read();
         while let Some((position, broken)) = beam.next_edge() {

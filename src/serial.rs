@@ -86,7 +86,7 @@ impl Write for Serial {
     }
 
     fn flush(&mut self) -> nb::Result<(), Infallible> {
-        if self.to_send.len() == 0 { Ok(()) } else { Err(nb::Error::WouldBlock) }
+        if self.to_send.is_empty() { Ok(()) } else { Err(nb::Error::WouldBlock) }
     }
 }
 

@@ -1,9 +1,19 @@
-//! The watchdog, used to reset the machine.
+//! The watchdog: resets a machine whose loop no longer turns, which then wakes up in HOLD with the tool out.
 //!
 //! After a watchdog reset the watchdog stays on, at its shortest period (data sheet, 11.8): it must be switched off before
 //! anything that takes time, or the machine, or an old bootloader, resets for ever.
 
+use avr_device::interrupt;
 use core::arch::{asm, naked_asm};
+
+/// WDTCSR: allow a change within the next four cycles.
+const ALLOW_CHANGE: u8 = 0x18;
+
+/// WDTCSR: reset after 16 ms.
+const RESET_SOON: u8 = 0x08;
+
+/// WDTCSR: reset after 250 ms, a hundred times the loop's longest turn.
+const RESET_LATER: u8 = 0x0C;
 
 /// Switches the watchdog off in the start-up code, before SRAM is cleared and long before `main`.
 ///
@@ -25,12 +35,38 @@ unsafe extern "C" fn switch_watchdog_off() {
     )
 }
 
+/// Starts the watchdog: from here on it must be fed every 250 ms.
+pub fn start() {
+    set(RESET_LATER);
+}
+
+/// Tells the watchdog that the loop turns.
+pub fn feed() {
+    // SAFETY: the instruction touches nothing but the watchdog's counter.
+    unsafe { asm!("wdr") };
+}
+
 /// Resets the machine.
 pub fn reset() -> ! {
-    avr_device::interrupt::disable();
-    // SAFETY: WDTCSR belongs to nobody else; the sequence is the data sheet's (11.9.2): 16 ms from here.
-    unsafe {
-        asm!("wdr", "sts 0x60, {change}", "sts 0x60, {reset}", change = in(reg_upper) 0x18_u8, reset = in(reg_upper) 0x08_u8)
-    };
-    loop {}
+    interrupt::disable();
+    set(RESET_SOON);
+    loop {
+        core::hint::spin_loop();
+    }
+}
+
+fn set(control: u8) {
+    interrupt::free(|_| {
+        // SAFETY: WDTCSR (0x60) belongs to this file alone; the two writes follow each other within four cycles, which
+        // no interrupt can stretch in here (11.9.2).
+        unsafe {
+            asm!(
+                "wdr",
+                "sts 0x60, {allow}",
+                "sts 0x60, {control}",
+                allow = in(reg_upper) ALLOW_CHANGE,
+                control = in(reg_upper) control,
+            );
+        }
+    });
 }

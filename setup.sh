@@ -1,0 +1,53 @@
+#!/usr/bin/env bash
+# Installs what a fresh machine needs to build, test, simulate and flash the weeder: packages of Debian or Ubuntu, and the
+# Rust toolchain that rust-toolchain.toml pins. Safe to run again; what is there already is left alone.
+set -euo pipefail
+cd "$(dirname "$0")"
+
+# For the firmware: the AVR linker and C library, and the programmer.
+# For the virtual Uno (simavr): a C compiler, and what its Rust binding is generated and linked with.
+packages=(
+    gcc-avr binutils-avr avr-libc avrdude
+    build-essential pkg-config clang libclang-dev libelf-dev zlib1g-dev libzstd-dev
+)
+
+missing=()
+if command -v dpkg-query >/dev/null; then
+    for package in "${packages[@]}"; do
+        state=$(dpkg-query --show --showformat='${db:Status-Status}' "$package" 2>/dev/null || true)
+        [ "$state" = installed ] || missing+=("$package")
+    done
+    if [ ${#missing[@]} -eq 0 ]; then
+        echo "Packages: all there."
+    else
+        echo "Packages: installing ${missing[*]}"
+        root=()
+        if [ "$(id -u)" -ne 0 ]; then
+            command -v sudo >/dev/null || {
+                echo "setup.sh: run it as root, or install sudo: packages are to be installed." >&2
+                exit 1
+            }
+            root=(sudo)
+        fi
+        "${root[@]}" apt-get update -q
+        "${root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends "${missing[@]}"
+    fi
+else
+    echo "Packages: this is neither Debian nor Ubuntu. Install what your system calls these:"
+    printf '    %s\n' "${packages[@]}"
+fi
+
+if ! command -v rustup >/dev/null; then
+    echo "setup.sh: rustup is missing. Install it as https://rustup.rs says, then run this again." >&2
+    exit 1
+fi
+channel=$(sed -n 's/^channel = "\(.*\)"$/\1/p' rust-toolchain.toml)
+installed=$(rustup component list --installed --toolchain "$channel" 2>/dev/null || true)
+if grep -q '^rust-src' <<<"$installed" && grep -q '^rustfmt' <<<"$installed" && grep -q '^clippy' <<<"$installed"; then
+    echo "Rust: $channel is there."
+else
+    echo "Rust: installing $channel"
+    rustup toolchain install "$channel" --profile minimal --component rust-src --component rustfmt --component clippy
+fi
+
+echo "Ready. Try: cargo sim"
