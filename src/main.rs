@@ -80,13 +80,10 @@ fn main() -> ! {
         let Ok(()) = lamp.set_state(lamp::is_lit(controller.state(), readings.now).into());
 
         // A line is carried out only when the one before it has been answered in full; until then the bytes wait.
-        if answer.is_done() {
-            if serial.take_lost() {
-                line.characters_lost();
-            }
-            if let Ok(byte) = serial.read()
-                && let Some(command) = line.take(byte)
-            {
+        while answer.is_done()
+            && let Ok(byte) = serial.read()
+        {
+            if let Some(command) = line.take(byte) {
                 answer = reply::answer(command, controller);
             }
         }

@@ -1,14 +1,15 @@
 //! The serial line on D0 and D1: 115200 baud, 8N1, moved by interrupts in both directions.
 //!
 //! Received bytes wait in one queue for the loop, bytes to send in another for the line. Nothing here ever waits: what
-//! cannot be read or written at once is `WouldBlock`, and a byte that comes in while its queue is full is lost and said to
-//! be.
+//! cannot be read or written at once is `WouldBlock`. A byte that comes in while its queue is full is lost, and
+//! [`GAP_MARK`] stands where it would have been, so that a line with a hole in it is never taken for a whole one.
 
 use crate::handover::Handover;
 use avr_device::{
     atmega328p::{USART0, usart0},
     interrupt,
 };
+use control::console::GAP_MARK;
 use core::{
     convert::Infallible,
     sync::atomic::{AtomicBool, Ordering},
@@ -27,7 +28,8 @@ const BAUD_DIVISOR: u16 = 16;
 
 static RECEIVING: Handover<Producer<'static, u8>> = Handover::new();
 static SENDING: Handover<Consumer<'static, u8>> = Handover::new();
-static LOST: AtomicBool = AtomicBool::new(false);
+/// Whether the last byte received found no room; the handler alone uses it.
+static GAP: AtomicBool = AtomicBool::new(false);
 
 /// The serial line, as the loop sees it.
 pub struct Serial {
@@ -55,15 +57,6 @@ impl Serial {
     /// Bytes that can be written now.
     pub fn room(&self) -> usize {
         self.to_send.capacity() - self.to_send.len()
-    }
-
-    /// Whether received bytes were lost since this was last asked.
-    pub fn take_lost(&mut self) -> bool {
-        let lost = LOST.load(Ordering::Relaxed);
-        if lost {
-            LOST.store(false, Ordering::Relaxed);
-        }
-        lost
     }
 }
 
@@ -125,9 +118,8 @@ pub unsafe fn on_received() {
     // SAFETY: the caller is the handler that owns the receiving end.
     unsafe {
         RECEIVING.with(|queue| {
-            if queue.enqueue(byte).is_err() || overrun {
-                LOST.store(true, Ordering::Relaxed);
-            }
+            let gap = (overrun || GAP.load(Ordering::Relaxed)) && queue.enqueue(GAP_MARK).is_err();
+            GAP.store(gap || queue.enqueue(byte).is_err(), Ordering::Relaxed);
         });
     }
 }

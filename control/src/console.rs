@@ -10,6 +10,9 @@ use heapless::Vec;
 /// Characters that a line may have.
 pub const LINE_LENGTH: usize = 80;
 
+/// What stands in the stream of bytes where some were lost: ASCII's own character for it, SUB.
+pub const GAP_MARK: u8 = 0x1A;
+
 words! {
     /// The first word of a command.
     pub enum Word {
@@ -151,14 +154,10 @@ impl LineBuffer {
                     self.spoil(Mistake::TooLong);
                 }
             }
+            GAP_MARK => self.spoil(Mistake::CharactersLost),
             _ => self.spoil(Mistake::NotText),
         }
         None
-    }
-
-    /// Notes that bytes went missing: the line that they belonged to must not be carried out.
-    pub fn characters_lost(&mut self) {
-        self.spoil(Mistake::CharactersLost);
     }
 
     fn spoil(&mut self, mistake: Mistake) {
@@ -263,12 +262,6 @@ mod tests {
 
     #[test]
     fn a_line_that_lost_characters_is_not_carried_out() {
-        let mut line = LineBuffer::new();
-        for &byte in b"hol" {
-            assert_eq!(line.take(byte), None);
-        }
-        line.characters_lost();
-        assert_eq!(line.take(b'd'), None);
-        assert_eq!(line.take(b'\n'), Some(Err(Mistake::CharactersLost)));
+        assert_eq!(answers(b"set k 1\x1A\nhold\n"), [Err(Mistake::CharactersLost), Ok(Command::Hold)]);
     }
 }
