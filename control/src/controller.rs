@@ -309,7 +309,8 @@ impl<C: Classifier> Controller<C> {
         let spacing = object.leading - self.last_plant;
         let features = Features::new(wheel, self.speed_mm_s(), spacing, object.width());
         let vote = self.classifier.classify(&features, self.settings.get(Setting::K) as u8);
-        let plan = Plan::new(self.geometry.beam_to_tool, object.width(), self.geometry.margin);
+        let (distance_mm, margin_mm) = (self.settings.get(Setting::BeamToToolMm), self.settings.get(Setting::MarginMm));
+        let plan = Plan::new(wheel, distance_mm, margin_mm, object.width());
         self.tell(Event::Object { vote, leading: object.leading, spacing, plan });
         if vote.class == Class::Weed {
             return;

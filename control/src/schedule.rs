@@ -10,7 +10,7 @@
 
 use crate::{
     object::Object,
-    units::{Position, Ticks},
+    units::{Position, Ticks, Wheel},
 };
 use heapless::Deque;
 
@@ -108,9 +108,13 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// The schedule of a canopy of `width`, `distance` from beam to tool.
-    pub fn new(distance: Ticks, width: Ticks, margin: Ticks) -> Self {
-        Self { delay: distance - margin, hold: width + margin + margin }
+    /// The schedule of a canopy of `width`, with the beam `distance_mm` ahead of the tool: each within a tick of its
+    /// equation, as each is rounded once.
+    pub fn new(wheel: Wheel, distance_mm: u16, margin_mm: u16, width: Ticks) -> Self {
+        Self {
+            delay: wheel.ticks(distance_mm.saturating_sub(margin_mm)),
+            hold: width + wheel.ticks(2 * margin_mm),
+        }
     }
 
     /// R: the tool is back in the row (Eq. 3).

@@ -113,6 +113,6 @@ impl SpeedMeter {
         let limit = (Interval::STEPS_PER_SECOND / silence.steps()) as i32;
         self.speed = TicksPerSecond(self.speed.0.clamp(-limit, limit));
         // Look again after an eighth more, so that the division stays rare.
-        self.patience = Interval::from_steps(silence.steps() + silence.steps() / 8);
+        self.patience = Interval::from_steps(silence.steps() + silence.steps() / 8).min(STANDSTILL);
     }
 }

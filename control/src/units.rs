@@ -172,11 +172,12 @@ impl Wheel {
         Ticks(((numerator + denominator / 2) / denominator) as i32)
     }
 
-    /// A distance in millimetres, rounded toward zero and limited to what 16 bits hold.
+    /// A distance in millimetres, rounded toward zero and limited to what 16 bits hold; right to 1 mm and 0.02 %.
     pub fn millimetres(self, distance: Ticks) -> i16 {
         // A tick in 1/65536 mm: at most 1.7 million (800 mm wheel, 100 counts). The limit keeps the product in 32 bits.
         let circumference = Self::PI_NUMERATOR * u32::from(self.diameter_mm) * 8192 / Self::PI_DENOMINATOR * 8;
-        let tick = circumference / u32::from(self.ticks_per_rev);
+        let counts = u32::from(self.ticks_per_rev);
+        let tick = (circumference + counts / 2) / counts;
         let limit = ((i16::MAX as u32) << 16) / tick;
         let magnitude = distance.0.unsigned_abs();
         let millimetres = if magnitude >= limit { i16::MAX } else { ((magnitude * tick) >> 16) as i16 };

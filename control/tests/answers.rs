@@ -1,0 +1,168 @@
+//! What the console answers, word for word, and that every line fits the serial line's buffer.
+
+mod common;
+
+use common::{ByWidth, readings};
+use control::{
+    alarm::Alarm,
+    classifier::{Class, Vote},
+    console::{LineBuffer, Word},
+    controller::{Controller, State},
+    event::Event,
+    reply::{self, LINE},
+    schedule::Plan,
+    settings::Setting,
+    units::{Position, Ticks},
+};
+
+type Machine = Controller<ByWidth>;
+
+/// Text that the machine said.
+#[derive(Default)]
+struct Said(String);
+
+impl ufmt::uWrite for Said {
+    type Error = std::convert::Infallible;
+    fn write_str(&mut self, text: &str) -> Result<(), Self::Error> {
+        self.0.push_str(text);
+        Ok(())
+    }
+}
+
+fn machine() -> Machine {
+    Controller::new(ByWidth, readings(0, 0), false)
+}
+
+/// Types a line and returns the answer's lines.
+fn ask(machine: &mut Machine, line: &str) -> Vec<String> {
+    let mut buffer = LineBuffer::new();
+    let command = line.bytes().chain([b'\n']).find_map(|byte| buffer.take(byte)).expect("a line that says something");
+    let mut answer = reply::answer(command, machine);
+    let mut lines = Vec::new();
+    while !answer.is_done() {
+        let mut said = Said::default();
+        answer.write_line(machine, &mut said).unwrap();
+        assert!(said.0.len() <= LINE, "{} characters: {}", said.0.len(), said.0);
+        lines.push(said.0.strip_suffix("\r\n").expect("a line's end").to_owned());
+    }
+    lines
+}
+
+fn settings() -> impl Iterator<Item = Setting> {
+    (0..).map_while(Setting::from_index)
+}
+
+#[test]
+fn every_answer_ends_in_exactly_one_ok_or_error() {
+    let mut lines: Vec<String> =
+        ["help", "status", "get", "start", "start now", "hold", "clear", "events on", "version", "nonsense", "set k 99"]
+            .map(str::to_owned)
+            .to_vec();
+    for setting in settings() {
+        let name = String::from_utf8(setting.text().bytes().collect()).unwrap();
+        lines.extend([format!("help {name}"), format!("get {name}"), format!("set {name} 60000"), format!("set {name} x")]);
+    }
+    for line in lines {
+        let answer = ask(&mut machine(), &line);
+        let ends = answer.iter().filter(|line| *line == "ok" || line.starts_with("error: ")).count();
+        assert_eq!(ends, 1, "{line}: {answer:?}");
+        assert!(answer.last().is_some_and(|line| line == "ok" || line.starts_with("error: ")), "{line}: {answer:?}");
+    }
+}
+
+#[test]
+fn help_lists_every_command() {
+    let help = ask(&mut machine(), "help");
+    for word in (0..).map_while(Word::from_index) {
+        let word = String::from_utf8(word.text().bytes().collect()).unwrap();
+        assert!(help.iter().any(|line| line.starts_with(&word)), "{word}");
+    }
+}
+
+#[test]
+fn a_setting_takes_every_value_of_its_range_and_no_other() {
+    for setting in settings() {
+        let name = String::from_utf8(setting.text().bytes().collect()).unwrap();
+        let description = setting.description();
+        let mut machine = machine();
+        for value in [description.least, description.greatest] {
+            assert_eq!(ask(&mut machine, &format!("set {name} {value}")), ["ok"]);
+            assert_eq!(machine.settings().get(setting), value);
+            assert!(ask(&mut machine, &format!("get {name}"))[0].starts_with(&format!("{name}={value} ")));
+        }
+        let outside = [description.least.checked_sub(1), description.greatest.checked_add(1)];
+        for value in outside.into_iter().flatten() {
+            let range = format!("from {} to {}", description.least, description.greatest);
+            let expected = format!("error: {name} takes a whole number {range}");
+            assert_eq!(ask(&mut machine, &format!("set {name} {value}")), [expected]);
+            assert_eq!(machine.settings().get(setting), description.greatest, "the old value stays");
+        }
+    }
+}
+
+#[test]
+fn geometry_is_set_in_hold_only() {
+    let mut machine = machine();
+    assert_eq!(ask(&mut machine, "start"), ["ok"]);
+    let refusal = "error: wheel_mm moves the machine's geometry, hold first";
+    assert_eq!(ask(&mut machine, "set wheel_mm 500"), [refusal]);
+    assert_eq!(ask(&mut machine, "set lead_out_ms 150"), ["ok"]);
+    assert_eq!(ask(&mut machine, "hold"), ["ok"]);
+    assert_eq!(ask(&mut machine, "set wheel_mm 500"), ["ok"]);
+}
+
+#[test]
+fn an_alarm_is_named_and_keeps_the_machine_from_starting_until_it_is_cleared() {
+    let mut machine = machine();
+    ask(&mut machine, "start");
+    machine.beam_edges_lost();
+    machine.step(readings(1000, 0));
+    assert!(ask(&mut machine, "status")[0].starts_with("state=alarm alarm=beam_edges_lost tool=out "));
+    assert_eq!(ask(&mut machine, "start"), ["error: an alarm is latched, see status, then clear it"]);
+    ask(&mut machine, "hold");
+    assert!(matches!(machine.state(), State::Alarm(_)), "hold does not clear an alarm");
+    assert_eq!(ask(&mut machine, "clear"), ["ok"]);
+    assert_eq!(ask(&mut machine, "start"), ["ok"]);
+}
+
+#[test]
+fn status_says_how_far_the_ground_that_was_seen_still_is() {
+    let mut machine = machine();
+    assert_eq!(
+        ask(&mut machine, "status")[0],
+        "state=hold tool=out pos=0 speed_mm_s=0 windows=0 lost=0 unseen_mm=400 missed=0"
+    );
+    assert_eq!(ask(&mut machine, "start now"), ["ok"]);
+    assert!(ask(&mut machine, "status")[0].contains("unseen_mm=0 "));
+}
+
+#[test]
+fn the_longest_numbers_fit_on_the_status_line() {
+    let mut machine = machine();
+    ask(&mut machine, "start");
+    machine.beam_edges_lost();
+    let mut readings = readings(1000, i32::MIN);
+    readings.lost = u16::MAX;
+    machine.step(readings);
+    ask(&mut machine, "status");
+}
+
+#[test]
+fn every_event_fits_on_a_line() {
+    let far = Position::new(i32::MIN);
+    let long = Ticks(i32::MIN / 4);
+    let vote = Vote { class: Class::Unknown, votes: u8::MAX };
+    let plan = Plan { delay: long, hold: long };
+    let mut events = vec![
+        Event::Object { vote, leading: far, spacing: long, plan },
+        Event::Swing { out: true, position: far },
+        Event::State(State::Hold),
+    ];
+    events.extend((0..).map_while(Alarm::from_index).map(|alarm| Event::Alarm { alarm, position: far }));
+    for event in events {
+        let mut said = Said::default();
+        reply::write_event(&event, &mut said).unwrap();
+        assert!(said.0.len() <= LINE, "{} characters: {}", said.0.len(), said.0);
+        assert!(said.0.ends_with("\r\n") && !said.0.contains(':'), "{}", said.0);
+    }
+}

@@ -1,0 +1,172 @@
+//! The one thing that must not happen, over random rows and random ways of rolling past them: stops, reversals, speeds
+//! from a crawl to 10 km/h, plants closer than the beam's distance and farther.
+//!
+//! The reference is slow and obvious: it knows where every plant stands and how fast the machine really rolls.
+
+mod common;
+
+use common::{ByWidth, readings};
+use control::{controller::Controller, event::Event, servo, settings::Setting, units::Ticks};
+use proptest::prelude::*;
+
+/// Ticks a metre of the default wheel.
+const TICKS_A_METRE: f64 = 1909.86;
+
+/// A turn of the main loop.
+const TURN_US: u64 = 500;
+
+/// The tool's command may be this far off where the true speed would have it, in ticks: the measured speed lags behind.
+const TOLERANCE: f64 = 12.0;
+
+#[derive(Clone, Debug)]
+struct Leg {
+    speed_mm_s: f64,
+    length_mm: f64,
+}
+
+fn legs() -> impl Strategy<Value = Vec<Leg>> {
+    let leg = prop_oneof![
+        4 => (200.0..2800.0, 100.0..1500.0),
+        1 => (-700.0..-50.0, 10.0..900.0),
+        1 => (5.0..50.0, 1.0..20.0),
+    ];
+    prop::collection::vec(leg.prop_map(|(speed_mm_s, length_mm)| Leg { speed_mm_s, length_mm }), 1..12)
+}
+
+/// Gaps in front of each plant and canopies, in millimetres.
+fn plants() -> impl Strategy<Value = Vec<(f64, f64)>> {
+    prop::collection::vec((60.0..900.0, 65.0..300.0), 1..20)
+}
+
+/// What a run showed.
+struct Run {
+    plants_told: usize,
+    plants_seen: usize,
+}
+
+/// Rolls past the plants and checks each order against them.
+fn roll(distance_mm: u16, plants: &[(f64, f64)], legs: &[Leg], paper: bool) -> Result<Run, TestCaseError> {
+    let mut place = 700.0 + f64::from(distance_mm);
+    let canopies: Vec<(f64, f64)> = plants
+        .iter()
+        .map(|&(gap_mm, canopy_mm)| {
+            let leading = place + gap_mm;
+            place = leading + canopy_mm;
+            (leading * TICKS_A_METRE / 1000.0, place * TICKS_A_METRE / 1000.0)
+        })
+        .collect();
+    let broken_at = |count: i32| canopies.iter().any(|&(from, to)| (from..to).contains(&f64::from(count)));
+
+    let mut machine = Controller::new(ByWidth, readings(0, 0), false);
+    machine.set(Setting::BeamToToolMm, distance_mm).unwrap();
+    // The beam of this test answers at once.
+    machine.set(Setting::BeamResponseMs, 0).unwrap();
+    machine.set(Setting::MaxWidthMm, 1500).unwrap();
+    let (lead_out_s, lead_in_s) = if paper { (0.0, 0.0) } else { (0.180, 0.040) };
+    machine.set(Setting::LeadOutMs, (lead_out_s * 1000.0) as u16).unwrap();
+    machine.set(Setting::LeadInMs, (lead_in_s * 1000.0) as u16).unwrap();
+    machine.tell_events(true);
+    machine.start(true).unwrap();
+    let distance = f64::from(machine.settings().ticks(Setting::BeamToToolMm).0);
+    let margin = f64::from(machine.settings().ticks(Setting::MarginMm).0);
+    let tool_in = servo::from_us(machine.settings().get(Setting::ServoInUs));
+
+    let mut run = Run { plants_told: 0, plants_seen: 0 };
+    let (mut time_us, mut position, mut count, mut broken, mut farthest) = (0_u64, 0.0_f64, 0_i32, false, 0_i32);
+    let mut speed = 0.0_f64;
+    for leg in legs {
+        let target = leg.speed_mm_s * TICKS_A_METRE / 1000.0;
+        let mut left = leg.length_mm * TICKS_A_METRE / 1000.0;
+        while left > 0.0 {
+            // A person pushes: 1 m/s2.
+            let most = 1000.0 * TICKS_A_METRE / 1000.0 * TURN_US as f64 / 1e6;
+            let step = (target - speed).clamp(-most, most);
+            speed += step;
+            let rolled = speed * TURN_US as f64 / 1e6;
+            position += rolled;
+            left -= rolled.abs().max(0.01);
+            time_us += TURN_US;
+            // Every count that was passed, with the beam's edges at theirs.
+            let reached = position.floor() as i32;
+            while count != reached {
+                count += (reached - count).signum();
+                if broken_at(count) != broken {
+                    broken = !broken;
+                    machine.beam_edge(readings(0, count).position, broken);
+                }
+            }
+            farthest = farthest.max(count);
+            let orders = machine.step(readings(time_us, count));
+            while let Some(event) = machine.next_event() {
+                run.plants_told += usize::from(matches!(event, Event::Object { .. }));
+            }
+            if orders.pulse != tool_in {
+                continue;
+            }
+            let tool = f64::from(count) - distance;
+            for &(leading, trailing) in &canopies {
+                let (from, to) = (leading - margin, trailing + margin);
+                // Until the tool begins to move it stays out for the lead: it may be told to come back that much early.
+                let early = (speed * lead_in_s).abs() * 1.5 + TOLERANCE;
+                let (from, to) = if speed >= 0.0 { (from, to - early) } else { (from + early, to) };
+                prop_assert!(
+                    !(from + TOLERANCE..=to).contains(&tool),
+                    "the tool is in the row at {tool}, within {from} to {to}, at {speed} ticks/s"
+                );
+            }
+        }
+    }
+    run.plants_seen = canopies.iter().filter(|&&(_, trailing)| trailing + 45.0 < f64::from(farthest)).count();
+    Ok(run)
+}
+
+/// Plants whose canopies stand closer than the merging gap would be one object; these stand at least 60 mm apart.
+fn check(distance_mm: u16, plants: &[(f64, f64)], legs: &[Leg], paper: bool) -> Result<(), TestCaseError> {
+    let run = roll(distance_mm, plants, legs, paper)?;
+    prop_assert!(
+        (run.plants_seen..=run.plants_seen + 1).contains(&run.plants_told),
+        "{} of {} plants were told",
+        run.plants_told,
+        run.plants_seen
+    );
+    Ok(())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn the_tool_is_never_in_the_row_over_a_plant_and_every_plant_is_told_once(
+        distance_mm in 150_u16..=2000,
+        plants in plants(),
+        legs in legs(),
+    ) {
+        check(distance_mm, &plants, &legs, false)?;
+    }
+
+    #[test]
+    fn the_same_without_leads_as_in_the_paper(distance_mm in 150_u16..=2000, plants in plants(), legs in legs()) {
+        check(distance_mm, &plants, &legs, true)?;
+    }
+}
+
+#[test]
+fn the_tool_is_in_the_row_wherever_nothing_keeps_it_out() {
+    let mut machine = Controller::new(ByWidth, readings(0, 0), false);
+    machine.start(false).unwrap();
+    let mut orders = machine.step(readings(0, 0));
+    let out = servo::from_us(machine.settings().get(Setting::ServoOutUs));
+    assert_eq!(orders.pulse, out, "the beam has not seen this ground");
+    for millisecond in 1..2000 {
+        let count = millisecond as i32;
+        orders = machine.step(readings(millisecond * 1000, count));
+        let seen = Ticks(count) - machine.settings().ticks(Setting::BeamToToolMm);
+        // 40 ticks are what the lead of 40 ms is at this speed.
+        if seen > Ticks(5) {
+            assert_ne!(orders.pulse, out, "at {count}");
+        }
+        if seen < Ticks(-45) {
+            assert_eq!(orders.pulse, out, "at {count}");
+        }
+    }
+}

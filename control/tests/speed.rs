@@ -1,0 +1,112 @@
+//! The speed from readings as the main loop makes them: now and then, and not in step with the encoder.
+
+use control::{
+    speed::SpeedMeter,
+    units::{Instant, Interval, Position},
+};
+use proptest::prelude::*;
+
+/// A machine whose position is any function of time, read every `turn_us`.
+struct Run {
+    meter: SpeedMeter,
+    time_us: u64,
+    start: (Instant, i32),
+}
+
+impl Run {
+    fn new() -> Self {
+        Self::from(Instant::default(), 0)
+    }
+
+    fn from(start: Instant, count: i32) -> Self {
+        Self { meter: SpeedMeter::new(Position::new(count), start), time_us: 0, start: (start, count) }
+    }
+
+    /// Rolls for `duration_ms`; `ticks` says how far since the start at a time in seconds.
+    fn roll(&mut self, duration_ms: u64, turn_us: u64, ticks: impl Fn(f64) -> f64) -> &mut Self {
+        let end = self.time_us + duration_ms * 1000;
+        while self.time_us < end {
+            self.time_us += turn_us;
+            let count = self.start.1.wrapping_add(ticks(self.time_us as f64 / 1e6).floor() as i32);
+            self.meter.read(self.start.0 + Interval::from_steps((self.time_us / 4) as u32), Position::new(count));
+        }
+        self
+    }
+
+    fn speed(&self) -> f64 {
+        f64::from(self.meter.speed().0)
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn a_steady_speed_is_right_to_one_percent(
+        speed in prop_oneof![20_f64..500.0, 500_f64..5_305.0, 5_305_f64..44_000.0],
+        backwards in any::<bool>(),
+        turn_us in 80_u64..400,
+    ) {
+        let speed = if backwards { -speed } else { speed };
+        let mut run = Run::new();
+        run.roll(1200, turn_us, |time| speed * time);
+        prop_assert!((run.speed() - speed).abs() <= 1.0 + speed.abs() / 100.0, "{} is not {speed}", run.speed());
+    }
+
+    #[test]
+    fn a_machine_that_stops_is_known_to_stand_after_half_a_second(speed in 20_f64..5_305.0) {
+        let mut run = Run::new();
+        run.roll(500, 200, |time| speed * time);
+        run.roll(520, 200, |_| speed * 0.5);
+        prop_assert_eq!(run.speed(), 0.0);
+    }
+
+    #[test]
+    fn counters_that_wrap_change_nothing(speed in 100_f64..5_305.0) {
+        let mut plain = Run::new();
+        let mut wrapping = Run::from(Instant::new(u32::MAX - 60_000), i32::MAX - 100);
+        for run in [&mut plain, &mut wrapping] {
+            run.roll(1000, 200, |time| speed * time);
+        }
+        prop_assert_eq!(plain.speed(), wrapping.speed());
+    }
+}
+
+#[test]
+fn a_stop_is_felt_within_tens_of_milliseconds() {
+    let mut run = Run::new();
+    run.roll(500, 200, |time| 1326.0 * time);
+    run.roll(50, 200, |_| 663.0);
+    assert!(run.speed() <= 25.0, "{}", run.speed());
+}
+
+#[test]
+fn a_start_from_standstill_is_not_held_back_by_the_time_it_stood() {
+    let mut run = Run::new();
+    run.roll(5000, 200, |_| 0.0);
+    run.roll(100, 200, |time| 1326.0 * (time - 5.0));
+    assert!((run.speed() - 1326.0).abs() < 20.0, "{}", run.speed());
+}
+
+#[test]
+fn a_reversal_is_followed() {
+    let mut run = Run::new();
+    run.roll(500, 200, |time| 800.0 * time);
+    run.roll(150, 200, |time| 400.0 - 800.0 * (time - 0.5));
+    assert!((run.speed() + 800.0).abs() < 20.0, "{}", run.speed());
+}
+
+#[test]
+fn a_machine_that_trembles_on_an_edge_stands() {
+    let mut run = Run::new();
+    run.roll(1000, 200, |time| f64::from((time * 50.0) as u32 % 2));
+    assert!(run.speed().abs() <= 15.0, "{}", run.speed());
+}
+
+#[test]
+fn one_tick_backwards_moves_the_answer_by_its_share() {
+    let mut run = Run::new();
+    run.roll(500, 200, |time| 1326.0 * time);
+    run.roll(20, 200, |time| 1326.0 * time - if time < 0.505 { 1.5 } else { 0.0 });
+    assert!((run.speed() - 1326.0).abs() < 40.0, "{}", run.speed());
+}
