@@ -74,6 +74,7 @@ fn roll(distance_mm: u16, plants: &[(f64, f64)], legs: &[Leg], paper: bool) -> R
     let mut run = Run { plants_told: 0, plants_seen: 0 };
     let (mut time_us, mut position, mut count, mut broken, mut farthest) = (0_u64, 0.0_f64, 0_i32, false, 0_i32);
     let mut speed = 0.0_f64;
+    let mut out_since_us = None;
     for leg in legs {
         let target = leg.speed_mm_s * TICKS_A_METRE / 1000.0;
         let mut left = leg.length_mm * TICKS_A_METRE / 1000.0;
@@ -100,10 +101,18 @@ fn roll(distance_mm: u16, plants: &[(f64, f64)], legs: &[Leg], paper: bool) -> R
             while let Some(event) = machine.next_event() {
                 run.plants_told += usize::from(matches!(event, Event::Object { .. }));
             }
+            let tool = f64::from(count) - distance;
             if orders.pulse != tool_in {
+                // The servo needs its lead to be out: over a canopy it must have had it.
+                let over_a_canopy = canopies.iter().any(|&(from, to)| (from..to).contains(&tool));
+                let out_for_s = (time_us - *out_since_us.get_or_insert(time_us)) as f64 / 1e6;
+                prop_assert!(
+                    !over_a_canopy || out_for_s + TURN_US as f64 / 1e6 >= lead_out_s,
+                    "the tool was told to leave only {out_for_s} s ago, at {tool}, at {speed} ticks/s"
+                );
                 continue;
             }
-            let tool = f64::from(count) - distance;
+            out_since_us = None;
             for &(leading, trailing) in &canopies {
                 let (from, to) = (leading - margin, trailing + margin);
                 // Until the tool begins to move it stays out for the lead: it may be told to come back that much early.
