@@ -14,6 +14,11 @@
 //!   too many is lost and sets DOR0. The interrupt is asked for as long as one waits (simavr: once a byte's time).
 //! - An edge of a timer's output carries the cycle in which it was due (simavr: the end of the instruction then running). An
 //!   edge that the firmware makes carries the cycle in which its instruction began.
+//! - OCR1A is double buffered in fast PWM: a new value counts from the next bottom (simavr: at once). Writing TCNT1 moves the
+//!   counter and leaves the pin and the prescaler alone (simavr: sets the pin where a match is to come, and rounds).
+//! - The servo's pin follows its timer while it is connected to it (simavr copies the timer's level into PORTB, where a firmware
+//!   that reads PORTB before an edge and writes it behind the edge takes the edge back).
+//! - A timer is stopped by a reset (simavr keeps its mode and its period).
 //! - An input keeps its level when the firmware writes its port (simavr raises pulled-up pins) and over a reset.
 //! - The clock, and the watchdog's time after its own reset, go on over a reset (simavr starts them from 0 and from the past).
 //! - Sleep advances the cycles and never waits; nothing is printed but simavr's errors; there is no debugger.
@@ -22,7 +27,9 @@
 //! # What is not
 //!
 //! - EEPROM writes finish at once (3.4 ms in truth), and the EEPROM-ready interrupt comes only after a write.
-//! - OCR1A is not double buffered: a new value counts in the running period.
+//! - OCR1B and the compare registers of Timer0 and Timer2 are not double buffered. PORTB's bit of the servo reads as the
+//!   timer's level.
+//! - TCNT1 of a stopped timer counts for nothing: the timer starts at its bottom, with the pin's edge.
 //! - An edge reaches its interrupt at once; the chip's synchroniser takes two or three cycles more.
 //! - The transmitter has no second buffer: it takes the next byte when the last one has left.
 //! - UBRR is what the clock divides; the crystal is exact.
@@ -30,6 +37,7 @@
 mod core;
 mod interrupts;
 mod recorder;
+mod timer;
 
 use std::collections::VecDeque;
 use std::path::Path;

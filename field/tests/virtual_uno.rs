@@ -20,24 +20,14 @@ const MILLISECOND: u64 = CYCLES_PER_SECOND / 1000;
 
 /// Compiles a fixture and returns its ELF.
 fn compile(name: &str) -> PathBuf {
-    let source = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("tests/fixtures")
-        .join(name)
-        .with_extension("c");
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures").join(name).with_extension("c");
     // Tests run at the same time, and several of them compile the same fixture.
     let thread = format!("{:?}", std::thread::current().id());
     let elf = Path::new(env!("CARGO_TARGET_TMPDIR"))
         .join(format!("{name}-{}-{thread}", std::process::id()))
         .with_extension("elf");
     let output = Command::new("avr-gcc")
-        .args([
-            "-mmcu=atmega328p",
-            "-DF_CPU=16000000UL",
-            "-Os",
-            "-Wall",
-            "-Werror",
-            "-o",
-        ])
+        .args(["-mmcu=atmega328p", "-DF_CPU=16000000UL", "-Os", "-Wall", "-Werror", "-o"])
         .args([&elf, &source])
         .output()
         .unwrap_or_else(|error| panic!("avr-gcc could not be started ({error}): run ./setup.sh"));
@@ -128,11 +118,7 @@ fn responses(uno: &mut Uno) -> Vec<u64> {
     }
     uno.run_for_ms(2).unwrap();
     let answers = uno.changes().iter().filter(|change| change.high);
-    let responses: Vec<u64> = edges
-        .iter()
-        .zip(answers)
-        .map(|(edge, answer)| answer.cycle - edge)
-        .collect();
+    let responses: Vec<u64> = edges.iter().zip(answers).map(|(edge, answer)| answer.cycle - edge).collect();
     assert_eq!(responses.len(), edges.len());
     responses
 }
@@ -142,10 +128,7 @@ fn entering_an_interrupt_takes_four_cycles() {
     // Entry, and the vector's `jmp` of 3 cycles. The main loop's instructions take 1 cycle, and its last one 2.
     let responses = responses(&mut boot("entry"));
     assert!(responses.contains(&7), "{responses:?}");
-    assert!(
-        responses.iter().all(|response| (7..=8).contains(response)),
-        "{responses:?}"
-    );
+    assert!(responses.iter().all(|response| (7..=8).contains(response)), "{responses:?}");
 }
 
 #[test]
@@ -178,11 +161,7 @@ fn interrupts_are_counted_and_timed_when_asked_for() {
 #[test]
 fn a_timer_pulse_is_exact_and_constant_while_the_core_is_busy() {
     let mut uno = boot("servo");
-    let edges = (1..20_000).map(|count| PinChange {
-        cycle: count * 799,
-        pin: Pin::EncoderA,
-        high: count % 2 == 1,
-    });
+    let edges = (1..20_000).map(|count| PinChange { cycle: count * 799, pin: Pin::EncoderA, high: count % 2 == 1 });
     uno.drive(edges);
     uno.run_for_ms(1000).unwrap();
     let pulses = uno.servo_pulses();
@@ -193,6 +172,87 @@ fn a_timer_pulse_is_exact_and_constant_while_the_core_is_busy() {
     }
 }
 
+/// Cycles of the fixture `pulses`: a frame, its two widths, a clock of its timer, and the longest turn of its loop.
+const FRAME_CYCLES: u64 = 20 * MILLISECOND;
+const NARROW_CYCLES: u64 = 3000 * TIMER_CLOCK_CYCLES;
+const WIDE_CYCLES: u64 = 4000 * TIMER_CLOCK_CYCLES;
+const TIMER_CLOCK_CYCLES: u64 = 8;
+const TURN_CYCLES: u64 = 80;
+
+/// Pulses an input for less than a pulse of the servo lasts.
+fn knock(uno: &mut Uno, pin: Pin, cycle: u64) {
+    uno.drive([(cycle, true), (cycle + 1000, false)].map(|(cycle, high)| PinChange { cycle, pin, high }));
+}
+
+/// Rise and width in cycles of the pulses that began at or after a cycle.
+fn pulses_since(uno: &Uno, cycle: u64) -> Vec<(u64, u64)> {
+    let pulses = uno.servo_pulses();
+    pulses.iter().filter(|pulse| pulse.rise >= cycle).map(|pulse| (pulse.rise, pulse.fall - pulse.rise)).collect()
+}
+
+#[test]
+fn a_new_width_begins_with_the_next_frame_whenever_it_is_written() {
+    let mut uno = boot("pulses");
+    uno.run_until(2 * FRAME_CYCLES).unwrap();
+    let start = pulses_since(&uno, 1000)[0].0;
+    let during_pulses = (100..WIDE_CYCLES + 1000).step_by(613);
+    let later = (WIDE_CYCLES..FRAME_CYCLES - 2 * TURN_CYCLES).step_by(9973);
+    let phases: Vec<u64> = during_pulses.chain(later).collect();
+    for (frame, phase) in (3..).zip(&phases) {
+        knock(&mut uno, Pin::EncoderA, start + frame * FRAME_CYCLES + phase);
+    }
+    let frames = phases.len() as u64 + 3;
+    uno.run_until(start + frames * FRAME_CYCLES + MILLISECOND).unwrap();
+
+    let pulses = pulses_since(&uno, start + 3 * FRAME_CYCLES);
+    assert_eq!(pulses.len(), phases.len());
+    for ((frame, pulse), width) in (3..).zip(pulses).zip([NARROW_CYCLES, WIDE_CYCLES].into_iter().cycle()) {
+        assert_eq!(pulse, (start + frame * FRAME_CYCLES, width));
+    }
+}
+
+#[test]
+fn a_frame_that_is_cut_short_is_followed_by_a_whole_one() {
+    let mut uno = boot("pulses");
+    uno.run_until(2 * FRAME_CYCLES).unwrap();
+    let first = pulses_since(&uno, 1000)[0].0;
+    let mut rise = first;
+    let mut width = NARROW_CYCLES;
+    for phase in (WIDE_CYCLES + 100..FRAME_CYCLES - 2 * TURN_CYCLES).step_by(3931) {
+        while rise + phase < uno.cycle() {
+            rise += FRAME_CYCLES;
+        }
+        knock(&mut uno, Pin::EncoderB, rise + phase);
+        uno.run_until(rise + phase + 3 * FRAME_CYCLES / 2).unwrap();
+
+        let changes: Vec<PinChange> =
+            uno.changes().iter().filter(|change| change.cycle >= rise + phase).copied().collect();
+        assert_eq!(changes[0].pin, Pin::Led, "{changes:?}");
+        // TCNT1 is written 8 cycles after the lamp, and the second clock after that is the bottom.
+        let pulses = pulses_since(&uno, rise + phase);
+        let delay = pulses[0].0 - changes[0].cycle;
+        assert!((8 + 9..=8 + 16).contains(&delay), "{delay} cycles");
+        assert_eq!((pulses[0].0 - first) % TIMER_CLOCK_CYCLES, 0, "the prescaler runs on");
+
+        rise = pulses[0].0;
+        width = NARROW_CYCLES + WIDE_CYCLES - width;
+        assert_eq!(pulses, [(rise, width), (rise + FRAME_CYCLES, width)]);
+    }
+}
+
+#[test]
+fn a_frame_that_is_cut_short_during_its_pulse_draws_the_pulse_out() {
+    let mut uno = boot("pulses");
+    uno.run_until(2 * FRAME_CYCLES).unwrap();
+    let rise = pulses_since(&uno, 1000)[0].0 + 2 * FRAME_CYCLES;
+    knock(&mut uno, Pin::EncoderB, rise + NARROW_CYCLES / 2);
+    uno.run_until(rise + 2 * FRAME_CYCLES).unwrap();
+    let pulses = pulses_since(&uno, rise);
+    let bottom = pulses[1].0 - FRAME_CYCLES;
+    assert!((0..2 * TURN_CYCLES).contains(&(bottom - rise - NARROW_CYCLES / 2)), "{pulses:?}");
+    assert_eq!(pulses, [(rise, bottom + WIDE_CYCLES - rise), (bottom + FRAME_CYCLES, WIDE_CYCLES)]);
+}
+
 #[test]
 fn every_pin_change_is_counted() {
     let mut uno = boot("servo");
@@ -200,11 +260,7 @@ fn every_pin_change_is_counted() {
     let start = uno.cycle();
     // Handed over in no order: A and B by themselves.
     for (pin, offset) in [(Pin::EncoderA, 0), (Pin::EncoderB, 250)] {
-        uno.drive((1..=600).map(|count| PinChange {
-            cycle: start + count * 500 + offset,
-            pin,
-            high: count % 2 == 1,
-        }));
+        uno.drive((1..=600).map(|count| PinChange { cycle: start + count * 500 + offset, pin, high: count % 2 == 1 }));
     }
     uno.run_for_ms(25).unwrap();
     assert_eq!(uno.read("edges"), Some(&1200_u16.to_le_bytes()[..]));
@@ -214,25 +270,16 @@ fn every_pin_change_is_counted() {
 #[test]
 fn eeprom_and_sram_outlive_the_reset_pin_and_eeprom_the_power() {
     let mut uno = Uno::boot_with_eeprom(&compile("memory"), &[9, 9, 9, 9, 9, 9, 9, 0]).unwrap();
-    assert_eq!(
-        uno.run_until_serial("\n", 10 * MILLISECOND).unwrap(),
-        format!("{POWER_ON}1H\n")
-    );
+    assert_eq!(uno.run_until_serial("\n", 10 * MILLISECOND).unwrap(), format!("{POWER_ON}1H\n"));
     let kept = uno.read("kept").unwrap().to_vec();
     assert_eq!(uno.read("started"), Some(&[42, 0][..]));
 
     uno.reset();
-    assert_eq!(
-        uno.run_until_serial("\n", 10 * MILLISECOND).unwrap(),
-        format!("{EXTERNAL}2H\n")
-    );
+    assert_eq!(uno.run_until_serial("\n", 10 * MILLISECOND).unwrap(), format!("{EXTERNAL}2H\n"));
     assert_eq!(uno.read("kept").unwrap(), [kept[0] + 1]);
 
     uno.power_cycle();
-    assert_eq!(
-        uno.run_until_serial("\n", 10 * MILLISECOND).unwrap(),
-        format!("{POWER_ON}3H\n")
-    );
+    assert_eq!(uno.run_until_serial("\n", 10 * MILLISECOND).unwrap(), format!("{POWER_ON}3H\n"));
     assert_eq!(uno.read("kept").unwrap(), kept);
     assert_eq!(uno.eeprom()[..9], [9, 9, 9, 9, 9, 9, 9, 3, 0xFF]);
 
@@ -247,19 +294,13 @@ fn a_watchdog_reset_is_reported_and_the_firmware_goes_on() {
     let asked_at = uno.cycle();
     uno.send(b"w");
     // EEPROM starts erased: 255 + 1 wraps to 0, and this is the second start.
-    assert_eq!(
-        uno.run_until_serial("\n", 30 * MILLISECOND).unwrap(),
-        format!("{WATCHDOG}1H\n")
-    );
+    assert_eq!(uno.run_until_serial("\n", 30 * MILLISECOND).unwrap(), format!("{WATCHDOG}1H\n"));
     let [reset] = uno.resets() else {
         panic!("one reset, not {:?}", uno.resets());
     };
     assert_eq!(reset.cause, ResetCause::Watchdog);
     let waited = reset.cycle - asked_at;
-    assert!(
-        (16 * MILLISECOND..17 * MILLISECOND).contains(&waited),
-        "{waited} cycles"
-    );
+    assert!((16 * MILLISECOND..17 * MILLISECOND).contains(&waited), "{waited} cycles");
 }
 
 #[test]
@@ -280,20 +321,11 @@ fn a_watchdog_that_nobody_turns_off_bites_again_after_sixteen_milliseconds() {
 fn a_driven_input_keeps_its_level_over_port_writes_and_resets() {
     let mut uno = boot("memory");
     uno.set(Pin::WorkSwitch, false);
-    assert_eq!(
-        uno.run_until_serial("\n", 10 * MILLISECOND).unwrap(),
-        format!("{POWER_ON}0L\n")
-    );
+    assert_eq!(uno.run_until_serial("\n", 10 * MILLISECOND).unwrap(), format!("{POWER_ON}0L\n"));
     uno.reset();
-    assert_eq!(
-        uno.run_until_serial("\n", 10 * MILLISECOND).unwrap(),
-        format!("{EXTERNAL}1L\n")
-    );
+    assert_eq!(uno.run_until_serial("\n", 10 * MILLISECOND).unwrap(), format!("{EXTERNAL}1L\n"));
     uno.power_cycle();
-    assert_eq!(
-        uno.run_until_serial("\n", 10 * MILLISECOND).unwrap(),
-        format!("{POWER_ON}2L\n")
-    );
+    assert_eq!(uno.run_until_serial("\n", 10 * MILLISECOND).unwrap(), format!("{POWER_ON}2L\n"));
 }
 
 #[test]
@@ -315,10 +347,7 @@ fn a_crash_and_a_halt_are_errors_that_say_where() {
 fn a_missing_answer_is_an_error_that_shows_what_came_instead() {
     let mut uno = boot("echo");
     let error = uno.run_until_serial("steady", 5 * MILLISECOND).unwrap_err().to_string();
-    assert!(
-        error.contains("\"steady\"") && error.contains("\"ready\\n\""),
-        "{error}"
-    );
+    assert!(error.contains("\"steady\"") && error.contains("\"ready\\n\""), "{error}");
     assert_eq!(uno.received(), "ready\n");
 }
 

@@ -18,7 +18,8 @@ use std::ptr::{self, NonNull};
 use simavr_ffi as simavr;
 
 use super::interrupts::{InterruptRecorder, InterruptStatistics};
-use super::recorder::{Recorder, cycles_per_byte, on_interrupt, on_output, on_reset, on_transmit};
+use super::recorder::{Recorder, cycles_per_byte, on_interrupt, on_output, on_reset, on_timer_output, on_transmit};
+use super::timer::{self, Timer1};
 use super::{Reset, ResetCause};
 use crate::firmware::EEPROM_BYTES;
 use crate::signal::{CYCLES_PER_SECOND, Pin};
@@ -123,6 +124,8 @@ impl Core {
         let recorder = NonNull::from(Box::leak(Box::new(Recorder {
             chip: avr,
             uart: uart.as_ptr(),
+            // SAFETY: `avr` was initialised above.
+            timer: unsafe { Timer1::of(avr) },
             servo_high: false,
             led_high: false,
             changes: Vec::new(),
@@ -144,6 +147,9 @@ impl Core {
                 let irq = pin_irq(avr, pin);
                 simavr::avr_irq_register_notify(irq, Some(on_output), parameter);
             }
+            let output_a = simavr::avr_io_getirq(avr, request(b"tmr1"), simavr::TIMER_IRQ_OUT_COMP as i32);
+            simavr::avr_irq_register_notify(output_a, Some(on_timer_output), parameter);
+            timer::take_over_writes(recorder);
             for vector in 1..=LAST_VECTOR {
                 let irq = simavr::avr_get_interrupt_irq(avr, vector);
                 if !irq.is_null() {
@@ -283,10 +289,7 @@ impl Core {
         let recorder = self.recorder_mut();
         recorder.record_level(Pin::Servo, false, cycle);
         recorder.record_level(Pin::Led, false, cycle);
-        recorder.resets.push(Reset {
-            cycle,
-            cause: ResetCause::PowerOn,
-        });
+        recorder.resets.push(Reset { cycle, cause: ResetCause::PowerOn });
     }
 
     /// Sets right what simavr leaves behind a reset: its clock at 0, and the inputs' levels forgotten.
@@ -298,6 +301,7 @@ impl Core {
         // SAFETY: as in `cycle`. The watchdog's timer, the only one that can run now, was set from this cycle.
         unsafe { (*self.chip.as_ptr()).cycle = cycle };
         let recorder = self.recorder_mut();
+        recorder.timer.stop();
         recorder.record_level(Pin::Servo, false, cycle);
         recorder.record_level(Pin::Led, false, cycle);
         recorder.interrupts.reset();
@@ -371,11 +375,8 @@ impl Core {
     /// The EEPROM's content.
     pub(super) fn eeprom(&self) -> Vec<u8> {
         let mut content = vec![0; EEPROM_BYTES];
-        let mut description = simavr::avr_eeprom_desc_t {
-            ee: content.as_mut_ptr(),
-            offset: 0,
-            size: EEPROM_BYTES as u32,
-        };
+        let mut description =
+            simavr::avr_eeprom_desc_t { ee: content.as_mut_ptr(), offset: 0, size: EEPROM_BYTES as u32 };
         // SAFETY: `description` names a buffer of the size it gives, and simavr copies into it.
         unsafe { simavr::avr_ioctl(self.chip.as_ptr(), request(b"eegp"), (&raw mut description).cast()) };
         content
@@ -383,11 +384,8 @@ impl Core {
 
     fn set_eeprom(&mut self, content: &[u8]) {
         let mut content = content.to_vec();
-        let mut description = simavr::avr_eeprom_desc_t {
-            ee: content.as_mut_ptr(),
-            offset: 0,
-            size: content.len() as u32,
-        };
+        let mut description =
+            simavr::avr_eeprom_desc_t { ee: content.as_mut_ptr(), offset: 0, size: content.len() as u32 };
         // SAFETY: as in `eeprom`; simavr copies out of it, and refuses what is empty or too long.
         unsafe { simavr::avr_ioctl(self.chip.as_ptr(), request(b"eesp"), (&raw mut description).cast()) };
     }

@@ -10,6 +10,7 @@ use simavr_ffi as simavr;
 
 use super::core::{UCSR0A, UCSR0B};
 use super::interrupts::InterruptRecorder;
+use super::timer::Timer1;
 use super::{ReceivedByte, Reset};
 use crate::signal::{Pin, PinChange};
 
@@ -35,6 +36,7 @@ const UPM01: u8 = 1 << 5;
 pub(super) struct Recorder {
     pub(super) chip: *mut simavr::avr_t,
     pub(super) uart: *mut simavr::avr_uart_t,
+    pub(super) timer: Timer1,
     pub(super) servo_high: bool,
     pub(super) led_high: bool,
     /// Edges of the output pins, oldest first.
@@ -113,19 +115,31 @@ unsafe fn due_cycle(avr: *mut simavr::avr_t) -> u64 {
     }
 }
 
-/// simavr's callback for a level on an output pin.
+/// simavr's callback for a level on an output pin's port.
 pub(super) unsafe extern "C" fn on_output(irq: *mut simavr::avr_irq_t, level: u32, recorder: *mut c_void) {
     // SAFETY: `recorder` is what `Core::new` registered, alive and not borrowed (see the module's text).
     let recorder = unsafe { &mut *recorder.cast::<Recorder>() };
     // SAFETY: simavr passes the line that it raises; the recorder's chip is the one that is running.
     let (bit, cycle) = unsafe { ((*irq).irq, due_cycle(recorder.chip)) };
-    let pin = if bit == u32::from(Pin::Servo.port_and_bit().1) {
-        Pin::Servo
+    let port_high = level & 1 != 0;
+    if bit == u32::from(Pin::Servo.port_and_bit().1) {
+        // SAFETY: as above.
+        let high = unsafe { recorder.timer.pin_is_high(recorder.chip, port_high) };
+        recorder.record_level(Pin::Servo, high, cycle);
     } else {
-        Pin::Led
-    };
-    // A timer's output carries a flag beside the level.
-    recorder.record_level(pin, level & 1 != 0, cycle);
+        recorder.record_level(Pin::Led, port_high, cycle);
+    }
+}
+
+/// simavr's callback for a level that Timer1 puts on its output A.
+pub(super) unsafe extern "C" fn on_timer_output(_: *mut simavr::avr_irq_t, level: u32, recorder: *mut c_void) {
+    // SAFETY: as in `on_output`. A timer's output carries a flag beside the level.
+    unsafe {
+        let recorder = &mut *recorder.cast::<Recorder>();
+        recorder.timer.output_becomes(level & 1 != 0);
+        let high = recorder.timer.pin_is_high(recorder.chip, recorder.servo_high);
+        recorder.record_level(Pin::Servo, high, due_cycle(recorder.chip));
+    }
 }
 
 /// simavr's callback for an interrupt handler that begins (1) or has returned (0).
@@ -151,10 +165,7 @@ pub(super) unsafe extern "C" fn on_transmit(_: *mut simavr::avr_irq_t, byte: u32
     unsafe {
         let recorder = &mut *recorder.cast::<Recorder>();
         (*recorder.uart).cycles_per_byte = cycles_per_byte(recorder.chip);
-        recorder.received.push(ReceivedByte {
-            cycle: (*recorder.chip).cycle,
-            byte: byte as u8,
-        });
+        recorder.received.push(ReceivedByte { cycle: (*recorder.chip).cycle, byte: byte as u8 });
     }
 }
 
