@@ -61,7 +61,7 @@ fn main() -> ! {
         let Ok(switch_on) = work_switch.is_low();
         Readings { now, position: Position::new(position), switch_on, lost }
     };
-    let controller = CONTROLLER.init(Controller::new(Nearest(examples::InFlash), read(), beam.is_broken()));
+    let controller = CONTROLLER.init(Controller::new(Nearest(examples::built_in()), read(), beam.is_broken()));
     let mut line = LineBuffer::new();
     let mut answer = Answer::Greeting;
     watchdog::start();

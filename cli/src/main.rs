@@ -3,6 +3,7 @@
 //! `weeder sim` ends with status 0 where no plant was damaged and 1 where one was; whatever else goes wrong, here and in
 //! the other commands, ends with status 2 and a message that says what would be right.
 
+mod bench;
 mod flash;
 mod progress;
 mod sim;
@@ -24,6 +25,8 @@ enum Command {
     Sim(Box<sim::Arguments>),
     /// Build the firmware and put it on the Uno at a USB port.
     Flash(flash::Arguments),
+    /// Count the cycles and bytes of the firmware and its classifier on a virtual Uno.
+    BenchUno,
 }
 
 /// Whether the plants are alive.
@@ -39,6 +42,7 @@ fn main() -> ExitCode {
     let result = match Arguments::parse().command {
         Command::Sim(arguments) => sim::run(&arguments),
         Command::Flash(arguments) => flash::run(&arguments).map(|()| Harm::None),
+        Command::BenchUno => bench::run().map(|()| Harm::None),
     };
     match result {
         Ok(Harm::None) => ExitCode::SUCCESS,

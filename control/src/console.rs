@@ -165,12 +165,13 @@ impl LineBuffer {
     }
 
     fn end(&mut self) -> Option<Result<Command, Mistake>> {
-        let line = core::mem::take(&mut self.characters);
-        match self.mistake.take() {
+        let said = match self.mistake.take() {
             Some(mistake) => Some(Err(mistake)),
-            None if line.iter().all(|&byte| byte == b' ' || byte == b'\t') => None,
-            None => Some(parse(&line)),
-        }
+            None if self.characters.iter().all(|&byte| byte == b' ' || byte == b'\t') => None,
+            None => Some(parse(&self.characters)),
+        };
+        self.characters.clear();
+        said
     }
 }
 

@@ -12,7 +12,7 @@ use crate::{
     object::Object,
     units::{Position, Ticks, Wheel},
 };
-use heapless::Deque;
+use heapless::Vec;
 
 /// Canopies remembered at once, ahead of the tool and behind it: four plants between beam and tool at the longest
 /// distance and the closest spacing, and some six metres of row to roll back over.
@@ -25,7 +25,7 @@ const MEMORY: Ticks = Ticks(1 << 20);
 /// The canopies known, in the order in which the beam saw them.
 #[derive(Clone, Debug)]
 pub struct Schedule {
-    canopies: Deque<Object, CAPACITY>,
+    canopies: Vec<Object, CAPACITY>,
     /// Everything behind this place is unknown.
     known_from: Position,
 }
@@ -37,7 +37,7 @@ pub struct Full;
 impl Schedule {
     /// An empty schedule that knows the ground from `known_from` on.
     pub const fn new(known_from: Position) -> Self {
-        Self { canopies: Deque::new(), known_from }
+        Self { canopies: Vec::new(), known_from }
     }
 
     /// The place from which on the ground is known.
@@ -59,15 +59,15 @@ impl Schedule {
     /// [`Full`] when even the oldest window lies at the tool or ahead of it; the canopy is then not added.
     pub fn push(&mut self, canopy: Object, tool: Position, margin: Ticks) -> Result<(), Full> {
         if self.canopies.is_full() {
-            let oldest = self.canopies.front().ok_or(Full)?;
+            let oldest = self.canopies.first().ok_or(Full)?;
             let end = oldest.trailing + margin;
             if !tool.is_ahead_of(end) {
                 return Err(Full);
             }
             self.known_from = end;
-            self.canopies.pop_front();
+            self.canopies.remove(0);
         }
-        self.canopies.push_back(canopy).map_err(|_| Full)
+        self.canopies.push(canopy).map_err(|_| Full)
     }
 
     /// Forgets what lies farther behind the tool than can be remembered.
@@ -75,9 +75,7 @@ impl Schedule {
         let horizon = tool - MEMORY;
         if horizon.is_ahead_of(self.known_from) {
             self.known_from = horizon;
-            while self.canopies.front().is_some_and(|canopy| horizon.is_ahead_of(canopy.trailing)) {
-                self.canopies.pop_front();
-            }
+            self.canopies.retain(|canopy| !horizon.is_ahead_of(canopy.trailing));
         }
     }
 

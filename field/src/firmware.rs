@@ -25,8 +25,14 @@ const SRAM_ORIGIN: u64 = 0x80_0000;
 const EEPROM_ORIGIN: u64 = 0x81_0000;
 const FUSES_ORIGIN: u64 = 0x82_0000;
 
-/// The firmware package, and the name of its binary.
-const PACKAGE: &str = "weeder-firmware";
+/// A program for the chip: its package, which is its binary's name too, and the alias that builds it.
+struct Program {
+    package: &'static str,
+    alias: &'static str,
+}
+
+const FIRMWARE: Program = Program { package: "weeder-firmware", alias: "firmware" };
+const BENCH: Program = Program { package: "knn-bench", alias: "bench-firmware" };
 
 /// What an outer cargo, or a shell, may have set that would change how the firmware is compiled.
 const FOREIGN_SETTINGS: [&str; 7] = [
@@ -49,14 +55,14 @@ pub enum BuildError {
     #[error("cargo could not be started ({0}): put it on PATH, ./setup.sh says how")]
     Start(String),
     /// Cargo's messages could not be read.
-    #[error("the messages of `cargo firmware` could not be read: {0}")]
+    #[error("cargo's messages could not be read: {0}")]
     Messages(String),
     /// Cargo ran and failed.
-    #[error("`cargo firmware` failed ({0}): its own messages stand above; where a tool is missing, run ./setup.sh")]
-    Failed(String),
+    #[error("`cargo {0}` failed ({1}): its own messages stand above; where a tool is missing, run ./setup.sh")]
+    Failed(&'static str, String),
     /// Cargo was content, but no ELF came of it.
-    #[error("`cargo firmware` made no ELF: the package `{PACKAGE}` should have a binary of that name")]
-    NoElf,
+    #[error("no ELF was made: the package `{0}` should have a binary of that name")]
+    NoElf(&'static str),
 }
 
 /// Builds the firmware of this workspace and returns the path of its ELF.
@@ -69,39 +75,51 @@ pub enum BuildError {
 /// Where cargo cannot be started, fails, or makes no ELF.
 pub fn build() -> Result<PathBuf, BuildError> {
     static BUILT: OnceLock<Result<PathBuf, BuildError>> = OnceLock::new();
-    BUILT.get_or_init(run_cargo).clone()
+    BUILT.get_or_init(|| FIRMWARE.build()).clone()
 }
 
-fn run_cargo() -> Result<PathBuf, BuildError> {
-    let mut command = Command::new("cargo");
-    command
-        .args(["firmware", "--message-format", "json-render-diagnostics"])
-        .arg("--target-dir")
-        .arg(target_directory())
-        .current_dir(workspace_root())
-        .stdin(Stdio::null())
-        .stdout(Stdio::piped());
-    for name in FOREIGN_SETTINGS {
-        command.env_remove(name);
-    }
-    let mut cargo = command.spawn().map_err(|error| BuildError::Start(error.to_string()))?;
+/// Builds the classifier's bench, which [`crate::bench`] runs, and returns the path of its ELF.
+///
+/// # Errors
+///
+/// As [`build`].
+pub fn build_bench() -> Result<PathBuf, BuildError> {
+    static BUILT: OnceLock<Result<PathBuf, BuildError>> = OnceLock::new();
+    BUILT.get_or_init(|| BENCH.build()).clone()
+}
 
-    let mut elf = None;
-    if let Some(messages) = cargo.stdout.take() {
-        for message in Message::parse_stream(BufReader::new(messages)) {
-            match message.map_err(|error| BuildError::Messages(error.to_string()))? {
-                Message::CompilerArtifact(artifact) if artifact.target.name == PACKAGE => {
-                    elf = artifact.executable.map(PathBuf::from).or(elf);
+impl Program {
+    fn build(&self) -> Result<PathBuf, BuildError> {
+        let mut command = Command::new("cargo");
+        command
+            .args([self.alias, "--message-format", "json-render-diagnostics"])
+            .arg("--target-dir")
+            .arg(target_directory())
+            .current_dir(workspace_root())
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped());
+        for name in FOREIGN_SETTINGS {
+            command.env_remove(name);
+        }
+        let mut cargo = command.spawn().map_err(|error| BuildError::Start(error.to_string()))?;
+
+        let mut elf = None;
+        if let Some(messages) = cargo.stdout.take() {
+            for message in Message::parse_stream(BufReader::new(messages)) {
+                match message.map_err(|error| BuildError::Messages(error.to_string()))? {
+                    Message::CompilerArtifact(artifact) if artifact.target.name == self.package => {
+                        elf = artifact.executable.map(PathBuf::from).or(elf);
+                    }
+                    _ => {}
                 }
-                _ => {}
             }
         }
+        let status = cargo.wait().map_err(|error| BuildError::Start(error.to_string()))?;
+        if !status.success() {
+            return Err(BuildError::Failed(self.alias, status.to_string()));
+        }
+        elf.ok_or(BuildError::NoElf(self.package))
     }
-    let status = cargo.wait().map_err(|error| BuildError::Start(error.to_string()))?;
-    if !status.success() {
-        return Err(BuildError::Failed(status.to_string()));
-    }
-    elf.ok_or(BuildError::NoElf)
 }
 
 /// The folder of the workspace's Cargo.toml, which is one above this crate's.

@@ -6,6 +6,7 @@
 //! happened to each plant, [`report`] and [`picture`] show it. [`replay`] plays a recording ([`capture`]) instead of a row,
 //! and [`waveform`] writes down what was on the pins.
 
+pub mod bench;
 pub mod capture;
 pub mod console;
 pub mod firmware;
@@ -19,6 +20,7 @@ pub mod report;
 pub mod row;
 pub mod servo;
 pub mod signal;
+pub mod training;
 pub mod trial;
 pub mod uno;
 pub mod verdict;
