@@ -18,7 +18,7 @@ use crate::{
     switch::Switch,
     units::{Instant, Position, Ticks, TicksPerSecond},
 };
-use heapless::Deque;
+use heapless::Vec;
 
 /// Events that wait to be told. They are short-lived: a plant gives three in half a second.
 const EVENTS: usize = 6;
@@ -103,7 +103,7 @@ pub struct Controller<C> {
     tool_out: bool,
     /// The last plant's leading edge, or where watching began.
     last_plant: Position,
-    events: Deque<Event, EVENTS>,
+    events: Vec<Event, EVENTS>,
     events_on: bool,
     events_missed: u16,
 }
@@ -125,7 +125,7 @@ impl<C: Classifier> Controller<C> {
             state: State::Hold,
             tool_out: true,
             last_plant: readings.position,
-            events: Deque::new(),
+            events: Vec::new(),
             events_on: false,
             events_missed: 0,
         }
@@ -262,7 +262,7 @@ impl<C: Classifier> Controller<C> {
 
     /// The next event to be told.
     pub fn next_event(&mut self) -> Option<Event> {
-        self.events.pop_front()
+        (!self.events.is_empty()).then(|| self.events.remove(0))
     }
 
     /// Events that found no room to wait in.
@@ -341,7 +341,7 @@ impl<C: Classifier> Controller<C> {
     }
 
     fn tell(&mut self, event: Event) {
-        if self.events_on && self.events.push_back(event).is_err() {
+        if self.events_on && self.events.push(event).is_err() {
             self.events_missed = self.events_missed.saturating_add(1);
         }
     }
