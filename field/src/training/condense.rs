@@ -1,0 +1,101 @@
+//! From many objects to the few examples that decide alike.
+//!
+//! 1. **Wilson's editing** (D. L. Wilson, 1972): an object whose k nearest others vote for the other class is noise, or
+//!    has the wrong label, and is taken out.
+//! 2. **Hart's condensing** (P. E. Hart, 1968): while there are objects that the examples kept so far do not treat as they
+//!    should, one of them is kept. A weed has to be known as a weed, within half the squared radius, so that what is a
+//!    little unlike all objects is still known later; a plant must not be taken for one. Hart takes such objects as
+//!    they come; here the one goes first that has the most others of its class and plight around it.
+//! 3. **Filling up**: plants that no kept example is near are unknown, which spares them. As long as there is room, they
+//!    are kept in the same order.
+//!
+//! Where several objects would do, the first in the list does.
+
+use super::{answer_of_others, class_of};
+use control::{
+    classifier::{Class, label},
+    features::COUNT,
+};
+use knn::{Example, Kind, classify, squared_distance};
+use thiserror::Error;
+
+/// What is left, as places in the list given.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Condensed {
+    /// The examples, in the order in which they were chosen.
+    pub kept: Vec<usize>,
+    /// How many objects were taken out as noise.
+    pub edited_out: usize,
+}
+
+/// The examples do not fit.
+#[derive(Debug, Error, PartialEq, Eq)]
+#[error(
+    "too many examples for the flash budget: these objects cannot be told apart with fewer than {needed} examples, \
+     and there is room for {most}: take out objects with a wrong label, or objects that are like no other"
+)]
+pub struct TooMany {
+    /// Examples wanted so far.
+    pub needed: usize,
+    /// Room for examples.
+    pub most: usize,
+}
+
+/// Chooses at most `most` of `examples`, for a vote of `k` within `radius`.
+///
+/// # Errors
+/// [`TooMany`], where Hart's rule keeps more.
+pub fn condense(examples: &[Example<COUNT>], k: u8, radius: u32, most: usize) -> Result<Condensed, TooMany> {
+    let is_outvoted = |index: usize| {
+        answer_of_others(examples, index, k, u32::MAX)
+            .is_ok_and(|answer| answer.kind == Kind::Known && answer.label != examples[index].label)
+    };
+    let edited: Vec<usize> = (0..examples.len()).filter(|&index| !is_outvoted(index)).collect();
+    let edited_out = examples.len() - edited.len();
+    let half = radius / 2;
+    let is_mistreated = |index: usize, kept: &[Example<COUNT>]| {
+        let answer = classify::<COUNT, { label::COUNT }>(kept, &examples[index].features, k, half);
+        let class = answer.map_or(Class::Unknown, |answer| class_of(&answer));
+        (class == Class::Weed) != (examples[index].label == label::WEED)
+    };
+    let mut kept = Vec::new();
+    keep_most_needed(examples, &edited, &mut kept, usize::MAX, half, is_mistreated);
+    if kept.len() > most {
+        return Err(TooMany { needed: kept.len(), most });
+    }
+    let is_stranger = |index: usize, kept: &[Example<COUNT>]| {
+        kept.iter().all(|example| !are_fellows(example, &examples[index], radius))
+    };
+    keep_most_needed(examples, &edited, &mut kept, most, radius, is_stranger);
+    Ok(Condensed { kept, edited_out })
+}
+
+/// While fewer than `most` are kept and `needs` says of any of `candidates` that the examples kept are not enough for it:
+/// keeps the one that has the most other such candidates of its class within `reach`.
+fn keep_most_needed(
+    examples: &[Example<COUNT>],
+    candidates: &[usize],
+    kept: &mut Vec<usize>,
+    most: usize,
+    reach: u32,
+    needs: impl Fn(usize, &[Example<COUNT>]) -> bool,
+) {
+    let mut table: Vec<Example<COUNT>> = kept.iter().map(|&index| examples[index]).collect();
+    while kept.len() < most {
+        let needy: Vec<usize> =
+            candidates.iter().copied().filter(|index| !kept.contains(index) && needs(*index, &table)).collect();
+        let serves =
+            |&one: &usize| needy.iter().filter(|&&other| are_fellows(&examples[one], &examples[other], reach)).count();
+        // `max_by_key` keeps the last among equals.
+        let Some(next) = needy.iter().copied().rev().max_by_key(serves) else {
+            return;
+        };
+        kept.push(next);
+        table.push(examples[next]);
+    }
+}
+
+/// Whether two examples are of one class and within `reach` of each other.
+fn are_fellows(one: &Example<COUNT>, other: &Example<COUNT>, reach: u32) -> bool {
+    one.label == other.label && squared_distance(&one.features, &other.features) <= reach
+}
