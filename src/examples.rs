@@ -51,12 +51,7 @@ impl Examples<{ features::COUNT }> for InFlash {
     }
 
     #[inline]
-    fn visit_near(
-        &self,
-        query: &[u8; features::COUNT],
-        mut reach: u32,
-        visit: &mut impl FnMut(u32, u8) -> u32,
-    ) -> u32 {
+    fn visit_near(&self, query: &[u8; features::COUNT], mut reach: u32, visit: &mut impl FnMut(u32, u8) -> u32) -> u32 {
         let table = self.0.as_ptr();
         let mut search = Search { next: table.cast::<Row>() as u16, end: 0 };
         search.end = search.next + size_of::<Row>() as u16 * table.len() as u16;
@@ -74,19 +69,22 @@ struct Search {
 }
 
 impl Search {
-    /// The squared distance and the label of the next example that is not farther than `reach`, which has 24 bits.
+    /// The squared distance and the label of the next example that is not farther than `reach`.
     #[inline(always)]
     fn next_near(&mut self, query: &[u8; features::COUNT], reach: u32) -> Option<(u32, u8)> {
         /// The distance's upper byte where no example is left; five features stay below 5 * 2^16.
         const NONE: u8 = u8::MAX;
 
         let [a, b, c, d, e] = *query;
-        let start = !reach;
+        // No example is beyond a reach of more than 24 bits.
+        let start = if reach < 1 << 24 { !reach } else { 0 };
         let (low, high, label): (u16, u8, u8);
         // SAFETY: the loop reads flash from `next` to `end` and nothing else, both of them a row's start or the table's end
         // (`visit_near` makes them, and each turn takes `next` one row on). R0 is free for use, and R1 is 0 again at the end.
         unsafe {
             asm!(
+                // R1, which is 0 elsewhere, takes the products: the carry is added by a register of its own.
+                "clr  {zero}",
                 "2:",
                 "cp   {next:l}, {end:l}",
                 "cpc  {next:h}, {end:h}",
@@ -167,7 +165,7 @@ impl Search {
                 c = in(reg) c,
                 d = in(reg) d,
                 e = in(reg) e,
-                zero = in(reg) 0_u8,
+                zero = out(reg) _,
                 low = out(reg_pair) low,
                 high = out(reg) high,
                 byte = out(reg) label,

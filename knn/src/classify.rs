@@ -97,13 +97,26 @@ pub fn classify<const FEATURES: usize, const CLASSES: usize>(
     radius: u32,
 ) -> Result<Answer<CLASSES>, ClassifyError> {
     const { assert!(CLASSES > 0 && CLASSES <= 256, "there are 1 to 256 classes") };
-    if k == 0 || k > MAX_K {
-        return Err(ClassifyError::KOutOfRange);
-    }
     let mut neighbours = [Neighbour::NONE; MAX_K as usize];
-    let (neighbours, _) = neighbours.split_at_mut(usize::from(k));
+    match neighbours.get_mut(..usize::from(k)) {
+        Some(neighbours @ [_, ..]) => search(examples, features, neighbours, radius),
+        _ => Err(ClassifyError::KOutOfRange),
+    }
+}
+
+/// [`classify`] with room for k neighbours, all of them [`Neighbour::NONE`] yet.
+///
+/// Out of line, because AVR reaches the first 63 bytes of a stack frame by far the fastest: the neighbours lie in the
+/// caller's.
+#[inline(never)]
+fn search<const FEATURES: usize, const CLASSES: usize>(
+    examples: &(impl Examples<FEATURES> + ?Sized),
+    features: &[u8; FEATURES],
+    neighbours: &mut [Neighbour],
+    radius: u32,
+) -> Result<Answer<CLASSES>, ClassifyError> {
     let mut nearest = Nearest::<CLASSES> { neighbours, level: [0; CLASSES], level_unknown: false };
-    examples.visit_near(features, DISTANCE_LIMIT, &mut |distance, label| {
+    examples.visit_near(features, DISTANCE_LIMIT - 1, &mut |distance, label| {
         nearest.admit(Neighbour::new(distance, label)).distance()
     });
     nearest.vote(radius)
@@ -146,21 +159,28 @@ impl<const CLASSES: usize> Nearest<'_, CLASSES> {
     /// Called for few examples: out of line, it leaves the registers to the loop over all of them.
     #[inline(never)]
     fn admit(&mut self, candidate: Neighbour) -> Neighbour {
-        // The candidate takes its place, and each farther neighbour the next one; the last falls out.
-        let mut carried = candidate;
-        let mut last = Neighbour::NONE;
-        for neighbour in self.neighbours.iter_mut() {
-            last = *neighbour;
-            if carried < last {
-                *neighbour = carried;
-                core::mem::swap(&mut carried, &mut last);
+        // From the last on, farther neighbours make room, each in the place behind it; the last one falls out.
+        let mut places = self.neighbours.iter_mut().rev();
+        let mut out = candidate;
+        if let Some(mut place) = places.next()
+            && candidate < *place
+        {
+            out = *place;
+            for neighbour in places {
+                if *neighbour <= candidate {
+                    break;
+                }
+                *place = *neighbour;
+                place = neighbour;
             }
+            *place = candidate;
         }
-        if carried.distance() != last.distance() {
+        let last = self.neighbours.last().copied().unwrap_or(Neighbour::NONE);
+        if out.distance() != last.distance() {
             self.level = [0; CLASSES];
             self.level_unknown = false;
-        } else if carried != Neighbour::NONE {
-            match self.level.get_mut(usize::from(carried.label())) {
+        } else if out != Neighbour::NONE {
+            match self.level.get_mut(usize::from(out.label())) {
                 Some(votes) => *votes = votes.wrapping_add(1),
                 None => self.level_unknown = true,
             }
