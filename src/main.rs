@@ -12,6 +12,7 @@
 mod beam;
 mod board;
 mod clock;
+mod eeprom;
 mod encoder;
 mod examples;
 mod handover;
@@ -40,7 +41,7 @@ use static_cell::{ConstStaticCell, StaticCell};
 fn main() -> ! {
     static EDGES: ConstStaticCell<beam::EdgeQueue> = ConstStaticCell::new(beam::EdgeQueue::new());
     static RECEIVED: ConstStaticCell<serial::ReceiveQueue> = ConstStaticCell::new(serial::ReceiveQueue::new());
-    static CONTROLLER: StaticCell<Controller<Nearest<examples::InFlash>>> = StaticCell::new();
+    static CONTROLLER: StaticCell<Controller<Nearest<examples::InFlash, eeprom::Eeprom>>> = StaticCell::new();
     static TO_SEND: ConstStaticCell<serial::SendQueue> = ConstStaticCell::new(serial::SendQueue::new());
 
     // SAFETY: the entry point is the first code to run and runs once, so nobody else holds the peripherals.
@@ -61,7 +62,8 @@ fn main() -> ! {
         let Ok(switch_on) = work_switch.is_low();
         Readings { now, position: Position::new(position), switch_on, lost }
     };
-    let controller = CONTROLLER.init(Controller::new(Nearest(examples::built_in()), read(), beam.is_broken()));
+    let classifier = Nearest::new(examples::built_in(), eeprom::Eeprom::new(peripherals.EEPROM));
+    let controller = CONTROLLER.init(Controller::new(classifier, read(), beam.is_broken()));
     let mut line = LineBuffer::new();
     let mut answer = Answer::Greeting;
     watchdog::start();
@@ -87,7 +89,8 @@ fn main() -> ! {
                 answer = reply::answer(command, controller);
             }
         }
-        if serial.room() >= reply::LINE {
+        // An answer waits for what its command wrote to the EEPROM: `ok` means that it is there.
+        if controller.classifier_mut().carry_on() && serial.room() >= reply::LINE {
             if !answer.is_done() {
                 let Ok(()) = answer.write_line(controller, &mut serial);
             } else if let Some(event) = controller.next_event() {

@@ -7,8 +7,9 @@
 use crate::{
     examples,
     features::{self, Features},
+    taught::{self, FieldExamples, Memory},
 };
-use knn::{Answer, Examples, Kind};
+use knn::{Answer, Example, Examples, Kind};
 
 /// What an object is taken for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,12 +31,6 @@ pub struct Vote {
     pub votes: u8,
 }
 
-/// Tells plants from weeds.
-pub trait Classifier {
-    /// Classifies an object by its `k` nearest examples.
-    fn classify(&self, features: &Features, k: u8) -> Vote;
-}
-
 /// Labels in an example table.
 pub mod label {
     /// A tall weed.
@@ -46,14 +41,66 @@ pub mod label {
     pub const COUNT: usize = 2;
 }
 
-/// Classifies by the nearest of the examples that `E` holds.
-#[derive(Clone, Debug)]
-pub struct Nearest<E>(pub E);
+/// An example as it stands in the list of all.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Listed {
+    /// Whether it was taught in the field, and can be forgotten.
+    pub from_field: bool,
+    /// Its number among those of its source.
+    pub number: u8,
+    /// The example.
+    pub example: Example<{ features::COUNT }>,
+}
 
-impl<E: Examples<{ features::COUNT }>> Classifier for Nearest<E> {
+/// All places for examples from the field are taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Full;
+
+/// Tells plants from weeds, and may be taught.
+pub trait Classifier {
+    /// Classifies an object by its `k` nearest examples.
+    fn classify(&self, features: &Features, k: u8) -> Vote;
+
+    /// Adds an object as an example of the class `label`, to be kept over a loss of power.
+    ///
+    /// # Errors
+    /// [`Full`]; one has to be forgotten first.
+    fn teach(&mut self, features: &Features, label: u8) -> Result<(), Full>;
+
+    /// Forgets the example from the field with this number; whether there was one.
+    fn forget(&mut self, number: u8) -> bool;
+
+    /// The first example from `place` on in the list of all, and the place behind it.
+    fn listed(&self, place: u8) -> Option<(Listed, u8)>;
+
+    /// Examples that were found spoiled, and dropped, when the machine woke up.
+    fn spoiled(&self) -> u8;
+}
+
+/// Classifies by the nearest of the built-in examples in `B` and those taught in the field, kept in `M`.
+#[derive(Clone, Debug)]
+pub struct Nearest<B, M> {
+    built_in: B,
+    field: FieldExamples<M>,
+}
+
+impl<B: Examples<{ features::COUNT }>, M: Memory> Nearest<B, M> {
+    /// A classifier with the built-in examples and those that the memory holds.
+    pub fn new(built_in: B, memory: M) -> Self {
+        Self { built_in, field: FieldExamples::new(memory) }
+    }
+
+    /// Carries on with what is being written to the memory, without waiting; whether all has been written.
+    pub fn carry_on(&mut self) -> bool {
+        self.field.carry_on()
+    }
+}
+
+impl<B: Examples<{ features::COUNT }>, M: Memory> Classifier for Nearest<B, M> {
     fn classify(&self, features: &Features, k: u8) -> Vote {
         let query = examples::scale().quantise(&features.values());
-        let answer = knn::classify::<{ features::COUNT }, { label::COUNT }>(&self.0, &query, k, examples::RADIUS);
+        let all = (&self.built_in, &self.field);
+        let answer = knn::classify::<{ features::COUNT }, { label::COUNT }>(&all, &query, k, examples::RADIUS);
         let Ok(Answer { label, votes, kind, .. }) = answer else {
             return Vote { class: Class::Unknown, votes: 0 };
         };
@@ -63,6 +110,32 @@ impl<E: Examples<{ features::COUNT }>> Classifier for Nearest<E> {
             _ => Class::Unknown,
         };
         let votes = votes.get(usize::from(label)).copied().unwrap_or(0);
-        Vote { class, votes: votes.min(usize::from(u8::MAX)) as u8 }
+        Vote { class, votes: votes as u8 }
+    }
+
+    fn teach(&mut self, features: &Features, label: u8) -> Result<(), Full> {
+        let example = Example::new(examples::scale().quantise(&features.values()), label);
+        self.field.add(example).map(|_| ()).map_err(|_| Full)
+    }
+
+    fn forget(&mut self, number: u8) -> bool {
+        self.field.forget(number)
+    }
+
+    fn listed(&self, place: u8) -> Option<(Listed, u8)> {
+        let built_in = self.built_in.len() as u8;
+        if let Some(example) = self.built_in.example(usize::from(place)) {
+            return Some((Listed { from_field: false, number: place, example }, place + 1));
+        }
+        (place - built_in..taught::CAPACITY).find_map(|number| {
+            let example = self.field.slot(number)?;
+            Some((Listed { from_field: true, number, example }, built_in + number + 1))
+        })
+    }
+
+    fn spoiled(&self) -> u8 {
+        self.field.spoiled()
     }
 }
+
+const _: () = assert!(examples::COUNT + taught::CAPACITY as usize <= u8::MAX as usize, "a byte counts the examples");

@@ -4,7 +4,7 @@
 //! are separated by blanks. A line that cannot be understood becomes one [`Mistake`] and changes nothing. How commands
 //! are carried out and answered is the business of [`reply`](crate::reply).
 
-use crate::{settings::Setting, text::words};
+use crate::{classifier::label, settings::Setting, text::words};
 use heapless::Vec;
 
 /// Characters that a line may have.
@@ -32,6 +32,14 @@ words! {
         Clear = "clear",
         /// Tells what happens, or stops telling.
         Events = "events",
+        /// Says what the last object was, and teaches it.
+        Label = "label",
+        /// Lists the examples.
+        Examples = "examples",
+        /// Forgets examples from the field.
+        Forget = "forget",
+        /// Lists the last objects.
+        Dump = "dump",
         /// Names the firmware.
         Version = "version",
     }
@@ -63,6 +71,16 @@ pub enum Command {
     Clear,
     /// `events on|off`.
     Events(bool),
+    /// `label plant|weed`, with the [`label`].
+    Label(u8),
+    /// `examples`.
+    Examples,
+    /// `forget N`.
+    Forget(u8),
+    /// `forget all`.
+    ForgetAll,
+    /// `dump`.
+    Dump,
     /// `version`.
     Version,
 }
@@ -115,6 +133,15 @@ pub fn parse(line: &[u8]) -> Result<Command, Mistake> {
         (Word::Clear, None, None) => Ok(Command::Clear),
         (Word::Events, Some([b'o', b'n']), None) => Ok(Command::Events(true)),
         (Word::Events, Some([b'o', b'f', b'f']), None) => Ok(Command::Events(false)),
+        (Word::Label, Some([b'p', b'l', b'a', b'n', b't']), None) => Ok(Command::Label(label::PLANT)),
+        (Word::Label, Some([b'w', b'e', b'e', b'd']), None) => Ok(Command::Label(label::WEED)),
+        (Word::Examples, None, None) => Ok(Command::Examples),
+        (Word::Forget, Some([b'a', b'l', b'l']), None) => Ok(Command::ForgetAll),
+        (Word::Forget, Some(digits), None) => {
+            let number = number(digits).and_then(|number| u8::try_from(number).ok());
+            number.map(Command::Forget).ok_or(Mistake::Usage(word))
+        }
+        (Word::Dump, None, None) => Ok(Command::Dump),
         (Word::Version, None, None) => Ok(Command::Version),
         _ => Err(Mistake::Usage(word)),
     }
@@ -202,6 +229,12 @@ mod tests {
             (b"clear", Command::Clear),
             (b"events on", Command::Events(true)),
             (b"events off", Command::Events(false)),
+            (b"label plant", Command::Label(label::PLANT)),
+            (b"label weed", Command::Label(label::WEED)),
+            (b"examples", Command::Examples),
+            (b"forget 31", Command::Forget(31)),
+            (b"forget all", Command::ForgetAll),
+            (b"dump", Command::Dump),
             (b"version", Command::Version),
         ] {
             assert_eq!(parse(line), Ok(command), "{}", line.escape_ascii());
@@ -225,6 +258,9 @@ mod tests {
             (b"start later", Mistake::Usage(Word::Start)),
             (b"events", Mistake::Usage(Word::Events)),
             (b"events maybe", Mistake::Usage(Word::Events)),
+            (b"label tree", Mistake::Usage(Word::Label)),
+            (b"forget", Mistake::Usage(Word::Forget)),
+            (b"forget 256", Mistake::Usage(Word::Forget)),
         ] {
             assert_eq!(parse(line), Err(mistake), "{}", line.escape_ascii());
         }

@@ -7,7 +7,7 @@
 
 use crate::{
     alarm::Alarm,
-    classifier::{Class, Classifier},
+    classifier::{Class, Classifier, Full, Vote},
     event::Event,
     features::Features,
     object::{Object, Watch},
@@ -16,9 +16,13 @@ use crate::{
     settings::{Setting, Settings},
     speed::SpeedMeter,
     switch::Switch,
+    taught,
     units::{Instant, Position, Ticks, TicksPerSecond},
 };
 use heapless::Vec;
+
+/// Objects remembered, so that they can be looked at and labelled.
+const OBJECTS: usize = 16;
 
 /// Events that wait to be told. They are short-lived: a plant gives three in half a second.
 const EVENTS: usize = 6;
@@ -85,6 +89,23 @@ pub enum Refusal {
     NotInHold,
     /// The value lies outside the setting's range.
     OutOfRange,
+    /// There is no object to label yet, or the last one has its label.
+    NothingToLabel,
+    /// All places for examples are taken.
+    ExamplesFull,
+    /// No example from the field has this number.
+    NoSuchExample,
+}
+
+/// An object as it was judged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Judged {
+    /// Its features.
+    pub features: Features,
+    /// What it was taken for.
+    pub vote: Vote,
+    /// What the operator said that it is, one of [`label`](crate::classifier::label).
+    pub label: Option<u8>,
 }
 
 /// The machine's decisions and all that they rest on.
@@ -103,6 +124,8 @@ pub struct Controller<C> {
     tool_out: bool,
     /// The last plant's leading edge, or where watching began.
     last_plant: Position,
+    /// The last objects, the oldest first.
+    objects: Vec<Judged, OBJECTS>,
     events: Vec<Event, EVENTS>,
     events_on: bool,
     events_missed: u16,
@@ -125,6 +148,7 @@ impl<C: Classifier> Controller<C> {
             state: State::Hold,
             tool_out: true,
             last_plant: readings.position,
+            objects: Vec::new(),
             events: Vec::new(),
             events_on: false,
             events_missed: 0,
@@ -216,6 +240,48 @@ impl<C: Classifier> Controller<C> {
         self.geometry = Geometry::of(&self.settings);
         self.leads = Leads::at(self.meter.speed(), &self.settings);
         Ok(())
+    }
+
+    /// Labels the last object and teaches it to the classifier.
+    ///
+    /// # Errors
+    /// [`Refusal::NothingToLabel`] and [`Refusal::ExamplesFull`].
+    pub fn label(&mut self, label: u8) -> Result<(), Refusal> {
+        let unlabelled = self.objects.last_mut().filter(|object| object.label.is_none());
+        let object = unlabelled.ok_or(Refusal::NothingToLabel)?;
+        self.classifier.teach(&object.features, label).map_err(|Full| Refusal::ExamplesFull)?;
+        object.label = Some(label);
+        Ok(())
+    }
+
+    /// Forgets an example from the field.
+    ///
+    /// # Errors
+    /// [`Refusal::NoSuchExample`].
+    pub fn forget(&mut self, number: u8) -> Result<(), Refusal> {
+        if self.classifier.forget(number) { Ok(()) } else { Err(Refusal::NoSuchExample) }
+    }
+
+    /// Forgets all examples from the field.
+    pub fn forget_all(&mut self) {
+        for number in 0..taught::CAPACITY {
+            self.classifier.forget(number);
+        }
+    }
+
+    /// The last objects, the oldest first.
+    pub fn objects(&self) -> &[Judged] {
+        &self.objects
+    }
+
+    /// What tells plants from weeds.
+    pub fn classifier(&self) -> &C {
+        &self.classifier
+    }
+
+    /// What tells plants from weeds, to carry on with what it writes.
+    pub fn classifier_mut(&mut self) -> &mut C {
+        &mut self.classifier
     }
 
     /// The settings in use.
@@ -311,6 +377,11 @@ impl<C: Classifier> Controller<C> {
         let vote = self.classifier.classify(&features, self.settings.get(Setting::K) as u8);
         let (distance_mm, margin_mm) = (self.settings.get(Setting::BeamToToolMm), self.settings.get(Setting::MarginMm));
         let plan = Plan::new(wheel, distance_mm, margin_mm, object.width());
+        if self.objects.is_full() {
+            self.objects.remove(0);
+        }
+        // There is room, as was just seen to.
+        let _ = self.objects.push(Judged { features, vote, label: None });
         self.tell(Event::Object { vote, leading: object.leading, spacing, plan });
         if vote.class == Class::Weed {
             return;

@@ -24,6 +24,9 @@ pub const SCALE: Scale<{ features::COUNT }> = Scale::new(table::RANGES);
 /// Squared distance beyond which an object is like no example.
 pub const RADIUS: u32 = table::RADIUS;
 
+/// Examples that vote, as the table was trained.
+pub const K: u8 = table::K;
+
 /// Most examples that the flash budget has room for, at 6 bytes each.
 pub const CAPACITY: usize = 64;
 
@@ -51,15 +54,18 @@ mod tests {
         classifier::{Class, Classifier, Nearest},
         features::{Features, SPEED_CLASSES_MM_S},
         settings::Setting,
+        taught::Volatile,
     };
 
     fn class(speed: i16, spacing_mm: i16, width_mm: i16) -> Class {
-        Nearest(EXAMPLES).classify(&Features::describe(speed, spacing_mm, width_mm), table::K).class
+        Nearest::new(EXAMPLES, Volatile::new())
+            .classify(&Features::describe(speed, spacing_mm, width_mm), table::K)
+            .class
     }
 
     #[test]
     fn the_settings_begin_with_the_k_of_the_training() {
-        assert_eq!(Setting::K.description().default, u16::from(table::K));
+        assert_eq!(Setting::K.description().default, u16::from(K));
     }
 
     #[test]

@@ -26,5 +26,6 @@ pub mod servo;
 pub mod settings;
 pub mod speed;
 pub mod switch;
+pub mod taught;
 pub mod text;
 pub mod units;

@@ -6,9 +6,9 @@
 
 use crate::{
     alarm::Alarm,
-    classifier::{Class, Classifier},
+    classifier::{Class, Classifier, Listed, label},
     console::{Command, Mistake, Word},
-    controller::{Controller, Refusal, State},
+    controller::{Controller, Judged, Refusal, State},
     event::Event,
     settings::{Description, Setting},
     text::{Text, text},
@@ -30,6 +30,10 @@ fn help(word: Word) -> (Text, Text) {
         Word::Hold => (text!("hold"), text!("take the tool out of the row")),
         Word::Clear => (text!("clear"), text!("clear an alarm")),
         Word::Events => (text!("events on|off"), text!("tell of plants, swings and alarms as they come")),
+        Word::Label => (text!("label plant|weed"), text!("say what the last object was, and teach it")),
+        Word::Examples => (text!("examples"), text!("all examples, with source and class")),
+        Word::Forget => (text!("forget N|all"), text!("forget examples from the field")),
+        Word::Dump => (text!("dump"), text!("the last 16 objects as CSV")),
         Word::Version => (text!("version"), text!("name the firmware")),
     }
 }
@@ -52,6 +56,12 @@ pub enum Answer {
     Get(Setting),
     /// All settings, from the one at this place on.
     GetAll(u8),
+    /// All examples, from the one at this place on.
+    Examples(u8),
+    /// The heading of the last objects.
+    DumpHeading,
+    /// The last objects, from the one at this place on.
+    Dump(u8),
     /// The firmware's name.
     Version,
     /// `ok`.
@@ -75,14 +85,16 @@ pub fn answer<C: Classifier>(line: Result<Command, Mistake>, controller: &mut Co
         Command::GetAll => Answer::GetAll(0),
         Command::Get(setting) => Answer::Get(setting),
         Command::Version => Answer::Version,
-        Command::Set(setting, value) => match controller.set(setting, value) {
-            Ok(()) => Answer::Ok,
-            Err(refusal) => Answer::Refused(refusal, Some(setting)),
-        },
-        Command::Start { now } => match controller.start(now) {
-            Ok(()) => Answer::Ok,
-            Err(refusal) => Answer::Refused(refusal, None),
-        },
+        Command::Examples => Answer::Examples(0),
+        Command::Dump => Answer::DumpHeading,
+        Command::Set(setting, value) => done(controller.set(setting, value), Some(setting)),
+        Command::Start { now } => done(controller.start(now), None),
+        Command::Label(label) => done(controller.label(label), None),
+        Command::Forget(number) => done(controller.forget(number), None),
+        Command::ForgetAll => {
+            controller.forget_all();
+            Answer::Ok
+        }
         Command::Hold => {
             controller.hold();
             Answer::Ok
@@ -95,6 +107,14 @@ pub fn answer<C: Classifier>(line: Result<Command, Mistake>, controller: &mut Co
             controller.tell_events(on);
             Answer::Ok
         }
+    }
+}
+
+/// The answer to a command that may have been refused.
+fn done(result: Result<(), Refusal>, setting: Option<Setting>) -> Answer {
+    match result {
+        Ok(()) => Answer::Ok,
+        Err(refusal) => Answer::Refused(refusal, setting),
     }
 }
 
@@ -144,6 +164,27 @@ impl Answer {
                     write_setting(controller, setting, out)?;
                 }
                 if place + 1 < Setting::COUNT { Self::GetAll(place + 1) } else { Self::Ok }
+            }
+            Self::Examples(place) => match controller.classifier().listed(place) {
+                Some((listed, next)) => {
+                    write_example(&listed, out)?;
+                    Self::Examples(next)
+                }
+                None => {
+                    say_number(out, text!("spoiled="), controller.classifier().spoiled().into())?;
+                    Self::Ok
+                }
+            },
+            Self::DumpHeading => {
+                say(out, text!("speed_mm_s,spacing_mm,delay_mm,hold_mm,actuation_mm,answer,votes,label"))?;
+                if controller.objects().is_empty() { Self::Ok } else { Self::Dump(0) }
+            }
+            Self::Dump(place) => {
+                let place = usize::from(place);
+                if let Some(object) = controller.objects().get(place) {
+                    write_object(object, out)?;
+                }
+                if place + 1 < controller.objects().len() { Self::Dump(place as u8 + 1) } else { Self::Ok }
             }
             Self::Version => {
                 write_version(out)?;
@@ -239,6 +280,25 @@ fn write_range<W: uWrite + ?Sized>(description: Description, out: &mut W) -> Res
     say_number(out, text!(" to "), description.greatest.into())
 }
 
+fn write_example<W: uWrite + ?Sized>(listed: &Listed, out: &mut W) -> Result<(), W::Error> {
+    say(out, if listed.from_field { text!("field") } else { text!("built_in") })?;
+    say_number(out, text!(" "), listed.number.into())?;
+    say(out, text!(" "))?;
+    say(out, label_name(listed.example.label))?;
+    listed.example.features.iter().try_for_each(|&feature| say_number(out, text!(" "), feature.into()))
+}
+
+fn write_object<W: uWrite + ?Sized>(object: &Judged, out: &mut W) -> Result<(), W::Error> {
+    for value in object.features.values() {
+        uwrite!(out, "{}", value)?;
+        say(out, text!(","))?;
+    }
+    say(out, class_name(object.vote.class))?;
+    say_number(out, text!(","), object.vote.votes.into())?;
+    say(out, text!(","))?;
+    object.label.map_or(Ok(()), |label| say(out, label_name(label)))
+}
+
 fn write_mistake<W: uWrite + ?Sized>(mistake: Mistake, out: &mut W) -> Result<(), W::Error> {
     say(out, text!("error: "))?;
     let what = match mistake {
@@ -267,6 +327,11 @@ where
             say(out, setting.text())?;
             say(out, text!(" moves the machine's geometry, hold first"))
         }
+        (Refusal::NothingToLabel, _) => {
+            say(out, text!("there is no object without a label, let the beam see one first"))
+        }
+        (Refusal::ExamplesFull, _) => say(out, text!("all 32 places are taken, forget one first")),
+        (Refusal::NoSuchExample, _) => say(out, text!("no field example has this number, examples lists them")),
         _ => say(out, text!("an alarm is latched, see status, then clear it")),
     }
 }
@@ -312,6 +377,10 @@ fn state_name(state: State) -> Text {
 
 fn place_name(tool_out: bool) -> Text {
     if tool_out { text!("out") } else { text!("in") }
+}
+
+fn label_name(label: u8) -> Text {
+    if label == label::PLANT { text!("plant") } else { text!("weed") }
 }
 
 fn class_name(class: Class) -> Text {

@@ -109,10 +109,7 @@ impl Plan {
     /// The schedule of a canopy of `width`, with the beam `distance_mm` ahead of the tool: each within a tick of its
     /// equation, as each is rounded once.
     pub fn new(wheel: Wheel, distance_mm: u16, margin_mm: u16, width: Ticks) -> Self {
-        Self {
-            delay: wheel.ticks(distance_mm.saturating_sub(margin_mm)),
-            hold: width + wheel.ticks(2 * margin_mm),
-        }
+        Self { delay: wheel.ticks(distance_mm.saturating_sub(margin_mm)), hold: width + wheel.ticks(2 * margin_mm) }
     }
 
     /// R: the tool is back in the row (Eq. 3).

@@ -54,13 +54,29 @@ fn settings() -> impl Iterator<Item = Setting> {
 
 #[test]
 fn every_answer_ends_in_exactly_one_ok_or_error() {
-    let mut lines: Vec<String> =
-        ["help", "status", "get", "start", "start now", "hold", "clear", "events on", "version", "nonsense", "set k 99"]
-            .map(str::to_owned)
-            .to_vec();
+    let mut lines: Vec<String> = [
+        "help",
+        "status",
+        "get",
+        "start",
+        "start now",
+        "hold",
+        "clear",
+        "events on",
+        "version",
+        "nonsense",
+        "set k 99",
+    ]
+    .map(str::to_owned)
+    .to_vec();
     for setting in settings() {
         let name = String::from_utf8(setting.text().bytes().collect()).unwrap();
-        lines.extend([format!("help {name}"), format!("get {name}"), format!("set {name} 60000"), format!("set {name} x")]);
+        lines.extend([
+            format!("help {name}"),
+            format!("get {name}"),
+            format!("set {name} 60000"),
+            format!("set {name} x"),
+        ]);
     }
     for line in lines {
         let answer = ask(&mut machine(), &line);

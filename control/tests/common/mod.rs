@@ -1,7 +1,7 @@
 //! What the tests of the decisions share: readings, and a classifier that knows the truth.
 
 use control::{
-    classifier::{Class, Classifier, Vote},
+    classifier::{Class, Classifier, Full, Listed, Vote},
     controller::Readings,
     features::Features,
     units::{Instant, Interval, Position},
@@ -15,6 +15,22 @@ impl Classifier for ByWidth {
     fn classify(&self, features: &Features, _: u8) -> Vote {
         let class = if features.hold_mm < 160 { Class::Weed } else { Class::Plant };
         Vote { class, votes: 1 }
+    }
+
+    fn teach(&mut self, _: &Features, _: u8) -> Result<(), Full> {
+        Err(Full)
+    }
+
+    fn forget(&mut self, _: u8) -> bool {
+        false
+    }
+
+    fn listed(&self, _: u8) -> Option<(Listed, u8)> {
+        None
+    }
+
+    fn spoiled(&self) -> u8 {
+        0
     }
 }
 

@@ -1,0 +1,301 @@
+//! Examples taught in the field, in memory that outlives the power.
+//!
+//! Each of [`CAPACITY`] examples has a slot of eight bytes: five features, the label, and a CRC-16 of both. An erased slot
+//! reads as ones. A slot whose CRC does not fit, because the power went away while it was written or a bit fell over, is
+//! dropped, and counted so that it can be told. Which slots hold an example is kept in SRAM, as checking them all takes
+//! longer than searching them.
+
+use crate::{classifier::label, features};
+use crc::{CRC_16_IBM_SDLC, Crc, NoTable};
+use knn::{Example, Examples};
+
+/// Examples that can be taught.
+pub const CAPACITY: u8 = 32;
+
+/// Bytes of a slot.
+pub const SLOT: usize = features::COUNT + 3;
+
+/// An example as it was taught.
+type Taught = Example<{ features::COUNT }>;
+
+/// The CRC, without a table: a byte at a time is fast enough for eight bytes, and tables cost flash.
+const CHECK: Crc<u16, NoTable> = Crc::<u16, NoTable>::new(&CRC_16_IBM_SDLC);
+
+/// Memory that keeps slots without power.
+pub trait Memory {
+    /// What lies in a slot.
+    fn read(&self, slot: u8) -> [u8; SLOT];
+
+    /// Begins to write a slot; earlier writes are finished first.
+    fn write(&mut self, slot: u8, bytes: [u8; SLOT]);
+
+    /// Carries on with a write, without waiting; whether all has been written.
+    fn carry_on(&mut self) -> bool;
+}
+
+/// A memory that forgets when the power goes: for the host.
+#[derive(Clone, Debug)]
+pub struct Volatile([[u8; SLOT]; CAPACITY as usize]);
+
+impl Volatile {
+    /// A memory with nothing in it.
+    pub const fn new() -> Self {
+        Self([[ERASED; SLOT]; CAPACITY as usize])
+    }
+}
+
+impl Default for Volatile {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Memory for Volatile {
+    fn read(&self, slot: u8) -> [u8; SLOT] {
+        self.0[usize::from(slot)]
+    }
+
+    fn write(&mut self, slot: u8, bytes: [u8; SLOT]) {
+        self.0[usize::from(slot)] = bytes;
+    }
+
+    fn carry_on(&mut self) -> bool {
+        true
+    }
+}
+
+/// The store of examples taught in the field.
+#[derive(Clone, Debug)]
+pub struct FieldExamples<M> {
+    memory: M,
+    /// A bit for each slot that holds an example.
+    held: u32,
+    spoiled: u8,
+}
+
+/// What a slot's bytes mean.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Slot {
+    Empty,
+    Holds(Taught),
+    Spoiled,
+}
+
+impl<M: Memory> FieldExamples<M> {
+    /// Looks through a memory for the examples that it holds.
+    pub fn new(memory: M) -> Self {
+        let mut store = Self { memory, held: 0, spoiled: 0 };
+        for slot in 0..CAPACITY {
+            match decode(store.memory.read(slot)) {
+                Slot::Empty => {}
+                Slot::Holds(_) => store.held |= 1 << slot,
+                Slot::Spoiled => store.spoiled += 1,
+            }
+        }
+        store
+    }
+
+    /// Slots that were found spoiled.
+    pub fn spoiled(&self) -> u8 {
+        self.spoiled
+    }
+
+    /// The example in a slot.
+    pub fn slot(&self, slot: u8) -> Option<Taught> {
+        if !self.holds(slot) {
+            return None;
+        }
+        let [a, b, c, d, e, label, ..] = self.memory.read(slot);
+        Some(Example::new([a, b, c, d, e], label))
+    }
+
+    /// Adds an example; returns its slot.
+    ///
+    /// # Errors
+    /// The example, when all slots are taken.
+    pub fn add(&mut self, example: Taught) -> Result<u8, Taught> {
+        let slot = (0..CAPACITY).find(|&slot| !self.holds(slot)).ok_or(example)?;
+        self.memory.write(slot, encode(example));
+        self.held |= 1 << slot;
+        Ok(slot)
+    }
+
+    /// Forgets the example in a slot; whether there was one.
+    pub fn forget(&mut self, slot: u8) -> bool {
+        let held = self.holds(slot);
+        if held {
+            self.memory.write(slot, [ERASED; SLOT]);
+            self.held &= !(1 << slot);
+        }
+        held
+    }
+
+    /// Carries on with what is being written, without waiting; whether all has been written.
+    pub fn carry_on(&mut self) -> bool {
+        self.memory.carry_on()
+    }
+
+    fn holds(&self, slot: u8) -> bool {
+        slot < CAPACITY && self.held >> slot & 1 != 0
+    }
+}
+
+impl<M: Memory> Examples<{ features::COUNT }> for FieldExamples<M> {
+    fn len(&self) -> usize {
+        self.held.count_ones() as usize
+    }
+
+    fn example(&self, index: usize) -> Option<Taught> {
+        (0..CAPACITY).filter_map(|slot| self.slot(slot)).nth(index)
+    }
+
+    /// Reads each slot once.
+    fn visit_near(&self, query: &[u8; features::COUNT], mut reach: u32, visit: &mut impl FnMut(u32, u8) -> u32) -> u32 {
+        for example in (0..CAPACITY).filter_map(|slot| self.slot(slot)) {
+            let distance = knn::squared_distance(query, &example.features);
+            if distance <= reach {
+                reach = visit(distance, example.label);
+            }
+        }
+        reach
+    }
+}
+
+/// What erased memory reads as.
+const ERASED: u8 = 0xFF;
+
+fn encode(example: Taught) -> [u8; SLOT] {
+    let [a, b, c, d, e] = example.features;
+    let [low, high] = CHECK.checksum(&[a, b, c, d, e, example.label]).to_le_bytes();
+    [a, b, c, d, e, example.label, low, high]
+}
+
+fn decode(bytes: [u8; SLOT]) -> Slot {
+    let [a, b, c, d, e, label, ..] = bytes;
+    let example = Example::new([a, b, c, d, e], label);
+    if bytes == [ERASED; SLOT] {
+        Slot::Empty
+    } else if usize::from(label) < label::COUNT && bytes == encode(example) {
+        Slot::Holds(example)
+    } else {
+        Slot::Spoiled
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use std::{vec, vec::Vec};
+
+    /// A memory whose power goes away after so many bytes.
+    #[derive(Clone, Debug)]
+    struct Flaky {
+        bytes: Vec<[u8; SLOT]>,
+        power: usize,
+    }
+
+    impl Memory for Flaky {
+        fn read(&self, slot: u8) -> [u8; SLOT] {
+            self.bytes[usize::from(slot)]
+        }
+
+        fn write(&mut self, slot: u8, bytes: [u8; SLOT]) {
+            for (old, new) in self.bytes[usize::from(slot)].iter_mut().zip(bytes) {
+                if self.power > 0 {
+                    *old = new;
+                    self.power -= 1;
+                }
+            }
+        }
+
+        fn carry_on(&mut self) -> bool {
+            true
+        }
+    }
+
+    fn store() -> FieldExamples<Flaky> {
+        FieldExamples::new(Flaky { bytes: vec![[ERASED; SLOT]; usize::from(CAPACITY)], power: usize::MAX })
+    }
+
+    fn example(number: u8) -> Taught {
+        Example::new([number, 2, 3, 4, 5], number % 2)
+    }
+
+    fn restart(store: FieldExamples<Flaky>) -> FieldExamples<Flaky> {
+        FieldExamples::new(Flaky { power: usize::MAX, ..store.memory })
+    }
+
+    #[test]
+    fn what_was_taught_is_there_after_a_restart() {
+        let mut store = store();
+        for number in 0..CAPACITY {
+            assert_eq!(store.add(example(number)), Ok(number));
+        }
+        assert_eq!(store.add(example(99)), Err(example(99)), "a full store hands the example back");
+        let mut store = restart(store);
+        assert_eq!(store.len(), usize::from(CAPACITY));
+        assert!(store.forget(7));
+        assert!(!store.forget(7) && !store.forget(CAPACITY));
+        let mut store = restart(store);
+        assert_eq!((store.slot(7), store.slot(8)), (None, Some(example(8))));
+        assert_eq!(store.add(example(50)), Ok(7), "the free slot is taken again");
+    }
+
+    #[test]
+    fn power_lost_at_any_byte_costs_at_most_the_example_being_written() {
+        for power in 0..=SLOT {
+            for forgetting in [false, true] {
+                let mut store = store();
+                for number in 0..4 {
+                    store.add(example(number)).unwrap();
+                }
+                store.memory.power = power;
+                if forgetting {
+                    store.forget(2);
+                } else {
+                    store.add(example(4)).unwrap();
+                }
+                let store = restart(store);
+                for number in [0, 1, 3] {
+                    assert_eq!(store.slot(number), Some(example(number)), "{power} {forgetting}");
+                }
+                let (slot, before, after) =
+                    if forgetting { (2, Some(example(2)), None) } else { (4, None, Some(example(4))) };
+                let now = store.slot(slot);
+                match power {
+                    0 => assert_eq!((now, store.spoiled()), (before, 0)),
+                    SLOT => assert_eq!((now, store.spoiled()), (after, 0)),
+                    _ => assert!(now.is_none() || now == before, "{power} {forgetting}: {now:?}"),
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_spoiled_byte_drops_its_example_and_is_counted() {
+        for byte in 0..SLOT {
+            for bit in 0..8 {
+                let mut store = store();
+                store.add(example(0)).unwrap();
+                store.add(example(1)).unwrap();
+                store.memory.bytes[0][byte] ^= 1 << bit;
+                let store = restart(store);
+                assert_eq!((store.slot(0), store.slot(1), store.spoiled()), (None, Some(example(1)), 1));
+            }
+        }
+    }
+
+    #[test]
+    fn field_examples_are_searched_like_any_others() {
+        let mut store = store();
+        for number in 0..10 {
+            store.add(example(number)).unwrap();
+        }
+        store.forget(3);
+        let plain: Vec<_> = (0..10).filter(|&number| number != 3).map(example).collect();
+        let query = [4, 2, 3, 4, 9];
+        let answer = knn::classify::<{ features::COUNT }, 2>(&store, &query, 3, 1000);
+        assert_eq!(answer, knn::classify(&plain[..], &query, 3, 1000));
+    }
+}
