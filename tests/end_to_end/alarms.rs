@@ -1,0 +1,140 @@
+//! Alarms: a fault puts the tool out, is named and blinked, and is latched until it is cleared.
+
+use crate::common::{
+    Run, ask, bare_ground, is_out_at_the_pin, number, refusal, run_for_ms, status, steady, throw_switch, trial, value,
+};
+use field::machine::Machine;
+use field::motion::mm_s;
+use field::row::{Row, Thing};
+use field::signal::{CYCLES_PER_SECOND, Pin, PinChange};
+use field::trial::{Start, Trial};
+use field::uno::Uno;
+
+/// What the LED's code is parted by: longer than the quarter of a second within a code.
+const PAUSE_CYCLES: u64 = CYCLES_PER_SECOND / 2;
+
+/// A run in which the beam is broken for 600 mm, more than any plant covers, while the tool is far behind in the row.
+fn with_a_blocked_beam(start: Start) -> Run {
+    let row = Row::new(vec![Thing::plant(1300.0, 600.0)]).expect("a plant is a row");
+    let machine = Machine { beam_to_tool_mm: 900.0, ..Machine::default() };
+    let motion = steady(mm_s(2.0), 1800.0);
+    let mut run = Run::begin(Trial { machine, start, ..trial(row, motion) }, &[]);
+    // 400 mm behind the beginning of what breaks the beam.
+    run.roll_to(1390.0);
+    assert!(!is_out_at_the_pin(&run.uno));
+    run.roll_to(1450.0);
+    run
+}
+
+/// The alarm is named in event and status, and the tool is out.
+#[track_caller]
+fn assert_alarm(run: &mut Run, name: &str, code: i64) {
+    let events = run.events("alarm");
+    assert_eq!(events.len(), 1, "{:#?}", run.lines());
+    assert_eq!((value(&events[0], "name"), number(&events[0], "code")), (name, code));
+    assert!(is_out_at_the_pin(&run.uno));
+    let status = status(&mut run.uno);
+    let said = ["state", "alarm", "tool"].map(|key| value(&status, key));
+    assert_eq!(said, ["alarm", name, "out"], "{status}");
+}
+
+/// The codes that the LED blinks during some seconds, the first and the last one, which may be cut, left out.
+fn blinked_codes(uno: &mut Uno) -> Vec<usize> {
+    let begin = uno.cycle();
+    run_for_ms(uno, 10_000);
+    let flashes: Vec<u64> = uno
+        .changes()
+        .iter()
+        .filter(|change| change.pin == Pin::Led && change.high && change.cycle > begin)
+        .map(|change| change.cycle)
+        .collect();
+    // A flash and the dark behind it take half a second; the pause comes on top.
+    let codes = flashes.chunk_by(|one, next| next - one < CYCLES_PER_SECOND * 6 / 10 + PAUSE_CYCLES / 10);
+    let mut codes: Vec<usize> = codes.map(<[u64]>::len).collect();
+    codes.pop();
+    codes.drain(..1);
+    codes
+}
+
+#[track_caller]
+fn assert_blinks(uno: &mut Uno, code: usize) {
+    let codes = blinked_codes(uno);
+    assert!(!codes.is_empty() && codes.iter().all(|&blinked| blinked == code), "{codes:?}");
+}
+
+#[test]
+fn a_beam_that_stays_broken_is_an_alarm_that_puts_the_tool_out() {
+    let mut run = with_a_blocked_beam(Start::Now);
+    assert_alarm(&mut run, "beam_blocked", 1);
+    let command = run.commands().pop().expect("a command");
+    let place_mm = run.place_mm(command.rise_cycle);
+    assert!(command.is_out() && (1395.0..1410.0).contains(&place_mm), "{place_mm} mm");
+}
+
+#[test]
+fn a_beam_that_stays_broken_at_standstill_is_no_alarm() {
+    let row = Row::new(vec![Thing::plant(300.0, 150.0)]).expect("a plant is a row");
+    let mut run = Run::begin(trial(row, steady(mm_s(1.0), 300.0).change_speed(0.0, 3000.0).go_on_for(4.0)), &[]);
+    run.roll_to_the_end();
+    assert_eq!(run.events("alarm"), [""; 0]);
+    assert_eq!(value(&status(&mut run.uno), "state"), "work");
+}
+
+#[test]
+fn more_plants_than_the_schedule_holds_are_an_alarm() {
+    let plants = (0..20).map(|number| Thing::plant(300.0 + 110.0 * f64::from(number), 90.0));
+    let row = Row::new(plants.collect()).expect("the plants stand apart");
+    let machine = Machine { beam_to_tool_mm: 2000.0, ..Machine::default() };
+    let mut run = Run::begin(Trial { machine, ..trial(row, steady(mm_s(2.5), 2300.0)) }, &["set merge_gap_ticks 5"]);
+    run.roll_to_the_end();
+    assert_alarm(&mut run, "schedule_full", 2);
+    assert_blinks(&mut run.uno, 2);
+}
+
+#[test]
+fn a_beam_that_flickers_faster_than_it_can_be_followed_is_an_alarm() {
+    let mut run = Run::begin(trial(bare_ground(), steady(mm_s(2.0), 900.0)), &[]);
+    run.roll_to(600.0);
+    assert!(!is_out_at_the_pin(&run.uno));
+    let begin = run.uno.cycle();
+    run.uno.drive((0..400).map(|edge| PinChange { cycle: begin + edge * 160, pin: Pin::Beam, high: edge % 2 == 1 }));
+    run.roll_to_the_end();
+    assert_alarm(&mut run, "beam_edges_lost", 3);
+    assert_blinks(&mut run.uno, 3);
+}
+
+#[test]
+fn an_alarm_refuses_to_start_and_blinks_its_code_until_it_is_cleared() {
+    let mut run = with_a_blocked_beam(Start::Now);
+    run.roll_to_the_end();
+    for command in ["start", "start now"] {
+        let answer = refusal(&mut run.uno, command);
+        assert!(answer.contains("alarm") && answer.contains("clear"), "{answer}");
+    }
+    ask(&mut run.uno, "hold");
+    assert_eq!(value(&status(&mut run.uno), "state"), "alarm");
+    assert_blinks(&mut run.uno, 1);
+    assert!(is_out_at_the_pin(&run.uno));
+
+    ask(&mut run.uno, "clear");
+    let cleared = status(&mut run.uno);
+    assert_eq!((value(&cleared, "state"), value(&cleared, "tool")), ("hold", "out"), "{cleared}");
+    ask(&mut run.uno, "start now");
+    run_for_ms(&mut run.uno, 30);
+    assert_eq!(value(&status(&mut run.uno), "state"), "work");
+    assert!(!is_out_at_the_pin(&run.uno));
+}
+
+#[test]
+fn the_switch_clears_an_alarm_by_going_off_and_on() {
+    let mut run = with_a_blocked_beam(Start::Switch);
+    run.roll_to_the_end();
+    throw_switch(&mut run.uno, false);
+    assert_eq!(value(&status(&mut run.uno), "state"), "hold");
+    throw_switch(&mut run.uno, true);
+    let after = status(&mut run.uno);
+    assert_eq!(value(&after, "state"), "work");
+    // The ground behind the beam is unknown after a fault: the tool waits for what the beam sees from there on.
+    assert!(number(&after, "unseen_mm") > 400, "{after}");
+    assert!(is_out_at_the_pin(&run.uno));
+}

@@ -1,0 +1,275 @@
+//! What the tests share: an Uno that has woken up, an operator at its console, and a run along a row.
+//!
+//! A [`Run`] is a trial that can be looked at and talked to on the way. Nothing in here judges: that is for the tests.
+
+use field::console::{self, ConsoleError};
+use field::firmware;
+use field::machine::{Machine, cycle_at};
+use field::motion::Motion;
+use field::row::{Row, Thing};
+use field::servo::Command;
+use field::signal::{Pin, PinChange};
+use field::trial::{self, Outcome, Start, Trial};
+use field::uno::Uno;
+use field::verdict::{Judgement, PlantOutcome, Timing, Verdict, judge};
+use std::ops::Range;
+use std::path::PathBuf;
+
+/// Greatest distance between a swing's command at the pin and its ideal place.
+pub const SWING_TOLERANCE_TICKS: f64 = 12.0;
+
+/// The firmware.
+pub fn elf() -> PathBuf {
+    firmware::build().expect("the firmware builds")
+}
+
+/// An Uno that has woken up with its inputs at rest: the switch off, the beam clear.
+pub fn woken_up() -> Uno {
+    trial::boot(&elf(), &[]).expect("the firmware wakes up")
+}
+
+/// Types a command and returns the lines of its answer, the `ok` left out.
+#[track_caller]
+pub fn ask(uno: &mut Uno, command: &str) -> Vec<String> {
+    console::ask(uno, command).expect("the firmware knows the command")
+}
+
+/// Types a command that the firmware is to refuse, and returns the refusal.
+#[track_caller]
+pub fn refusal(uno: &mut Uno, command: &str) -> String {
+    match console::ask(uno, command) {
+        Err(ConsoleError::Refused { answer, .. }) => answer,
+        other => panic!("`{command}` was not refused: {other:?}"),
+    }
+}
+
+/// The status line.
+#[track_caller]
+pub fn status(uno: &mut Uno) -> String {
+    let lines = ask(uno, "status");
+    // The end of an event's line may come before it.
+    lines.into_iter().find(|line| line.starts_with("state=")).expect("a status line")
+}
+
+/// The word behind `key=` in a line.
+#[track_caller]
+pub fn value<'a>(line: &'a str, key: &str) -> &'a str {
+    line.split_whitespace()
+        .find_map(|word| word.strip_prefix(key)?.strip_prefix('='))
+        .unwrap_or_else(|| panic!("{line:?} has no {key}="))
+}
+
+/// The number behind `key=` in a line.
+#[track_caller]
+pub fn number(line: &str, key: &str) -> i64 {
+    value(line, key).parse().unwrap_or_else(|error| panic!("{key} in {line:?}: {error}"))
+}
+
+/// Runs for a time in milliseconds.
+#[track_caller]
+pub fn run_for_ms(uno: &mut Uno, time_ms: u64) {
+    uno.run_for_ms(time_ms).expect("the firmware runs");
+}
+
+/// Throws the work switch and waits until it has stopped bouncing.
+#[track_caller]
+pub fn throw_switch(uno: &mut Uno, work: bool) {
+    uno.set(Pin::WorkSwitch, !work);
+    run_for_ms(uno, 50);
+}
+
+/// Whether the servo's last pulse asks for the tool to be out.
+pub fn is_out_at_the_pin(uno: &Uno) -> bool {
+    let pulse = *uno.servo_pulses().last().expect("the servo has pulses");
+    (pulse.width_us() - 2000.0).abs() < 1.0
+}
+
+/// The machine rolls at a steady speed from 0 to `end_mm`; it has its speed after a few centimetres.
+pub fn steady(speed_mm_s: f64, end_mm: f64) -> Motion {
+    Motion::steady(0.0, 3000.0, speed_mm_s, end_mm)
+}
+
+/// A row that begins far beyond where the machine ever comes.
+pub fn bare_ground() -> Row {
+    Row::new(vec![Thing::plant(100_000.0, 100.0)]).expect("a plant is a row")
+}
+
+/// A trial of the usual machine and timing, started by `start`.
+pub fn trial(row: Row, motion: Motion) -> Trial {
+    Trial { row, machine: Machine::default(), motion, timing: Timing::default(), start: Start::Command }
+}
+
+/// Runs a trial to its end.
+#[track_caller]
+pub fn outcome(trial: &Trial) -> Outcome {
+    trial.run(&elf(), |_| {}).expect("the firmware runs")
+}
+
+/// Every plant was kept, the margin less its tolerance on both sides included.
+#[track_caller]
+pub fn assert_all_kept(judgement: &Judgement) {
+    let harmed: Vec<&PlantOutcome> = judgement.plants.iter().filter(|plant| plant.verdict != Verdict::Kept).collect();
+    assert!(harmed.is_empty(), "{harmed:#?}");
+}
+
+/// Each plant has one swing out and one in, for itself alone, and there is no other swing.
+#[track_caller]
+pub fn assert_a_swing_each(judgement: &Judgement, commands: &[Command]) {
+    for plant in &judgement.plants {
+        assert_eq!(plant.swings, 1, "{plant:?}");
+        assert!(plant.out_error_ticks.is_some() && plant.in_error_ticks.is_some(), "{plant:?}");
+    }
+    assert_eq!(judgement.idle_swings, 0);
+    // Two a plant; before them the tool that is out at power-up, and its way into the row.
+    assert_eq!(commands.len(), 2 + 2 * judgement.plants.len(), "{commands:?}");
+}
+
+/// Each command was at the pin close to its ideal place.
+#[track_caller]
+pub fn assert_commands_in_place(judgement: &Judgement) {
+    for plant in &judgement.plants {
+        for error in [plant.out_error_ticks, plant.in_error_ticks].into_iter().flatten() {
+            assert!(error.abs() <= SWING_TOLERANCE_TICKS, "{plant:?}");
+        }
+    }
+}
+
+/// No count was lost and none was made up.
+#[track_caller]
+pub fn assert_position_exact(outcome: &Outcome) {
+    assert_eq!(outcome.status.position_ticks, outcome.true_ticks);
+    assert_eq!(outcome.status.lost_ticks, 0);
+}
+
+/// Types bytes and returns every line that comes until the firmware has had time to answer all of them.
+#[track_caller]
+pub fn exchange(uno: &mut Uno, bytes: &[u8]) -> Vec<String> {
+    uno.received();
+    uno.send(bytes);
+    // A byte takes 0.087 ms; the longest answers take less than 100 ms.
+    run_for_ms(uno, bytes.len() as u64 / 10 + 200);
+    uno.received().lines().map(str::to_owned).collect()
+}
+
+/// A machine on its way along a row, with the firmware telling its events.
+pub struct Run {
+    /// The Uno.
+    pub uno: Uno,
+    trial: Trial,
+    start_cycle: u64,
+    heard: String,
+}
+
+impl Run {
+    /// Wakes the firmware up, gives it these commands and those of the trial's start, and sets the machine in motion.
+    #[track_caller]
+    pub fn begin(trial: Trial, commands: &[&str]) -> Self {
+        let mut uno =
+            trial::boot(&elf(), &[trial.machine.beam_before(&trial.row, &trial.motion)]).expect("it wakes up");
+        let Machine { wheel_mm, ticks_per_rev, beam_to_tool_mm, .. } = trial.machine;
+        ask(&mut uno, &format!("set wheel_mm {wheel_mm}"));
+        ask(&mut uno, &format!("set ticks_per_rev {ticks_per_rev}"));
+        ask(&mut uno, &format!("set beam_to_tool_mm {beam_to_tool_mm}"));
+        ask(&mut uno, "events on");
+        for command in commands {
+            ask(&mut uno, command);
+        }
+        match trial.start {
+            Start::Command => uno.send(b"start\n"),
+            Start::Now => uno.send(b"start now\n"),
+            Start::Switch => uno.set(Pin::WorkSwitch, false),
+        }
+        run_for_ms(&mut uno, 100);
+        uno.received();
+        let start_cycle = uno.cycle();
+        uno.drive(trial.machine.pin_changes(&trial.row, &trial.motion, start_cycle));
+        Self { uno, trial, start_cycle, heard: String::new() }
+    }
+
+    /// Rolls on until the machine first comes to a place.
+    #[track_caller]
+    pub fn roll_to(&mut self, place_mm: f64) {
+        let passings = self.trial.motion.passings(place_mm);
+        let passing = passings.first().expect("the machine comes to the place");
+        self.uno.run_until(cycle_at(self.start_cycle, passing.time_s)).expect("the firmware runs");
+    }
+
+    /// Types a line every so many milliseconds of the way, to the motion's end.
+    #[track_caller]
+    pub fn roll_on_asking(&mut self, line: &str, every_ms: u64) {
+        let end = self.end_cycle();
+        while self.uno.cycle() < end {
+            self.uno.send(format!("{line}\n").as_bytes());
+            run_for_ms(&mut self.uno, every_ms);
+        }
+    }
+
+    /// Rolls on to the motion's end, and waits for the last of its events.
+    #[track_caller]
+    pub fn roll_to_the_end(&mut self) {
+        self.uno.run_until(self.end_cycle()).expect("the firmware runs");
+        run_for_ms(&mut self.uno, 50);
+        assert_eq!(self.uno.resets(), []);
+    }
+
+    fn end_cycle(&self) -> u64 {
+        cycle_at(self.start_cycle, self.trial.motion.duration_s())
+    }
+
+    /// The cycles of the whole motion.
+    pub fn cycles(&self) -> Range<u64> {
+        self.start_cycle..self.end_cycle()
+    }
+
+    /// The machine's place at a cycle.
+    pub fn place_mm(&self, cycle: u64) -> f64 {
+        self.trial.motion.position_mm(field::machine::time_at_s(self.start_cycle, cycle))
+    }
+
+    /// Every line that the firmware has sent on the way.
+    pub fn lines(&mut self) -> Vec<String> {
+        self.heard += &self.uno.received();
+        self.heard.lines().map(str::to_owned).collect()
+    }
+
+    /// The event lines of this name.
+    pub fn events(&mut self, name: &str) -> Vec<String> {
+        let mut lines = self.lines();
+        lines.retain(|line| line.split_whitespace().next() == Some(name));
+        lines
+    }
+
+    /// What happened to the row.
+    pub fn judgement(&self) -> Judgement {
+        let Trial { row, machine, motion, timing, .. } = &self.trial;
+        judge(row, machine, motion, *timing, &self.uno.servo_pulses(), self.start_cycle)
+    }
+
+    /// The commands at the servo's pin.
+    pub fn commands(&self) -> Vec<Command> {
+        self.trial.machine.servo.commands(&self.uno.servo_pulses())
+    }
+
+    /// The first command after a cycle.
+    #[track_caller]
+    pub fn first_command_after(&self, cycle: u64) -> Command {
+        let mut commands = self.commands().into_iter();
+        commands.find(|command| command.rise_cycle > cycle).expect("there is a command")
+    }
+}
+
+/// Steps of an encoder, +1 or -1, as levels on its pins from AB = 00, each at its cycle.
+pub fn encoder_steps(steps: impl IntoIterator<Item = (u64, i32)>) -> Vec<PinChange> {
+    const FORWARD: [(bool, bool); 4] = [(false, false), (true, false), (true, true), (false, true)];
+    let mut phase = 0_i32;
+    steps
+        .into_iter()
+        .map(|(cycle, step)| {
+            let (a, _) = FORWARD[phase.rem_euclid(4) as usize];
+            phase += step;
+            let (new_a, new_b) = FORWARD[phase.rem_euclid(4) as usize];
+            let (pin, high) = if a == new_a { (Pin::EncoderB, new_b) } else { (Pin::EncoderA, new_a) };
+            PinChange { cycle, pin, high }
+        })
+        .collect()
+}

@@ -1,0 +1,103 @@
+//! Every setting over the console: its range, what is beyond it, and what may be changed while the machine works.
+
+use crate::common::{ask, refusal, run_for_ms, woken_up};
+use control::settings::{Description, Setting};
+use field::uno::Uno;
+
+/// Every setting with its name.
+fn settings() -> impl Iterator<Item = (Setting, String)> {
+    (0..).map_while(Setting::from_index).map(|setting| {
+        let name = setting.text().bytes().map(char::from).collect();
+        (setting, name)
+    })
+}
+
+/// The value that the firmware says.
+#[track_caller]
+fn get(uno: &mut Uno, name: &str) -> u16 {
+    let lines = ask(uno, &format!("get {name}"));
+    assert_eq!(lines.len(), 1, "{lines:?}");
+    let (said, rest) = lines[0].split_once('=').expect("name=value");
+    assert_eq!(said, name);
+    rest.split_whitespace().next().expect("a value").parse().expect("a number")
+}
+
+#[test]
+fn get_lists_every_setting_with_value_range_and_default() {
+    let listed = ask(&mut woken_up(), "get");
+    let expected: Vec<String> = settings()
+        .map(|(setting, name)| {
+            let Description { least, greatest, default, .. } = setting.description();
+            format!("{name}={default} from {least} to {greatest}, default {default}")
+        })
+        .collect();
+    assert_eq!(listed, expected);
+}
+
+#[test]
+fn every_setting_takes_the_ends_of_its_range() {
+    let mut uno = woken_up();
+    for (setting, name) in settings() {
+        let Description { least, greatest, default, .. } = setting.description();
+        for value in [least, greatest, default] {
+            assert_eq!(ask(&mut uno, &format!("set {name} {value}")), [""; 0]);
+            assert_eq!(get(&mut uno, &name), value);
+        }
+    }
+}
+
+#[test]
+fn every_setting_refuses_what_is_beyond_its_range_and_keeps_its_value() {
+    let mut uno = woken_up();
+    for (setting, name) in settings() {
+        let Description { least, greatest, default, .. } = setting.description();
+        let below = i32::from(least) - 1;
+        let above = i32::from(greatest) + 1;
+        for value in
+            [below.to_string(), above.to_string(), "65536".into(), "4294967296".into(), "1.5".into(), "much".into()]
+        {
+            let answer = refusal(&mut uno, &format!("set {name} {value}"));
+            let right = format!("error: {name} takes a whole number from {least} to {greatest}");
+            assert_eq!(answer, right, "set {name} {value}");
+        }
+        assert_eq!(get(&mut uno, &name), default);
+    }
+}
+
+#[test]
+fn settings_that_move_the_geometry_are_refused_while_the_machine_works() {
+    let mut uno = woken_up();
+    ask(&mut uno, "start");
+    let mut geometric = Vec::new();
+    for (setting, name) in settings() {
+        let Description { least, default, geometry, .. } = setting.description();
+        if geometry {
+            let answer = refusal(&mut uno, &format!("set {name} {least}"));
+            assert!(answer.contains(&name) && answer.contains("hold first"), "{answer}");
+            assert_eq!(get(&mut uno, &name), default);
+            geometric.push(name);
+        } else {
+            ask(&mut uno, &format!("set {name} {least}"));
+            assert_eq!(get(&mut uno, &name), least);
+        }
+    }
+    assert_eq!(geometric, ["ticks_per_rev", "wheel_mm", "beam_to_tool_mm", "margin_mm"]);
+
+    ask(&mut uno, "hold");
+    for name in geometric {
+        let (setting, _) = settings().find(|(_, other)| *other == name).expect("a setting");
+        ask(&mut uno, &format!("set {name} {}", setting.description().least));
+    }
+}
+
+#[test]
+fn the_distance_from_beam_to_tool_shows_in_the_status_at_once() {
+    let mut uno = woken_up();
+    for beam_to_tool_mm in [100, 750, 2000] {
+        ask(&mut uno, &format!("set beam_to_tool_mm {beam_to_tool_mm}"));
+        run_for_ms(&mut uno, 5);
+        let status = crate::common::status(&mut uno);
+        let unseen_mm = crate::common::number(&status, "unseen_mm");
+        assert!((beam_to_tool_mm - 1..=beam_to_tool_mm).contains(&unseen_mm), "{status}");
+    }
+}

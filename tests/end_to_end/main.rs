@@ -1,0 +1,23 @@
+//! End to end: the real ELF in the virtual Uno, judged by its pins and its serial line.
+//!
+//! One file a behaviour. They are modules of one test program, so that the firmware is built once and the simulations
+//! share the processor's cores. What is asserted here can be seen from outside the chip; the decisions themselves are
+//! tested in `control`, the simulator in `field`.
+
+mod alarms;
+mod common;
+mod console_grammar;
+mod console_settings;
+mod encoder_at_full_rate;
+mod leaves_the_row_when_told;
+mod long_beam_distance;
+mod memory_budget;
+mod paper_mode;
+mod recordings;
+mod serial_noise;
+mod servo_pulses;
+mod stops_and_rolls_back;
+mod tall_weeds;
+mod the_schedule_on_the_pins;
+mod wakes_up_in_hold;
+mod weeds_at_every_speed;

@@ -1,0 +1,120 @@
+//! Motions that are not steady: the tool's place follows from the machine's place and speed, so plants are as safe.
+
+use crate::common::{Run, number, trial};
+use field::motion::{Motion, mm_s};
+use field::row::{Row, Thing};
+use field::verdict::{Judgement, Verdict};
+
+/// Where the three plants stand, far enough apart that each has a swing of its own.
+const PLACES_MM: [f64; 3] = [800.0, 1500.0, 2200.0];
+
+/// Rolls past the plants.
+fn roll(motion: Motion) -> Run {
+    let row =
+        Row::new(PLACES_MM.map(|place_mm| Thing::plant(place_mm, 150.0)).to_vec()).expect("the plants stand apart");
+    let mut run = Run::begin(trial(row, motion), &[]);
+    run.roll_to_the_end();
+    run.uno.send(b"status\n");
+    run.uno.run_for_ms(50).expect("the firmware runs");
+    run
+}
+
+/// Each plant was counted once and none damaged; the tool was in the row between them.
+#[track_caller]
+fn assert_unharmed_and_counted_once(run: &mut Run) -> Judgement {
+    let judgement = run.judgement();
+    for plant in &judgement.plants {
+        assert_ne!(plant.verdict, Verdict::Damaged, "{plant:?}");
+    }
+    assert!(judgement.weeded_share > 0.1, "the tool was in the row at all");
+    let counted = run.events("plant").len() + run.events("unknown").len();
+    assert_eq!(counted, PLACES_MM.len(), "{:#?}", run.lines());
+    let lines = run.lines();
+    let status = lines.iter().rev().find(|line| line.starts_with("state=")).expect("a status");
+    assert_eq!((number(status, "lost"), number(status, "missed")), (0, 0), "{status}");
+    judgement
+}
+
+#[test]
+fn slow_at_the_beam_and_fast_at_the_tool_harms_no_plant() {
+    // Beyond 950 mm the beam has passed the first plant, and the tool has not reached it.
+    let motion = Motion::starting_at(0.0)
+        .change_speed(mm_s(1.0), 1000.0)
+        .roll_to(950.0)
+        .change_speed(mm_s(2.5), 3000.0)
+        .roll_to(2900.0);
+    assert_unharmed_and_counted_once(&mut roll(motion));
+}
+
+#[test]
+fn slow_at_the_beam_and_fast_at_the_tool_for_each_plant_harms_none() {
+    let mut motion = Motion::starting_at(0.0).change_speed(mm_s(1.0), 1000.0);
+    for place_mm in PLACES_MM {
+        // Slow while the beam passes the canopy, fast before the tool comes to it.
+        motion = motion
+            .roll_to(place_mm + 90.0)
+            .change_speed(mm_s(2.5), 3000.0)
+            .roll_to(place_mm + 500.0)
+            .change_speed(mm_s(1.0), 3000.0);
+    }
+    assert_unharmed_and_counted_once(&mut roll(motion.roll_to(2900.0)));
+}
+
+#[test]
+fn a_stop_over_a_plant_keeps_the_tool_out_of_it() {
+    // The tool stops over the middle plant.
+    let motion = Motion::starting_at(0.0)
+        .change_speed(mm_s(2.0), 1000.0)
+        .stop_at(1900.0, 1000.0)
+        .go_on_for(2.0)
+        .change_speed(mm_s(2.0), 1000.0)
+        .roll_to(2900.0);
+    let judgement = assert_unharmed_and_counted_once(&mut roll(motion));
+    assert_eq!(judgement.plants[1].swings, 1);
+}
+
+#[test]
+fn a_stop_with_the_beam_in_a_plant_makes_one_plant_of_it() {
+    let motion = Motion::starting_at(0.0)
+        .change_speed(mm_s(2.0), 1000.0)
+        .stop_at(1500.0, 1000.0)
+        .go_on_for(1.5)
+        .change_speed(mm_s(2.0), 1000.0)
+        .roll_to(2900.0);
+    assert_unharmed_and_counted_once(&mut roll(motion));
+}
+
+#[test]
+fn rolling_back_over_a_plant_and_forward_again_harms_none_and_counts_none_twice() {
+    // The tool goes back over the middle plant, the beam over the last one.
+    let motion = Motion::starting_at(0.0)
+        .change_speed(mm_s(2.0), 1000.0)
+        .stop_at(2320.0, 1000.0)
+        .change_speed(-mm_s(1.0), 1000.0)
+        .stop_at(1650.0, 1000.0)
+        .change_speed(mm_s(2.0), 1000.0)
+        .roll_to(2900.0);
+    assert_unharmed_and_counted_once(&mut roll(motion));
+}
+
+#[test]
+fn rolling_back_fast_over_two_plants_harms_none() {
+    let motion = Motion::starting_at(0.0)
+        .change_speed(mm_s(2.5), 1000.0)
+        .stop_at(2400.0, 1500.0)
+        .change_speed(-mm_s(2.5), 1000.0)
+        .stop_at(900.0, 1500.0)
+        .change_speed(mm_s(2.5), 1000.0)
+        .roll_to(2900.0);
+    assert_unharmed_and_counted_once(&mut roll(motion));
+}
+
+#[test]
+fn shunting_with_the_beam_in_a_plant_makes_one_plant_of_it() {
+    let mut motion = Motion::starting_at(0.0).change_speed(mm_s(1.5), 1000.0);
+    for _ in 0..3 {
+        motion = motion.stop_at(1540.0, 1000.0).change_speed(-mm_s(1.0), 1000.0);
+        motion = motion.stop_at(1300.0, 1000.0).change_speed(mm_s(1.5), 1000.0);
+    }
+    assert_unharmed_and_counted_once(&mut roll(motion.roll_to(2900.0)));
+}

@@ -1,0 +1,128 @@
+//! Waking up: in HOLD with the tool out, whatever the switch says, and in the row only over ground that was seen.
+
+use crate::common::{
+    Run, SWING_TOLERANCE_TICKS, assert_all_kept, bare_ground, elf, is_out_at_the_pin, number, run_for_ms, status,
+    steady, throw_switch, trial, value, woken_up,
+};
+use field::machine::Machine;
+use field::motion::mm_s;
+use field::row::{Row, Thing};
+use field::signal::{CYCLES_PER_SECOND, Pin, PinChange};
+use field::trial::{Start, boot};
+use field::uno::Uno;
+
+/// Time in which the servo shows a decision: a frame and the loop's turn.
+const FRAME_MS: u64 = 25;
+
+#[track_caller]
+fn assert_in_hold_with_tool_out(uno: &mut Uno) {
+    let status = status(uno);
+    assert_eq!((value(&status, "state"), value(&status, "tool")), ("hold", "out"), "{status}");
+    assert!(is_out_at_the_pin(uno));
+}
+
+/// Rolls the machine over bare ground while nothing else happens.
+fn roll(uno: &mut Uno, length_mm: f64) {
+    let motion = steady(mm_s(2.0), length_mm);
+    uno.drive(Machine::default().pin_changes(&bare_ground(), &motion, uno.cycle()));
+    run_for_ms(uno, (motion.duration_s() * 1000.0) as u64 + 10);
+}
+
+#[test]
+fn a_switch_that_is_on_at_power_up_starts_nothing_until_it_has_been_off() {
+    let mut uno = boot(&elf(), &[PinChange { cycle: 0, pin: Pin::WorkSwitch, high: false }]).expect("it wakes up");
+    run_for_ms(&mut uno, 200);
+    assert_in_hold_with_tool_out(&mut uno);
+    // Farther than from the beam to the tool, so that the tool could go into the row.
+    roll(&mut uno, 600.0);
+    assert_in_hold_with_tool_out(&mut uno);
+    throw_switch(&mut uno, false);
+    assert_in_hold_with_tool_out(&mut uno);
+    assert!(uno.servo_pulses().iter().all(|pulse| (pulse.width_us() - 2000.0).abs() < 0.1));
+
+    throw_switch(&mut uno, true);
+    run_for_ms(&mut uno, FRAME_MS);
+    let status = status(&mut uno);
+    assert_eq!((value(&status, "state"), value(&status, "tool")), ("work", "in"), "{status}");
+    assert!(!is_out_at_the_pin(&uno));
+}
+
+#[test]
+fn the_servo_has_its_signal_from_the_first_frame_on() {
+    let uno = woken_up();
+    let first = uno.servo_pulses()[0];
+    assert!((first.width_us() - 2000.0).abs() < 0.1, "{first:?}");
+    assert!(first.rise < CYCLES_PER_SECOND / 10, "{first:?}");
+}
+
+#[test]
+fn the_tool_enters_the_row_when_seen_ground_reaches_it() {
+    for start in [Start::Command, Start::Switch] {
+        let (machine, speed_mm_s) = (Machine::default(), mm_s(2.0));
+        let mut run = Run::begin(field::trial::Trial { start, ..trial(bare_ground(), steady(speed_mm_s, 700.0)) }, &[]);
+        let begin = run.cycles().start;
+        run.roll_to_the_end();
+        let command = run.first_command_after(begin);
+        assert!(!command.is_out());
+        // Led by the 40 ms that the servo takes at least.
+        let ideal_mm = machine.beam_to_tool_mm - speed_mm_s * 0.040;
+        let error_ticks = (run.place_mm(command.rise_cycle) - ideal_mm) / machine.tick_mm();
+        assert!(error_ticks.abs() <= SWING_TOLERANCE_TICKS, "{error_ticks} ticks after {start:?}");
+    }
+}
+
+#[test]
+fn the_status_says_how_far_seen_ground_still_is() {
+    let mut run = Run::begin(trial(bare_ground(), steady(mm_s(1.0), 1000.0)), &[]);
+    let mut uno_says = |place_mm: f64| {
+        run.roll_to(place_mm);
+        number(&status(&mut run.uno), "unseen_mm")
+    };
+    // The answer tells of a moment some milliseconds later, and the beam answers for a millisecond before it.
+    for (place_mm, unseen_mm) in [(50.0, 350), (300.0, 100), (390.0, 10)] {
+        let said = uno_says(place_mm);
+        assert!((unseen_mm - 3..=unseen_mm + 1).contains(&said), "{said} mm at {place_mm} mm");
+    }
+    assert_eq!(uno_says(500.0), 0);
+}
+
+#[test]
+fn told_to_start_now_the_tool_enters_the_row_over_unseen_ground() {
+    let mut uno = woken_up();
+    uno.send(b"start now\n");
+    run_for_ms(&mut uno, FRAME_MS);
+    assert!(!is_out_at_the_pin(&uno));
+    assert_eq!(number(&status(&mut uno), "pos"), 0);
+}
+
+#[test]
+fn a_plant_in_the_beam_at_power_up_is_kept() {
+    let row = Row::new(vec![Thing::plant(0.0, 150.0), Thing::plant(700.0, 150.0)]).expect("the plants stand apart");
+    let mut run = Run::begin(trial(row, steady(mm_s(2.0), 1300.0)), &[]);
+    run.roll_to_the_end();
+    assert_all_kept(&run.judgement());
+    assert!(run.commands().len() > 2, "the tool was in the row at all");
+}
+
+#[test]
+fn nothing_that_was_scheduled_survives_a_reset() {
+    for restart in [Uno::reset, Uno::power_cycle] {
+        let row = Row::new(vec![Thing::plant(300.0, 150.0)]).expect("a plant is a row");
+        let mut run = Run::begin(trial(row, steady(mm_s(2.0), 500.0)), &["set margin_mm 60"]);
+        run.roll_to_the_end();
+        let before = status(&mut run.uno);
+        assert_eq!((value(&before, "state"), number(&before, "windows")), ("work", 1), "{before}");
+
+        let cycle = run.uno.cycle();
+        restart(&mut run.uno);
+        run.uno.run_until_serial("\n", 3 * CYCLES_PER_SECOND).expect("the firmware wakes up");
+        run_for_ms(&mut run.uno, FRAME_MS);
+        assert_in_hold_with_tool_out(&mut run.uno);
+        let after = status(&mut run.uno);
+        assert_eq!((number(&after, "pos"), number(&after, "windows")), (0, 0), "{after}");
+        assert_eq!(number(&after, "unseen_mm"), 400, "{after}");
+        let pulses = run.uno.servo_pulses();
+        let mut since = pulses.iter().filter(|pulse| pulse.rise > cycle);
+        assert!(since.all(|pulse| (pulse.width_us() - 2000.0).abs() < 0.1));
+    }
+}
