@@ -1,12 +1,15 @@
 //! The `weeder` command: tries the firmware on a simulated field, and puts it on an Arduino Uno.
 //!
-//! `weeder sim` ends with status 0 where no plant was damaged and 1 where one was; whatever else goes wrong, here and in
-//! the other commands, ends with status 2 and a message that says what would be right.
+//! `weeder sim` and `weeder classify` end with status 0 where no plant was damaged, or would be, and 1 where one was;
+//! whatever else goes wrong, here and in the other commands, ends with status 2 and a message that says what would be
+//! right.
 
 mod bench;
+mod classify;
 mod flash;
 mod progress;
 mod sim;
+mod train;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -27,6 +30,10 @@ enum Command {
     Flash(flash::Arguments),
     /// Count the cycles and bytes of the firmware and its classifier on a virtual Uno.
     BenchUno,
+    /// Make an example table of labelled objects, and say how well it tells plants from weeds.
+    Train(train::Arguments),
+    /// Say what the firmware's classifier takes recorded objects for.
+    Classify(classify::Arguments),
 }
 
 /// Whether the plants are alive.
@@ -43,6 +50,8 @@ fn main() -> ExitCode {
         Command::Sim(arguments) => sim::run(&arguments),
         Command::Flash(arguments) => flash::run(&arguments).map(|()| Harm::None),
         Command::BenchUno => bench::run().map(|()| Harm::None),
+        Command::Train(arguments) => train::run(&arguments),
+        Command::Classify(arguments) => classify::run(&arguments),
     };
     match result {
         Ok(Harm::None) => ExitCode::SUCCESS,

@@ -24,7 +24,6 @@ use control::{
     classifier::{Class, label},
     examples,
     features::{COUNT, Features},
-    settings::Setting,
 };
 use knn::{Answer, ClassifyError, Example, Range, Scale, classify, squared_distance};
 use table::Recorded;
@@ -75,12 +74,7 @@ pub struct Model {
 impl Model {
     /// The table that the firmware carries, with the k that it starts with.
     pub fn built_in() -> Self {
-        Self {
-            scale: examples::SCALE,
-            radius: examples::RADIUS,
-            k: Setting::K.description().default as u8,
-            examples: examples::EXAMPLES.to_vec(),
-        }
+        Self { scale: examples::SCALE, radius: examples::RADIUS, k: examples::K, examples: examples::EXAMPLES.to_vec() }
     }
 
     /// The classifier's answer to an object.

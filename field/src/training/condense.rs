@@ -5,7 +5,8 @@
 //! 2. **Hart's condensing** (P. E. Hart, 1968): while there are objects that the examples kept so far do not treat as they
 //!    should, one of them is kept. A weed has to be known as a weed, within half the squared radius, so that what is a
 //!    little unlike all objects is still known later; a plant must not be taken for one. Hart takes such objects as
-//!    they come; here the one goes first that has the most others of its class and plight around it.
+//!    they come; here the one goes first that has the most others of its class and plight around it, as long as they
+//!    have no example near.
 //! 3. **Filling up**: plants that no kept example is near are unknown, which spares them. As long as there is room, they
 //!    are kept in the same order.
 //!
@@ -71,7 +72,7 @@ pub fn condense(examples: &[Example<COUNT>], k: u8, radius: u32, most: usize) ->
 }
 
 /// While fewer than `most` are kept and `needs` says of any of `candidates` that the examples kept are not enough for it:
-/// keeps the one that has the most other such candidates of its class within `reach`.
+/// keeps the one that has the most of those within `reach` that have no example of their class there.
 fn keep_most_needed(
     examples: &[Example<COUNT>],
     candidates: &[usize],
@@ -84,8 +85,11 @@ fn keep_most_needed(
     while kept.len() < most {
         let needy: Vec<usize> =
             candidates.iter().copied().filter(|index| !kept.contains(index) && needs(*index, &table)).collect();
+        // Those near a kept example may need another one yet, but those that have none come first.
+        let is_alone = |index: &usize| !table.iter().any(|example| are_fellows(example, &examples[*index], reach));
+        let alone: Vec<usize> = needy.iter().copied().filter(is_alone).collect();
         let serves =
-            |&one: &usize| needy.iter().filter(|&&other| are_fellows(&examples[one], &examples[other], reach)).count();
+            |&one: &usize| alone.iter().filter(|&&other| are_fellows(&examples[one], &examples[other], reach)).count();
         // `max_by_key` keeps the last among equals.
         let Some(next) = needy.iter().copied().rev().max_by_key(serves) else {
             return;

@@ -17,11 +17,11 @@ use crate::motion::Motion;
 use crate::planting::{Planting, PlantingError};
 use crate::row::{Kind, Problem, Row, Thing};
 use crate::signal::{CYCLES_PER_SECOND, Pin, PinChange};
-use control::classifier::{Class, Classifier, Vote};
+use control::classifier::{Class, Classifier, Full, Listed, Vote};
 use control::controller::{Controller, Readings};
 use control::features::{Features, SPEED_CLASSES_MM_S};
 use control::quadrature::{Quadrature, Step};
-use control::units::{Instant, Interval, Position};
+use control::units::{Instant, Interval, Position, Ticks};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::cell::RefCell;
@@ -166,6 +166,24 @@ impl Classifier for &Recorder<'_> {
         };
         Vote { class, votes: 0 }
     }
+
+    // It knows the truth already: there is nothing to teach it, and nothing to forget.
+
+    fn teach(&mut self, _features: &Features, _label: u8) -> Result<(), Full> {
+        Err(Full)
+    }
+
+    fn forget(&mut self, _number: u8) -> bool {
+        false
+    }
+
+    fn listed(&self, _place: u8) -> Option<(Listed, u8)> {
+        None
+    }
+
+    fn spoiled(&self) -> u8 {
+        0
+    }
 }
 
 /// What the controller sees of a row.
@@ -216,7 +234,7 @@ impl Encoder {
         let bit = if change.pin == Pin::EncoderA { 0b10 } else { 0b01 };
         self.channels = if change.high { self.channels | bit } else { self.channels & !bit };
         if let Step::Ticks(ticks) = self.decoder.step(self.channels) {
-            self.position = self.position + control::units::Ticks(i32::from(ticks));
+            self.position = self.position + Ticks(i32::from(ticks));
         }
     }
 }
