@@ -15,7 +15,6 @@ mod clock;
 mod eeprom;
 mod encoder;
 mod examples;
-mod handover;
 mod serial;
 mod servo;
 mod watchdog;
@@ -35,14 +34,11 @@ use control::{
 };
 use embedded_hal::digital::{InputPin, OutputPin};
 use embedded_hal_nb::serial::Read;
-use static_cell::{ConstStaticCell, StaticCell};
+use static_cell::StaticCell;
 
 #[avr_device::entry]
 fn main() -> ! {
-    static EDGES: ConstStaticCell<beam::EdgeQueue> = ConstStaticCell::new(beam::EdgeQueue::new());
-    static RECEIVED: ConstStaticCell<serial::ReceiveQueue> = ConstStaticCell::new(serial::ReceiveQueue::new());
     static CONTROLLER: StaticCell<Controller<Nearest<examples::InFlash, eeprom::Eeprom>>> = StaticCell::new();
-    static TO_SEND: ConstStaticCell<serial::SendQueue> = ConstStaticCell::new(serial::SendQueue::new());
 
     // SAFETY: the entry point is the first code to run and runs once, so nobody else holds the peripherals.
     let peripherals = unsafe { Peripherals::steal() };
@@ -51,9 +47,9 @@ fn main() -> ! {
     let (mut lamp, mut work_switch) = board::pins(&peripherals.PORTB, &peripherals.PORTD);
     let clock = clock::Clock::new(peripherals.TC0);
     encoder::watch(&peripherals.EXINT, &peripherals.PORTD, &peripherals.CPU);
-    let mut beam = beam::Beam::new(&peripherals.EXINT, &peripherals.PORTB, EDGES.take());
-    let mut serial = serial::Serial::new(peripherals.USART0, RECEIVED.take(), TO_SEND.take());
-    // SAFETY: every interrupt's state has been handed over above, and no critical section is open.
+    let mut beam = beam::Beam::new(&peripherals.EXINT, &peripherals.PORTB);
+    let mut serial = serial::Serial::new(peripherals.USART0);
+    // SAFETY: every interrupt's peripheral is set up, and no critical section is open.
     unsafe { interrupt::enable() };
 
     let mut read = move || {
@@ -103,31 +99,32 @@ fn main() -> ! {
 // The beam: its level changed.
 #[avr_device::interrupt(atmega328p)]
 fn PCINT0() {
-    // SAFETY: interrupts are off while a handler runs.
-    let position = encoder::position(unsafe { CriticalSection::new() });
-    // SAFETY: this is the handler that owns the beam's end of the queue.
-    unsafe { beam::on_change(position) };
+    let cs = interrupts_are_off();
+    beam::on_change(cs, encoder::position(cs));
 }
 
 // The clock's counter ran over.
 #[avr_device::interrupt(atmega328p)]
 fn TIMER0_OVF() {
-    // SAFETY: interrupts are off while a handler runs.
-    clock::on_overflow(unsafe { CriticalSection::new() });
+    clock::on_overflow(interrupts_are_off());
 }
 
 // A byte has come in.
 #[avr_device::interrupt(atmega328p)]
 fn USART_RX() {
-    // SAFETY: this is the handler that owns the receiving end.
-    unsafe { serial::on_received() };
+    serial::on_received(interrupts_are_off());
 }
 
 // The line can take a byte.
 #[avr_device::interrupt(atmega328p)]
 fn USART_UDRE() {
-    // SAFETY: this is the handler that owns the sending end.
-    unsafe { serial::on_ready_to_send() };
+    serial::on_ready_to_send(interrupts_are_off());
+}
+
+/// What an interrupt handler has by being one.
+fn interrupts_are_off<'a>() -> CriticalSection<'a> {
+    // SAFETY: called by the handlers above alone; the chip turns interrupts off while one runs, and none turns them on.
+    unsafe { CriticalSection::new() }
 }
 
 /// A panic is a fault like any other: the watchdog resets the machine, which wakes up in HOLD with the tool out.

@@ -4,59 +4,52 @@
 //! cannot be read or written at once is `WouldBlock`. A byte that comes in while its queue is full is lost, and
 //! [`GAP_MARK`] stands where it would have been, so that a line with a hole in it is never taken for a whole one.
 
-use crate::handover::Handover;
 use avr_device::{
     atmega328p::{USART0, usart0},
-    interrupt,
+    interrupt::{self, CriticalSection, Mutex},
 };
 use control::console::GAP_MARK;
 use core::{
+    cell::{Cell, RefCell},
     convert::Infallible,
-    sync::atomic::{AtomicBool, Ordering},
 };
 use embedded_hal_nb::serial::{ErrorType, Read, Write};
-use heapless::spsc::{Consumer, Producer, Queue};
-
-/// Bytes received and not yet read: 5 ms of a full line.
-pub type ReceiveQueue = Queue<u8, 64>;
-
-/// Bytes to be sent: the longest line.
-pub type SendQueue = Queue<u8, { control::reply::LINE + 1 }>;
+use heapless::spsc::Queue;
 
 /// Divisor for 115200 baud at double speed; off by 2.1 %, as on every Uno (data sheet, table 20-6).
 const BAUD_DIVISOR: u16 = 16;
 
-static RECEIVING: Handover<Producer<'static, u8>> = Handover::new();
-static SENDING: Handover<Consumer<'static, u8>> = Handover::new();
-/// Whether the last byte received found no room; the handler alone uses it.
-static GAP: AtomicBool = AtomicBool::new(false);
+/// Bytes received and not yet read: 5 ms of a full line. The queues are used as they are, not split into their ends: an end
+/// does not know at compile time that its length is a power of two, and divides.
+static RECEIVED: Mutex<RefCell<Queue<u8, 64>>> = Mutex::new(RefCell::new(Queue::new()));
+
+/// Bytes to be sent: the longest line.
+static TO_SEND: Mutex<RefCell<Queue<u8, { control::reply::LINE + 1 }>>> = Mutex::new(RefCell::new(Queue::new()));
+
+/// Whether the last byte received found no room.
+static GAP: Mutex<Cell<bool>> = Mutex::new(Cell::new(false));
 
 /// The serial line, as the loop sees it.
 pub struct Serial {
     usart: USART0,
-    received: Consumer<'static, u8>,
-    to_send: Producer<'static, u8>,
 }
 
 impl Serial {
     /// Opens the line.
-    pub fn new(usart: USART0, received: &'static mut ReceiveQueue, to_send: &'static mut SendQueue) -> Self {
-        let (receiving, received) = received.split();
-        let (to_send, sending) = to_send.split();
-        interrupt::free(|cs| {
-            RECEIVING.give(cs, receiving);
-            SENDING.give(cs, sending);
-        });
+    pub fn new(usart: USART0) -> Self {
         usart.ubrr0().write(|w| w.set(BAUD_DIVISOR));
         usart.ucsr0a().write(|w| w.u2x0().set_bit());
         usart.ucsr0c().write(|w| w.ucsz0().chr8());
         usart.ucsr0b().write(|w| w.rxen0().set_bit().txen0().set_bit().rxcie0().set_bit());
-        Self { usart, received, to_send }
+        Self { usart }
     }
 
     /// Bytes that can be written now.
     pub fn room(&self) -> usize {
-        self.to_send.capacity() - self.to_send.len()
+        interrupt::free(|cs| {
+            let queue = TO_SEND.borrow(cs).borrow();
+            queue.capacity() - queue.len()
+        })
     }
 }
 
@@ -66,20 +59,22 @@ impl ErrorType for Serial {
 
 impl Read for Serial {
     fn read(&mut self) -> nb::Result<u8, Infallible> {
-        self.received.dequeue().ok_or(nb::Error::WouldBlock)
+        interrupt::free(|cs| RECEIVED.borrow(cs).borrow_mut().dequeue()).ok_or(nb::Error::WouldBlock)
     }
 }
 
 impl Write for Serial {
     fn write(&mut self, byte: u8) -> nb::Result<(), Infallible> {
-        self.to_send.enqueue(byte).map_err(|_| nb::Error::WouldBlock)?;
-        // Not atomic, and need not be: the one bit that the handler changes is the one that is set here.
-        self.usart.ucsr0b().modify(|_, w| w.udrie0().set_bit());
-        Ok(())
+        interrupt::free(|cs| {
+            TO_SEND.borrow(cs).borrow_mut().enqueue(byte).map_err(|_| nb::Error::WouldBlock)?;
+            self.usart.ucsr0b().modify(|_, w| w.udrie0().set_bit());
+            Ok(())
+        })
     }
 
     fn flush(&mut self) -> nb::Result<(), Infallible> {
-        if self.to_send.is_empty() { Ok(()) } else { Err(nb::Error::WouldBlock) }
+        let sent = interrupt::free(|cs| TO_SEND.borrow(cs).borrow().is_empty());
+        if sent { Ok(()) } else { Err(nb::Error::WouldBlock) }
     }
 }
 
@@ -103,39 +98,24 @@ impl ufmt::uWrite for Serial {
 
 /// The handlers' view of the USART.
 fn usart() -> &'static usart0::RegisterBlock {
-    // SAFETY: the handlers use UDR0, which the loop does not touch, and UDRIE0, which may be set and cleared in any order.
+    // SAFETY: the handlers use UDR0, which the loop does not touch, and UDRIE0, which it sets with interrupts off.
     unsafe { &*USART0::ptr() }
 }
 
 /// A byte has come in.
-///
-/// # Safety
-/// To be called by the handler of USART_RX alone.
-pub unsafe fn on_received() {
+pub fn on_received(cs: CriticalSection) {
     // An overrun of the hardware's own two bytes shows until UDR0 is read.
     let overrun = usart().ucsr0a().read().dor0().bit_is_set();
     let byte = usart().udr0().read().bits();
-    // SAFETY: the caller is the handler that owns the receiving end.
-    unsafe {
-        RECEIVING.with(|queue| {
-            let gap = (overrun || GAP.load(Ordering::Relaxed)) && queue.enqueue(GAP_MARK).is_err();
-            GAP.store(gap || queue.enqueue(byte).is_err(), Ordering::Relaxed);
-        });
-    }
+    let mut queue = RECEIVED.borrow(cs).borrow_mut();
+    let gap = (overrun || GAP.borrow(cs).get()) && queue.enqueue(GAP_MARK).is_err();
+    GAP.borrow(cs).set(gap || queue.enqueue(byte).is_err());
 }
 
 /// The line can take a byte.
-///
-/// # Safety
-/// To be called by the handler of USART_UDRE alone.
-pub unsafe fn on_ready_to_send() {
-    // SAFETY: the caller is the handler that owns the sending end.
-    unsafe {
-        SENDING.with(|queue| {
-            match queue.dequeue() {
-                Some(byte) => usart().udr0().write(|w| w.set(byte)),
-                None => usart().ucsr0b().modify(|_, w| w.udrie0().clear_bit()),
-            };
-        });
-    }
+pub fn on_ready_to_send(cs: CriticalSection) {
+    match TO_SEND.borrow(cs).borrow_mut().dequeue() {
+        Some(byte) => usart().udr0().write(|w| w.set(byte)),
+        None => usart().ucsr0b().modify(|_, w| w.udrie0().clear_bit()),
+    };
 }
