@@ -19,7 +19,7 @@ fn assert_near(line: &str, key: &str, true_ticks: f64) {
 #[track_caller]
 fn assert_schedules_as_the_equations_say(machine: Machine) {
     let row = Planting { plants: 5, ..Planting::default() }.grow(3).expect("the plants have room");
-    let trial = Trial::at_speed(row.clone(), machine.clone(), Timing::default(), mm_s(2.0));
+    let trial = Trial::at_speed(row.clone(), machine, Timing::default(), mm_s(2.0));
     let start_mm = trial.motion.start_mm();
     let mut run = Run::begin(trial, &[]);
     run.roll_to_the_end();

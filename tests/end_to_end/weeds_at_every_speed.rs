@@ -23,7 +23,7 @@ fn assert_weeds_at(speed_km_h: f64) {
     let machine = Machine::default();
     for seed in 1..=4 {
         let row = PLANTING.grow(seed).expect("the plants have room");
-        let outcome = outcome(&Trial::at_speed(row, machine.clone(), Timing::default(), mm_s(speed_km_h)));
+        let outcome = outcome(&Trial::at_speed(row, machine, Timing::default(), mm_s(speed_km_h)));
         assert_all_kept(&outcome.judgement);
         assert_a_swing_each(&outcome.judgement, &machine.servo.commands(&outcome.pulses));
         assert_commands_in_place(&outcome.judgement);
