@@ -76,9 +76,9 @@ impl Search {
         const NONE: u8 = u8::MAX;
 
         let [a, b, c, d, e] = *query;
-        // No example is beyond a reach of more than 24 bits.
-        let start = if reach < 1 << 24 { !reach } else { 0 };
-        let (low, high, label): (u16, u8, u8);
+        // The sum lies in the upper three of four bytes, above the label. No example is beyond a reach of 24 bits.
+        let start = if reach < 1 << 24 { !(reach << 8) } else { 0 };
+        let (lower, upper): (u16, u16);
         // SAFETY: the loop reads flash from `next` to `end` and nothing else, both of them a row's start or the table's end
         // (`visit_near` makes them, and each turn takes `next` one row on). R0 is free for use, and R1 is 0 again at the end.
         unsafe {
@@ -91,8 +91,8 @@ impl Search {
                 "breq 3f",
                 "movw r30, {next:l}",
                 "adiw {next:l}, {row}",
-                "movw {low:l}, {start:l}",
-                "mov  {high}, {start_high}",
+                "mov  {lower:h}, {start_lower:h}",
+                "movw {upper:l}, {start_upper:l}",
                 // A feature: its difference, squared, joins the sum.
                 "lpm  {byte}, Z+",
                 "sub  {byte}, {a}",
@@ -100,9 +100,9 @@ impl Search {
                 "neg  {byte}",
                 "4:",
                 "mul  {byte}, {byte}",
-                "add  {low:l}, r0",
-                "adc  {low:h}, r1",
-                "adc  {high}, {zero}",
+                "add  {lower:h}, r0",
+                "adc  {upper:l}, r1",
+                "adc  {upper:h}, {zero}",
                 "brcs 2b",
                 "lpm  {byte}, Z+",
                 "sub  {byte}, {b}",
@@ -110,9 +110,9 @@ impl Search {
                 "neg  {byte}",
                 "4:",
                 "mul  {byte}, {byte}",
-                "add  {low:l}, r0",
-                "adc  {low:h}, r1",
-                "adc  {high}, {zero}",
+                "add  {lower:h}, r0",
+                "adc  {upper:l}, r1",
+                "adc  {upper:h}, {zero}",
                 "brcs 2b",
                 "lpm  {byte}, Z+",
                 "sub  {byte}, {c}",
@@ -120,9 +120,9 @@ impl Search {
                 "neg  {byte}",
                 "4:",
                 "mul  {byte}, {byte}",
-                "add  {low:l}, r0",
-                "adc  {low:h}, r1",
-                "adc  {high}, {zero}",
+                "add  {lower:h}, r0",
+                "adc  {upper:l}, r1",
+                "adc  {upper:h}, {zero}",
                 "brcs 2b",
                 "lpm  {byte}, Z+",
                 "sub  {byte}, {d}",
@@ -130,9 +130,9 @@ impl Search {
                 "neg  {byte}",
                 "4:",
                 "mul  {byte}, {byte}",
-                "add  {low:l}, r0",
-                "adc  {low:h}, r1",
-                "adc  {high}, {zero}",
+                "add  {lower:h}, r0",
+                "adc  {upper:l}, r1",
+                "adc  {upper:h}, {zero}",
                 "brcs 2b",
                 "lpm  {byte}, Z+",
                 "sub  {byte}, {e}",
@@ -140,40 +140,41 @@ impl Search {
                 "neg  {byte}",
                 "4:",
                 "mul  {byte}, {byte}",
-                "add  {low:l}, r0",
-                "adc  {low:h}, r1",
-                "adc  {high}, {zero}",
+                "add  {lower:h}, r0",
+                "adc  {upper:l}, r1",
+                "adc  {upper:h}, {zero}",
                 "brcs 2b",
                 // Within reach: the distance is what the sum has grown by.
-                "sub  {low:l}, {start:l}",
-                "sbc  {low:h}, {start:h}",
-                "sbc  {high}, {start_high}",
-                "lpm  {byte}, Z",
+                "sub  {lower:h}, {start_lower:h}",
+                "sbc  {upper:l}, {start_upper:l}",
+                "sbc  {upper:h}, {start_upper:h}",
+                "lpm  {lower:l}, Z",
                 "rjmp 4f",
                 "3:",
-                "mov  {high}, {zero}",
-                "dec  {high}",
+                "mov  {upper:h}, {zero}",
+                "dec  {upper:h}",
                 "4:",
                 "clr  r1",
                 row = const size_of::<Row>(),
                 next = inout(reg_iw) self.next,
                 end = in(reg_pair) self.end,
-                start = in(reg_pair) start as u16,
-                start_high = in(reg) (start >> 16) as u8,
+                start_lower = in(reg_pair) start as u16,
+                start_upper = in(reg_pair) (start >> 16) as u16,
                 a = in(reg) a,
                 b = in(reg) b,
                 c = in(reg) c,
                 d = in(reg) d,
                 e = in(reg) e,
                 zero = out(reg) _,
-                low = out(reg_pair) low,
-                high = out(reg) high,
-                byte = out(reg) label,
+                lower = out(reg_pair) lower,
+                upper = out(reg_pair) upper,
+                byte = out(reg) _,
                 out("r30") _,
                 out("r31") _,
                 options(readonly, nostack),
             );
         }
-        (high != NONE).then(|| (u32::from(low) | u32::from(high) << 16, label))
+        let found = u32::from(lower) | u32::from(upper) << 16;
+        ((upper >> 8) as u8 != NONE).then_some((found >> 8, found as u8))
     }
 }

@@ -1,0 +1,21 @@
+//! The classifier's cycles and memory, counted on the virtual Uno. The same sources give the same figures everywhere.
+
+use field::{bench, firmware};
+use knn_bench::Task;
+
+#[test]
+fn a_classification_among_32_examples_in_flash_takes_at_most_4000_cycles() {
+    let elf = firmware::build_bench().expect("the bench builds");
+    let costs = bench::classifier(&elf, |_| ()).expect("the bench runs, and every answer is the plain search's");
+    let (_, cycles) = costs.tasks.iter().find(|(task, _)| *task == Task::Classify(32)).expect("it is measured");
+    assert!(cycles.mean <= 4000.0, "{cycles:?}");
+    assert!(cycles.most <= 5000, "{cycles:?}");
+    assert!(costs.stack < 200, "{} bytes of stack", costs.stack);
+}
+
+#[test]
+fn another_program_is_not_taken_for_the_bench() {
+    let elf = firmware::build().expect("the firmware builds");
+    let error = bench::classifier(&elf, |_| ()).expect_err("the firmware measures nothing");
+    assert!(error.to_string().contains("run the ELF that `cargo bench-firmware` makes"), "{error}");
+}
