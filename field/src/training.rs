@@ -189,16 +189,20 @@ pub enum TrainingError {
     TooMany(#[from] TooMany),
 }
 
-/// An object is a stranger when it is farther from every example than nearly all objects were from their nearest
-/// fellow: the share that is nearly all, and how much farther, as a factor of the squared distance (twice as far).
+/// An object is a stranger when it is farther from every example than nearly all objects are from their nearest fellow:
+/// the share that is nearly all, and how much farther, as a factor of the squared distance (twice as far).
 const FELLOW_QUANTILE: f64 = 0.99;
-const RADIUS_FACTOR: u32 = 4;
+const FELLOW_FACTOR: u32 = 4;
+
+/// Nor may the radius reach more than half way to the other class (a quarter of the squared distance), for nearly all.
+const ENEMY_QUANTILE: f64 = 0.01;
+const ENEMY_DIVISOR: u32 = 4;
 
 /// Learns from objects, and condenses them to at most `most` examples.
 ///
 /// - **Scale**: [`Scale::learn_ranges`] of all objects.
 /// - **Radius**: four times the 99 % quantile of the squared distances from each object to the nearest other of its
-///   class.
+///   class, but at most a quarter of the 1 % quantile of those to the nearest of the other class. Noise does not count.
 /// - **k**, where none is given: each odd k is tried by leaving one object out and asking all others. The best has the
 ///   fewest plants taken for weeds, then the fewest weeds taken for plants, then the fewest plants unknown. Among
 ///   equals the smallest from 3 on wins: with a k of 1 a single object with a wrong label decides.
@@ -224,7 +228,8 @@ pub fn train(objects: &[Labelled], k: Option<u8>, most: usize) -> Result<Trainin
     let values: Vec<[i32; COUNT]> = objects.iter().map(|object| object.features.values()).collect();
     let ranges = Scale::learn_ranges(&values).ok_or(TrainingError::NoObjects)?;
     let examples = quantised(&Scale::new(ranges), objects);
-    let radius = learn_radius(&examples);
+    let edited = condense::edit(&examples);
+    let radius = learn_radius(&examples, &edited);
     let left_out = |k| leave_one_out(&examples, objects, k, radius);
     let (k, leave_one_out) = match k {
         Some(k) => (k, left_out(k)),
@@ -237,13 +242,13 @@ pub fn train(objects: &[Labelled], k: Option<u8>, most: usize) -> Result<Trainin
             .min_by_key(|(_, confusion)| confusion.harm())
             .ok_or(TrainingError::TooFew { objects: objects.len(), k: 1 })?,
     };
-    let condensed = condense::condense(&examples, k, radius, most)?;
+    let kept = condense::condense(&examples, &edited, k, radius, most)?;
     let mut training = Training {
         ranges,
         radius,
         k,
-        edited_out: condensed.edited_out,
-        kept: condensed.kept.into_iter().map(|index| objects[index]).collect(),
+        edited_out: examples.len() - edited.len(),
+        kept: kept.into_iter().map(|index| objects[index]).collect(),
         leave_one_out,
         by_table: Confusion::default(),
     };
@@ -257,18 +262,27 @@ fn quantised(scale: &Scale<COUNT>, objects: &[Labelled]) -> Vec<Example<COUNT>> 
     objects.iter().map(example).collect()
 }
 
-/// The radius, from the distances between objects of one class.
-fn learn_radius(examples: &[Example<COUNT>]) -> u32 {
-    let nearest_fellow = |(index, example): (usize, &Example<COUNT>)| {
-        let fellows =
-            examples.iter().enumerate().filter(|(other, fellow)| *other != index && fellow.label == example.label);
-        fellows.map(|(_, fellow)| squared_distance(&example.features, &fellow.features)).min()
+/// The radius, from the distances between objects of one class and of both, of those whose places are `edited`.
+fn learn_radius(examples: &[Example<COUNT>], edited: &[usize]) -> u32 {
+    let distances = |of_one_class: bool| {
+        let nearest = |&index: &usize| {
+            let one = &examples[index];
+            let others = edited.iter().filter(|&&other| other != index).map(|&other| &examples[other]);
+            let wanted = others.filter(|other| (other.label == one.label) == of_one_class);
+            wanted.map(|other| squared_distance(&one.features, &other.features)).min()
+        };
+        edited.iter().filter_map(nearest).collect::<Vec<u32>>()
     };
-    let mut distances: Vec<u32> = examples.iter().enumerate().filter_map(nearest_fellow).collect();
-    distances.sort_unstable();
-    let rank = (distances.len() as f64 * FELLOW_QUANTILE) as usize;
-    // Never less than what rounding to bytes moves an object.
-    distances.get(rank).map_or(0, |distance| distance * RADIUS_FACTOR).max(COUNT as u32 * RADIUS_FACTOR)
+    let near = quantile(distances(true), FELLOW_QUANTILE).map_or(0, |distance| distance * FELLOW_FACTOR);
+    let far = quantile(distances(false), ENEMY_QUANTILE).map_or(u32::MAX, |distance| distance / ENEMY_DIVISOR);
+    // Rounding to bytes moves an object by up to one in each feature: that alone makes no stranger.
+    near.min(far).max(COUNT as u32)
+}
+
+/// The value that a share of all does not exceed; `None` of nothing.
+fn quantile(mut values: Vec<u32>, share: f64) -> Option<u32> {
+    values.sort_unstable();
+    values.get((values.len() as f64 * share) as usize).copied()
 }
 
 /// The answer of all examples but the one at `index` to that one.

@@ -115,6 +115,26 @@ fn an_object_between_plants_and_weeds_is_unknown() {
 }
 
 #[test]
+fn a_handful_of_objects_does_not_make_weeds_of_what_is_nearer_to_plants() {
+    // So few that each is far from its nearest fellow.
+    let plants = (0..4).map(|n| labelled(Kind::Plant, 278 + 139 * n, 500, 140));
+    let weeds = (0..4).map(|n| labelled(Kind::Weed, 278 + 139 * n, 300, 16));
+    let objects: Vec<Labelled> = plants.chain(weeds).collect();
+    let model = train(&objects, Some(1), MOST_EXAMPLES).unwrap().model();
+    for width_mm in 79..140 {
+        assert_ne!(model.class(&Features::describe(417, 400, width_mm)), Class::Weed, "{width_mm}");
+    }
+    assert_eq!(model.class(&objects[5].features), Class::Weed);
+}
+
+#[test]
+fn as_many_examples_are_kept_as_vote() {
+    let training = train(&clear_case(), Some(15), MOST_EXAMPLES).unwrap();
+    assert!(training.kept.len() >= 15);
+    assert_eq!(training.by_table.plants_taken_for_weeds(), 0);
+}
+
+#[test]
 fn objects_that_need_more_examples_than_there_is_room_for_are_refused_by_name() {
     let error = train(&synthetic::objects(1).unwrap(), None, 10).unwrap_err();
     assert!(matches!(error, TrainingError::TooMany(_)));

@@ -1,14 +1,14 @@
 //! From many objects to the few examples that decide alike.
 //!
-//! 1. **Wilson's editing** (D. L. Wilson, 1972): an object whose k nearest others vote for the other class is noise, or
-//!    has the wrong label, and is taken out.
+//! 1. **Wilson's editing** (D. L. Wilson, 1972): an object whose three nearest others vote for the other class is noise,
+//!    or has the wrong label, and is taken out.
 //! 2. **Hart's condensing** (P. E. Hart, 1968): while there are objects that the examples kept so far do not treat as they
 //!    should, one of them is kept. A weed has to be known as a weed, within half the squared radius, so that what is a
 //!    little unlike all objects is still known later; a plant must not be taken for one. Hart takes such objects as
 //!    they come; here the one goes first that has the most others of its class and plight around it, as long as they
 //!    have no example near.
 //! 3. **Filling up**: plants that no kept example is near are unknown, which spares them. As long as there is room, they
-//!    are kept in the same order.
+//!    are kept in the same order; and in any case so many objects as are to vote.
 //!
 //! Where several objects would do, the first in the list does.
 
@@ -19,15 +19,6 @@ use control::{
 };
 use knn::{Example, Kind, classify, squared_distance};
 use thiserror::Error;
-
-/// What is left, as places in the list given.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Condensed {
-    /// The examples, in the order in which they were chosen.
-    pub kept: Vec<usize>,
-    /// How many objects were taken out as noise.
-    pub edited_out: usize,
-}
 
 /// The examples do not fit.
 #[derive(Debug, Error, PartialEq, Eq)]
@@ -42,17 +33,30 @@ pub struct TooMany {
     pub most: usize,
 }
 
-/// Chooses at most `most` of `examples`, for a vote of `k` within `radius`.
-///
-/// # Errors
-/// [`TooMany`], where Hart's rule keeps more.
-pub fn condense(examples: &[Example<COUNT>], k: u8, radius: u32, most: usize) -> Result<Condensed, TooMany> {
-    let is_outvoted = |index: usize| {
-        answer_of_others(examples, index, k, u32::MAX)
+/// Neighbours that vote on whether an object is noise, as Wilson has it.
+const EDITORS: u8 = 3;
+
+/// The places of those examples that are not noise.
+pub fn edit(examples: &[Example<COUNT>]) -> Vec<usize> {
+    let is_noise = |index: usize| {
+        answer_of_others(examples, index, EDITORS, u32::MAX)
             .is_ok_and(|answer| answer.kind == Kind::Known && answer.label != examples[index].label)
     };
-    let edited: Vec<usize> = (0..examples.len()).filter(|&index| !is_outvoted(index)).collect();
-    let edited_out = examples.len() - edited.len();
+    (0..examples.len()).filter(|&index| !is_noise(index)).collect()
+}
+
+/// Chooses at most `most` of those `examples` whose places are `edited`, for a vote of `k` within `radius`; gives their
+/// places, in the order in which they were chosen.
+///
+/// # Errors
+/// [`TooMany`], where more are needed.
+pub fn condense(
+    examples: &[Example<COUNT>],
+    edited: &[usize],
+    k: u8,
+    radius: u32,
+    most: usize,
+) -> Result<Vec<usize>, TooMany> {
     let half = radius / 2;
     let is_mistreated = |index: usize, kept: &[Example<COUNT>]| {
         let answer = classify::<COUNT, { label::COUNT }>(kept, &examples[index].features, k, half);
@@ -60,15 +64,18 @@ pub fn condense(examples: &[Example<COUNT>], k: u8, radius: u32, most: usize) ->
         (class == Class::Weed) != (examples[index].label == label::WEED)
     };
     let mut kept = Vec::new();
-    keep_most_needed(examples, &edited, &mut kept, usize::MAX, half, is_mistreated);
-    if kept.len() > most {
-        return Err(TooMany { needed: kept.len(), most });
+    keep_most_needed(examples, edited, &mut kept, usize::MAX, half, is_mistreated);
+    let needed = kept.len().max(usize::from(k));
+    if needed > most {
+        return Err(TooMany { needed, most });
     }
     let is_stranger = |index: usize, kept: &[Example<COUNT>]| {
         kept.iter().all(|example| !are_fellows(example, &examples[index], radius))
     };
-    keep_most_needed(examples, &edited, &mut kept, most, radius, is_stranger);
-    Ok(Condensed { kept, edited_out })
+    keep_most_needed(examples, edited, &mut kept, most, radius, is_stranger);
+    let others: Vec<usize> = edited.iter().copied().filter(|index| !kept.contains(index)).collect();
+    kept.extend(others.iter().take(usize::from(k).saturating_sub(kept.len())));
+    Ok(kept)
 }
 
 /// While fewer than `most` are kept and `needs` says of any of `candidates` that the examples kept are not enough for it:
