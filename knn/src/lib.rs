@@ -43,21 +43,24 @@
 //! | `[Example<F>; n]` | n (F + 1) | |
 //! | [`Table<F, N>`](Table) | N (F + 1) + 2 | `add_example` O(1), `remove` O(n) |
 //! | [`Scale<F>`](Scale) | 7 F | `quantise`: F subtractions, shifts and multiplications |
-//! | [`classify`] | about 100 + 2 C of stack | n F multiplications of 8 x 8 bits; k steps an example within reach; k + C to vote |
+//! | [`classify`] | about 130 + 2 C of stack | n F multiplications of 8 x 8 bits; k steps an example within reach; k + C to vote |
 //!
-//! In cycles of an ATmega328P, for F = 5 and C = 2, random examples in SRAM, `opt-level = "s"`: about
-//! 600 + 207 n + (130 + 37 k) m, where m counts the examples that were among the k nearest when they were met, about
-//! k (1 + ln(n / k)) of n in random order. Measured means, in the simulator simavr:
+//! In cycles of an ATmega328P, for F = 5, C = 2 and k = 3, the examples in flash behind a store whose
+//! [`Examples::visit_near`] is written in assembly, compiled for size (`opt-level = "z"`), over 256 random queries:
 //!
-//! | n | k = 3 | k = 15 |
-//! |---|---|---|
-//! | 8 | 3,762 | |
-//! | 16 | 5,803 | 15,178 |
-//! | 32 | 9,642 | 26,163 |
-//! | 64 | 16,658 | 39,006 |
-//! | 128 | 29,882 | 56,100 |
+//! | n | fewest | mean | most |
+//! |---|---|---|---|
+//! | 8 | 1,741 | 2,267 | 2,646 |
+//! | 16 | 2,083 | 2,843 | 3,637 |
+//! | 32 | 2,901 | 3,908 | 4,889 |
+//! | 64 | 4,228 | 5,541 | 7,083 |
+//! | 128 | 6,667 | 8,136 | 10,432 |
 //!
-//! `quantise` took 1,274 cycles. A store that overrides [`Examples::visit_near`] with assembly replaces the 207.
+//! That is about 700 for the call and the vote, 40 for each example, and 190 for each that was among the k nearest when
+//! it was met: about k (1 + ln(n / k)) of n in random order. Searched by the plain [`Examples::visit_near`], an example
+//! costs about 200 instead of 40. Where more examples than k are as far as the k-th nearest, a second pass counts them.
+//! [`Scale::quantise`] takes 1,467 cycles. `cargo bench-uno`, in the weeder's workspace, measures all of this anew in the
+//! simulator simavr.
 //!
 //! # What it does not do
 //!
