@@ -91,7 +91,14 @@ pub fn run(arguments: &Arguments) -> Result<Harm> {
 
 impl Arguments {
     fn objects(&self) -> Result<Vec<Labelled>> {
-        if self.synthetic { Ok(synthetic::objects(self.seed)?) } else { Ok(table::read_labelled(&self.files)?) }
+        if self.synthetic {
+            return Ok(synthetic::objects(self.seed)?);
+        }
+        let lesson = table::read_labelled(&self.files)?;
+        if lesson.unlabelled > 0 {
+            println!("Passed over {} without a label", lesson.unlabelled);
+        }
+        Ok(lesson.objects)
     }
 
     /// The command that gives the same table again.

@@ -180,7 +180,8 @@ const HEADER: &str = "speed_mm_s,spacing_mm,delay_mm,hold_mm,actuation_mm,label\
 /// What reading files with these texts says; they are called 0.csv, 1.csv and so on.
 fn read_text(texts: &[&str]) -> Result<Vec<Labelled>, String> {
     let (folder, paths) = files(texts);
-    read_labelled(&paths).map_err(|error| error.to_string().replace(&format!("{}/", folder.path().display()), ""))
+    let lesson = read_labelled(&paths).map(|lesson| lesson.objects);
+    lesson.map_err(|error| error.to_string().replace(&format!("{}/", folder.path().display()), ""))
 }
 
 fn files(texts: &[&str]) -> (TempDir, Vec<PathBuf>) {
@@ -207,7 +208,7 @@ fn files_that_have_one_class_each_make_one_table() {
     let weeds = format!("{HEADER}694,300,226,117,440,weed\n");
     assert_eq!(read_text(&[&plants, &weeds]).unwrap().len(), 2);
     let error = read_text(&[&plants, &plants]).unwrap_err();
-    assert_eq!(error, "1.csv, line 2: all objects up to here are of the class plant: add some of the other class, too");
+    assert_eq!(error, "1.csv, line 2: up to here there is no label weed: some objects of either class are needed");
 }
 
 #[test]
@@ -224,14 +225,31 @@ fn a_bad_line_is_named_with_what_would_be_right() {
         ("694,500,226,2.5,573,plant\n", "line 2: hold_mm is `2.5`: it has to be a whole number"),
         ("694,40000,226,250,573,plant\n", "line 2: spacing_mm is 40000: it has to be from -32768 to 32767"),
         ("694,500,226,250,573,stone\n", "line 2: `stone` is not a class: label has to be plant or weed"),
-        ("694,500,226,250,573,\n", "line 2: there is no label: it has to be plant or weed"),
-        ("694,500,226,250,573\n", "line 2: 5 fields where the header has 6"),
-        ("694,500,226,250,573,weed\n", "line 2: all objects up to here are of the class weed"),
+        ("694,500,226,250,573,\n", "line 2: up to here there is no label plant"),
+        ("694,500,226,250,573\n", "line 2: fields: 5, where the header has 6"),
+        (
+            "694,500,226,250,573,weed\n",
+            "line 2: up to here there is no label plant: some objects of either class are needed",
+        ),
         ("", "line 1: there are no objects below the header"),
     ] {
         let error = read_text(&[&format!("{HEADER}{lines}")]).unwrap_err();
         assert!(error.starts_with(&format!("0.csv, {message}")), "{error}");
     }
+}
+
+#[test]
+fn objects_without_a_label_are_passed_over_and_counted() {
+    let text = format!("{HEADER}694,500,226,250,573,plant\n694,520,226,250,573,\n694,300,226,117,440,weed\n");
+    let (_folder, paths) = files(&[&text]);
+    let lesson = read_labelled(&paths).unwrap();
+    assert_eq!((lesson.objects.len(), lesson.unlabelled), (2, 1));
+}
+
+#[test]
+fn objects_to_learn_from_have_a_column_of_labels() {
+    let error = read_text(&["speed_mm_s,spacing_mm,delay_mm,hold_mm,actuation_mm\n694,500,226,250,573\n"]).unwrap_err();
+    assert!(error.starts_with("0.csv, line 1: the column `label` is missing"), "{error}");
 }
 
 #[test]

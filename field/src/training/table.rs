@@ -1,7 +1,7 @@
 //! Tables of objects in CSV files, as the firmware's console and its users write them.
 //!
 //! The header names the five features and `label`, in any order; more columns are passed over, and so are lines that
-//! begin with `#`. All features are whole numbers. A label is `plant` or `weed`.
+//! begin with `#`. All features are whole numbers. A label is `plant`, `weed`, or empty where nobody said what it was.
 
 use super::Labelled;
 use crate::row::Kind;
@@ -56,52 +56,64 @@ pub enum TableError {
 /// # Errors
 /// Names the file, the line and what would be right.
 pub fn read(path: &Path) -> Result<Vec<Recorded>, TableError> {
-    let objects = read_with_lines(path)?;
+    let objects = read_with_lines(path, false)?;
     Ok(objects.into_iter().map(|(_, object)| object).collect())
 }
 
-/// Reads objects that all have a label, of both classes, from files that together make one table.
+/// Objects to learn from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Lesson {
+    /// Those with a label, of both classes.
+    pub objects: Vec<Labelled>,
+    /// How many there were without, which teach nothing.
+    pub unlabelled: usize,
+}
+
+/// Reads objects of both classes from files that together make one table.
 ///
 /// # Errors
 /// Names the file, the line and what would be right.
-pub fn read_labelled(paths: &[PathBuf]) -> Result<Vec<Labelled>, TableError> {
-    let mut objects = Vec::new();
+pub fn read_labelled(paths: &[PathBuf]) -> Result<Lesson, TableError> {
+    let mut lesson = Lesson { objects: Vec::new(), unlabelled: 0 };
     let mut last = None;
     for path in paths {
-        for (line, Recorded { features, kind }) in read_with_lines(path)? {
-            let Some(kind) = kind else {
-                let problem = format!("there is no {LABEL}: it has to be plant or weed, or the line has to go");
-                return Err(TableError::Line { path: path.clone(), line, problem });
-            };
-            objects.push(Labelled { features, kind });
-            last = Some((path, line, kind));
+        for (line, Recorded { features, kind }) in read_with_lines(path, true)? {
+            match kind {
+                Some(kind) => lesson.objects.push(Labelled { features, kind }),
+                None => lesson.unlabelled += 1,
+            }
+            last = Some((path, line));
         }
     }
-    if let Some((path, line, kind)) = last
-        && objects.iter().all(|object| object.kind == kind)
-    {
-        let problem = format!("all objects up to here are of the class {kind}: add some of the other class, too");
-        return Err(TableError::Line { path: path.clone(), line, problem });
+    let has = |kind: Kind| lesson.objects.iter().any(|object| object.kind == kind);
+    let missing = [Kind::Plant, Kind::Weed].into_iter().find(|&kind| !has(kind));
+    match (missing, last) {
+        (Some(kind), Some((path, line))) => {
+            let problem = format!("up to here there is no {LABEL} {kind}: some objects of either class are needed");
+            Err(TableError::Line { path: path.clone(), line, problem })
+        }
+        _ => Ok(lesson),
     }
-    Ok(objects)
 }
 
-fn read_with_lines(path: &Path) -> Result<Vec<(u64, Recorded)>, TableError> {
+fn read_with_lines(path: &Path, wants_label: bool) -> Result<Vec<(u64, Recorded)>, TableError> {
     let file = File::open(path).map_err(|source| TableError::File { path: path.into(), source })?;
     let at = |line: u64, problem: String| TableError::Line { path: path.into(), line, problem };
     let from_csv = |error: csv::Error| at(error.position().map_or(1, csv::Position::line), explain(&error));
 
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(file);
     let header = reader.headers().map_err(from_csv)?.clone();
-    let place = |column: &str| header.iter().position(|name| name == column);
-    let mut places = [0; COLUMNS.len()];
-    for (index, column) in places.iter_mut().zip(COLUMNS) {
-        *index = place(column).ok_or_else(|| {
+    let place = |column: &str| {
+        header.iter().position(|name| name == column).ok_or_else(|| {
             let all = COLUMNS.join(",");
             at(1, format!("the column `{column}` is missing: the header has to name {all},{LABEL}"))
-        })?;
+        })
+    };
+    let mut places = [0; COLUMNS.len()];
+    for (index, column) in places.iter_mut().zip(COLUMNS) {
+        *index = place(column)?;
     }
-    let label = place(LABEL);
+    let label = if wants_label { Some(place(LABEL)?) } else { place(LABEL).ok() };
 
     let mut objects = Vec::new();
     let mut record = StringRecord::new();
@@ -145,7 +157,7 @@ fn whole_number(column: &str, text: &str) -> Result<i16, String> {
 fn explain(error: &csv::Error) -> String {
     match error.kind() {
         csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
-            format!("{len} fields where the header has {expected_len}: each line has one field a column")
+            format!("fields: {len}, where the header has {expected_len}: each line has one field a column")
         }
         csv::ErrorKind::Utf8 { .. } => "this is not text: a table is a CSV file in UTF-8".to_owned(),
         _ => error.to_string(),
