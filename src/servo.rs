@@ -21,6 +21,8 @@ pub struct Servo {
 impl Servo {
     /// Starts the signal with pulses of `width`.
     pub fn new(timer: TC1, port: &PORTB, width: HalfMicros) -> Self {
+        // The pin before the timer: the first pulse is whole then.
+        port.ddrb().modify(|_, w| w.pb1().set_bit());
         // ICR1 before the mode: the counter never runs without a top.
         timer.icr1().write(|w| w.set(FRAME - 1));
         timer.ocr1a().write(|w| w.set(compare(width)));
@@ -29,7 +31,6 @@ impl Servo {
         timer.tccr1a().write(|w| unsafe { w.com1a().match_clear().wgm1().bits(0b10) });
         // SAFETY: WGM13 and WGM12 of mode 14.
         timer.tccr1b().write(|w| unsafe { w.wgm1().bits(0b11).cs1().prescale_8() });
-        port.ddrb().modify(|_, w| w.pb1().set_bit());
         Self { timer, width }
     }
 

@@ -9,6 +9,7 @@ mod common;
 mod console_grammar;
 mod console_settings;
 mod encoder_at_full_rate;
+mod field_examples;
 mod leaves_the_row_when_told;
 mod long_beam_distance;
 mod memory_budget;

@@ -1,0 +1,163 @@
+//! Examples taught in the field: they change what the next object is taken for, and outlive the power.
+
+use crate::common::{ask, elf, refusal, run_for_ms, woken_up};
+use control::taught;
+use field::machine::Machine;
+use field::motion::Motion;
+use field::row::{Row, Thing};
+use field::signal::CYCLES_PER_SECOND;
+use field::uno::Uno;
+use knn::Example;
+use std::cell::RefCell;
+
+/// Where the firmware keeps the slots in EEPROM.
+const SLOTS_BEGIN: usize = 512;
+
+/// A width that is neither a plant's nor a weed's to the built-in examples.
+const ODD_WIDTH_MM: f64 = 55.0;
+
+/// Rolls past `count` odd objects, in hold.
+fn roll_past_odd_objects(uno: &mut Uno, count: usize) {
+    let things = (0..count).map(|index| Thing::weed(300.0 + 300.0 * index as f64, ODD_WIDTH_MM)).collect();
+    let row = Row::new(things).expect("the objects stand apart");
+    let motion = Motion::steady(0.0, 3000.0, 500.0, 300.0 * (count as f64 + 1.0));
+    let start = uno.cycle();
+    uno.drive(Machine::default().pin_changes(&row, &motion, start));
+    run_for_ms(uno, (motion.duration_s() * 1000.0) as u64 + 50);
+}
+
+/// An Uno that wakes up with this in its EEPROM.
+fn waking_up_with(eeprom: &[u8]) -> Uno {
+    let mut uno = Uno::boot_with_eeprom(&elf(), eeprom).expect("the firmware wakes up");
+    greeted(&mut uno);
+    uno
+}
+
+fn greeted(uno: &mut Uno) {
+    uno.run_until_serial("\n", CYCLES_PER_SECOND).expect("the firmware greets");
+}
+
+/// EEPROM as a memory for examples, to fill it with the firmware's own code.
+struct Image<'a>(&'a RefCell<Vec<u8>>);
+
+impl taught::Memory for Image<'_> {
+    fn read(&self, slot: u8) -> [u8; taught::SLOT] {
+        let begin = SLOTS_BEGIN + usize::from(slot) * taught::SLOT;
+        self.0.borrow()[begin..begin + taught::SLOT].try_into().expect("a slot's bytes")
+    }
+
+    fn write(&mut self, slot: u8, bytes: [u8; taught::SLOT]) {
+        let begin = SLOTS_BEGIN + usize::from(slot) * taught::SLOT;
+        self.0.borrow_mut()[begin..begin + taught::SLOT].copy_from_slice(&bytes);
+    }
+
+    fn carry_on(&mut self) -> bool {
+        true
+    }
+}
+
+/// An EEPROM with an example in every slot.
+fn full_eeprom() -> Vec<u8> {
+    let bytes = RefCell::new(vec![0xFF; 1024]);
+    let mut store = taught::FieldExamples::new(Image(&bytes));
+    for number in 0..taught::CAPACITY {
+        store.add(Example::new([number, 1, 2, 3, 4], number % 2)).expect("there is room");
+    }
+    bytes.into_inner()
+}
+
+fn answers(uno: &mut Uno) -> Vec<String> {
+    let objects = ask(uno, "dump");
+    let (heading, objects) = objects.split_first().expect("a heading");
+    assert_eq!(heading, "speed_mm_s,spacing_mm,delay_mm,hold_mm,actuation_mm,answer,votes,label");
+    objects.to_vec()
+}
+
+fn field_examples(uno: &mut Uno) -> Vec<String> {
+    let mut examples = ask(uno, "examples");
+    examples.retain(|line| line.starts_with("field "));
+    examples
+}
+
+#[test]
+fn an_object_that_was_labelled_is_known_when_it_comes_again() {
+    let mut uno = woken_up();
+    roll_past_odd_objects(&mut uno, 1);
+    let seen = answers(&mut uno);
+    assert_eq!(seen.len(), 1);
+    assert!(seen[0].contains(",unknown,") && seen[0].ends_with(','), "{seen:?}");
+
+    ask(&mut uno, "label weed");
+    let seen = answers(&mut uno);
+    assert!(seen[0].ends_with(",weed"), "{seen:?}");
+    assert_eq!(
+        refusal(&mut uno, "label weed"),
+        "error: there is no object without a label, let the beam see one first"
+    );
+    assert_eq!(field_examples(&mut uno).len(), 1);
+
+    // One neighbour decides: the next one is like the one that was taught.
+    uno.power_cycle();
+    greeted(&mut uno);
+    ask(&mut uno, "set k 1");
+    roll_past_odd_objects(&mut uno, 1);
+    let seen = answers(&mut uno);
+    assert!(seen.len() == 1 && seen[0].contains(",weed,1,"), "{seen:?}");
+}
+
+#[test]
+fn what_was_taught_survives_a_loss_of_power_and_a_spoiled_one_is_dropped_and_counted() {
+    let mut uno = woken_up();
+    roll_past_odd_objects(&mut uno, 1);
+    ask(&mut uno, "label plant");
+    let taught = field_examples(&mut uno);
+    assert_eq!(taught.len(), 1);
+    assert!(taught[0].starts_with("field 0 plant "), "{taught:?}");
+    uno.power_cycle();
+    greeted(&mut uno);
+    assert_eq!(field_examples(&mut uno), taught);
+    assert!(ask(&mut uno, "examples").contains(&"spoiled=0".to_owned()));
+
+    let mut eeprom = uno.eeprom();
+    eeprom[SLOTS_BEGIN + 2] ^= 0x10;
+    let mut uno = waking_up_with(&eeprom);
+    assert!(field_examples(&mut uno).is_empty());
+    assert!(ask(&mut uno, "examples").contains(&"spoiled=1".to_owned()));
+}
+
+#[test]
+fn examples_are_forgotten_one_by_one_or_all_at_once() {
+    let mut uno = waking_up_with(&full_eeprom());
+    assert_eq!(field_examples(&mut uno).len(), usize::from(taught::CAPACITY));
+    ask(&mut uno, "forget 31");
+    assert_eq!(refusal(&mut uno, "forget 31"), "error: no field example has this number, examples lists them");
+    assert_eq!(field_examples(&mut uno).len(), usize::from(taught::CAPACITY) - 1);
+    ask(&mut uno, "forget all");
+    assert!(field_examples(&mut uno).is_empty());
+    assert!(uno.eeprom()[SLOTS_BEGIN..SLOTS_BEGIN + 256].iter().all(|&byte| byte == 0xFF));
+}
+
+#[test]
+fn a_full_store_refuses_to_learn_until_something_is_forgotten() {
+    let mut uno = waking_up_with(&full_eeprom());
+    roll_past_odd_objects(&mut uno, 1);
+    assert_eq!(refusal(&mut uno, "label plant"), "error: all 32 places are taken, forget one first");
+    ask(&mut uno, "forget 5");
+    ask(&mut uno, "label plant");
+    assert!(field_examples(&mut uno)[5].starts_with("field 5 plant "));
+}
+
+#[test]
+fn without_an_object_there_is_nothing_to_label() {
+    let mut uno = woken_up();
+    let none = "error: there is no object without a label, let the beam see one first";
+    assert_eq!(refusal(&mut uno, "label plant"), none);
+    assert_eq!(answers(&mut uno), [""; 0]);
+}
+
+#[test]
+fn the_last_sixteen_objects_are_dumped() {
+    let mut uno = woken_up();
+    roll_past_odd_objects(&mut uno, 18);
+    assert_eq!(answers(&mut uno).len(), 16);
+}
