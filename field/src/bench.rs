@@ -253,7 +253,7 @@ pub fn memory_table(classifier: &ClassifierCosts, firmware: &FirmwareCosts) -> T
         ("flash", firmware.size.flash),
         ("static SRAM", firmware.size.sram),
         ("stack at its deepest", firmware.stack as u64),
-        ("of that, the classifier", classifier.stack.into()),
+        ("stack of a classification", classifier.stack.into()),
     ] {
         table.add_row([name.to_owned(), bytes.to_string()]);
     }
