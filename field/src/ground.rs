@@ -17,11 +17,11 @@ pub fn union(mut stretches: Vec<Range<f64>>) -> Vec<Range<f64>> {
 
 /// The share of `row` that the stretches of a [`union`] cover, from 0 to 1.
 pub fn share_of(row: &Range<f64>, union: &[Range<f64>]) -> f64 {
-    let covered: f64 = union
+    let covered = union
         .iter()
         .map(|stretch| stretch.end.min(row.end) - stretch.start.max(row.start))
         .filter(|length| *length > 0.0)
-        .sum();
+        .fold(0.0, |sum, length| sum + length);
     covered / (row.end - row.start)
 }
 
