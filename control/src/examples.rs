@@ -1,7 +1,7 @@
 //! The built-in examples: plants and tall weeds at the paper's four speeds.
 //!
-//! They were trained on simulated rows: `examples/table.rs` is what `weeder train --synthetic` wrote, in physical units. The
-//! compiler turns it into bytes. The result is a plain constant, so that it costs nothing where it is not used: the
+//! They were trained on simulated rows: `examples/table.rs` is what `weeder train --synthetic` wrote, in physical units.
+//! The compiler turns it into bytes. The result is a plain constant, so that it costs nothing where it is not used: the
 //! firmware lays it into flash, the host reads it as it is.
 
 mod table;

@@ -184,6 +184,16 @@ pub enum TrainingError {
     /// k is not one that the classifier takes.
     #[error("k is {0}: it has to be 1 to {MAX_K}")]
     KOutOfRange(u8),
+    /// The few examples would cut plants that all objects together spare.
+    #[error(
+        "with a vote of {k}, so few examples cut {plants} plants that all objects together spare: choose a smaller --k"
+    )]
+    Outvoted {
+        /// Examples that vote.
+        k: u8,
+        /// Plants cut by the table, beyond those that all objects cut.
+        plants: usize,
+    },
     /// The table would not fit.
     #[error(transparent)]
     TooMany(#[from] TooMany),
@@ -253,7 +263,10 @@ pub fn train(objects: &[Labelled], k: Option<u8>, most: usize) -> Result<Trainin
         by_table: Confusion::default(),
     };
     training.by_table = training.model().judge(objects);
-    Ok(training)
+    match training.by_table.plants_taken_for_weeds().saturating_sub(leave_one_out.plants_taken_for_weeds()) {
+        0 => Ok(training),
+        plants => Err(TrainingError::Outvoted { k, plants }),
+    }
 }
 
 /// The objects as examples.

@@ -128,6 +128,21 @@ fn a_handful_of_objects_does_not_make_weeds_of_what_is_nearer_to_plants() {
 }
 
 #[test]
+fn a_table_that_cuts_plants_which_all_objects_together_spare_is_refused() {
+    let objects = synthetic::objects(1).unwrap();
+    let few = train(&objects, None, MOST_EXAMPLES).unwrap().kept;
+    let error = train(&few, Some(15), MOST_EXAMPLES).unwrap_err();
+    assert!(matches!(error, TrainingError::Outvoted { k: 15, .. }), "{error}");
+}
+
+#[test]
+fn lines_are_counted_alike_however_they_end() {
+    let text = format!("{HEADER}694,500,226,250,573,plant\nok\n").replace('\n', "\r\n");
+    let error = read_text(&[&text]).unwrap_err();
+    assert!(error.starts_with("0.csv, line 3: fields: 1, where the header has 6"), "{error}");
+}
+
+#[test]
 fn as_many_examples_are_kept_as_vote() {
     let training = train(&clear_case(), Some(15), MOST_EXAMPLES).unwrap();
     assert!(training.kept.len() >= 15);
@@ -263,5 +278,5 @@ fn objects_to_be_classified_need_no_label() {
 #[test]
 fn a_file_that_does_not_exist_is_named() {
     let error = read_labelled(&[PathBuf::from("no/such/objects.csv")]).unwrap_err().to_string();
-    assert!(error.starts_with("no/such/objects.csv: "), "{error}");
+    assert!(error.starts_with("no/such/objects.csv cannot be read"), "{error}");
 }

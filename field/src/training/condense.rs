@@ -8,7 +8,8 @@
 //!    they come; here the one goes first that has the most others of its class and plight around it, as long as they
 //!    have no example near.
 //! 3. **Filling up**: plants that no kept example is near are unknown, which spares them. As long as there is room, they
-//!    are kept in the same order; and in any case so many objects as are to vote.
+//!    are kept in the same order; and in any case so many objects as are to vote. Hart's rule has the last word: a table
+//!    that cannot treat all of them as it should without more examples than there is room for is refused.
 //!
 //! Where several objects would do, the first in the list does.
 
@@ -59,22 +60,27 @@ pub fn condense(
 ) -> Result<Vec<usize>, TooMany> {
     let half = radius / 2;
     let is_mistreated = |index: usize, kept: &[Example<COUNT>]| {
-        let answer = classify::<COUNT, { label::COUNT }>(kept, &examples[index].features, k, half);
-        let class = answer.map_or(Class::Unknown, |answer| class_of(&answer));
-        (class == Class::Weed) != (examples[index].label == label::WEED)
+        let is_weed = examples[index].label == label::WEED;
+        let reach = if is_weed { half } else { radius };
+        let answer = classify::<COUNT, { label::COUNT }>(kept, &examples[index].features, k, reach);
+        is_weed != (answer.map_or(Class::Unknown, |answer| class_of(&answer)) == Class::Weed)
     };
     let mut kept = Vec::new();
-    keep_most_needed(examples, edited, &mut kept, usize::MAX, half, is_mistreated);
-    let needed = kept.len().max(usize::from(k));
-    if needed > most {
-        return Err(TooMany { needed, most });
-    }
+    keep_most_needed(examples, edited, &mut kept, usize::MAX, half, &is_mistreated);
+    let fits = |kept: &[usize]| match kept.len().max(usize::from(k)) {
+        needed if needed > most => Err(TooMany { needed, most }),
+        _ => Ok(()),
+    };
+    fits(&kept)?;
     let is_stranger = |index: usize, kept: &[Example<COUNT>]| {
         kept.iter().all(|example| !are_fellows(example, &examples[index], radius))
     };
     keep_most_needed(examples, edited, &mut kept, most, radius, is_stranger);
     let others: Vec<usize> = edited.iter().copied().filter(|index| !kept.contains(index)).collect();
     kept.extend(others.iter().take(usize::from(k).saturating_sub(kept.len())));
+    // A plant that is no longer a stranger can be outvoted by the weeds around it, and so can a weed.
+    keep_most_needed(examples, edited, &mut kept, usize::MAX, half, &is_mistreated);
+    fits(&kept)?;
     Ok(kept)
 }
 

@@ -7,7 +7,7 @@ use super::Labelled;
 use crate::row::Kind;
 use control::features::Features;
 use csv::StringRecord;
-use std::fs::File;
+use std::fs;
 use std::io;
 use std::num::IntErrorKind;
 use std::path::{Path, PathBuf};
@@ -32,7 +32,7 @@ pub struct Recorded {
 #[derive(Debug, Error)]
 pub enum TableError {
     /// The file itself.
-    #[error("{}: {source}", path.display())]
+    #[error("{} cannot be read", path.display())]
     File {
         /// The file.
         path: PathBuf,
@@ -97,11 +97,15 @@ pub fn read_labelled(paths: &[PathBuf]) -> Result<Lesson, TableError> {
 }
 
 fn read_with_lines(path: &Path, wants_label: bool) -> Result<Vec<(u64, Recorded)>, TableError> {
-    let file = File::open(path).map_err(|source| TableError::File { path: path.into(), source })?;
+    let bytes = fs::read(path).map_err(|source| TableError::File { path: path.into(), source })?;
     let at = |line: u64, problem: String| TableError::Line { path: path.into(), line, problem };
     let from_csv = |error: csv::Error| at(error.position().map_or(1, csv::Position::line), explain(&error));
 
-    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(file);
+    let text = String::from_utf8(bytes)
+        .map_err(|_| at(1, "this is not text: a table is a CSV file in UTF-8".to_owned()))?
+        // The reader counts a line that ends with both as one line less.
+        .replace("\r\n", "\n");
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(text.as_bytes());
     let header = reader.headers().map_err(from_csv)?.clone();
     let place = |column: &str| {
         header.iter().position(|name| name == column).ok_or_else(|| {
@@ -159,7 +163,6 @@ fn explain(error: &csv::Error) -> String {
         csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
             format!("fields: {len}, where the header has {expected_len}: each line has one field a column")
         }
-        csv::ErrorKind::Utf8 { .. } => "this is not text: a table is a CSV file in UTF-8".to_owned(),
         _ => error.to_string(),
     }
 }
