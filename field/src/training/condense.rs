@@ -66,7 +66,7 @@ pub fn condense(
         is_weed != (answer.map_or(Class::Unknown, |answer| class_of(&answer)) == Class::Weed)
     };
     let mut kept = Vec::new();
-    keep_most_needed(examples, edited, &mut kept, usize::MAX, half, &is_mistreated);
+    keep_most_needed(examples, edited, &mut kept, usize::MAX, half, is_mistreated);
     let fits = |kept: &[usize]| match kept.len().max(usize::from(k)) {
         needed if needed > most => Err(TooMany { needed, most }),
         _ => Ok(()),
@@ -79,7 +79,7 @@ pub fn condense(
     let others: Vec<usize> = edited.iter().copied().filter(|index| !kept.contains(index)).collect();
     kept.extend(others.iter().take(usize::from(k).saturating_sub(kept.len())));
     // A plant that is no longer a stranger can be outvoted by the weeds around it, and so can a weed.
-    keep_most_needed(examples, edited, &mut kept, usize::MAX, half, &is_mistreated);
+    keep_most_needed(examples, edited, &mut kept, usize::MAX, half, is_mistreated);
     fits(&kept)?;
     Ok(kept)
 }
