@@ -75,6 +75,26 @@ impl Search {
         /// The distance's upper byte where no example is left; five features stay below 5 * 2^16.
         const NONE: u8 = u8::MAX;
 
+        /// A feature: its difference, squared, joins the sum. Out of reach, the next example has its turn.
+        macro_rules! feature {
+            ($query:literal) => {
+                concat!(
+                    "lpm  {byte}, Z+\n",
+                    "sub  {byte}, {",
+                    $query,
+                    "}\n",
+                    "brcc 4f\n",
+                    "neg  {byte}\n",
+                    "4:\n",
+                    "mul  {byte}, {byte}\n",
+                    "add  {lower:h}, r0\n",
+                    "adc  {upper:l}, r1\n",
+                    "adc  {upper:h}, {zero}\n",
+                    "brcs 2b",
+                )
+            };
+        }
+
         let [a, b, c, d, e] = *query;
         // The sum lies in the upper three of four bytes, above the label. No example is beyond a reach of 24 bits.
         let start = if reach < 1 << 24 { !(reach << 8) } else { 0 };
@@ -93,57 +113,11 @@ impl Search {
                 "adiw {next:l}, {row}",
                 "mov  {lower:h}, {start_lower:h}",
                 "movw {upper:l}, {start_upper:l}",
-                // A feature: its difference, squared, joins the sum.
-                "lpm  {byte}, Z+",
-                "sub  {byte}, {a}",
-                "brcc 4f",
-                "neg  {byte}",
-                "4:",
-                "mul  {byte}, {byte}",
-                "add  {lower:h}, r0",
-                "adc  {upper:l}, r1",
-                "adc  {upper:h}, {zero}",
-                "brcs 2b",
-                "lpm  {byte}, Z+",
-                "sub  {byte}, {b}",
-                "brcc 4f",
-                "neg  {byte}",
-                "4:",
-                "mul  {byte}, {byte}",
-                "add  {lower:h}, r0",
-                "adc  {upper:l}, r1",
-                "adc  {upper:h}, {zero}",
-                "brcs 2b",
-                "lpm  {byte}, Z+",
-                "sub  {byte}, {c}",
-                "brcc 4f",
-                "neg  {byte}",
-                "4:",
-                "mul  {byte}, {byte}",
-                "add  {lower:h}, r0",
-                "adc  {upper:l}, r1",
-                "adc  {upper:h}, {zero}",
-                "brcs 2b",
-                "lpm  {byte}, Z+",
-                "sub  {byte}, {d}",
-                "brcc 4f",
-                "neg  {byte}",
-                "4:",
-                "mul  {byte}, {byte}",
-                "add  {lower:h}, r0",
-                "adc  {upper:l}, r1",
-                "adc  {upper:h}, {zero}",
-                "brcs 2b",
-                "lpm  {byte}, Z+",
-                "sub  {byte}, {e}",
-                "brcc 4f",
-                "neg  {byte}",
-                "4:",
-                "mul  {byte}, {byte}",
-                "add  {lower:h}, r0",
-                "adc  {upper:l}, r1",
-                "adc  {upper:h}, {zero}",
-                "brcs 2b",
+                feature!("a"),
+                feature!("b"),
+                feature!("c"),
+                feature!("d"),
+                feature!("e"),
                 // Within reach: the distance is what the sum has grown by.
                 "sub  {lower:h}, {start_lower:h}",
                 "sbc  {upper:l}, {start_upper:l}",

@@ -36,7 +36,7 @@ fn machine() -> Machine {
 /// Types a line and returns the answer's lines.
 fn ask(machine: &mut Machine, line: &str) -> Vec<String> {
     let mut buffer = LineBuffer::new();
-    let command = line.bytes().chain([b'\n']).find_map(|byte| buffer.take(byte)).expect("a line that says something");
+    let command = line.bytes().chain(*b"\n").find_map(|byte| buffer.take(byte)).expect("a line that says something");
     let mut answer = reply::answer(command, machine);
     let mut lines = Vec::new();
     while !answer.is_done() {
