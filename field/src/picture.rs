@@ -1,14 +1,14 @@
 //! A picture of the row along the ground: what stood there, what the beam saw, and where the tool was.
 //!
-//! The row is broken into lanes, to be read like lines of a text. The picture brings its own light background, so that it
-//! reads the same on a light page and on a dark one.
+//! The row is broken into lanes, to be read like lines of a text.
 
+use crate::drawing::{Legend, PALE_INK, document, line, paper, rectangle, swatch, tenth, words};
 use crate::row::{Kind, Thing};
 use crate::trial::{Outcome, Trial};
 use crate::verdict::Verdict;
 use std::ops::Range;
 use svg::Document;
-use svg::node::element::{ClipPath, Definitions, Ellipse, Group, Line, Polyline, Rectangle, Text};
+use svg::node::element::{ClipPath, Definitions, Ellipse, Group, Line, Polyline};
 
 /// Ground in a lane, and the picture's pixels for a millimetre of it.
 const LANE_MM: f64 = 2500.0;
@@ -29,9 +29,6 @@ const IN_Y: f64 = 132.0;
 const OUT_Y: f64 = 96.0;
 const SCALE_Y: f64 = 140.0;
 
-const PAPER: &str = "#fbfaf6";
-const INK: &str = "#33312c";
-const PALE_INK: &str = "#8a857a";
 const PLANT: &str = "#4c9a50";
 const MARGIN_CUT: &str = "#e0a526";
 const DAMAGED: &str = "#cf3a32";
@@ -47,13 +44,8 @@ pub fn draw(trial: &Trial, outcome: &Outcome) -> Document {
     let lanes = ((span.end - span.start) / LANE_MM).ceil().max(1.0) as usize;
     let (width, height) = (LANE_WIDTH + 2.0 * SIDE, HEAD + lanes as f64 * LANE_HEIGHT + 8.0);
     let clip = ClipPath::new().set("id", "lane").add(rectangle(0.0, 0.0, LANE_WIDTH, LANE_HEIGHT, "#000"));
-    let mut document = Document::new()
-        .set("viewBox", (0, 0, width.round() as i32, height.round() as i32))
-        .set("font-family", "system-ui, sans-serif")
-        .set("font-size", 12)
-        .add(Definitions::new().add(clip))
-        .add(rectangle(0.0, 0.0, width, height, PAPER).set("rx", 10))
-        .add(legend());
+    let mut document =
+        document(width, height).add(Definitions::new().add(clip)).add(paper(width, height)).add(legend());
     for lane in 0..lanes {
         let start_mm = span.start + lane as f64 * LANE_MM;
         let ground = start_mm..(start_mm + LANE_MM).min(span.end);
@@ -158,44 +150,15 @@ fn legend() -> Group {
         (OUT, "tool clear of the row"),
         (CURVE, "tool's angle"),
     ];
-    let mut legend = Group::new();
-    let mut x = SIDE;
+    let mut legend = Legend::new(SIDE, 22.0);
     for (colour, meaning) in entries {
-        legend =
-            legend.add(rectangle(x, 22.0, 12.0, 12.0, colour).set("rx", 2)).add(words(x + 17.0, 32.0, meaning, INK));
-        x += 42.0 + 6.4 * meaning.len() as f64;
+        legend.explain(|x, y| swatch(x, y, colour), meaning);
     }
-    legend
+    legend.drawn()
 }
 
 fn angle_y(degrees: f64) -> f64 {
     IN_Y + (OUT_Y - IN_Y) * degrees / crate::servo::OUT_DEGREES
-}
-
-fn tenth(value: f64) -> f64 {
-    (value * 10.0).round() / 10.0
-}
-
-fn rectangle(x: f64, y: f64, width: f64, height: f64, fill: &str) -> Rectangle {
-    Rectangle::new()
-        .set("x", tenth(x))
-        .set("y", tenth(y))
-        .set("width", tenth(width))
-        .set("height", tenth(height))
-        .set("fill", fill)
-}
-
-fn line(x1: f64, y1: f64, x2: f64, y2: f64, stroke: &str) -> Line {
-    Line::new()
-        .set("x1", tenth(x1))
-        .set("y1", tenth(y1))
-        .set("x2", tenth(x2))
-        .set("y2", tenth(y2))
-        .set("stroke", stroke)
-}
-
-fn words(x: f64, y: f64, words: &str, fill: &str) -> Text {
-    Text::new(words).set("x", tenth(x)).set("y", tenth(y)).set("fill", fill)
 }
 
 #[cfg(test)]

@@ -5,12 +5,13 @@
 //! actuation follow from the other features, so that nothing is hidden behind the two that are drawn.
 
 use super::{Labelled, Model, Training};
+use crate::drawing::{INK, Legend, MARK_SIZE, PALE_INK, document, line, paper, rectangle, swatch, tenth, words};
 use crate::row::Kind;
 use control::classifier::Class;
 use control::features::{Features, SPEED_CLASSES_MM_S, speed_class};
 use std::ops::Range;
 use svg::Document;
-use svg::node::element::{Circle, Group, Line, Rectangle, Text};
+use svg::node::element::{Circle, Group};
 
 /// A panel's size in pixels, and the grain of its ground.
 const PANEL_WIDTH: f64 = 420.0;
@@ -28,9 +29,6 @@ const PANELS_ABREAST: usize = 2;
 /// Hold of an object without width: the two margins of the reference machine.
 const LEAST_HOLD_MM: f64 = 100.0;
 
-const PAPER: &str = "#fbfaf6";
-const INK: &str = "#33312c";
-const PALE_INK: &str = "#8a857a";
 const PLANT: &str = "#2f7d34";
 const WEED: &str = "#a0521c";
 const PLANT_GROUND: &str = "#d3e8d0";
@@ -47,12 +45,7 @@ pub fn draw(training: &Training, objects: &[Labelled]) -> Document {
     let (across, down) = (LEFT + PANEL_WIDTH + RIGHT, ABOVE + PANEL_HEIGHT + BELOW);
     let width = across * classes.len().min(PANELS_ABREAST) as f64;
     let height = HEAD + down * classes.len().div_ceil(PANELS_ABREAST) as f64;
-    let mut document = Document::new()
-        .set("viewBox", (0, 0, width.round() as i32, height.round() as i32))
-        .set("font-family", "system-ui, sans-serif")
-        .set("font-size", 12)
-        .add(rectangle(0.0, 0.0, width, height, PAPER).set("rx", 10))
-        .add(legend());
+    let mut document = document(width, height).add(paper(width, height)).add(legend());
     for (index, class) in classes.into_iter().enumerate() {
         let (column, line) = (index % PANELS_ABREAST, index / PANELS_ABREAST);
         let corner = (column as f64 * across + LEFT, HEAD + line as f64 * down + ABOVE);
@@ -105,8 +98,8 @@ impl Axes {
         let title = format!("{:.1} km/h", f64::from(class_mm_s) * 0.0036);
         let mut drawn = Group::new()
             .add(words(0.0, -8.0, &title, INK).set("font-weight", "bold"))
-            .add(line(0.0, PANEL_HEIGHT, PANEL_WIDTH, PANEL_HEIGHT))
-            .add(line(0.0, 0.0, 0.0, PANEL_HEIGHT))
+            .add(line(0.0, PANEL_HEIGHT, PANEL_WIDTH, PANEL_HEIGHT, PALE_INK))
+            .add(line(0.0, 0.0, 0.0, PANEL_HEIGHT, PALE_INK))
             .add(words(PANEL_WIDTH, PANEL_HEIGHT + 34.0, "spacing, mm", INK).set("text-anchor", "end"))
             .add(
                 words(0.0, 0.0, "hold, mm", INK)
@@ -116,13 +109,13 @@ impl Axes {
         for spacing_mm in marks(&self.spacing_mm) {
             let x = self.x(spacing_mm);
             drawn = drawn
-                .add(line(x, PANEL_HEIGHT, x, PANEL_HEIGHT + 4.0))
+                .add(line(x, PANEL_HEIGHT, x, PANEL_HEIGHT + 4.0, PALE_INK))
                 .add(words(x, PANEL_HEIGHT + 17.0, &spacing_mm.to_string(), PALE_INK).set("text-anchor", "middle"));
         }
         for hold_mm in marks(&self.hold_mm) {
             let y = self.y(hold_mm);
             drawn = drawn
-                .add(line(-4.0, y, 0.0, y))
+                .add(line(-4.0, y, 0.0, y, PALE_INK))
                 .add(words(-8.0, y + 4.0, &hold_mm.to_string(), PALE_INK).set("text-anchor", "end"));
         }
         drawn
@@ -190,40 +183,16 @@ fn legend() -> Group {
         (WEED_GROUND, "known as a weed"),
         (UNKNOWN_GROUND, "unknown: spared like a plant"),
     ];
-    let mut legend = Group::new();
-    let mut x = LEFT;
+    // Some of the colours are almost the paper's.
+    let outlined = |x, y, colour| swatch(x, y, colour).set("stroke", PALE_INK).set("stroke-width", 0.5);
+    let ring = |x, y| {
+        let (x, y) = (x + MARK_SIZE / 2.0, y + MARK_SIZE / 2.0);
+        Circle::new().set("cx", x).set("cy", y).set("r", 4).set("fill", "none").set("stroke", INK)
+    };
+    let mut legend = Legend::new(LEFT, 18.0);
     for (colour, meaning) in entries {
-        legend = legend
-            .add(rectangle(x, 18.0, 12.0, 12.0, colour).set("rx", 2).set("stroke", PALE_INK).set("stroke-width", 0.5))
-            .add(words(x + 17.0, 28.0, meaning, INK));
-        x += 42.0 + 6.4 * meaning.len() as f64;
+        legend.explain(|x, y| outlined(x, y, colour), meaning);
     }
-    let ring = Circle::new().set("cx", x + 6.0).set("cy", 24).set("r", 4).set("fill", "none").set("stroke", INK);
-    legend.add(ring).add(words(x + 17.0, 28.0, "kept as an example", INK))
-}
-
-fn tenth(value: f64) -> f64 {
-    (value * 10.0).round() / 10.0
-}
-
-fn rectangle(x: f64, y: f64, width: f64, height: f64, fill: &str) -> Rectangle {
-    Rectangle::new()
-        .set("x", tenth(x))
-        .set("y", tenth(y))
-        .set("width", tenth(width))
-        .set("height", tenth(height))
-        .set("fill", fill)
-}
-
-fn line(x1: f64, y1: f64, x2: f64, y2: f64) -> Line {
-    Line::new()
-        .set("x1", tenth(x1))
-        .set("y1", tenth(y1))
-        .set("x2", tenth(x2))
-        .set("y2", tenth(y2))
-        .set("stroke", PALE_INK)
-}
-
-fn words(x: f64, y: f64, words: &str, fill: &str) -> Text {
-    Text::new(words).set("x", tenth(x)).set("y", tenth(y)).set("fill", fill)
+    legend.explain(ring, "kept as an example");
+    legend.drawn()
 }
