@@ -129,39 +129,23 @@ impl Capture {
     ///
     /// Where the file is no VCD, has no such channels, or leaves their levels open.
     pub fn read(path: &Path, channels: &Channels) -> Result<Capture, CaptureError> {
-        let file = File::open(path).map_err(|source| CaptureError::Read {
-            path: path.into(),
-            source,
-        })?;
+        let file = File::open(path).map_err(|source| CaptureError::Read { path: path.into(), source })?;
         Capture::parse(path, BufReader::new(file), channels)
     }
 
     fn parse(path: &Path, file: impl BufRead, channels: &Channels) -> Result<Capture, CaptureError> {
-        let read_error = |source| CaptureError::Read {
-            path: path.into(),
-            source,
-        };
+        let read_error = |source| CaptureError::Read { path: path.into(), source };
         let mut parser = Parser::new(file);
         let header = parser.parse_header().map_err(read_error)?;
-        let timescale = header
-            .timescale
-            .ok_or_else(|| CaptureError::NoTimescale { path: path.into() })?;
+        let timescale = header.timescale.ok_or_else(|| CaptureError::NoTimescale { path: path.into() })?;
 
         let mut known = Vec::new();
         list_channels("", &header.items, &mut known);
         let mut wires = BTreeMap::new();
-        let wanted = [
-            (Pin::EncoderA, Some(channels.a)),
-            (Pin::EncoderB, Some(channels.b)),
-            (Pin::Beam, channels.beam),
-        ];
+        let wanted = [(Pin::EncoderA, Some(channels.a)), (Pin::EncoderB, Some(channels.b)), (Pin::Beam, channels.beam)];
         for (pin, name) in wanted {
             let Some(name) = name else { continue };
-            let channel = Channel {
-                pin,
-                name: name.to_owned(),
-                level: None,
-            };
+            let channel = Channel { pin, name: name.to_owned(), level: None };
             if wires.insert(find_channel(path, name, &known)?, channel).is_some() {
                 return Err(CaptureError::SharedChannel { name: name.to_owned() });
             }
@@ -172,10 +156,7 @@ impl Capture {
         while let Some(command) = parser.next().transpose().map_err(read_error)? {
             match command {
                 Command::Timestamp(later) if later < time => {
-                    return Err(CaptureError::BackInTime {
-                        path: path.into(),
-                        line: parser.line(),
-                    });
+                    return Err(CaptureError::BackInTime { path: path.into(), line: parser.line() });
                 }
                 Command::Timestamp(later) => time = later,
                 Command::ChangeScalar(wire, value) => {
@@ -194,21 +175,14 @@ impl Capture {
                     };
                     if channel.level.replace(high) != Some(high) {
                         let cycle = to_cycles(time, timescale);
-                        changes.push(PinChange {
-                            cycle,
-                            pin: channel.pin,
-                            high,
-                        });
+                        changes.push(PinChange { cycle, pin: channel.pin, high });
                     }
                 }
                 _ => {}
             }
         }
         match wires.into_values().find(|channel| channel.level.is_none()) {
-            Some(Channel { name, .. }) => Err(CaptureError::NoSamples {
-                path: path.into(),
-                name,
-            }),
+            Some(Channel { name, .. }) => Err(CaptureError::NoSamples { path: path.into(), name }),
             None => Ok(Capture { changes }),
         }
     }
@@ -216,10 +190,7 @@ impl Capture {
     /// The recording's levels with its first one at `cycle`.
     pub fn starting_at(&self, cycle: u64) -> impl Iterator<Item = PinChange> {
         let first = self.changes.first().map_or(0, |change| change.cycle);
-        self.changes.iter().map(move |change| PinChange {
-            cycle: change.cycle - first + cycle,
-            ..*change
-        })
+        self.changes.iter().map(move |change| PinChange { cycle: change.cycle - first + cycle, ..*change })
     }
 }
 
@@ -245,24 +216,17 @@ fn list_channels<'a>(scope: &str, items: &'a [ScopeItem], known: &mut Vec<(Strin
 
 /// The wire of the channel `name`.
 fn find_channel(path: &Path, name: &str, known: &[(String, &Var)]) -> Result<IdCode, CaptureError> {
-    let matching: Vec<_> = known
-        .iter()
-        .filter(|(full_name, channel)| full_name == name || channel.reference == name)
-        .collect();
+    let matching: Vec<_> =
+        known.iter().filter(|(full_name, channel)| full_name == name || channel.reference == name).collect();
     match matching[..] {
         [(_, channel)] if channel.size == 1 => Ok(channel.code),
-        [(_, channel)] => Err(CaptureError::NotOneWire {
-            path: path.into(),
-            name: name.to_owned(),
-            width: channel.size,
-        }),
+        [(_, channel)] => {
+            Err(CaptureError::NotOneWire { path: path.into(), name: name.to_owned(), width: channel.size })
+        }
         [] => Err(CaptureError::UnknownChannel {
             path: path.into(),
             name: name.to_owned(),
-            known: known
-                .iter()
-                .map(|(_, channel)| format!("`{}`", channel.reference))
-                .collect(),
+            known: known.iter().map(|(_, channel)| format!("`{}`", channel.reference)).collect(),
         }),
         _ => Err(CaptureError::AmbiguousChannel {
             path: path.into(),
@@ -276,11 +240,7 @@ fn find_channel(path: &Path, name: &str, known: &[(String, &Var)]) -> Result<IdC
 mod tests {
     use super::*;
 
-    const CHANNELS: Channels = Channels {
-        a: "A",
-        b: "B",
-        beam: None,
-    };
+    const CHANNELS: Channels = Channels { a: "A", b: "B", beam: None };
 
     fn recording(timescale: &str, samples: &str) -> String {
         format!(
@@ -291,13 +251,7 @@ mod tests {
 
     fn parse(file: &str, channels: &Channels) -> Result<Vec<(u64, Pin, bool)>, String> {
         Capture::parse(Path::new("row.vcd"), file.as_bytes(), channels)
-            .map(|capture| {
-                capture
-                    .changes
-                    .iter()
-                    .map(|change| (change.cycle, change.pin, change.high))
-                    .collect()
-            })
+            .map(|capture| capture.changes.iter().map(|change| (change.cycle, change.pin, change.high)).collect())
             .map_err(|error| error.to_string())
     }
 
@@ -326,43 +280,19 @@ mod tests {
         assert_eq!(unknown, "row.vcd has no channel `C`; it has `A`, `B`, `bus`");
         assert!(error(Channels { b: "bus", ..CHANNELS }).contains("8 bits wide"));
         assert!(error(Channels { b: "A", ..CHANNELS }).contains("given for two signals"));
-        assert!(
-            error(Channels {
-                beam: Some("B"),
-                ..CHANNELS
-            })
-            .contains("given for two signals")
-        );
-        assert!(
-            parse(
-                &file,
-                &Channels {
-                    a: "analyser.A",
-                    ..CHANNELS
-                }
-            )
-            .is_ok()
-        );
+        assert!(error(Channels { beam: Some("B"), ..CHANNELS }).contains("given for two signals"));
+        assert!(parse(&file, &Channels { a: "analyser.A", ..CHANNELS }).is_ok());
     }
 
     #[test]
     fn a_name_in_two_scopes_must_be_written_in_full() {
-        let file = recording("1 us", "#0 0! 0\" 1$").replace(
-            "$enddefinitions",
-            "$scope module other $end $var wire 1 $ A $end $upscope $end $enddefinitions",
-        );
+        let file = recording("1 us", "#0 0! 0\" 1$")
+            .replace("$enddefinitions", "$scope module other $end $var wire 1 $ A $end $upscope $end $enddefinitions");
         assert_eq!(
             parse(&file, &CHANNELS).unwrap_err(),
             "row.vcd has several channels `A`: write one of `analyser.A`, `other.A`"
         );
-        let chosen = parse(
-            &file,
-            &Channels {
-                a: "other.A",
-                ..CHANNELS
-            },
-        )
-        .unwrap();
+        let chosen = parse(&file, &Channels { a: "other.A", ..CHANNELS }).unwrap();
         assert!(chosen.contains(&(0, Pin::EncoderA, true)));
     }
 
@@ -380,14 +310,8 @@ mod tests {
 
     #[test]
     fn a_recording_can_be_moved_to_a_later_start() {
-        let changes = [40, 56, 90].map(|cycle| PinChange {
-            cycle,
-            pin: Pin::EncoderA,
-            high: cycle == 56,
-        });
-        let capture = Capture {
-            changes: changes.to_vec(),
-        };
+        let changes = [40, 56, 90].map(|cycle| PinChange { cycle, pin: Pin::EncoderA, high: cycle == 56 });
+        let capture = Capture { changes: changes.to_vec() };
         let moved: Vec<u64> = capture.starting_at(1000).map(|change| change.cycle).collect();
         assert_eq!(moved, [1000, 1016, 1050]);
     }
@@ -405,19 +329,12 @@ mod tests {
         }
         let path = std::env::temp_dir().join(format!("weeder-waveform-{}.vcd", std::process::id()));
         crate::waveform::write(&path, written.iter().rev().copied()).unwrap();
-        let channels = Channels {
-            a: "encoder_a",
-            b: "encoder_b",
-            beam: Some("beam"),
-        };
+        let channels = Channels { a: "encoder_a", b: "encoder_b", beam: Some("beam") };
         let read = Capture::read(&path, &channels);
         std::fs::remove_file(&path).unwrap();
 
-        let at_rest = [Pin::EncoderA, Pin::EncoderB, Pin::Beam].map(|pin| PinChange {
-            cycle: 0,
-            pin,
-            high: pin.level_at_rest(),
-        });
+        let at_rest =
+            [Pin::EncoderA, Pin::EncoderB, Pin::Beam].map(|pin| PinChange { cycle: 0, pin, high: pin.level_at_rest() });
         assert_eq!(read.unwrap().changes, [&at_rest[..], &written].concat());
     }
 }

@@ -224,20 +224,11 @@ impl Image {
     ///
     /// Where the file cannot be read, is no ELF for AVR, or holds more than the ATmega328P does.
     pub fn read(path: &Path) -> Result<Image, ImageError> {
-        let bytes = std::fs::read(path).map_err(|source| ImageError::Read {
-            path: path.into(),
-            source,
-        })?;
-        let not_elf = |reason| ImageError::NotElf {
-            path: path.into(),
-            reason,
-        };
+        let bytes = std::fs::read(path).map_err(|source| ImageError::Read { path: path.into(), source })?;
+        let not_elf = |reason| ImageError::NotElf { path: path.into(), reason };
         let architecture = object::File::parse(&*bytes).map_err(not_elf)?.architecture();
         if architecture != Architecture::Avr {
-            return Err(ImageError::NotAvr {
-                path: path.into(),
-                architecture,
-            });
+            return Err(ImageError::NotAvr { path: path.into(), architecture });
         }
         let file = ElfFile32::<LittleEndian>::parse(&*bytes).map_err(not_elf)?;
 
@@ -257,12 +248,7 @@ impl Image {
             };
             let end = start + content.len() as u64;
             if end > limit as u64 {
-                return Err(ImageError::TooLarge {
-                    path: path.into(),
-                    memory: name,
-                    end,
-                    limit,
-                });
+                return Err(ImageError::TooLarge { path: path.into(), memory: name, end, limit });
             }
             let (start, end) = (start as usize, end as usize);
             if memory.len() < end {
@@ -272,12 +258,7 @@ impl Image {
             memory[start..end].copy_from_slice(content);
         }
 
-        Ok(Image {
-            flash,
-            eeprom,
-            size: size(&file),
-            variables: variables(&file),
-        })
+        Ok(Image { flash, eeprom, size: size(&file), variables: variables(&file) })
     }
 }
 

@@ -27,15 +27,8 @@ pub enum Pin {
 
 impl Pin {
     /// Every pin, in the order of the board's numbering.
-    pub const ALL: [Pin; 7] = [
-        Pin::EncoderA,
-        Pin::EncoderB,
-        Pin::WorkSwitch,
-        Pin::EndSwitch,
-        Pin::Beam,
-        Pin::Servo,
-        Pin::Led,
-    ];
+    pub const ALL: [Pin; 7] =
+        [Pin::EncoderA, Pin::EncoderB, Pin::WorkSwitch, Pin::EndSwitch, Pin::Beam, Pin::Servo, Pin::Led];
 
     /// The pin's name in a waveform file.
     pub const fn name(self) -> &'static str {

@@ -338,18 +338,11 @@ impl Uno {
 
     /// The complete pulses on the servo's line since the first power-up, oldest first.
     pub fn servo_pulses(&self) -> Vec<Pulse> {
-        let servo: Vec<_> = self
-            .changes()
-            .iter()
-            .filter(|change| change.pin == Pin::Servo)
-            .collect();
+        let servo: Vec<_> = self.changes().iter().filter(|change| change.pin == Pin::Servo).collect();
         servo
             .windows(2)
             .filter(|edges| edges[0].high && !edges[1].high)
-            .map(|edges| Pulse {
-                rise: edges[0].cycle,
-                fall: edges[1].cycle,
-            })
+            .map(|edges| Pulse { rise: edges[0].cycle, fall: edges[1].cycle })
             .collect()
     }
 

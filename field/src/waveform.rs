@@ -37,10 +37,7 @@ pub fn write(path: &Path, changes: impl IntoIterator<Item = PinChange>) -> Resul
     changes.sort_by_key(|change| change.cycle);
     File::create(path)
         .and_then(|file| write_to(BufWriter::new(file), &changes))
-        .map_err(|source| WaveformError {
-            path: path.into(),
-            source,
-        })
+        .map_err(|source| WaveformError { path: path.into(), source })
 }
 
 /// Writes changes, sorted by cycle.
@@ -83,10 +80,7 @@ mod tests {
 
     #[test]
     fn a_cycle_is_a_whole_number_of_the_units() {
-        assert_eq!(
-            UNITS_PER_CYCLE * CYCLES_PER_SECOND,
-            UNITS.1.divisor() / u64::from(UNITS.0)
-        );
+        assert_eq!(UNITS_PER_CYCLE * CYCLES_PER_SECOND, UNITS.1.divisor() / u64::from(UNITS.0));
     }
 
     #[test]
