@@ -170,6 +170,7 @@ impl LineBuffer {
     }
 
     /// Takes a byte. At a line's end, returns what the line says; an empty line says nothing.
+    #[inline(never)]
     pub fn take(&mut self, byte: u8) -> Option<Result<Command, Mistake>> {
         match byte {
             b'\r' | b'\n' => return self.end(),

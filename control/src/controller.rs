@@ -133,6 +133,7 @@ pub struct Controller<C> {
 
 impl<C: Classifier> Controller<C> {
     /// A controller for a machine that just woke up: in HOLD, with the tool out, and with no ground known.
+    #[inline(never)]
     pub fn new(classifier: C, readings: Readings, beam_broken: bool) -> Self {
         let settings = Settings::new();
         Self {
@@ -169,6 +170,7 @@ impl<C: Classifier> Controller<C> {
     }
 
     /// Takes the machine's readings and decides where the tool is to be.
+    #[inline(never)]
     pub fn step(&mut self, readings: Readings) -> Orders {
         self.readings = readings;
         if let Some(speed) = self.meter.read(readings.now, readings.position) {

@@ -56,6 +56,7 @@ impl Features {
     }
 
     /// The features in the paper's order: speed, encoder value, delay, hold, actuation.
+    #[inline(never)]
     pub const fn values(&self) -> [i32; COUNT] {
         [
             self.speed_mm_s as i32,

@@ -6,36 +6,71 @@
 
 use crate::{
     alarm::Alarm,
-    classifier::{Class, Classifier, Listed, label},
+    classifier::{self, Class, Classifier, label},
     console::{Command, Mistake, Word},
     controller::{Controller, Judged, Refusal, State},
     event::Event,
     settings::{Description, Setting},
-    text::{Text, text},
+    text::{Listed, Text, list, text},
 };
 use ufmt::{uWrite, uwrite};
 
 /// Room that a line needs, its end included.
 pub const LINE: usize = 127;
 
-/// A command with its words, and what it does.
-#[inline(never)]
-fn help(word: Word) -> (Text, Text) {
-    match word {
-        Word::Help => (text!("help [name]"), text!("this list, or what a setting is")),
-        Word::Status => (text!("status"), text!("state, position, speed and windows in one line")),
-        Word::Get => (text!("get [name]"), text!("one setting, or all")),
-        Word::Set => (text!("set name value"), text!("change a setting, until the next reset")),
-        Word::Start => (text!("start [now]"), text!("weed; now, at once over ground the beam has not seen")),
-        Word::Hold => (text!("hold"), text!("take the tool out of the row")),
-        Word::Clear => (text!("clear"), text!("clear an alarm")),
-        Word::Events => (text!("events on|off"), text!("tell of plants, swings and alarms as they come")),
-        Word::Label => (text!("label plant|weed"), text!("say what the last object was, and teach it")),
-        Word::Examples => (text!("examples"), text!("all examples, with source and class")),
-        Word::Forget => (text!("forget N|all"), text!("forget examples from the field")),
-        Word::Dump => (text!("dump"), text!("the last 16 objects as CSV")),
-        Word::Version => (text!("version"), text!("name the firmware")),
-    }
+/// The one table of what is said about the commands.
+macro_rules! commands {
+    ($($Word:ident $usage:literal, $help:literal;)*) => {
+        impl Word {
+            /// The command with the words that it takes.
+            fn usage(self) -> Listed {
+                Listed(list!($($usage),*), self as u8)
+            }
+
+            /// What it does.
+            fn help(self) -> Listed {
+                Listed(list!($($help),*), self as u8)
+            }
+        }
+
+        const _: () = {
+            let mut place = 0;
+            $(
+                assert!(Word::$Word as u8 == place, "the commands stand here in the order of their words");
+                place += 1;
+            )*
+            assert!(place == Word::COUNT);
+        };
+    };
+}
+
+commands! {
+    Help "help [name]",
+        "this list, or what a setting is";
+    Status "status",
+        "state, position, speed and windows in one line";
+    Get "get [name]",
+        "one setting, or all";
+    Set "set name value",
+        "change a setting, until the next reset";
+    Start "start [now]",
+        "weed; now, at once over ground the beam has not seen";
+    Hold "hold",
+        "take the tool out of the row";
+    Clear "clear",
+        "clear an alarm";
+    Events "events on|off",
+        "tell of plants, swings and alarms as they come";
+    Label "label plant|weed",
+        "say what the last object was, and teach it";
+    Examples "examples",
+        "all examples, with source and class";
+    Forget "forget N|all",
+        "forget examples from the field";
+    Dump "dump",
+        "the last 16 objects as CSV";
+    Version "version",
+        "name the firmware";
 }
 
 /// The part of an answer that has not been written yet.
@@ -73,6 +108,7 @@ pub enum Answer {
 }
 
 /// Carries a line out and begins its answer.
+#[inline(never)]
 pub fn answer<C: Classifier>(line: Result<Command, Mistake>, controller: &mut Controller<C>) -> Answer {
     let command = match line {
         Ok(command) => command,
@@ -128,6 +164,7 @@ impl Answer {
     ///
     /// # Errors
     /// What `out` reports.
+    #[inline(never)]
     pub fn write_line<C, W>(&mut self, controller: &Controller<C>, out: &mut W) -> Result<(), W::Error>
     where
         C: Classifier,
@@ -142,8 +179,7 @@ impl Answer {
             }
             Self::Help(place) => {
                 if let Some(word) = Word::from_index(place) {
-                    let (usage, explanation) = help(word);
-                    explain(out, usage, explanation)?;
+                    explain(out, word.usage(), word.help())?;
                 }
                 if place + 1 < Word::COUNT { Self::Help(place + 1) } else { Self::Ok }
             }
@@ -233,7 +269,7 @@ pub fn write_event<W: uWrite + ?Sized>(event: &Event, out: &mut W) -> Result<(),
         }
         Event::Alarm { alarm, position } => {
             say(out, text!("alarm name="))?;
-            say(out, alarm.text())?;
+            say_listed(out, alarm.text())?;
             say_number(out, text!(" code="), alarm.code().into())?;
             say_number(out, text!(" pos="), position.count())?;
         }
@@ -251,7 +287,7 @@ where
     say(out, state_name(controller.state()))?;
     if let State::Alarm(alarm) = controller.state() {
         say(out, text!(" alarm="))?;
-        say(out, alarm.text())?;
+        say_listed(out, alarm.text())?;
     }
     say(out, text!(" tool="))?;
     say(out, place_name(controller.tool_out()))?;
@@ -269,7 +305,7 @@ where
     W: uWrite + ?Sized,
 {
     let description = setting.description();
-    say(out, setting.text())?;
+    say_listed(out, setting.text())?;
     say_number(out, text!("="), controller.settings().get(setting).into())?;
     write_range(description, out)?;
     say_number(out, text!(", default "), description.default.into())
@@ -280,7 +316,7 @@ fn write_range<W: uWrite + ?Sized>(description: Description, out: &mut W) -> Res
     say_number(out, text!(" to "), description.greatest.into())
 }
 
-fn write_example<W: uWrite + ?Sized>(listed: &Listed, out: &mut W) -> Result<(), W::Error> {
+fn write_example<W: uWrite + ?Sized>(listed: &classifier::Listed, out: &mut W) -> Result<(), W::Error> {
     say(out, if listed.from_field { text!("field") } else { text!("built_in") })?;
     say_number(out, text!(" "), listed.number.into())?;
     say(out, text!(" "))?;
@@ -309,7 +345,7 @@ fn write_mistake<W: uWrite + ?Sized>(mistake: Mistake, out: &mut W) -> Result<()
         Mistake::UnknownSetting => text!("no such setting, get lists them all"),
         Mistake::Usage(word) => {
             say(out, text!("the words do not fit, the command is "))?;
-            help(word).0
+            return say_listed(out, word.usage());
         }
         Mistake::Value(setting) => return write_allowed(setting, out),
     };
@@ -324,7 +360,7 @@ where
     match (refusal, setting) {
         (Refusal::OutOfRange, Some(setting)) => write_allowed(setting, out),
         (Refusal::NotInHold, Some(setting)) => {
-            say(out, setting.text())?;
+            say_listed(out, setting.text())?;
             say(out, text!(" moves the machine's geometry, hold first"))
         }
         (Refusal::NothingToLabel, _) => {
@@ -337,7 +373,7 @@ where
 }
 
 fn write_allowed<W: uWrite + ?Sized>(setting: Setting, out: &mut W) -> Result<(), W::Error> {
-    say(out, setting.text())?;
+    say_listed(out, setting.text())?;
     say(out, text!(" takes a whole number"))?;
     write_range(setting.description(), out)
 }
@@ -348,10 +384,10 @@ fn write_version<W: uWrite + ?Sized>(out: &mut W) -> Result<(), W::Error> {
 }
 
 /// A name and what it stands for.
-fn explain<W: uWrite + ?Sized>(out: &mut W, name: Text, explanation: Text) -> Result<(), W::Error> {
-    say(out, name)?;
+fn explain<W: uWrite + ?Sized>(out: &mut W, name: Listed, explanation: Listed) -> Result<(), W::Error> {
+    say_listed(out, name)?;
     say(out, text!(" - "))?;
-    say(out, explanation)
+    say_listed(out, explanation)
 }
 
 /// A text and a number after it: in one place, and in one width, which costs the least flash.
@@ -364,6 +400,12 @@ fn say_number<W: uWrite + ?Sized>(out: &mut W, text: Text, number: i32) -> Resul
 /// A text.
 #[inline(never)]
 fn say<W: uWrite + ?Sized>(out: &mut W, text: Text) -> Result<(), W::Error> {
+    text.bytes().try_for_each(|byte| out.write_char(char::from(byte)))
+}
+
+/// A text of a list.
+#[inline(never)]
+fn say_listed<W: uWrite + ?Sized>(out: &mut W, text: Listed) -> Result<(), W::Error> {
     text.bytes().try_for_each(|byte| out.write_char(char::from(byte)))
 }
 

@@ -4,7 +4,7 @@
 //! whole number in 16 bits whose name carries its unit.
 
 use crate::{
-    text::{Text, text, words},
+    text::{Listed, list, words},
     units::{Ticks, Wheel},
 };
 
@@ -44,11 +44,8 @@ macro_rules! settings {
 
         impl Setting {
             /// What it is, for the operator.
-            #[inline(never)]
-            pub fn help(self) -> Text {
-                match self {
-                    $(Self::$Variant => text!($help),)*
-                }
+            pub fn help(self) -> Listed {
+                Listed(list!($($help),*), self as u8)
             }
         }
 

@@ -24,6 +24,7 @@ impl Position {
     }
 
     /// Whether this place lies ahead of `other`.
+    #[inline(never)]
     pub fn is_ahead_of(self, other: Self) -> bool {
         (self - other).0 > 0
     }
@@ -142,6 +143,7 @@ impl TicksPerSecond {
     /// How far the machine rolls at this speed, in so many milliseconds.
     ///
     /// Right while speed times milliseconds stays below 2^31: up to 2.1 million ticks a second over a whole second.
+    #[inline(never)]
     pub fn distance_in_ms(self, milliseconds: u16) -> Ticks {
         // Divided without its sign: the chip has one division routine then, the shorter.
         let magnitude = (self.0.unsigned_abs().wrapping_mul(u32::from(milliseconds)) / 1000) as i32;
