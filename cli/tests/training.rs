@@ -88,7 +88,7 @@ fn a_table_larger_than_the_flash_budget_is_refused_by_name() {
 #[test]
 fn a_table_that_teaches_nothing_is_refused_with_file_and_line() {
     let train = ["train", "objects.csv"];
-    assert_refused("", &train, "objects.csv, line 1: there are no objects below the header");
+    assert_refused("", &train, "objects.csv, line 1: nothing stands below the header");
     assert_refused("694,500,226,250,573,plant\n", &train, "objects.csv, line 2: up to here there is no label weed");
     assert_refused("694,500,NaN,250,573,plant\n", &train, "objects.csv, line 2: delay_mm is `NaN`");
 }

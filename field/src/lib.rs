@@ -9,6 +9,7 @@
 pub mod bench;
 pub mod capture;
 pub mod console;
+mod csv_table;
 mod drawing;
 pub mod firmware;
 pub mod ground;

@@ -2,25 +2,27 @@
 //! width at the beam's height.
 //!
 //! A [`Row`] comes from a list, from a CSV file of measured plants or, with [`Planting`](crate::planting::Planting), from a
-//! seed. Things in a row
-//! stand apart: where canopies close up, the beam sees one object, and so does the row. Weeds that are too short for the
-//! beam are not in it: they are the ground that the tool works.
+//! seed. Things in a row stand apart: where canopies close up, the beam sees one object, and so does the row. Weeds that
+//! are too short for the beam are not in it: they are the ground that the tool works.
 //!
 //! All places are millimetres along the ground, from an origin of the row's own.
 
-use serde::{Deserialize, Serialize};
+use crate::csv_table::CsvTable;
+use serde::Serialize;
 use std::fmt;
-use std::fs::File;
 use std::io;
 use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::Path;
+use std::str::FromStr;
 use thiserror::Error;
+
+pub use crate::csv_table::TableError;
 
 /// Widest thing that a row takes. Wider than any crop plant that is weeded between.
 pub const MAX_WIDTH_MM: f64 = 1000.0;
 
 /// What a thing in the row is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
     /// A crop plant: the tool has to go round it.
@@ -35,6 +37,19 @@ impl fmt::Display for Kind {
             Kind::Plant => "plant",
             Kind::Weed => "weed",
         })
+    }
+}
+
+/// A text is neither `plant` nor `weed`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[error("it has to be plant or weed")]
+pub struct UnknownKind;
+
+impl FromStr for Kind {
+    type Err = UnknownKind;
+
+    fn from_str(text: &str) -> Result<Self, UnknownKind> {
+        [Kind::Plant, Kind::Weed].into_iter().find(|kind| kind.to_string() == text).ok_or(UnknownKind)
     }
 }
 
@@ -127,39 +142,8 @@ pub enum Problem {
     Empty,
 }
 
-/// A row's file could not be read or written.
-#[derive(Debug, Error)]
-pub enum FileError {
-    /// The file itself.
-    #[error("{}: {source}", path.display())]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// What the system says.
-        source: io::Error,
-    },
-    /// A line of it.
-    #[error("{}, line {line}: {problem}", path.display())]
-    Line {
-        /// The file.
-        path: PathBuf,
-        /// The line, counted from 1.
-        line: u64,
-        /// What is wrong with it.
-        problem: String,
-    },
-    /// The table as a whole.
-    #[error("{}: {problem}", path.display())]
-    Table {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong with it.
-        problem: Problem,
-    },
-}
-
 /// A line of a row's CSV file.
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Debug, Serialize)]
 struct Record {
     position_mm: f64,
     width_mm: f64,
@@ -226,41 +210,25 @@ impl Row {
     ///
     /// # Errors
     /// Names the file, the line and what would be right.
-    pub fn read_csv(path: &Path) -> Result<Self, FileError> {
-        let file = File::open(path).map_err(|source| FileError::File { path: path.into(), source })?;
-        let at = |line: u64, problem: String| FileError::Line { path: path.into(), line, problem };
-        let from_csv = |error: csv::Error, header: &csv::StringRecord| {
-            let line = error.position().map_or(1, csv::Position::line);
-            at(line, explain(&error, header))
-        };
-
-        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(file);
-        let no_header = csv::StringRecord::new();
-        let header = reader.headers().map_err(|error| from_csv(error, &no_header))?.clone();
-        for column in COLUMNS {
-            if !header.iter().any(|name| name == column) {
-                let problem = format!("the column `{column}` is missing: the header has to name {}", COLUMNS.join(","));
-                return Err(at(1, problem));
-            }
-        }
-
-        let mut lines: Vec<(u64, Thing)> = Vec::new();
-        let mut record = csv::StringRecord::new();
-        while reader.read_record(&mut record).map_err(|error| from_csv(error, &header))? {
-            let line = record.position().map_or(0, csv::Position::line);
-            let Record { position_mm, width_mm, kind } =
-                record.deserialize(Some(&header)).map_err(|error| from_csv(error, &header))?;
-            let thing = Thing { position_mm, width_mm, kind, leaves: Vec::new() };
-            thing.check().map_err(|problem| at(line, problem.to_string()))?;
+    pub fn read_csv(path: &Path) -> Result<Self, TableError> {
+        let table = CsvTable::read(path, &COLUMNS)?;
+        let mut lines = Vec::new();
+        for line in table.lines() {
+            let thing = Thing {
+                position_mm: line.value("position_mm", "a number of millimetres along the row")?,
+                width_mm: line.value("width_mm", "a number of millimetres")?,
+                kind: line.value("kind", "plant or weed")?,
+                leaves: Vec::new(),
+            };
+            thing.check().map_err(|problem| line.error(problem.to_string()))?;
             lines.push((line, thing));
         }
         lines.sort_by(|(_, a), (_, b)| a.position_mm.total_cmp(&b.position_mm));
         for pair in lines.windows(2) {
             let (line, thing) = &pair[1];
-            thing.check_after(&pair[0].1).map_err(|problem| at(*line, problem.to_string()))?;
+            thing.check_after(&pair[0].1).map_err(|problem| line.error(problem.to_string()))?;
         }
-        Self::new(lines.into_iter().map(|(_, thing)| thing).collect())
-            .map_err(|problem| FileError::Table { path: path.into(), problem })
+        Ok(Self { things: lines.into_iter().map(|(_, thing)| thing).collect() })
     }
 
     /// Writes the row as a CSV table that [`Row::read_csv`] reads. Gaps within a ragged canopy are not kept.
@@ -274,20 +242,6 @@ impl Row {
         }
         writer.flush()?;
         Ok(())
-    }
-}
-
-/// What a CSV error says about the line, without the record number and byte that nobody asked for.
-fn explain(error: &csv::Error, header: &csv::StringRecord) -> String {
-    match error.kind() {
-        csv::ErrorKind::Deserialize { err, .. } => match err.field().and_then(|index| header.get(index as usize)) {
-            Some(column) => format!("{column}: {}, where a number is wanted", err.kind()),
-            None => err.kind().to_string(),
-        },
-        csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
-            format!("{len} fields where the header has {expected_len}: each line has one field a column")
-        }
-        _ => error.to_string(),
     }
 }
 
@@ -334,18 +288,20 @@ mod tests {
         let header = "position_mm,width_mm,kind\n";
         for (text, error) in [
             ("250,150,plant\n750,-5,plant\n", "row.csv, line 3: width_mm is -5: it has to be above 0"),
-            ("250,wide,plant\n", "row.csv, line 2: width_mm: invalid float literal, where a number is wanted"),
-            ("250,150,crop\n", "row.csv, line 2: unknown variant `crop`, expected `plant` or `weed`"),
-            ("250,150\n", "row.csv, line 2: 2 fields where the header has 3"),
+            ("250,wide,plant\n", "row.csv, line 2: width_mm is `wide`: it has to be a number of millimetres"),
+            ("250,150,crop\n", "row.csv, line 2: kind is `crop`: it has to be plant or weed"),
+            ("250,150\n", "row.csv, line 2: fields: 2, where the header has 3"),
             ("NaN,150,plant\n", "row.csv, line 2: position_mm is NaN"),
             (
                 "750,150,plant\n250,150,plant\n700,20,weed\n",
                 "row.csv, line 2: the plant at 750 mm and the weed at 700 mm overlap",
             ),
-            ("", "row.csv: nothing stands in the row"),
+            ("", "row.csv, line 1: nothing stands below the header"),
         ] {
-            let said = read(&format!("{header}{text}")).unwrap_err();
-            assert!(said.starts_with(error), "{said}");
+            for end in ["\n", "\r\n"] {
+                let said = read(&format!("{header}{text}").replace('\n', end)).unwrap_err();
+                assert!(said.starts_with(error), "{said}");
+            }
         }
     }
 
@@ -358,6 +314,6 @@ mod tests {
     #[test]
     fn a_missing_file_is_named() {
         let said = Row::read_csv(Path::new("no/such/row.csv")).unwrap_err().to_string();
-        assert!(said.starts_with("no/such/row.csv: "), "{said}");
+        assert!(said.starts_with("no/such/row.csv cannot be read"), "{said}");
     }
 }
