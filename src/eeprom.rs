@@ -11,12 +11,11 @@ use core::arch::asm;
 /// Where the slots begin: the lower half is for settings.
 const BASE: u16 = 512;
 
-/// The EEPROM, and what is yet to be written.
+/// The EEPROM, and the slot that is being written.
 pub struct Eeprom {
     registers: EEPROM,
+    slot: u8,
     bytes: [u8; SLOT],
-    /// Address of the next byte.
-    address: u16,
     /// Bytes still to go.
     left: u8,
 }
@@ -24,16 +23,11 @@ pub struct Eeprom {
 impl Eeprom {
     /// The EEPROM, with nothing to be written.
     pub const fn new(registers: EEPROM) -> Self {
-        Self { registers, bytes: [0; SLOT], address: 0, left: 0 }
+        Self { registers, slot: 0, bytes: [0; SLOT], left: 0 }
     }
 
     fn is_busy(&self) -> bool {
         self.registers.eecr().read().eepe().bit_is_set()
-    }
-
-    /// Waits for the byte under way, at most 3.4 ms.
-    fn wait(&self) {
-        while self.is_busy() {}
     }
 
     fn write_byte(&mut self, address: u16, byte: u8) {
@@ -49,21 +43,24 @@ impl Eeprom {
 
 impl Memory for Eeprom {
     fn read(&self, slot: u8) -> [u8; SLOT] {
-        self.wait();
-        let start = BASE + u16::from(slot) * SLOT as u16;
-        let mut address = start;
-        [(); SLOT].map(|()| {
+        if self.left > 0 && slot == self.slot {
+            return self.bytes;
+        }
+        // Nothing can be read while a byte is written: it is there in 3.4 ms at the most.
+        while self.is_busy() {}
+        let mut bytes = [0; SLOT];
+        for (address, byte) in (address(slot)..).zip(&mut bytes) {
             self.registers.eear().write(|w| w.set(address));
             self.registers.eecr().modify(|_, w| w.eere().set_bit());
-            address += 1;
-            self.registers.eedr().read().bits()
-        })
+            *byte = self.registers.eedr().read().bits();
+        }
+        bytes
     }
 
     fn write(&mut self, slot: u8, bytes: [u8; SLOT]) {
         while !self.carry_on() {}
+        self.slot = slot;
         self.bytes = bytes;
-        self.address = BASE + u16::from(slot) * SLOT as u16;
         self.left = SLOT as u8;
     }
 
@@ -74,10 +71,14 @@ impl Memory for Eeprom {
         if self.left == 0 {
             return true;
         }
-        let byte = self.bytes[SLOT - usize::from(self.left)];
-        self.write_byte(self.address, byte);
-        self.address += 1;
+        let written = SLOT as u8 - self.left;
+        self.write_byte(address(self.slot) + u16::from(written), self.bytes[usize::from(written)]);
         self.left -= 1;
         false
     }
+}
+
+/// Where a slot begins.
+const fn address(slot: u8) -> u16 {
+    BASE + slot as u16 * SLOT as u16
 }

@@ -176,8 +176,11 @@ impl<C: Classifier> Controller<C> {
         if let Some(speed) = self.meter.read(readings.now, readings.position) {
             self.leads = Leads::at(speed, &self.settings);
         }
-        if let Some(on) = self.switch.read(readings.now, readings.switch_on) {
-            self.enter(if on { State::Work } else { State::Hold });
+        match self.switch.read(readings.now, readings.switch_on) {
+            // An alarm wants to be cleared first, if by nothing else then by the switch going off.
+            Some(true) if self.state == State::Hold => self.enter(State::Work),
+            Some(false) => self.enter(State::Hold),
+            _ => {}
         }
         let ground = readings.position - self.leads.response;
         if let Some(object) = self.watch.roll_to(ground, self.geometry.merge_gap) {

@@ -5,7 +5,7 @@
 //! dropped, and counted so that it can be told. Which slots hold an example is kept in SRAM, as checking them all takes
 //! longer than searching them.
 
-use crate::{classifier::label, features};
+use crate::features;
 use crc::{CRC_16_IBM_SDLC, Crc, NoTable};
 use knn::{Example, Examples};
 
@@ -23,10 +23,11 @@ const CHECK: Crc<u16, NoTable> = Crc::<u16, NoTable>::new(&CRC_16_IBM_SDLC);
 
 /// Memory that keeps slots without power.
 pub trait Memory {
-    /// What lies in a slot.
+    /// What lies in a slot, or will lie there once it is written.
     fn read(&self, slot: u8) -> [u8; SLOT];
 
-    /// Begins to write a slot; earlier writes are finished first.
+    /// Begins to write a slot. Whatever is still being written is finished first, which may take time: ask
+    /// [`carry_on`](Self::carry_on) before.
     fn write(&mut self, slot: u8, bytes: [u8; SLOT]);
 
     /// Carries on with a write, without waiting; whether all has been written.
@@ -68,28 +69,31 @@ impl Memory for Volatile {
 #[derive(Clone, Debug)]
 pub struct FieldExamples<M> {
     memory: M,
-    /// A bit for each slot that holds an example.
-    held: u32,
+    slots: [Slot; CAPACITY as usize],
     spoiled: u8,
 }
 
-/// What a slot's bytes mean.
+/// What a slot is known to be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Slot {
-    Empty,
-    Holds(Taught),
-    Spoiled,
+    /// Free.
+    Free,
+    /// It holds an example.
+    Held,
+    /// Its example is forgotten and yet to be erased.
+    Forgotten,
 }
 
 impl<M: Memory> FieldExamples<M> {
     /// Looks through a memory for the examples that it holds.
     pub fn new(memory: M) -> Self {
-        let mut store = Self { memory, held: 0, spoiled: 0 };
-        for slot in 0..CAPACITY {
-            match decode(store.memory.read(slot)) {
-                Slot::Empty => {}
-                Slot::Holds(_) => store.held |= 1 << slot,
-                Slot::Spoiled => store.spoiled += 1,
+        let mut store = Self { memory, slots: [Slot::Free; CAPACITY as usize], spoiled: 0 };
+        for (number, slot) in (0..).zip(&mut store.slots) {
+            let bytes = store.memory.read(number);
+            if bytes == encode(example_in(bytes)) {
+                *slot = Slot::Held;
+            } else if bytes != [ERASED; SLOT] {
+                store.spoiled += 1;
             }
         }
         store
@@ -101,12 +105,11 @@ impl<M: Memory> FieldExamples<M> {
     }
 
     /// The example in a slot.
-    pub fn slot(&self, slot: u8) -> Option<Taught> {
-        if !self.holds(slot) {
-            return None;
+    pub fn slot(&self, number: u8) -> Option<Taught> {
+        match self.slots.get(usize::from(number)) {
+            Some(Slot::Held) => Some(example_in(self.memory.read(number))),
+            _ => None,
         }
-        let [a, b, c, d, e, label, ..] = self.memory.read(slot);
-        Some(Example::new([a, b, c, d, e], label))
     }
 
     /// Adds an example; returns its slot.
@@ -114,35 +117,46 @@ impl<M: Memory> FieldExamples<M> {
     /// # Errors
     /// The example, when all slots are taken.
     pub fn add(&mut self, example: Taught) -> Result<u8, Taught> {
-        let slot = (0..CAPACITY).find(|&slot| !self.holds(slot)).ok_or(example)?;
-        self.memory.write(slot, encode(example));
-        self.held |= 1 << slot;
-        Ok(slot)
-    }
-
-    /// Forgets the example in a slot; whether there was one.
-    pub fn forget(&mut self, slot: u8) -> bool {
-        let held = self.holds(slot);
-        if held {
-            self.memory.write(slot, [ERASED; SLOT]);
-            self.held &= !(1 << slot);
+        for (number, slot) in (0..).zip(&mut self.slots) {
+            if *slot != Slot::Held {
+                *slot = Slot::Held;
+                self.memory.write(number, encode(example));
+                return Ok(number);
+            }
         }
-        held
+        Err(example)
     }
 
-    /// Carries on with what is being written, without waiting; whether all has been written.
+    /// Forgets the example in a slot, which [`carry_on`](Self::carry_on) will erase; whether there was one.
+    pub fn forget(&mut self, number: u8) -> bool {
+        match self.slots.get_mut(usize::from(number)) {
+            Some(slot @ Slot::Held) => {
+                *slot = Slot::Forgotten;
+                true
+            }
+            _ => false,
+        }
+    }
+
+    /// Carries on with what is to be written, without waiting; whether all has been.
     pub fn carry_on(&mut self) -> bool {
-        self.memory.carry_on()
-    }
-
-    fn holds(&self, slot: u8) -> bool {
-        slot < CAPACITY && self.held >> slot & 1 != 0
+        if !self.memory.carry_on() {
+            return false;
+        }
+        for (number, slot) in (0..).zip(&mut self.slots) {
+            if *slot == Slot::Forgotten {
+                *slot = Slot::Free;
+                self.memory.write(number, [ERASED; SLOT]);
+                return false;
+            }
+        }
+        true
     }
 }
 
 impl<M: Memory> Examples<{ features::COUNT }> for FieldExamples<M> {
     fn len(&self) -> usize {
-        self.held.count_ones() as usize
+        self.slots.iter().filter(|&&slot| slot == Slot::Held).count()
     }
 
     fn example(&self, index: usize) -> Option<Taught> {
@@ -170,16 +184,10 @@ fn encode(example: Taught) -> [u8; SLOT] {
     [a, b, c, d, e, example.label, low, high]
 }
 
-fn decode(bytes: [u8; SLOT]) -> Slot {
+/// What a slot's bytes say, right or not.
+fn example_in(bytes: [u8; SLOT]) -> Taught {
     let [a, b, c, d, e, label, ..] = bytes;
-    let example = Example::new([a, b, c, d, e], label);
-    if bytes == [ERASED; SLOT] {
-        Slot::Empty
-    } else if usize::from(label) < label::COUNT && bytes == encode(example) {
-        Slot::Holds(example)
-    } else {
-        Slot::Spoiled
-    }
+    Example::new([a, b, c, d, e], label)
 }
 
 #[cfg(test)]
@@ -237,6 +245,7 @@ mod tests {
         assert_eq!(store.len(), usize::from(CAPACITY));
         assert!(store.forget(7));
         assert!(!store.forget(7) && !store.forget(CAPACITY));
+        while !store.carry_on() {}
         let mut store = restart(store);
         assert_eq!((store.slot(7), store.slot(8)), (None, Some(example(8))));
         assert_eq!(store.add(example(50)), Ok(7), "the free slot is taken again");
@@ -256,6 +265,7 @@ mod tests {
                 } else {
                     store.add(example(4)).unwrap();
                 }
+                while !store.carry_on() {}
                 let store = restart(store);
                 for number in [0, 1, 3] {
                     assert_eq!(store.slot(number), Some(example(number)), "{power} {forgetting}");

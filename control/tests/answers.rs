@@ -7,7 +7,7 @@ use control::{
     alarm::Alarm,
     classifier::{Class, Vote},
     console::{LineBuffer, Word},
-    controller::{Controller, State},
+    controller::{Controller, Readings, State},
     event::Event,
     reply::{self, LINE},
     schedule::Plan,
@@ -181,4 +181,20 @@ fn every_event_fits_on_a_line() {
         assert!(said.0.len() <= LINE, "{} characters: {}", said.0.len(), said.0);
         assert!(said.0.ends_with("\r\n") && !said.0.contains(':'), "{}", said.0);
     }
+}
+
+#[test]
+fn an_alarm_is_not_cleared_by_throwing_the_switch_on() {
+    let mut machine = machine();
+    ask(&mut machine, "start");
+    machine.beam_edges_lost();
+    let mut throw = |milliseconds: u64, switch_on: bool| {
+        for moment in [milliseconds, milliseconds + 30] {
+            machine.step(Readings { switch_on, ..readings(moment * 1000, 0) });
+        }
+        machine.state()
+    };
+    assert_eq!(throw(100, true), State::Alarm(Alarm::BeamEdgesLost));
+    assert_eq!(throw(200, false), State::Hold);
+    assert_eq!(throw(300, true), State::Work);
 }
