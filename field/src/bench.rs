@@ -4,7 +4,7 @@
 //! are exact. [`firmware`] runs the real firmware on a row and reports its interrupts. [`classifier_table`],
 //! [`interrupt_table`] and [`memory_table`] show the figures to people, the classifier's beside those of others.
 
-use crate::firmware::{Image, ImageError, Size};
+use crate::firmware::{ImageError, Size};
 use crate::machine::Machine;
 use crate::motion::mm_s;
 use crate::planting::{Planting, PlantingError};
@@ -178,7 +178,7 @@ pub fn firmware(elf: &Path, mut progress: impl FnMut(f64)) -> Result<FirmwareCos
     }
     Ok(FirmwareCosts {
         interrupts: uno.interrupt_statistics().cloned().unwrap_or_default(),
-        size: Image::read(elf)?.size,
+        size: Size::read(elf)?,
         stack: uno.deepest_stack(),
     })
 }

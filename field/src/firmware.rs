@@ -144,13 +144,14 @@ pub struct Size {
 }
 
 impl Size {
-    /// The memory that the ELF at `path` takes.
+    /// The memory that the ELF at `path` takes, whether or not the chip has it.
     ///
     /// # Errors
     ///
-    /// As [`Image::read`].
+    /// Where the file cannot be read or is no ELF for AVR.
     pub fn read(path: &Path) -> Result<Size, ImageError> {
-        Image::read(path).map(|image| image.size)
+        let bytes = read_bytes(path)?;
+        parse(path, &bytes).map(|file| size(&file))
     }
 }
 
@@ -158,7 +159,7 @@ impl Size {
 #[derive(Debug, thiserror::Error)]
 pub enum ImageError {
     /// The file could not be read.
-    #[error("{path} could not be read: {source}")]
+    #[error("{path} could not be read")]
     Read {
         /// The file.
         path: PathBuf,
@@ -224,14 +225,8 @@ impl Image {
     ///
     /// Where the file cannot be read, is no ELF for AVR, or holds more than the ATmega328P does.
     pub fn read(path: &Path) -> Result<Image, ImageError> {
-        let bytes = std::fs::read(path).map_err(|source| ImageError::Read { path: path.into(), source })?;
-        let not_elf = |reason| ImageError::NotElf { path: path.into(), reason };
-        let architecture = object::File::parse(&*bytes).map_err(not_elf)?.architecture();
-        if architecture != Architecture::Avr {
-            return Err(ImageError::NotAvr { path: path.into(), architecture });
-        }
-        let file = ElfFile32::<LittleEndian>::parse(&*bytes).map_err(not_elf)?;
-
+        let bytes = read_bytes(path)?;
+        let file = parse(path, &bytes)?;
         let mut flash = Vec::new();
         let mut eeprom = Vec::new();
         for header in file.elf_program_headers() {
@@ -260,6 +255,20 @@ impl Image {
 
         Ok(Image { flash, eeprom, size: size(&file), variables: variables(&file) })
     }
+}
+
+fn read_bytes(path: &Path) -> Result<Vec<u8>, ImageError> {
+    std::fs::read(path).map_err(|source| ImageError::Read { path: path.into(), source })
+}
+
+/// Takes the content of the file at `path` for an ELF for AVR.
+fn parse<'data>(path: &Path, bytes: &'data [u8]) -> Result<ElfFile32<'data, LittleEndian>, ImageError> {
+    let not_elf = |reason| ImageError::NotElf { path: path.into(), reason };
+    let architecture = object::File::parse(bytes).map_err(not_elf)?.architecture();
+    if architecture != Architecture::Avr {
+        return Err(ImageError::NotAvr { path: path.into(), architecture });
+    }
+    ElfFile32::parse(bytes).map_err(not_elf)
 }
 
 fn size(file: &ElfFile32<LittleEndian>) -> Size {

@@ -5,6 +5,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use field::firmware::{ImageError, Size};
 use field::signal::{CYCLES_PER_SECOND, Pin, PinChange};
 use field::uno::{ResetCause, SENT_BYTE_CYCLES, Uno, UnoError};
 
@@ -27,7 +28,9 @@ fn compile(name: &str) -> PathBuf {
         .join(format!("{name}-{}-{thread}", std::process::id()))
         .with_extension("elf");
     let output = Command::new("avr-gcc")
-        .args(["-mmcu=atmega328p", "-DF_CPU=16000000UL", "-Os", "-Wall", "-Werror", "-o"])
+        .args(["-mmcu=atmega328p", "-DF_CPU=16000000UL", "-Os", "-Wall", "-Werror"])
+        // The linker's own refusal of what is too large is not the one that is tested here.
+        .args(["-Wl,--defsym=__TEXT_REGION_LENGTH__=65536", "-o"])
         .args([&elf, &source])
         .output()
         .unwrap_or_else(|error| panic!("avr-gcc could not be started ({error}): run ./setup.sh"));
@@ -392,4 +395,17 @@ fn the_size_is_what_the_sections_add_up_to() {
     assert!((100..1000).contains(&uno.size().flash), "{:?}", uno.size());
     uno.run_for_ms(5).unwrap();
     assert!((2..40).contains(&uno.deepest_stack()), "{}", uno.deepest_stack());
+}
+
+#[test]
+fn a_firmware_too_large_for_the_chip_is_measured_but_not_run() {
+    let elf = compile("oversized");
+    let Size { flash, sram } = Size::read(&elf).expect("it is an ELF for AVR");
+    assert!((40_100..40_500).contains(&flash), "{flash}");
+    assert_eq!(sram, 100);
+    let Err(UnoError::Image(ImageError::TooLarge { memory: "flash", end, .. })) = Uno::boot(&elf) else {
+        panic!("40 kB do not fit into 32 KiB");
+    };
+    // The first values of variables come behind the code, which is too large by itself.
+    assert_eq!(end, flash - sram);
 }
