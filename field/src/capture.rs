@@ -28,7 +28,7 @@ pub struct Channels<'a> {
 #[derive(Debug, thiserror::Error)]
 pub enum CaptureError {
     /// The file could not be read.
-    #[error("the recording {path} could not be read: {source}")]
+    #[error("the recording {path} could not be read")]
     Read {
         /// The file.
         path: PathBuf,

@@ -14,7 +14,7 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub enum TableError {
     /// The file itself.
-    #[error("{} cannot be read", path.display())]
+    #[error("{path} cannot be read")]
     File {
         /// The file.
         path: PathBuf,
@@ -22,7 +22,7 @@ pub enum TableError {
         source: io::Error,
     },
     /// A line of it.
-    #[error("{}, line {line}: {problem}", path.display())]
+    #[error("{path}, line {line}: {problem}")]
     Line {
         /// The file.
         path: PathBuf,

@@ -1,10 +1,13 @@
 //! The field on a desk: the simulated row and machine, the virtual Uno that runs the real firmware, and their reports.
 //!
-//! [`row`] says what stands in the row and [`planting`] grows one by chance; [`motion`] is how the machine rolls, and
-//! [`machine`] turns both into levels on the firmware's pins. [`uno`] runs the firmware's ELF ([`firmware`]) on simavr,
-//! [`console`] talks to it, and [`servo`] is what its pulses do to the tool. [`trial`] joins them, [`verdict`] judges what
-//! happened to each plant, [`report`] and [`picture`] show it. [`replay`] plays a recording ([`capture`]) instead of a row,
-//! and [`waveform`] writes down what was on the pins.
+//! - **The field**: [`row`] says what stands in the row, [`planting`] grows one by chance, [`ground`] counts which ground is
+//!   covered. [`motion`] is how the machine rolls, [`machine`] turns both into levels on the firmware's pins ([`signal`]),
+//!   and [`servo`] is what its pulses do to the tool.
+//! - **The virtual Uno**: [`firmware`] builds and reads the ELF, [`uno`] runs it on simavr, [`console`] talks to it.
+//! - **Trials**: [`trial`] joins them, [`verdict`] judges what happened to each plant, [`report`] and [`picture`] show it,
+//!   and [`waveform`] writes down what was on the pins. [`replay`] plays a recording ([`capture`]) instead of a row, and
+//!   [`mod@bench`] counts cycles and bytes.
+//! - **Training**: [`training`] makes the example table that the firmware carries, of labelled objects.
 
 pub mod bench;
 pub mod capture;

@@ -19,7 +19,7 @@ const UNITS_PER_CYCLE: u64 = 10_000_000_000 / CYCLES_PER_SECOND;
 
 /// A waveform file that could not be written.
 #[derive(Debug, thiserror::Error)]
-#[error("the waveform {path} could not be written: {source}")]
+#[error("the waveform {path} could not be written")]
 pub struct WaveformError {
     /// The file.
     pub path: PathBuf,
