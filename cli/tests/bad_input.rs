@@ -30,7 +30,7 @@ fn canopies_wider_than_their_spacing_are_refused() {
 
 #[test]
 fn more_weeds_than_there_is_room_for_are_refused() {
-    assert_refused(&["sim", "--plants", "2", "--weeds", "50"], "50 tall weeds do not fit between the plants");
+    assert_refused(&["sim", "--plants", "2", "--weeds", "50"], "there is no room for 50 tall weeds between the plants");
 }
 
 #[test]

@@ -3,6 +3,7 @@
 //! A [`Planting`] says how much of each, a seed says which row of all the possible ones: the same seed gives the same row
 //! on every machine. Scatter is spread evenly, so that it has limits that a test can state.
 
+use crate::report::counted;
 use crate::row::{Problem, Row, Thing};
 use rand::seq::SliceRandom;
 use rand::{Rng, RngExt, SeedableRng};
@@ -15,8 +16,9 @@ use thiserror::Error;
 pub enum PlantingError {
     /// The weeds asked for do not fit.
     #[error(
-        "{0} tall weeds do not fit between the plants at {WEED_MARGIN_MM} mm from the next canopy: \
-         ask for fewer weeds, or for a larger spacing"
+        "there is no room for {} between the plants, {WEED_MARGIN_MM} mm from the next canopy: \
+         ask for fewer weeds, or for a larger spacing",
+        counted(.0, "tall weed")
     )]
     NoRoomForWeeds(usize),
     /// The canopies do not fit into the spacing.

@@ -2,6 +2,7 @@
 //!
 //! The picture of the row is in [`crate::picture`].
 
+use crate::console::Status;
 use crate::firmware::Size;
 use crate::machine::Machine;
 use crate::motion::Motion;
@@ -10,7 +11,7 @@ use crate::trial::{Outcome, Trial};
 use crate::verdict::{PlantOutcome, Verdict};
 use comfy_table::{Attribute, Cell, CellAlignment, Color, Table, presets};
 use serde::Serialize;
-use std::fmt::Write;
+use std::fmt::{Display, Write};
 use std::io;
 
 /// Width that the machine weeds with its inter-row tools (the paper's chapter on the tines: 40 cm).
@@ -92,7 +93,7 @@ pub fn totals(trial: &Trial, outcome: &Outcome) -> String {
         line("", format!("the tool reached {depth_mm:.0} mm into the canopy that was hit worst"));
     }
     if judgement.idle_swings > 0 {
-        line("", format!("the tool swung out {} times for no plant", judgement.idle_swings));
+        line("", format!("the tool swung out {} for no plant", counted(judgement.idle_swings, "time")));
     }
     if !judgement.weeds.is_empty() {
         let cut = judgement.weeds.iter().filter(|weed| weed.cut).count();
@@ -121,7 +122,8 @@ pub fn totals(trial: &Trial, outcome: &Outcome) -> String {
     );
     line("Swings", swing_words(&judgement.plants, &trial.machine));
     if outcome.stray_pulses > 0 {
-        line("", format!("{} pulses on the line had no servo's width and were ignored", outcome.stray_pulses));
+        let pulses = counted(outcome.stray_pulses, "pulse");
+        line("", format!("{pulses} of a width that no servo knows: ignored"));
     }
     line("Encoder", count_words(outcome));
     if status.state != "work" {
@@ -158,8 +160,8 @@ fn swing_words(plants: &[PlantOutcome], machine: &Machine) -> String {
     let worst = errors.iter().copied().fold(0.0, f64::max);
     let mean = errors.iter().sum::<f64>() / errors.len() as f64;
     format!(
-        "{} commands, off their ideal place by {mean:.1} ticks ({:.1} mm) in the mean, {worst:.1} ticks ({:.1} mm) at worst",
-        errors.len(),
+        "{}, off their ideal place by {mean:.1} ticks ({:.1} mm) in the mean, {worst:.1} ticks ({:.1} mm) at worst",
+        counted(errors.len(), "command"),
         mean * machine.tick_mm(),
         worst * machine.tick_mm(),
     )
@@ -171,7 +173,15 @@ fn count_words(outcome: &Outcome) -> String {
         0 => "exactly where the machine is".to_owned(),
         off => format!("{off:+} from where the machine is"),
     };
-    format!("position {} ticks, {place}; {} counts lost", outcome.status.position_ticks, outcome.status.lost_ticks)
+    let Status { position_ticks, lost_ticks, .. } = outcome.status;
+    format!("position {}, {place}; {} lost", counted(position_ticks, "tick"), counted(lost_ticks, "count"))
+}
+
+/// A number of things in words, such as `1 plant` and `2 plants`.
+pub(crate) fn counted(number: impl Display, thing: &str) -> String {
+    let number = number.to_string();
+    let plural = if number == "1" { "" } else { "s" };
+    format!("{number} {thing}{plural}")
 }
 
 /// A line of the plants' CSV table.
@@ -246,9 +256,9 @@ pub fn write_weeds_csv(outcome: &Outcome, to: impl io::Write) -> Result<(), csv:
 pub fn introduction(row: &Row, machine: &Machine, motion: &Motion) -> String {
     let span = row.span_mm();
     format!(
-        "{} plants and {} tall weeds on {:.2} m of row, beam {:.0} mm ahead of the tool, {:.0} s on the field",
-        row.plants().count(),
-        row.weeds().count(),
+        "{} and {} on {:.2} m of row, beam {:.0} mm ahead of the tool, {:.0} s on the field",
+        counted(row.plants().count(), "plant"),
+        counted(row.weeds().count(), "tall weed"),
         (span.end - span.start) / 1000.0,
         machine.beam_to_tool_mm,
         motion.duration_s(),
@@ -258,7 +268,6 @@ pub fn introduction(row: &Row, machine: &Machine, motion: &Motion) -> String {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use crate::console::Status;
     use crate::motion::mm_s;
     use crate::row::Thing;
     use crate::signal::{CYCLES_PER_SECOND, Pulse};
@@ -299,6 +308,21 @@ pub(crate) mod tests {
         ] {
             assert!(totals.contains(words), "{words:?} is not in\n{totals}");
         }
+    }
+
+    #[test]
+    fn one_thing_is_told_from_several() {
+        let (trial, mut outcome) = ruined_row();
+        (outcome.stray_pulses, outcome.judgement.idle_swings, outcome.status.lost_ticks) = (1, 1, 1);
+        let words = totals(&trial, &outcome);
+        assert!(words.contains("swung out 1 time for no plant"), "{words}");
+        assert!(words.contains("1 pulse of a width that no servo knows: ignored"), "{words}");
+        assert!(words.contains("; 1 count lost"), "{words}");
+        outcome.stray_pulses = 2;
+        let words = totals(&trial, &outcome);
+        assert!(words.contains("2 pulses of a width that no servo knows: ignored"), "{words}");
+        let introduction = introduction(&trial.row, &trial.machine, &trial.motion);
+        assert!(introduction.starts_with("2 plants and 1 tall weed on 1.00 m of row"), "{introduction}");
     }
 
     #[test]

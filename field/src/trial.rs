@@ -9,6 +9,7 @@ use crate::console::{ConsoleError, Status, ask};
 use crate::firmware::Size;
 use crate::machine::Machine;
 use crate::motion::Motion;
+use crate::report::counted;
 use crate::row::Row;
 use crate::servo::WIDTHS_US;
 use crate::signal::{CYCLES_PER_SECOND, Pin, PinChange, Pulse};
@@ -53,7 +54,7 @@ pub enum TrialError {
     #[error(transparent)]
     Console(#[from] ConsoleError),
     /// The firmware started anew on the way.
-    #[error("the firmware restarted {0} times during the trial, so that its position means nothing")]
+    #[error("the firmware restarted {} during the trial, so that its position means nothing", counted(.0, "time"))]
     Restarted(usize),
 }
 
