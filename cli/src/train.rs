@@ -3,7 +3,9 @@
 use crate::Harm;
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
-use field::training::{self, Labelled, MOST_EXAMPLES, Training, listing, regions, synthetic, table};
+use field::training::{
+    self, DEFAULT_MOST_EXAMPLES, Labelled, MOST_EXAMPLES, Training, listing, regions, synthetic, table,
+};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -26,8 +28,8 @@ pub struct Arguments {
     /// Examples that vote: 1 to 15, or `auto` for those that do best.
     #[arg(long, value_name = "auto|N", default_value = "auto")]
     k: Votes,
-    /// Most examples that the table may have.
-    #[arg(long, default_value_t = MOST_EXAMPLES)]
+    /// Most examples that the table may have; the firmware has room for 128.
+    #[arg(long, value_name = "N", default_value_t = DEFAULT_MOST_EXAMPLES)]
     max: usize,
     /// Draw what the table decides.
     #[arg(long, value_name = "FILE.svg")]

@@ -81,8 +81,25 @@ fn objects_without_labels_are_classified_without_a_score() {
 
 #[test]
 fn a_table_larger_than_the_flash_budget_is_refused_by_name() {
-    assert_refused("", &["train", "--synthetic", "--max", "65"], "too many examples for the flash budget");
+    let room = "too many examples for the flash budget: --max is 129 and there is room for 128";
+    assert_refused("", &["train", "--synthetic", "--max", "129"], room);
     assert_refused("", &["train", "--synthetic", "--max", "9"], "too many examples for the flash budget");
+}
+
+#[test]
+fn objects_that_take_more_examples_than_the_flash_has_room_for_are_refused_by_name() {
+    // Plants and weeds like the squares of a chessboard, 200 of each; four objects a square, so that none is noise.
+    let square = |place: i32| {
+        let (spacing_mm, hold_mm) = (100 + place / 20 * 50, 100 + place % 20 * 10);
+        let label = if (place / 20 + place) % 2 == 0 { "plant" } else { "weed" };
+        format!("694,{spacing_mm},226,{hold_mm},500,{label}\n").repeat(4)
+    };
+    let chessboard: String = (0..400).map(square).collect();
+    for most in ["64", "128"] {
+        let room = format!("and there is room for {most}: take out objects with a wrong label");
+        assert_refused(&chessboard, &["train", "objects.csv", "--max", most], "too many examples for the flash budget");
+        assert_refused(&chessboard, &["train", "objects.csv", "--max", most], &room);
+    }
 }
 
 #[test]

@@ -28,7 +28,7 @@ pub const RADIUS: u32 = table::RADIUS;
 pub const K: u8 = table::K;
 
 /// Most examples that the flash budget has room for, at 6 bytes each.
-pub const CAPACITY: usize = 64;
+pub const CAPACITY: usize = 128;
 
 /// Examples in the table.
 pub const COUNT: usize = table::TAUGHT.len();

@@ -17,6 +17,7 @@ pub mod table;
 pub use confusion::Confusion;
 pub use knn::MAX_K;
 
+use crate::report::counted;
 use crate::row::Kind;
 use comfy_table::{CellAlignment, Table, presets};
 use condense::TooMany;
@@ -31,6 +32,9 @@ use thiserror::Error;
 
 /// Most examples that the firmware's flash budget has room for.
 pub const MOST_EXAMPLES: usize = examples::CAPACITY;
+
+/// Most examples where nobody asks for more: enough for the simulated field, and each makes the search longer.
+pub const DEFAULT_MOST_EXAMPLES: usize = 64;
 
 /// An object whose kind is known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -186,7 +190,8 @@ pub enum TrainingError {
     KOutOfRange(u8),
     /// The few examples would cut plants that all objects together spare.
     #[error(
-        "with a vote of {k}, so few examples cut {plants} plants that all objects together spare: choose a smaller --k"
+        "with a vote of {k}, so few examples cut {} that all objects together spare: choose a smaller --k",
+        counted(plants, "plant")
     )]
     Outvoted {
         /// Examples that vote.

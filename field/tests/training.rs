@@ -6,7 +6,7 @@ use control::features::{Features, SPEED_CLASSES_MM_S};
 use control::taught::Volatile;
 use field::row::Kind;
 use field::training::table::{read, read_labelled};
-use field::training::{Labelled, MOST_EXAMPLES, Model, TrainingError, listing, regions, synthetic, train};
+use field::training::{DEFAULT_MOST_EXAMPLES, Labelled, Model, TrainingError, listing, regions, synthetic, train};
 use std::io::Write;
 use std::path::PathBuf;
 use tempfile::TempDir;
@@ -29,7 +29,7 @@ fn clear_case() -> Vec<Labelled> {
 #[test]
 fn each_object_of_the_simulated_field_is_judged_right_by_all_others() {
     let objects = synthetic::objects(1).unwrap();
-    let training = train(&objects, None, MOST_EXAMPLES).unwrap();
+    let training = train(&objects, None, DEFAULT_MOST_EXAMPLES).unwrap();
     assert_eq!(training.k, K);
     for confusion in [training.leave_one_out, training.by_table] {
         let (plants, weeds) = (confusion.count(Kind::Plant) as f64, confusion.count(Kind::Weed) as f64);
@@ -91,7 +91,7 @@ fn one_plant_labelled_as_a_weed_makes_no_weeds_of_the_plants_around_it() {
     let mut objects = clear_case();
     let plant = objects[30];
     objects[30].kind = Kind::Weed;
-    let training = train(&objects, None, MOST_EXAMPLES).unwrap();
+    let training = train(&objects, None, DEFAULT_MOST_EXAMPLES).unwrap();
     assert_eq!(training.edited_out, 1);
     assert!(training.k > 1);
     assert_ne!(training.model().class(&plant.features), Class::Weed);
@@ -108,7 +108,7 @@ fn few_examples_decide_like_many() {
 
 #[test]
 fn an_object_between_plants_and_weeds_is_unknown() {
-    let model = train(&clear_case(), None, MOST_EXAMPLES).unwrap().model();
+    let model = train(&clear_case(), None, DEFAULT_MOST_EXAMPLES).unwrap().model();
     for width_mm in 50..90 {
         assert_eq!(model.class(&Features::describe(556, 400, width_mm)), Class::Unknown, "{width_mm}");
     }
@@ -120,7 +120,7 @@ fn a_handful_of_objects_does_not_make_weeds_of_what_is_nearer_to_plants() {
     let plants = (0..4).map(|n| labelled(Kind::Plant, 278 + 139 * n, 500, 140));
     let weeds = (0..4).map(|n| labelled(Kind::Weed, 278 + 139 * n, 300, 16));
     let objects: Vec<Labelled> = plants.chain(weeds).collect();
-    let model = train(&objects, Some(1), MOST_EXAMPLES).unwrap().model();
+    let model = train(&objects, Some(1), DEFAULT_MOST_EXAMPLES).unwrap().model();
     for width_mm in 79..140 {
         assert_ne!(model.class(&Features::describe(417, 400, width_mm)), Class::Weed, "{width_mm}");
     }
@@ -130,14 +130,14 @@ fn a_handful_of_objects_does_not_make_weeds_of_what_is_nearer_to_plants() {
 #[test]
 fn a_table_that_cuts_plants_which_all_objects_together_spare_is_refused() {
     let objects = synthetic::objects(1).unwrap();
-    let few = train(&objects, None, MOST_EXAMPLES).unwrap().kept;
-    let error = train(&few, Some(15), MOST_EXAMPLES).unwrap_err();
+    let few = train(&objects, None, DEFAULT_MOST_EXAMPLES).unwrap().kept;
+    let error = train(&few, Some(15), DEFAULT_MOST_EXAMPLES).unwrap_err();
     assert!(matches!(error, TrainingError::Outvoted { k: 15, .. }), "{error}");
 }
 
 #[test]
 fn as_many_examples_are_kept_as_vote() {
-    let training = train(&clear_case(), Some(15), MOST_EXAMPLES).unwrap();
+    let training = train(&clear_case(), Some(15), DEFAULT_MOST_EXAMPLES).unwrap();
     assert!(training.kept.len() >= 15);
     assert_eq!(training.by_table.plants_taken_for_weeds(), 0);
 }
@@ -161,7 +161,7 @@ fn no_objects_and_objects_of_one_class_are_refused() {
 
 #[test]
 fn a_written_table_of_examples_reads_back() {
-    let training = train(&clear_case(), None, MOST_EXAMPLES).unwrap();
+    let training = train(&clear_case(), None, DEFAULT_MOST_EXAMPLES).unwrap();
     let mut text = Vec::new();
     listing::write_csv(&training, &mut text).unwrap();
     let mut read_back = read_text(&[&String::from_utf8(text).unwrap()]).unwrap();
@@ -176,7 +176,7 @@ fn a_written_table_of_examples_reads_back() {
 fn the_picture_has_a_panel_for_each_speed_and_a_ring_for_each_example() {
     let mut objects = clear_case();
     objects.push(labelled(Kind::Plant, 278, 500, 150));
-    let training = train(&objects, None, MOST_EXAMPLES).unwrap();
+    let training = train(&objects, None, DEFAULT_MOST_EXAMPLES).unwrap();
     let drawn = regions::draw(&training, &objects).to_string();
     assert_eq!(drawn.matches("km/h").count(), 2);
     // The legend has one circle more.
