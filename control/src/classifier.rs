@@ -127,10 +127,12 @@ impl<B: Examples<{ features::COUNT }>, M: Memory> Classifier for Nearest<B, M> {
         if let Some(example) = self.built_in.example(usize::from(place)) {
             return Some((Listed { from_field: false, number: place, example }, place + 1));
         }
-        (place - built_in..taught::CAPACITY).find_map(|number| {
-            let example = self.field.slot(number)?;
-            Some((Listed { from_field: true, number, example }, built_in + number + 1))
-        })
+        for number in place - built_in..taught::CAPACITY {
+            if let Some(example) = self.field.slot(number) {
+                return Some((Listed { from_field: true, number, example }, built_in + number + 1));
+            }
+        }
+        None
     }
 
     fn spoiled(&self) -> u8 {

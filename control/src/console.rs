@@ -104,47 +104,85 @@ pub enum Mistake {
     Value(Setting),
 }
 
+words! {
+    /// A word that a command may take.
+    pub enum Argument {
+        /// Of `start`.
+        Now = "now",
+        /// Of `events`.
+        On = "on",
+        /// Of `events`.
+        Off = "off",
+        /// Of `forget`.
+        All = "all",
+        /// Of `label`.
+        Plant = "plant",
+        /// Of `label`.
+        Weed = "weed",
+    }
+}
+
 /// Reads a line.
 ///
 /// # Errors
 /// A [`Mistake`] that says what would have been right.
 pub fn parse(line: &[u8]) -> Result<Command, Mistake> {
-    let mut words = line.split(|&byte| byte == b' ' || byte == b'\t').filter(|word| !word.is_empty());
-    let word = words.next().and_then(Word::find).ok_or(Mistake::UnknownCommand)?;
-    let (first, second) = (words.next(), words.next());
-    if words.next().is_some() {
-        return Err(Mistake::Usage(word));
+    let (word, rest) = split_word(line);
+    let word = Word::find(word).ok_or(Mistake::UnknownCommand)?;
+    let usage = Err(Mistake::Usage(word));
+    let (first, rest) = split_word(rest);
+    let (second, rest) = split_word(rest);
+    // Only `set` takes two words, and takes nothing less.
+    if second.is_empty() == (word == Word::Set) || !rest.iter().all(is_blank) {
+        return usage;
     }
-    let setting = |name| Setting::find(name).ok_or(Mistake::UnknownSetting);
-    match (word, first, second) {
-        (Word::Help, None, None) => Ok(Command::Help),
-        (Word::Help, Some(name), None) => setting(name).map(Command::Explain),
-        (Word::Status, None, None) => Ok(Command::Status),
-        (Word::Get, None, None) => Ok(Command::GetAll),
-        (Word::Get, Some(name), None) => setting(name).map(Command::Get),
-        (Word::Set, Some(name), Some(digits)) => {
-            let setting = setting(name)?;
-            let value = number(digits).ok_or(Mistake::Value(setting))?;
-            Ok(Command::Set(setting, value))
-        }
-        (Word::Start, None, None) => Ok(Command::Start { now: false }),
-        (Word::Start, Some([b'n', b'o', b'w']), None) => Ok(Command::Start { now: true }),
-        (Word::Hold, None, None) => Ok(Command::Hold),
-        (Word::Clear, None, None) => Ok(Command::Clear),
-        (Word::Events, Some([b'o', b'n']), None) => Ok(Command::Events(true)),
-        (Word::Events, Some([b'o', b'f', b'f']), None) => Ok(Command::Events(false)),
-        (Word::Label, Some([b'p', b'l', b'a', b'n', b't']), None) => Ok(Command::Label(label::PLANT)),
-        (Word::Label, Some([b'w', b'e', b'e', b'd']), None) => Ok(Command::Label(label::WEED)),
-        (Word::Examples, None, None) => Ok(Command::Examples),
-        (Word::Forget, Some([b'a', b'l', b'l']), None) => Ok(Command::ForgetAll),
-        (Word::Forget, Some(digits), None) => {
-            let number = number(digits).and_then(|number| u8::try_from(number).ok());
-            number.map(Command::Forget).ok_or(Mistake::Usage(word))
-        }
-        (Word::Dump, None, None) => Ok(Command::Dump),
-        (Word::Version, None, None) => Ok(Command::Version),
-        _ => Err(Mistake::Usage(word)),
+    if first.is_empty() {
+        return match word {
+            Word::Help => Ok(Command::Help),
+            Word::Status => Ok(Command::Status),
+            Word::Get => Ok(Command::GetAll),
+            Word::Start => Ok(Command::Start { now: false }),
+            Word::Hold => Ok(Command::Hold),
+            Word::Clear => Ok(Command::Clear),
+            Word::Examples => Ok(Command::Examples),
+            Word::Dump => Ok(Command::Dump),
+            Word::Version => Ok(Command::Version),
+            Word::Set | Word::Events | Word::Label | Word::Forget => usage,
+        };
     }
+    if let Word::Help | Word::Get | Word::Set = word {
+        let setting = Setting::find(first).ok_or(Mistake::UnknownSetting)?;
+        return match word {
+            Word::Help => Ok(Command::Explain(setting)),
+            Word::Get => Ok(Command::Get(setting)),
+            _ => number(second).map(|value| Command::Set(setting, value)).ok_or(Mistake::Value(setting)),
+        };
+    }
+    match (word, Argument::find(first)) {
+        (Word::Start, Some(Argument::Now)) => Ok(Command::Start { now: true }),
+        (Word::Events, Some(Argument::On)) => Ok(Command::Events(true)),
+        (Word::Events, Some(Argument::Off)) => Ok(Command::Events(false)),
+        (Word::Label, Some(Argument::Plant)) => Ok(Command::Label(label::PLANT)),
+        (Word::Label, Some(Argument::Weed)) => Ok(Command::Label(label::WEED)),
+        (Word::Forget, Some(Argument::All)) => Ok(Command::ForgetAll),
+        (Word::Forget, None) => match number(first) {
+            Some(number @ 0..=255) => Ok(Command::Forget(number as u8)),
+            _ => usage,
+        },
+        _ => usage,
+    }
+}
+
+/// The next word of a line, empty at its end, and what follows it.
+#[inline(never)]
+fn split_word(line: &[u8]) -> (&[u8], &[u8]) {
+    let start = line.iter().position(|byte| !is_blank(byte)).unwrap_or(line.len());
+    let line = &line[start..];
+    line.split_at(line.iter().position(is_blank).unwrap_or(line.len()))
+}
+
+fn is_blank(byte: &u8) -> bool {
+    matches!(byte, b' ' | b'\t')
 }
 
 /// A whole number in 16 bits, digits only.
@@ -195,7 +233,7 @@ impl LineBuffer {
     fn end(&mut self) -> Option<Result<Command, Mistake>> {
         let said = match self.mistake.take() {
             Some(mistake) => Some(Err(mistake)),
-            None if self.characters.iter().all(|&byte| byte == b' ' || byte == b'\t') => None,
+            None if self.characters.iter().all(is_blank) => None,
             None => Some(parse(&self.characters)),
         };
         self.characters.clear();

@@ -75,7 +75,10 @@ impl Schedule {
         let horizon = tool - MEMORY;
         if horizon.is_ahead_of(self.known_from) {
             self.known_from = horizon;
-            self.canopies.retain(|canopy| !horizon.is_ahead_of(canopy.trailing));
+            // They stand in order, so that only the first can lie behind.
+            while self.canopies.first().is_some_and(|canopy| horizon.is_ahead_of(canopy.trailing)) {
+                self.canopies.remove(0);
+            }
         }
     }
 
