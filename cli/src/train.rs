@@ -28,8 +28,12 @@ pub struct Arguments {
     /// Examples that vote: 1 to 15, or `auto` for those that do best.
     #[arg(long, value_name = "auto|N", default_value = "auto")]
     k: Votes,
-    /// Most examples that the table may have; the firmware has room for 128.
-    #[arg(long, value_name = "N", default_value_t = DEFAULT_MOST_EXAMPLES)]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = DEFAULT_MOST_EXAMPLES,
+        help = format!("Most examples that the table may have, up to {MOST_EXAMPLES}")
+    )]
     max: usize,
     /// Draw what the table decides.
     #[arg(long, value_name = "FILE.svg")]
