@@ -59,7 +59,7 @@ fn main() -> ! {
         Readings { now, position: Position::new(position), switch_on, lost }
     };
     let classifier = Nearest::new(examples::built_in(), eeprom::Eeprom::new(peripherals.EEPROM));
-    let controller = CONTROLLER.init_with(|| Controller::new(classifier, read(), beam.is_broken()));
+    let controller = CONTROLLER.init(Controller::new(classifier, read(), beam.is_broken()));
     let mut line = LineBuffer::new();
     let mut answer = Answer::Greeting;
     watchdog::start();

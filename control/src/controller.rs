@@ -9,7 +9,7 @@ use crate::{
     alarm::Alarm,
     classifier::{Class, Classifier, Full, Vote},
     event::Event,
-    features::Features,
+    features::{self, Features},
     object::{Object, Watch},
     schedule::{Plan, Schedule},
     servo::{self, HalfMicros},
@@ -97,15 +97,23 @@ pub enum Refusal {
     NoSuchExample,
 }
 
-/// An object as it was judged.
+/// An object as it was judged: what its features follow from, in less room than they take.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Judged {
-    /// Its features.
-    pub features: Features,
+    speed_class_mm_s: i16,
+    spacing_mm: i16,
+    width_mm: i16,
     /// What it was taken for.
     pub vote: Vote,
     /// What the operator said that it is, one of [`label`](crate::classifier::label).
     pub label: Option<u8>,
+}
+
+impl Judged {
+    /// Its features.
+    pub fn features(&self) -> Features {
+        Features::describe(self.speed_class_mm_s, self.spacing_mm, self.width_mm)
+    }
 }
 
 /// The machine's decisions and all that they rest on.
@@ -133,7 +141,6 @@ pub struct Controller<C> {
 
 impl<C: Classifier> Controller<C> {
     /// A controller for a machine that just woke up: in HOLD, with the tool out, and with no ground known.
-    #[inline(never)]
     pub fn new(classifier: C, readings: Readings, beam_broken: bool) -> Self {
         let settings = Settings::new();
         Self {
@@ -254,7 +261,7 @@ impl<C: Classifier> Controller<C> {
     pub fn label(&mut self, label: u8) -> Result<(), Refusal> {
         let unlabelled = self.objects.last_mut().filter(|object| object.label.is_none());
         let object = unlabelled.ok_or(Refusal::NothingToLabel)?;
-        self.classifier.teach(&object.features, label).map_err(|Full| Refusal::ExamplesFull)?;
+        self.classifier.teach(&object.features(), label).map_err(|Full| Refusal::ExamplesFull)?;
         object.label = Some(label);
         Ok(())
     }
@@ -378,7 +385,9 @@ impl<C: Classifier> Controller<C> {
     fn judge(&mut self, object: Object) {
         let wheel = self.settings.wheel();
         let spacing = object.leading - self.last_plant;
-        let features = Features::new(wheel, self.speed_mm_s(), spacing, object.width());
+        let speed_class_mm_s = features::speed_class(self.speed_mm_s());
+        let (spacing_mm, width_mm) = (wheel.millimetres(spacing), wheel.millimetres(object.width()));
+        let features = Features::describe(speed_class_mm_s, spacing_mm, width_mm);
         let vote = self.classifier.classify(&features, self.settings.get(Setting::K) as u8);
         let (distance_mm, margin_mm) = (self.settings.get(Setting::BeamToToolMm), self.settings.get(Setting::MarginMm));
         let plan = Plan::new(wheel, distance_mm, margin_mm, object.width());
@@ -386,7 +395,7 @@ impl<C: Classifier> Controller<C> {
             self.objects.remove(0);
         }
         // There is room, as was just seen to.
-        let _ = self.objects.push(Judged { features, vote, label: None });
+        let _ = self.objects.push(Judged { speed_class_mm_s, spacing_mm, width_mm, vote, label: None });
         self.tell(Event::Object { vote, leading: object.leading, spacing, plan });
         if vote.class == Class::Weed {
             return;

@@ -4,8 +4,6 @@
 //! own machine would schedule the object: beam 400 mm ahead of the tool, 50 mm margin, 180 and 40 ms of lead. So the
 //! examples that one machine was taught with hold on another, whatever its wheel, its encoder and its settings.
 
-use crate::units::{Ticks, Wheel};
-
 /// Features in a vector.
 pub const COUNT: usize = 5;
 
@@ -36,12 +34,8 @@ pub struct Features {
 }
 
 impl Features {
-    /// Describes an object of `width`, `spacing` behind the last plant, seen at `speed_mm_s`.
-    pub fn new(wheel: Wheel, speed_mm_s: i16, spacing: Ticks, width: Ticks) -> Self {
-        Self::describe(speed_class(speed_mm_s), wheel.millimetres(spacing), wheel.millimetres(width))
-    }
-
     /// Describes an object of `width_mm`, `spacing_mm` behind the last plant, in one of the speed classes.
+    #[inline(never)]
     pub const fn describe(speed_class_mm_s: i16, spacing_mm: i16, width_mm: i16) -> Self {
         let speed = speed_class_mm_s as u16 as u32;
         let delay = reference::BEAM_TO_TOOL_MM - reference::MARGIN_MM;
@@ -86,8 +80,6 @@ pub const fn speed_class(speed_mm_s: i16) -> i16 {
 mod tests {
     use super::*;
 
-    const WHEEL: Wheel = Wheel { ticks_per_rev: 2400, diameter_mm: 400 };
-
     #[test]
     fn a_speed_belongs_to_the_nearest_of_the_papers_classes() {
         for (speed, class) in
@@ -100,16 +92,13 @@ mod tests {
     #[test]
     fn the_features_are_the_papers_schedule_on_the_reference_machine() {
         // 150 mm of canopy at 2.5 km/h: Y = 350 mm less 124 mm of lead, Z = 250 mm, R = 600 mm less 27 mm.
-        let features = Features::new(WHEEL, 700, Ticks(955), Ticks(287));
+        let features = Features::describe(694, 500, 150);
         assert_eq!(features.values(), [694, 500, 226, 250, 573]);
     }
 
     #[test]
-    fn another_wheel_gives_the_same_features() {
-        let small = Wheel { ticks_per_rev: 1000, diameter_mm: 250 };
-        assert_eq!(
-            Features::new(small, 700, small.ticks(501), small.ticks(151)),
-            Features::new(WHEEL, 700, WHEEL.ticks(501), WHEEL.ticks(151)),
-        );
+    fn features_beyond_what_16_bits_hold_are_limited() {
+        let features = Features::describe(278, i16::MAX, i16::MAX);
+        assert_eq!((features.hold_mm, features.actuation_mm), (i16::MAX, i16::MAX));
     }
 }

@@ -325,7 +325,7 @@ fn write_example<W: uWrite + ?Sized>(listed: &classifier::Listed, out: &mut W) -
 }
 
 fn write_object<W: uWrite + ?Sized>(object: &Judged, out: &mut W) -> Result<(), W::Error> {
-    for value in object.features.values() {
+    for value in object.features().values() {
         uwrite!(out, "{}", value)?;
         say(out, text!(","))?;
     }

@@ -116,7 +116,7 @@ fn search<const FEATURES: usize, const CLASSES: usize>(
     nearest: &mut [Neighbour],
     radius: u32,
 ) -> Result<Answer<CLASSES>, ClassifyError> {
-    scan(examples, features, DISTANCE_LIMIT - 1, &mut |distance, label| {
+    examples.visit_near(features, DISTANCE_LIMIT - 1, &mut |distance, label| {
         admit(nearest, Neighbour::new(distance, label)).distance()
     });
     let [next, neighbours @ ..] = nearest else { return Err(ClassifyError::KOutOfRange) };
@@ -129,7 +129,7 @@ fn search<const FEATURES: usize, const CLASSES: usize>(
     let mut ballot = Ballot { votes: [0; CLASSES], unknown: false };
     if next.distance() == last.distance() {
         // There are more than k within the last neighbour's distance, perhaps more than found room: all of them vote.
-        scan(examples, features, last.distance(), &mut |_, label| {
+        examples.visit_near(features, last.distance(), &mut |_, label| {
             ballot.count(label);
             last.distance()
         });
@@ -139,17 +139,6 @@ fn search<const FEATURES: usize, const CLASSES: usize>(
         }
     }
     ballot.decide(neighbours, first.distance(), radius)
-}
-
-/// One pass over the examples: in one place for both passes, because it is most of the code.
-#[inline(never)]
-fn scan<const FEATURES: usize>(
-    examples: &(impl Examples<FEATURES> + ?Sized),
-    features: &[u8; FEATURES],
-    reach: u32,
-    mut visit: &mut dyn FnMut(u32, u8) -> u32,
-) {
-    examples.visit_near(features, reach, &mut visit);
 }
 
 /// Gives an example its place among the k + 1 nearest, farthest first, and returns the k-th nearest.
