@@ -13,8 +13,7 @@ use heapless::spsc::Queue;
 /// Position and level of an edge: the beam is broken from here on, or clear.
 pub type Edge = (i32, bool);
 
-/// Edges that wait for the loop: a turn of the loop is shorter than the sensor's 1 ms, so that more than one already
-/// means dust.
+/// Edges that wait for the loop: 15 of them, which a sensor with a response of 1 ms cannot make in less than 15 ms.
 static EDGES: Mutex<RefCell<Queue<Edge, 16>>> = Mutex::new(RefCell::new(Queue::new()));
 static LOST: Mutex<Cell<bool>> = Mutex::new(Cell::new(false));
 

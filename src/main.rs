@@ -1,8 +1,8 @@
 //! The weeder's firmware: wiring, the interrupts, and the loop that reads, decides and applies.
 //!
 //! Interrupts only count, stamp and move bytes; the crate `control` decides, and each file beside this one knows one
-//! peripheral. This is the only file that knows them all. The loop never waits for anything: a turn takes well below a
-//! millisecond, whatever the serial line and the field are doing.
+//! peripheral. This is the only file that knows them all. The loop never waits for the serial line or the field; the one
+//! thing that it may wait for is a byte on its way into the EEPROM, when an object is to be judged just then.
 
 #![no_std]
 #![no_main]

@@ -1,8 +1,9 @@
 //! The weeder's decisions, from beam edge to swing, without a register, a clock, a float or a heap.
 //!
-//! The data's way: a beam edge with its position becomes an [`object`], the object's [`features`] a class, a plant a
-//! window of the [`schedule`], and the schedule with the present [`speed`] tells the [`tool`] whether to be in the row or
-//! out of it. [`controller`] is the front door through which all of that, the operator's switch and the [`console`] pass.
+//! The data's way: a beam edge with its position becomes an [`object`], the object's [`features`] a class by the
+//! [`classifier`], a plant a window of the [`schedule`], and the schedule with the present [`speed`] tells whether the tool
+//! has to be out of the row. [`controller`] is the front door through which all of that, the operator's [`switch`] and the
+//! [`console`] pass; [`reply`] words what comes back.
 //!
 //! Position and time are arguments everywhere, so that a test can bend both. What this crate does not do: read a pin,
 //! wait, or know how its text reaches a terminal.
