@@ -1,9 +1,9 @@
 //! The machine's speed, from the encoder's position and the time at which it was read.
 //!
-//! The meter remembers the places and times of a few position changes, at least [`SPACING`] apart, and divides the
+//! The meter remembers the places and times of a few position changes, at least `SPACING` apart, and divides the
 //! distance since the oldest by the time it took: a window of about 80 ms at walking speed, and of six ticks when the
 //! machine creeps. A wheel that has fallen silent for longer than it should is slower than one tick in that silence; after
-//! [`STANDSTILL`] it stands. A single tick backwards, as vibration gives, moves the answer by its share and no more.
+//! `STANDSTILL` it stands. A single tick backwards, as vibration gives, moves the answer by its share and no more.
 
 use crate::units::{Instant, Interval, Position, TicksPerSecond};
 

@@ -1,9 +1,9 @@
 //! Text that lies in flash.
 //!
-//! An AVR keeps Rust's string literals in SRAM, of which there are 2 KiB. [`text!`] lays a literal into flash instead and
+//! An AVR keeps Rust's string literals in SRAM, of which there are 2 KiB. `text!` lays a literal into flash instead and
 //! gives a [`Text`], which is no more than its address and length: all texts share one piece of code that writes them.
-//! [`list!`] lays many literals behind each other, so that a number chooses one, which takes far less code than a match.
-//! [`words!`] makes an enum whose variants are words.
+//! `list!` lays many literals behind each other, so that a number chooses one, which takes far less code than a match.
+//! `words!` makes an enum whose variants are words.
 
 use avr_progmem::wrapper::ProgMem;
 
@@ -12,7 +12,7 @@ use avr_progmem::wrapper::ProgMem;
 pub struct Text(ProgMem<[u8]>);
 
 impl Text {
-    /// The text whose characters lie in `flash`; made by [`text!`].
+    /// The text whose characters lie in `flash`; made by `text!`.
     pub(crate) const fn new(flash: ProgMem<[u8]>) -> Self {
         Self(flash)
     }
@@ -23,7 +23,7 @@ impl Text {
     }
 }
 
-/// Texts behind each other in flash, each behind a byte with its length; made by [`list!`].
+/// Texts behind each other in flash, each behind a byte with its length; made by `list!`.
 #[derive(Clone, Copy)]
 pub struct List(ProgMem<[u8]>);
 
