@@ -20,8 +20,8 @@ const RESET_LATER: u8 = 0x0C;
 /// The cause of the reset moves from MCUSR, which must be cleared for the watchdog to go off, to GPIOR0.
 #[unsafe(naked)]
 #[unsafe(no_mangle)]
-// SAFETY: .init3 is run through, not called; the code falls into the next start-up section and touches r0 and r24 alone,
-// which nobody uses that early.
+// SAFETY: .init3 is run through, not called; the code falls into the next start-up section and changes r24 alone,
+// which nobody uses that early; r1 is 0 since .init2.
 #[unsafe(link_section = ".init3")]
 unsafe extern "C" fn switch_watchdog_off() {
     naked_asm!(
