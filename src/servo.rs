@@ -6,7 +6,10 @@
 //!
 //! Timer1's 16-bit registers share a byte of temporary storage (16.3): no interrupt may touch them, and none does.
 
-use avr_device::atmega328p::{PORTB, TC1};
+use avr_device::{
+    atmega328p::{PORTB, TC1},
+    interrupt,
+};
 use control::servo::{self, Action, FRAME, HalfMicros};
 use core::convert::Infallible;
 use embedded_hal::pwm::{ErrorType, SetDutyCycle};
@@ -40,15 +43,20 @@ impl Servo {
         if width == self.width {
             return;
         }
-        let action = servo::action(self.timer.tcnt1().read().bits(), self.width, gap_ms);
-        if action == Action::Wait {
-            return;
+        // No interrupt may come between reading the counter and setting it: the frame could end in the meantime.
+        let changed = interrupt::free(|_| {
+            let action = servo::action(self.timer.tcnt1().read().bits(), self.width, gap_ms);
+            if action != Action::Wait {
+                self.timer.ocr1a().write(|w| w.set(compare(width)));
+            }
+            if action == Action::Restart {
+                self.timer.tcnt1().write(|w| w.set(FRAME - 2));
+            }
+            action != Action::Wait
+        });
+        if changed {
+            self.width = width;
         }
-        self.timer.ocr1a().write(|w| w.set(compare(width)));
-        if action == Action::Restart {
-            self.timer.tcnt1().write(|w| w.set(FRAME - 2));
-        }
-        self.width = width;
     }
 }
 

@@ -12,12 +12,12 @@ const ALLOW_CHANGE: u8 = 0x18;
 /// WDTCSR: reset after 16 ms.
 const RESET_SOON: u8 = 0x08;
 
-/// WDTCSR: reset after 250 ms, a hundred times the loop's longest turn.
+/// WDTCSR: reset after 250 ms, many times the loop's longest turn.
 const RESET_LATER: u8 = 0x0C;
 
 /// Switches the watchdog off in the start-up code, before SRAM is cleared and long before `main`.
 ///
-/// The cause of the reset moves from MCUSR, which must be cleared for the watchdog to go off, to GPIOR0.
+/// MCUSR is cleared first: while it tells of a watchdog reset, the watchdog cannot go off.
 #[unsafe(naked)]
 #[unsafe(no_mangle)]
 // SAFETY: .init3 is run through, not called; the code falls into the next start-up section and changes r24 alone,
@@ -25,9 +25,7 @@ const RESET_LATER: u8 = 0x0C;
 #[unsafe(link_section = ".init3")]
 unsafe extern "C" fn switch_watchdog_off() {
     naked_asm!(
-        "in r24, 0x34",  // MCUSR
-        "out 0x1e, r24", // GPIOR0
-        "out 0x34, r1",
+        "out 0x34, r1",  // MCUSR
         "ldi r24, 0x18", // WDCE and WDE open the four cycles in which WDE may be cleared
         "wdr",
         "sts 0x60, r24", // WDTCSR

@@ -85,7 +85,7 @@ struct Leads {
 pub enum Refusal {
     /// An alarm is latched.
     AlarmLatched,
-    /// The setting moves the machine's geometry, and the machine is not in HOLD.
+    /// The setting changes where the tool is, and the machine is at work.
     NotInHold,
     /// The value lies outside the setting's range.
     OutOfRange,
@@ -245,7 +245,7 @@ impl<C: Classifier> Controller<C> {
     /// # Errors
     /// [`Refusal::NotInHold`] and [`Refusal::OutOfRange`]; nothing is changed then.
     pub fn set(&mut self, setting: Setting, value: u16) -> Result<(), Refusal> {
-        if setting.description().geometry && self.state == State::Work {
+        if setting.description().hold_only && self.state == State::Work {
             return Err(Refusal::NotInHold);
         }
         self.settings.set(setting, value).map_err(|_| Refusal::OutOfRange)?;
@@ -388,7 +388,12 @@ impl<C: Classifier> Controller<C> {
         let speed_class_mm_s = features::speed_class(self.speed_mm_s());
         let (spacing_mm, width_mm) = (wheel.millimetres(spacing), wheel.millimetres(object.width()));
         let features = Features::describe(speed_class_mm_s, spacing_mm, width_mm);
-        let vote = self.classifier.classify(&features, self.settings.get(Setting::K) as u8);
+        // What is left of an object whose beginning was not seen may be as narrow as a weed.
+        let vote = if object.cut {
+            Vote { class: Class::Unknown, votes: 0 }
+        } else {
+            self.classifier.classify(&features, self.settings.get(Setting::K) as u8)
+        };
         let (distance_mm, margin_mm) = (self.settings.get(Setting::BeamToToolMm), self.settings.get(Setting::MarginMm));
         let plan = Plan::new(wheel, distance_mm, margin_mm, object.width());
         if self.objects.is_full() {

@@ -21,6 +21,20 @@ pub fn scale() -> Scale<{ features::COUNT }> {
 /// From a feature's value to a byte.
 pub const SCALE: Scale<{ features::COUNT }> = Scale::new(table::RANGES);
 
+/// The ranges of [`SCALE`] as bytes: what an example's bytes stand for.
+pub const SCALE_BYTES: [u8; 8 * features::COUNT] = {
+    let mut bytes = [0; 8 * features::COUNT];
+    let mut feature = 0;
+    while feature < features::COUNT {
+        let (_, behind) = bytes.split_at_mut(8 * feature);
+        let (lowest, behind) = behind.split_at_mut(4);
+        lowest.copy_from_slice(&table::RANGES[feature].lowest.to_le_bytes());
+        behind.split_at_mut(4).0.copy_from_slice(&table::RANGES[feature].highest.to_le_bytes());
+        feature += 1;
+    }
+    bytes
+};
+
 /// Squared distance beyond which an object is like no example.
 pub const RADIUS: u32 = table::RADIUS;
 

@@ -1,8 +1,8 @@
 //! The paper's five features of an object.
 //!
-//! Speed, encoder value, delay, hold and actuation are given in millimetres and millimetres a second, as the paper's
-//! own machine would schedule the object: beam 400 mm ahead of the tool, 50 mm margin, 180 and 40 ms of lead. So the
-//! examples that one machine was taught with hold on another, whatever its wheel, its encoder and its settings.
+//! Speed, encoder value, delay, hold and actuation are given in millimetres and millimetres a second, as a machine with
+//! the default settings would schedule the object: beam 400 mm ahead of the tool, 50 mm margin, 180 and 40 ms of lead. So
+//! the examples that one machine was taught with hold on another, whatever its wheel, its encoder and its settings.
 
 /// Features in a vector.
 pub const COUNT: usize = 5;

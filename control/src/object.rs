@@ -17,6 +17,8 @@ pub struct Object {
     pub leading: Position,
     /// Where the beam cleared, at or ahead of `leading`.
     pub trailing: Position,
+    /// Whether it was in the beam already when watching began, so that its width is only what was left of it.
+    pub cut: bool,
 }
 
 impl Object {
@@ -31,8 +33,8 @@ impl Object {
 enum Sight {
     /// Nothing.
     Clear,
-    /// An object that began at `leading`.
-    Broken { leading: Position },
+    /// An object that began at `leading`, or before it.
+    Broken { leading: Position, cut: bool },
     /// Clear ground behind an object, which may turn out to be a gap in it.
     Gap(Object),
 }
@@ -49,7 +51,7 @@ pub struct Watch {
 impl Watch {
     /// Begins to watch at `ground`, with the beam broken or not.
     pub fn start(ground: Position, broken: bool) -> Self {
-        let sight = if broken { Sight::Broken { leading: ground } } else { Sight::Clear };
+        let sight = if broken { Sight::Broken { leading: ground, cut: true } } else { Sight::Clear };
         Self { frontier: ground, broken, sight }
     }
 
@@ -67,7 +69,7 @@ impl Watch {
     pub fn open(&self) -> Option<Position> {
         match self.sight {
             Sight::Clear => None,
-            Sight::Broken { leading } | Sight::Gap(Object { leading, .. }) => Some(leading),
+            Sight::Broken { leading, .. } | Sight::Gap(Object { leading, .. }) => Some(leading),
         }
     }
 
@@ -101,9 +103,9 @@ impl Watch {
     /// Takes the beam's level at the frontier for what is seen there.
     fn turn(&mut self) {
         self.sight = match (self.sight, self.broken) {
-            (Sight::Clear, true) => Sight::Broken { leading: self.frontier },
-            (Sight::Gap(Object { leading, .. }), true) => Sight::Broken { leading },
-            (Sight::Broken { leading }, false) => Sight::Gap(Object { leading, trailing: self.frontier }),
+            (Sight::Clear, true) => Sight::Broken { leading: self.frontier, cut: false },
+            (Sight::Gap(Object { leading, cut, .. }), true) => Sight::Broken { leading, cut },
+            (Sight::Broken { leading, cut }, false) => Sight::Gap(Object { leading, trailing: self.frontier, cut }),
             (sight, _) => sight,
         };
     }
@@ -162,6 +164,19 @@ mod tests {
         assert_eq!(objects(&[(100, 400)], there_and_back), [(100, 400)]);
         let past_it = (0..700).chain((0..700).rev()).chain(0..900);
         assert_eq!(objects(&[(100, 400)], past_it), [(100, 400)]);
+    }
+
+    #[test]
+    fn what_was_in_the_beam_when_watching_began_is_known_to_be_cut() {
+        let mut watch = Watch::start(Position::new(0), true);
+        assert_eq!(watch.edge(Position::new(20), false, GAP), None);
+        assert_eq!(watch.edge(Position::new(30), true, GAP), None, "its own leaves");
+        assert_eq!(watch.edge(Position::new(35), false, GAP), None);
+        let object = watch.edge(Position::new(100), true, GAP).expect("the gap has been seen");
+        assert!(object.cut, "{object:?}");
+        watch.edge(Position::new(400), false, GAP);
+        let object = watch.roll_to(Position::new(440), GAP).expect("the gap has been seen");
+        assert!(!object.cut, "{object:?}");
     }
 
     #[test]

@@ -361,7 +361,7 @@ where
         (Refusal::OutOfRange, Some(setting)) => write_allowed(setting, out),
         (Refusal::NotInHold, Some(setting)) => {
             say_listed(out, setting.text())?;
-            say(out, text!(" moves the machine's geometry, hold first"))
+            say(out, text!(" changes where the tool is, hold first"))
         }
         (Refusal::NothingToLabel, _) => {
             say(out, text!("there is no object without a label, let the beam see one first"))

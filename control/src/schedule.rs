@@ -128,7 +128,7 @@ mod tests {
     const MARGIN: Ticks = Ticks(95);
 
     fn canopy(leading: i32, trailing: i32) -> Object {
-        Object { leading: Position::new(leading), trailing: Position::new(trailing) }
+        Object { leading: Position::new(leading), trailing: Position::new(trailing), cut: false }
     }
 
     fn closed(schedule: &Schedule, from: i32, to: i32) -> bool {
@@ -198,7 +198,7 @@ mod tests {
         let base = i32::MAX - 1100;
         let at = |offset: i32| Position::new(base.wrapping_add(offset));
         let mut schedule = Schedule::new(at(0));
-        let canopy = Object { leading: at(1000), trailing: at(1300) };
+        let canopy = Object { leading: at(1000), trailing: at(1300), cut: false };
         schedule.push(canopy, at(0), MARGIN).unwrap();
         for (offset, closed) in [(904, false), (905, true), (1150, true), (1395, true), (1396, false)] {
             assert_eq!(schedule.is_closed(at(offset), at(offset), MARGIN), closed, "{offset}");

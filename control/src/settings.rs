@@ -1,7 +1,7 @@
 //! The settings: one table of name, range, unit, default and help, and the values in use.
 //!
-//! The console, the host's tools and the manual all read this table; it lies in flash on the machine. Every value is a
-//! whole number in 16 bits whose name carries its unit.
+//! The console reads this table from flash; a test holds the README to it. Every value is a whole number in 16 bits whose
+//! name carries its unit.
 
 use crate::{
     text::{Listed, list, words},
@@ -17,13 +17,13 @@ pub struct Description {
     pub greatest: u16,
     /// The value before anything is set.
     pub default: u16,
-    /// Whether it moves the machine's geometry, so that it may be set in HOLD only.
-    pub geometry: bool,
+    /// Whether it changes where the tool is, so that it is not to be set while the machine works.
+    pub hold_only: bool,
 }
 
 /// The one table from which everything else about the settings is made.
 macro_rules! settings {
-    ($($(#[$doc:meta])* $Variant:ident $name:literal: $least:literal to $greatest:literal, $default:literal, $geometry:literal, $help:literal;)*) => {
+    ($($(#[$doc:meta])* $Variant:ident $name:literal: $least:literal to $greatest:literal, $default:literal, $hold_only:literal, $help:literal;)*) => {
         words! {
             /// A setting.
             pub enum Setting {
@@ -37,7 +37,7 @@ macro_rules! settings {
                     least: $least,
                     greatest: $greatest,
                     default: $default,
-                    geometry: $geometry,
+                    hold_only: $hold_only,
                 },)*
             ];
         }
@@ -73,10 +73,10 @@ settings! {
     LeadInMs "lead_in_ms": 0 to 500, 40, false,
         "shortest time from the command until the tool begins to come back";
     /// Pulse for the tool in the row.
-    ServoInUs "servo_in_us": 500 to 2500, 1500, false,
+    ServoInUs "servo_in_us": 500 to 2500, 1500, true,
         "servo pulse for the tool in the row, 0 degrees";
     /// Pulse for the tool out of the row.
-    ServoOutUs "servo_out_us": 500 to 2500, 2000, false,
+    ServoOutUs "servo_out_us": 500 to 2500, 2000, true,
         "servo pulse for the tool out of the row, 45 degrees";
     /// Shortest gap between two servo pulses.
     ServoGapMs "servo_gap_ms": 0 to 15, 3, false,

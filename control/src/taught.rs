@@ -1,11 +1,11 @@
 //! Examples taught in the field, in memory that outlives the power.
 //!
-//! Each of [`CAPACITY`] examples has a slot of eight bytes: five features, the label, and a CRC-16 of both. An erased slot
-//! reads as ones. A slot whose CRC does not fit, because the power went away while it was written or a bit fell over, is
+//! Each of [`CAPACITY`] examples has a slot of eight bytes: five features, the label, and a CRC-16 of both and of the scale
+//! by which the features became bytes, as under another scale they would mean something else. An erased slot reads as ones. A slot whose CRC does not fit, because the power went away while it was written or a bit fell over, is
 //! dropped, and counted so that it can be told. Which slots hold an example is kept in SRAM, as checking them all takes
 //! longer than searching them.
 
-use crate::features;
+use crate::{examples, features};
 use crc::{CRC_16_IBM_SDLC, Crc, NoTable};
 use knn::{Example, Examples};
 
@@ -20,6 +20,9 @@ type Taught = Example<{ features::COUNT }>;
 
 /// The CRC, without a table: a byte at a time is fast enough for eight bytes, and tables cost flash.
 const CHECK: Crc<u16, NoTable> = Crc::<u16, NoTable>::new(&CRC_16_IBM_SDLC);
+
+/// Stands for the scale in each slot's CRC.
+const SCALE_MARK: [u8; 2] = CHECK.checksum(&examples::SCALE_BYTES).to_le_bytes();
 
 /// Memory that keeps slots without power.
 pub trait Memory {
@@ -180,7 +183,8 @@ const ERASED: u8 = 0xFF;
 
 fn encode(example: Taught) -> [u8; SLOT] {
     let [a, b, c, d, e] = example.features;
-    let [low, high] = CHECK.checksum(&[a, b, c, d, e, example.label]).to_le_bytes();
+    let [mark, scale] = SCALE_MARK;
+    let [low, high] = CHECK.checksum(&[a, b, c, d, e, example.label, mark, scale]).to_le_bytes();
     [a, b, c, d, e, example.label, low, high]
 }
 
@@ -294,6 +298,17 @@ mod tests {
                 assert_eq!((store.slot(0), store.slot(1), store.spoiled()), (None, Some(example(1)), 1));
             }
         }
+    }
+
+    #[test]
+    fn an_example_of_another_scale_is_spoiled() {
+        let mut store = store();
+        store.add(example(0)).unwrap();
+        let [a, b, c, d, e, label, ..] = store.memory.bytes[0];
+        let [low, high] = CHECK.checksum(&[a, b, c, d, e, label, !SCALE_MARK[0], SCALE_MARK[1]]).to_le_bytes();
+        store.memory.bytes[0][6..].copy_from_slice(&[low, high]);
+        let store = restart(store);
+        assert_eq!((store.slot(0), store.spoiled()), (None, 1));
     }
 
     #[test]

@@ -117,11 +117,12 @@ fn a_setting_takes_every_value_of_its_range_and_no_other() {
 }
 
 #[test]
-fn geometry_is_set_in_hold_only() {
+fn what_changes_where_the_tool_is_is_not_set_while_the_machine_works() {
     let mut machine = machine();
     assert_eq!(ask(&mut machine, "start"), ["ok"]);
-    let refusal = "error: wheel_mm moves the machine's geometry, hold first";
+    let refusal = "error: wheel_mm changes where the tool is, hold first";
     assert_eq!(ask(&mut machine, "set wheel_mm 500"), [refusal]);
+    assert!(ask(&mut machine, "set servo_out_us 1500")[0].starts_with("error: servo_out_us changes"));
     assert_eq!(ask(&mut machine, "set lead_out_ms 150"), ["ok"]);
     assert_eq!(ask(&mut machine, "hold"), ["ok"]);
     assert_eq!(ask(&mut machine, "set wheel_mm 500"), ["ok"]);
@@ -197,4 +198,15 @@ fn an_alarm_is_not_cleared_by_throwing_the_switch_on() {
     assert_eq!(throw(100, true), State::Alarm(Alarm::BeamEdgesLost));
     assert_eq!(throw(200, false), State::Hold);
     assert_eq!(throw(300, true), State::Work);
+}
+
+#[test]
+fn the_readme_names_every_setting_with_its_default() {
+    let readme = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../README.md")).unwrap();
+    for setting in settings() {
+        let name = String::from_utf8(setting.text().bytes().collect()).unwrap();
+        let row = readme.lines().find(|line| line.starts_with('|') && line.contains(&format!("`{name}`")));
+        let row = row.unwrap_or_else(|| panic!("the README has no row for {name}"));
+        assert!(row.contains(&setting.description().default.to_string()), "{name}: {row}");
+    }
 }

@@ -65,26 +65,27 @@ fn every_setting_refuses_what_is_beyond_its_range_and_keeps_its_value() {
 }
 
 #[test]
-fn settings_that_move_the_geometry_are_refused_while_the_machine_works() {
+fn settings_that_change_where_the_tool_is_are_refused_while_the_machine_works() {
     let mut uno = woken_up();
     ask(&mut uno, "start");
-    let mut geometric = Vec::new();
+    let mut refused = Vec::new();
     for (setting, name) in settings() {
-        let Description { least, default, geometry, .. } = setting.description();
-        if geometry {
+        let Description { least, default, hold_only, .. } = setting.description();
+        if hold_only {
             let answer = refusal(&mut uno, &format!("set {name} {least}"));
             assert!(answer.contains(&name) && answer.contains("hold first"), "{answer}");
             assert_eq!(get(&mut uno, &name), default);
-            geometric.push(name);
+            refused.push(name);
         } else {
             ask(&mut uno, &format!("set {name} {least}"));
             assert_eq!(get(&mut uno, &name), least);
         }
     }
-    assert_eq!(geometric, ["ticks_per_rev", "wheel_mm", "beam_to_tool_mm", "margin_mm"]);
+    let names = ["ticks_per_rev", "wheel_mm", "beam_to_tool_mm", "margin_mm", "servo_in_us", "servo_out_us"];
+    assert_eq!(refused, names);
 
     ask(&mut uno, "hold");
-    for name in geometric {
+    for name in refused {
         let (setting, _) = settings().find(|(_, other)| *other == name).expect("a setting");
         ask(&mut uno, &format!("set {name} {}", setting.description().least));
     }

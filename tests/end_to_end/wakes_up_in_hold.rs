@@ -97,11 +97,16 @@ fn told_to_start_now_the_tool_enters_the_row_over_unseen_ground() {
 
 #[test]
 fn a_plant_in_the_beam_at_power_up_is_kept() {
-    let row = Row::new(vec![Thing::plant(0.0, 150.0), Thing::plant(700.0, 150.0)]).expect("the plants stand apart");
-    let mut run = Run::begin(trial(row, steady(mm_s(2.0), 1300.0)), &[]);
-    run.roll_to_the_end();
-    assert_all_kept(&run.judgement());
-    assert!(run.commands().len() > 2, "the tool was in the row at all");
+    // Half of the canopy is left, or no more of it than a weed is wide.
+    for centre_mm in [0.0, -55.0, -60.0, -65.0] {
+        let plants = vec![Thing::plant(centre_mm, 150.0), Thing::plant(700.0, 150.0)];
+        let row = Row::new(plants).expect("the plants stand apart");
+        let mut run = Run::begin(trial(row, steady(mm_s(2.0), 1300.0)), &[]);
+        run.roll_to_the_end();
+        assert_all_kept(&run.judgement());
+        assert!(run.commands().len() > 2, "the tool was in the row at all");
+        assert_eq!(run.events("unknown").len(), 1, "{:#?}", run.lines());
+    }
 }
 
 #[test]
