@@ -71,7 +71,7 @@ fn main() -> ! {
             controller.beam_edge(Position::new(position), broken);
         }
         if beam.take_lost() {
-            controller.beam_edges_lost();
+            controller.beam_edges_lost(beam.is_broken());
         }
         let orders = controller.step(readings);
         servo.command(orders.pulse, orders.gap_ms);

@@ -141,3 +141,33 @@ impl<B: Examples<{ features::COUNT }>, M: Memory> Classifier for Nearest<B, M> {
 }
 
 const _: () = assert!(examples::COUNT + taught::CAPACITY as usize <= u8::MAX as usize, "a byte counts the examples");
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::taught::Volatile;
+
+    #[test]
+    fn examples_in_flash_and_from_the_field_are_searched_as_one_set() {
+        // As many of both as there may ever be: weeds built in, and the field teaches that the same object is a plant.
+        let features = Features::describe(556, 300, 60);
+        let bytes = examples::scale().quantise(&features.values());
+        let mut nearest = Nearest::new([Example::new(bytes, label::WEED); examples::CAPACITY], Volatile::new());
+        assert_eq!(nearest.classify(&features, 3), Vote { class: Class::Weed, votes: examples::CAPACITY as u8 });
+        for _ in 0..taught::CAPACITY {
+            assert_eq!(nearest.teach(&features, label::PLANT), Ok(()));
+        }
+        assert_eq!(nearest.teach(&features, label::PLANT), Err(Full));
+        let mut listed = 0;
+        let mut place = 0;
+        while let Some((example, next)) = nearest.listed(place) {
+            assert_eq!(example.from_field, example.example.label == label::PLANT);
+            (listed, place) = (listed + 1, next);
+        }
+        assert_eq!(listed, examples::CAPACITY + usize::from(taught::CAPACITY));
+        // All are level with the k-th nearest, so all vote, those from the field too.
+        let all = (&nearest.built_in, &nearest.field);
+        let answer = knn::classify::<{ features::COUNT }, { label::COUNT }>(&all, &bytes, 3, examples::RADIUS).unwrap();
+        assert_eq!(answer.votes.map(usize::from), [examples::CAPACITY, usize::from(taught::CAPACITY)]);
+    }
+}

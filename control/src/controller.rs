@@ -171,8 +171,9 @@ impl<C: Classifier> Controller<C> {
         }
     }
 
-    /// Edges of the beam were lost: what stood there is not known.
-    pub fn beam_edges_lost(&mut self) {
+    /// Edges of the beam were lost: what stood there is not known, and neither is the beam's level, which is now `broken`.
+    pub fn beam_edges_lost(&mut self, broken: bool) {
+        self.watch = Watch::start(self.watch.frontier(), broken);
         self.raise(Alarm::BeamEdgesLost);
     }
 

@@ -132,7 +132,7 @@ fn what_changes_where_the_tool_is_is_not_set_while_the_machine_works() {
 fn an_alarm_is_named_and_keeps_the_machine_from_starting_until_it_is_cleared() {
     let mut machine = machine();
     ask(&mut machine, "start");
-    machine.beam_edges_lost();
+    machine.beam_edges_lost(false);
     machine.step(readings(1000, 0));
     assert!(ask(&mut machine, "status")[0].starts_with("state=alarm alarm=beam_edges_lost tool=out "));
     assert_eq!(ask(&mut machine, "start"), ["error: an alarm is latched, see status, then clear it"]);
@@ -157,7 +157,7 @@ fn status_says_how_far_the_ground_that_was_seen_still_is() {
 fn the_longest_numbers_fit_on_the_status_line() {
     let mut machine = machine();
     ask(&mut machine, "start");
-    machine.beam_edges_lost();
+    machine.beam_edges_lost(false);
     let mut readings = readings(1000, i32::MIN);
     readings.lost = u16::MAX;
     machine.step(readings);
@@ -188,7 +188,7 @@ fn every_event_fits_on_a_line() {
 fn an_alarm_is_not_cleared_by_throwing_the_switch_on() {
     let mut machine = machine();
     ask(&mut machine, "start");
-    machine.beam_edges_lost();
+    machine.beam_edges_lost(false);
     let mut throw = |milliseconds: u64, switch_on: bool| {
         for moment in [milliseconds, milliseconds + 30] {
             machine.step(Readings { switch_on, ..readings(moment * 1000, 0) });
@@ -208,5 +208,14 @@ fn the_readme_names_every_setting_with_its_default() {
         let row = readme.lines().find(|line| line.starts_with('|') && line.contains(&format!("`{name}`")));
         let row = row.unwrap_or_else(|| panic!("the README has no row for {name}"));
         assert!(row.contains(&setting.description().default.to_string()), "{name}: {row}");
+    }
+}
+
+#[test]
+fn after_lost_edges_the_beam_is_what_it_is_now_and_not_what_the_last_edge_said() {
+    for broken in [false, true] {
+        let mut machine = machine();
+        machine.beam_edges_lost(broken);
+        assert_eq!(machine.windows(), u8::from(broken));
     }
 }
