@@ -1,8 +1,10 @@
 //! The beam across the row on D8: every edge with the encoder's position at which it came.
 //!
 //! The pin-change interrupt PCINT0 stamps an edge and queues it; the loop takes it from there. A queue that is full loses
-//! the edge and says so. What the edges mean is not known here. Low = broken.
+//! the edge and says so. What the edges mean is not known here. Low = broken. This is the one file beside main.rs that
+//! uses another peripheral's: what the handler stamps is the encoder's count.
 
+use crate::encoder;
 use avr_device::{
     atmega328p::{EXINT, PORTB, portb},
     interrupt::{self, CriticalSection, Mutex},
@@ -46,8 +48,12 @@ impl<'a> Beam<'a> {
     }
 }
 
-/// The beam's level changed, at `position`.
-pub fn on_change(cs: CriticalSection, position: i32) {
+// The beam's level changed.
+#[avr_device::interrupt(atmega328p)]
+fn PCINT0() {
+    // SAFETY: the chip turns interrupts off while a handler runs, and this one does not turn them on.
+    let cs = unsafe { CriticalSection::new() };
+    let position = encoder::position(cs);
     // SAFETY: PINB is only read here, which has no side effect on anybody.
     let broken = unsafe { (*PORTB::ptr()).pinb().read().pb0().bit_is_clear() };
     if EDGES.borrow(cs).borrow_mut().enqueue((position, broken)).is_err() {

@@ -37,8 +37,11 @@ impl Clock {
     }
 }
 
-/// Timer0 ran over.
-pub fn on_overflow(cs: CriticalSection) {
+// The clock's counter ran over.
+#[avr_device::interrupt(atmega328p)]
+fn TIMER0_OVF() {
+    // SAFETY: the chip turns interrupts off while a handler runs, and this one does not turn them on.
+    let cs = unsafe { CriticalSection::new() };
     let overflows = OVERFLOWS.borrow(cs);
     overflows.set(overflows.get().wrapping_add(1));
 }

@@ -1,8 +1,9 @@
-//! The weeder's firmware: wiring, the interrupts, and the loop that reads, decides and applies.
+//! The weeder's firmware: wiring, and the loop that reads, decides and applies.
 //!
-//! Interrupts only count, stamp and move bytes; the crate `control` decides, and each file beside this one knows one
-//! peripheral. This is the only file that knows them all. The loop never waits for the serial line or the field; the one
-//! thing that it may wait for is a byte on its way into the EEPROM, when an object is to be judged just then.
+//! The crate `control` decides, and each file beside this one knows one peripheral with its interrupt, which only counts,
+//! stamps or moves bytes. This is the only file that knows them all. The loop never waits for the serial line or the
+//! field; the one thing that it may wait for is a byte on its way into the EEPROM, when an object is to be judged just
+//! then.
 
 #![no_std]
 #![no_main]
@@ -19,10 +20,7 @@ mod serial;
 mod servo;
 mod watchdog;
 
-use avr_device::{
-    atmega328p::Peripherals,
-    interrupt::{self, CriticalSection},
-};
+use avr_device::{atmega328p::Peripherals, interrupt};
 use control::{
     classifier::Nearest,
     console::LineBuffer,
@@ -94,37 +92,6 @@ fn main() -> ! {
             }
         }
     }
-}
-
-// The beam: its level changed.
-#[avr_device::interrupt(atmega328p)]
-fn PCINT0() {
-    let cs = interrupts_are_off();
-    beam::on_change(cs, encoder::position(cs));
-}
-
-// The clock's counter ran over.
-#[avr_device::interrupt(atmega328p)]
-fn TIMER0_OVF() {
-    clock::on_overflow(interrupts_are_off());
-}
-
-// A byte has come in.
-#[avr_device::interrupt(atmega328p)]
-fn USART_RX() {
-    serial::on_received(interrupts_are_off());
-}
-
-// The line can take a byte.
-#[avr_device::interrupt(atmega328p)]
-fn USART_UDRE() {
-    serial::on_ready_to_send(interrupts_are_off());
-}
-
-/// What an interrupt handler has by being one.
-fn interrupts_are_off<'a>() -> CriticalSection<'a> {
-    // SAFETY: called by the handlers above alone; the chip turns interrupts off while one runs, and none turns them on.
-    unsafe { CriticalSection::new() }
 }
 
 /// A panic is a fault like any other: the watchdog resets the machine, which wakes up in HOLD with the tool out.

@@ -102,8 +102,11 @@ fn usart() -> &'static usart0::RegisterBlock {
     unsafe { &*USART0::ptr() }
 }
 
-/// A byte has come in.
-pub fn on_received(cs: CriticalSection) {
+// A byte has come in.
+#[avr_device::interrupt(atmega328p)]
+fn USART_RX() {
+    // SAFETY: the chip turns interrupts off while a handler runs, and this one does not turn them on.
+    let cs = unsafe { CriticalSection::new() };
     // An overrun of the hardware's own two bytes shows until UDR0 is read.
     let overrun = usart().ucsr0a().read().dor0().bit_is_set();
     let byte = usart().udr0().read().bits();
@@ -112,8 +115,11 @@ pub fn on_received(cs: CriticalSection) {
     GAP.borrow(cs).set(gap || queue.enqueue(byte).is_err());
 }
 
-/// The line can take a byte.
-pub fn on_ready_to_send(cs: CriticalSection) {
+// The line can take a byte.
+#[avr_device::interrupt(atmega328p)]
+fn USART_UDRE() {
+    // SAFETY: the chip turns interrupts off while a handler runs, and this one does not turn them on.
+    let cs = unsafe { CriticalSection::new() };
     match TO_SEND.borrow(cs).borrow_mut().dequeue() {
         Some(byte) => usart().udr0().write(|w| w.set(byte)),
         None => usart().ucsr0b().modify(|_, w| w.udrie0().clear_bit()),
