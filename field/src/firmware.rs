@@ -12,7 +12,7 @@ use std::sync::OnceLock;
 
 use cargo_metadata::Message;
 use object::read::elf::{ElfFile32, ProgramHeader};
-use object::{Architecture, LittleEndian, Object, ObjectSection, ObjectSymbol, SectionFlags, elf};
+use object::{Architecture, LittleEndian, Object, ObjectSection, ObjectSymbol, SectionFlags, SymbolKind, elf};
 
 /// Flash of the ATmega328P in bytes (data sheet, section 8.2).
 pub const FLASH_BYTES: usize = 32 * 1024;
@@ -216,6 +216,8 @@ pub struct Image {
     pub size: Size,
     /// Variables in SRAM by their symbol's name.
     pub variables: HashMap<String, Variable>,
+    /// Addresses of functions in flash, in bytes, by their symbol's name.
+    pub functions: HashMap<String, u32>,
 }
 
 impl Image {
@@ -253,7 +255,7 @@ impl Image {
             memory[start..end].copy_from_slice(content);
         }
 
-        Ok(Image { flash, eeprom, size: size(&file), variables: variables(&file) })
+        Ok(Image { flash, eeprom, size: size(&file), variables: variables(&file), functions: functions(&file) })
     }
 }
 
@@ -303,7 +305,22 @@ fn variables(file: &ElfFile32<LittleEndian>) -> HashMap<String, Variable> {
                 address: u16::try_from(symbol.address() - SRAM_ORIGIN).ok()?,
                 size: u16::try_from(symbol.size()).ok()?,
             };
-            Some((symbol.name().ok()?.to_owned(), variable))
+            Some((name(&symbol)?, variable))
         })
         .collect()
+}
+
+fn functions(file: &ElfFile32<LittleEndian>) -> HashMap<String, u32> {
+    file.symbols()
+        .filter(|symbol| symbol.kind() == SymbolKind::Text)
+        .filter_map(|symbol| Some((name(&symbol)?, u32::try_from(symbol.address()).ok()?)))
+        .collect()
+}
+
+/// A symbol's name as its source has it: a Rust path from the crate on, without the compiler's numbers.
+fn name<'data>(symbol: &impl ObjectSymbol<'data>) -> Option<String> {
+    // A local variable's symbol may carry a number behind its mangled name.
+    let mangled = symbol.name().ok()?;
+    let (mangled, _) = mangled.split_once('.').unwrap_or((mangled, ""));
+    Some(format!("{:#}", rustc_demangle::demangle(mangled)))
 }

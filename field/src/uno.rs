@@ -23,10 +23,19 @@
 //! - The clock, and the watchdog's time after its own reset, go on over a reset (simavr starts them from 0 and from the past).
 //! - Sleep advances the cycles and never waits; nothing is printed but simavr's errors; there is no debugger.
 //! - SRAM is not zero at power-up.
+//! - An EEPROM write takes 3.4 ms (simavr: none), and where power goes meanwhile its byte is undefined.
+//!
+//! # Faults
+//!
+//! [`Uno::write`] and [`Uno::write_sram`] turn bits over in SRAM, [`Uno::stall`] hangs the main program, [`Uno::reset`],
+//! [`Uno::brown_out`] and [`Uno::power_cycle`] start the chip anew at any cycle, each with its cause in MCUSR (data sheet,
+//! 11.9.1; the cause of the very first start is power-on); the watchdog does so by itself. SRAM keeps its content in all of
+//! them but the power cycle.
 //!
 //! # What is not
 //!
-//! - EEPROM writes finish at once (3.4 ms in truth), and the EEPROM-ready interrupt comes only after a write.
+//! - Writes that only erase or do not erase first take as long as the others. The EEPROM-ready interrupt comes only after a
+//!   write, and the core is not halted for the 2 to 4 cycles after an order to the EEPROM.
 //! - OCR1B and the compare registers of Timer0 and Timer2 are not double buffered. PORTB's bit of the servo reads as the
 //!   timer's level.
 //! - TCNT1 of a stopped timer counts for nothing: the timer starts at its bottom, with the pin's edge.
@@ -35,17 +44,22 @@
 //! - UBRR is what the clock divides; the crystal is exact.
 
 mod core;
+mod eeprom;
 mod interrupts;
 mod recorder;
 mod timer;
+mod turns;
 
 use std::collections::VecDeque;
 use std::path::Path;
 
 use self::core::{Core, Stop};
 pub use self::interrupts::{HandlerCycles, InterruptStatistics};
-use crate::firmware::{EEPROM_BYTES, Image, ImageError, Size};
+pub use self::turns::Turns;
+use crate::firmware::{EEPROM_BYTES, Image, ImageError, Size, Variable};
 use crate::signal::{CYCLES_PER_SECOND, Pin, PinChange, Pulse};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 
 /// The serial line's bits in a second, both ways (README, serial monitor).
 pub const BAUD: u64 = 115_200;
@@ -80,6 +94,33 @@ pub enum UnoError {
         /// Where, in bytes.
         program_counter: u32,
     },
+    /// The ELF has no such symbol, or the bytes do not fit into it.
+    #[error("the firmware has no variable `{symbol}` of at least {length} bytes: give its path from the crate on")]
+    NoVariable {
+        /// The symbol asked for.
+        symbol: String,
+        /// Bytes that were to be put into it.
+        length: usize,
+    },
+    /// The bytes do not fit into SRAM.
+    #[error("{length} bytes from {address:#06x} do not fit into SRAM, which is from 0x0100 to 0x08ff")]
+    NotInSram {
+        /// Where the first was to go.
+        address: u16,
+        /// How many there were.
+        length: usize,
+    },
+    /// The ELF has no such function.
+    #[error("the firmware has no function `{0}`: give its path from the crate on")]
+    NoFunction(String),
+    /// The firmware did not come to a function.
+    #[error("the firmware did not come to `{symbol}` within {timeout_cycles} cycles")]
+    NotReached {
+        /// The function.
+        symbol: String,
+        /// How long it was waited for.
+        timeout_cycles: u64,
+    },
     /// A text that was waited for did not come.
     #[error("the firmware did not send {text:?} within {timeout_cycles} cycles; it sent {received:?}")]
     NoAnswer {
@@ -99,6 +140,8 @@ pub enum ResetCause {
     PowerOn,
     /// The reset pin was pulled ([`Uno::reset`]).
     External,
+    /// The supply sagged ([`Uno::brown_out`]).
+    BrownOut,
     /// The watchdog ran out.
     Watchdog,
 }
@@ -175,7 +218,37 @@ impl Uno {
         self.core.reset();
     }
 
-    /// Takes the power away and gives it back. EEPROM, inputs and the clock stay; SRAM does not.
+    /// Lets the supply sag for a moment: too low to run, high enough for SRAM, which keeps its content, as do EEPROM, inputs and
+    /// the clock. A byte that was being written to the EEPROM is torn.
+    pub fn brown_out(&mut self) {
+        self.core.brown_out();
+    }
+
+    /// Hangs the main program where it is, as an endless loop would, until the next reset. Interrupts are as they are there:
+    /// inside a critical section none comes any more. The clock runs on until no handler is running.
+    ///
+    /// # Errors
+    ///
+    /// As [`Uno::run_until`].
+    pub fn stall(&mut self) -> Result<(), UnoError> {
+        while self.core.is_in_handler() {
+            self.step(self.cycle() + 1)?;
+        }
+        self.core.stall();
+        Ok(())
+    }
+
+    /// As [`Uno::power_cycle`], with SRAM that comes up with random content, the same for the same seed. Then
+    /// [`Uno::deepest_stack`] can be told only of a firmware that paints its stack.
+    pub fn power_cycle_to_noise(&mut self, seed: u64) {
+        self.power_cycle();
+        let mut noise = [0; Core::SRAM_BYTES];
+        ChaCha8Rng::seed_from_u64(seed).fill_bytes(&mut noise);
+        self.core.set_sram(core::SRAM_START, &noise);
+    }
+
+    /// Takes the power away and gives it back. EEPROM, inputs and the clock stay; SRAM does not, and a byte that was being
+    /// written to the EEPROM is torn.
     pub fn power_cycle(&mut self) {
         self.core.lose_power();
         let mut fresh = Core::new(&self.image.flash, &self.core.eeprom(), self.core.cycle());
@@ -188,7 +261,7 @@ impl Uno {
         &self.core.recorder().resets
     }
 
-    /// The EEPROM's 1024 bytes.
+    /// The EEPROM's 1024 bytes, as they would be found if power went now: a byte that is being written is torn.
     pub fn eeprom(&self) -> Vec<u8> {
         self.core.eeprom()
     }
@@ -274,6 +347,26 @@ impl Uno {
         }
     }
 
+    /// Runs until the next instruction is the first of a function, by its path from the crate on: `main` is where the start-up
+    /// code has filled SRAM and no line of the firmware's own has run.
+    ///
+    /// # Errors
+    ///
+    /// As [`Uno::run_until`], where the ELF has no such function, and where it is not reached within `timeout_cycles`.
+    pub fn run_until_symbol(&mut self, symbol: &str, timeout_cycles: u64) -> Result<(), UnoError> {
+        let address = self.image.functions.get(symbol).copied();
+        let address = address.ok_or_else(|| UnoError::NoFunction(symbol.to_owned()))?;
+        let deadline = self.cycle() + timeout_cycles;
+        while self.core.program_counter() != address {
+            if self.cycle() >= deadline {
+                return Err(UnoError::NotReached { symbol: symbol.to_owned(), timeout_cycles });
+            }
+            // A cycle is less than any instruction has, so that each is seen.
+            self.step(self.cycle() + 1)?;
+        }
+        Ok(())
+    }
+
     /// Runs a step, and what falls due before it.
     fn step(&mut self, until: u64) -> Result<(), UnoError> {
         while let Some(change) = self.to_drive.pop_front_if(|change| change.cycle <= self.core.cycle()) {
@@ -356,13 +449,56 @@ impl Uno {
         self.core.interrupt_statistics()
     }
 
-    /// A variable's bytes in SRAM, by its symbol's name in the ELF; `None` where there is no such symbol.
+    /// Times the main loop's turns from now on; a second call starts afresh. The simulation is slower for it.
+    pub fn measure_turns(&mut self) {
+        self.core.measure_turns();
+    }
+
+    /// The main loop's turns since [`Uno::measure_turns`]; `None` before it.
+    pub fn turns(&self) -> Option<&Turns> {
+        self.core.turns()
+    }
+
+    /// A variable's bytes in SRAM, by its symbol: in Rust the path from the crate on. `None` where there is no such symbol.
     pub fn read(&self, symbol: &str) -> Option<&[u8]> {
         let variable = self.image.variables.get(symbol)?;
         Some(self.core.sram(variable.address, variable.size))
     }
 
-    /// The most bytes that the stack has taken since power-up, as far as they were written.
+    /// Puts bytes into a variable from its first byte on, as bits that fall over would. It is named as in [`Uno::read`].
+    ///
+    /// # Errors
+    ///
+    /// Where there is no such symbol, or more bytes than it has.
+    pub fn write(&mut self, symbol: &str, bytes: &[u8]) -> Result<(), UnoError> {
+        let length = bytes.len();
+        match self.image.variables.get(symbol) {
+            Some(&Variable { address, size }) if length <= size.into() => self.write_sram(address, bytes),
+            _ => Err(UnoError::NoVariable { symbol: symbol.to_owned(), length }),
+        }
+    }
+
+    /// Puts bytes into SRAM from an address of the data space on.
+    ///
+    /// # Errors
+    ///
+    /// Where they do not fit into SRAM, which is from 0x0100 to 0x08FF.
+    pub fn write_sram(&mut self, address: u16, bytes: &[u8]) -> Result<(), UnoError> {
+        let length = bytes.len();
+        let fits = u16::try_from(length).is_ok_and(|count| self.core.sram(address, count).len() == length);
+        if !fits {
+            return Err(UnoError::NotInSram { address, length });
+        }
+        self.core.set_sram(address, bytes);
+        Ok(())
+    }
+
+    /// Address of the first byte behind the static data, down to which the stack may grow.
+    pub fn first_stack_address(&self) -> u16 {
+        core::SRAM_START + self.image.size.sram as u16
+    }
+
+    /// The most bytes that the stack has taken since power-up, or since the firmware painted it, as far as they were written.
     pub fn deepest_stack(&self) -> usize {
         self.core.deepest_stack(self.image.size.sram as u16)
     }

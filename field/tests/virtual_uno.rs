@@ -1,10 +1,13 @@
 //! The virtual Uno against small C programs, compiled here by avr-gcc, whose timing the data sheet tells.
 //!
-//! Each program stands in `fixtures/` and shows one thing; the firmware itself plays no part here.
+//! Each program stands in `fixtures/` and shows one thing; the firmware itself plays no part here. Faults are in
+//! `virtual_uno_faults.rs`.
 
-use std::path::{Path, PathBuf};
-use std::process::Command;
+mod common;
 
+use std::path::Path;
+
+use common::{boot, compile};
 use field::firmware::{ImageError, Size};
 use field::signal::{CYCLES_PER_SECOND, Pin, PinChange};
 use field::uno::{ResetCause, SENT_BYTE_CYCLES, Uno, UnoError};
@@ -19,28 +22,8 @@ const FIRMWARE_BIT_CYCLES: u64 = 8 * 17;
 
 const MILLISECOND: u64 = CYCLES_PER_SECOND / 1000;
 
-/// Compiles a fixture and returns its ELF.
-fn compile(name: &str) -> PathBuf {
-    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures").join(name).with_extension("c");
-    // Tests run at the same time, and several of them compile the same fixture.
-    let thread = format!("{:?}", std::thread::current().id());
-    let elf = Path::new(env!("CARGO_TARGET_TMPDIR"))
-        .join(format!("{name}-{}-{thread}", std::process::id()))
-        .with_extension("elf");
-    let output = Command::new("avr-gcc")
-        .args(["-mmcu=atmega328p", "-DF_CPU=16000000UL", "-Os", "-Wall", "-Werror"])
-        // The linker's own refusal of what is too large is not the one that is tested here.
-        .args(["-Wl,--defsym=__TEXT_REGION_LENGTH__=65536", "-o"])
-        .args([&elf, &source])
-        .output()
-        .unwrap_or_else(|error| panic!("avr-gcc could not be started ({error}): run ./setup.sh"));
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    elf
-}
-
-fn boot(name: &str) -> Uno {
-    Uno::boot(&compile(name)).expect("a fixture boots")
-}
+/// Time in which a byte has been written to the EEPROM.
+const EEPROM_WRITE_MS: u64 = 4;
 
 #[test]
 fn a_byte_takes_ten_bits_both_ways() {
@@ -281,9 +264,11 @@ fn eeprom_and_sram_outlive_the_reset_pin_and_eeprom_the_power() {
     assert_eq!(uno.run_until_serial("\n", 10 * MILLISECOND).unwrap(), format!("{EXTERNAL}2H\n"));
     assert_eq!(uno.read("kept").unwrap(), [kept[0] + 1]);
 
+    uno.run_for_ms(EEPROM_WRITE_MS).unwrap();
     uno.power_cycle();
     assert_eq!(uno.run_until_serial("\n", 10 * MILLISECOND).unwrap(), format!("{POWER_ON}3H\n"));
     assert_eq!(uno.read("kept").unwrap(), kept);
+    uno.run_for_ms(EEPROM_WRITE_MS).unwrap();
     assert_eq!(uno.eeprom()[..9], [9, 9, 9, 9, 9, 9, 9, 3, 0xFF]);
 
     let causes: Vec<_> = uno.resets().iter().map(|reset| reset.cause).collect();
@@ -327,6 +312,7 @@ fn a_driven_input_keeps_its_level_over_port_writes_and_resets() {
     assert_eq!(uno.run_until_serial("\n", 10 * MILLISECOND).unwrap(), format!("{POWER_ON}0L\n"));
     uno.reset();
     assert_eq!(uno.run_until_serial("\n", 10 * MILLISECOND).unwrap(), format!("{EXTERNAL}1L\n"));
+    uno.run_for_ms(EEPROM_WRITE_MS).unwrap();
     uno.power_cycle();
     assert_eq!(uno.run_until_serial("\n", 10 * MILLISECOND).unwrap(), format!("{POWER_ON}2L\n"));
 }

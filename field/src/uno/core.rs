@@ -17,9 +17,11 @@ use std::ptr::{self, NonNull};
 
 use simavr_ffi as simavr;
 
+use super::eeprom::{self, Eeprom};
 use super::interrupts::{InterruptRecorder, InterruptStatistics};
 use super::recorder::{Recorder, cycles_per_byte, on_interrupt, on_output, on_reset, on_timer_output, on_transmit};
 use super::timer::{self, Timer1};
+use super::turns::{TurnRecorder, Turns};
 use super::{Reset, ResetCause};
 use crate::firmware::EEPROM_BYTES;
 use crate::signal::{CYCLES_PER_SECOND, Pin};
@@ -39,11 +41,11 @@ const LAST_VECTOR: u8 = 25;
 const WAKE_UP_CYCLES: u64 = 4;
 
 /// First and last address of SRAM in the data space (data sheet, figure 8-3).
-const SRAM_START: u16 = 0x0100;
+pub(super) const SRAM_START: u16 = 0x0100;
 const SRAM_END: u16 = 0x08FF;
 
-/// What SRAM holds at power-up. A real chip's content is random; a byte that is not zero catches those who count on it,
-/// and shows how deep the stack has been.
+/// What SRAM holds at power-up, where nothing else is asked for. A real chip's content is random; a byte that is not zero
+/// catches those who count on it, and shows how deep the stack has been.
 const SRAM_AT_POWER_UP: u8 = 0xC5;
 
 /// Complete bytes that the receiver keeps: two in its buffer and one in the shift register (data sheet, USART0, receiver error flags).
@@ -54,14 +56,21 @@ const MCUSR: u16 = 0x54;
 pub(super) const UCSR0A: u16 = 0xC0;
 pub(super) const UCSR0B: u16 = 0xC1;
 
-/// MCUSR: the cause was the reset pin.
+/// MCUSR: the cause was the reset pin, or too low a supply voltage (data sheet, 11.9.1).
 const EXTRF: u8 = 1 << 1;
+const BORF: u8 = 1 << 2;
 /// UCSR0A: a byte waits.
 const RXC0: u8 = 1 << 7;
 /// UCSR0A: bytes were lost.
 const DOR0: u8 = 1 << 3;
 /// UCSR0B: the receiver is on.
 const RXEN0: u8 = 1 << 4;
+
+/// The instruction `wdr`, which feeds the watchdog.
+const WDR: u16 = 0x95A8;
+
+/// Cycles of a jump to itself (`rjmp`).
+const LOOP_CYCLES: u64 = 2;
 
 /// A four letter request code of simavr (`AVR_IOCTL_DEF`).
 const fn request(name: &[u8; 4]) -> u32 {
@@ -86,6 +95,8 @@ pub(super) struct Core {
     held: [Held; 2],
     /// The last step left the chip asleep.
     asleep: bool,
+    /// Address in flash at which the main program loops for ever.
+    stalled_at: Option<u32>,
 }
 
 #[derive(Clone, Copy, Default)]
@@ -126,12 +137,15 @@ impl Core {
             uart: uart.as_ptr(),
             // SAFETY: `avr` was initialised above.
             timer: unsafe { Timer1::of(avr) },
+            // SAFETY: as above.
+            eeprom: unsafe { Eeprom::of(avr) },
             servo_high: false,
             led_high: false,
             changes: Vec::new(),
             received: Vec::new(),
             resets: Vec::new(),
             interrupts: InterruptRecorder::default(),
+            turns: TurnRecorder::default(),
             reset_at: None,
         })));
         let parameter = recorder.as_ptr().cast::<c_void>();
@@ -150,6 +164,7 @@ impl Core {
             let output_a = simavr::avr_io_getirq(avr, request(b"tmr1"), simavr::TIMER_IRQ_OUT_COMP as i32);
             simavr::avr_irq_register_notify(output_a, Some(on_timer_output), parameter);
             timer::take_over_writes(recorder);
+            eeprom::take_over_writes(recorder);
             for vector in 1..=LAST_VECTOR {
                 let irq = simavr::avr_get_interrupt_irq(avr, vector);
                 if !irq.is_null() {
@@ -168,6 +183,7 @@ impl Core {
             input: NonNull::new(input).expect("the ATmega328P has a UART"),
             held: [Held::default(); 2],
             asleep: false,
+            stalled_at: None,
         };
         core.set_eeprom(eeprom);
         core
@@ -208,12 +224,35 @@ impl Core {
         self.recorder().interrupts.statistics()
     }
 
+    /// Starts the count of the main loop's turns afresh.
+    pub(super) fn measure_turns(&mut self) {
+        self.recorder_mut().turns.turn_on();
+    }
+
+    /// The main loop's turns since [`Core::measure_turns`].
+    pub(super) fn turns(&self) -> Option<&Turns> {
+        self.recorder().turns.turns()
+    }
+
+    /// Whether an interrupt's handler runs.
+    pub(super) fn is_in_handler(&self) -> bool {
+        // SAFETY: as in `cycle`.
+        unsafe { (*self.chip.as_ptr()).interrupts.running_ptr > 0 }
+    }
+
+    /// Has the main program jump to where it is, for ever; handlers go on. No handler may be running.
+    pub(super) fn stall(&mut self) {
+        self.stalled_at = Some(self.program_counter());
+    }
+
     /// Serves a pending interrupt, runs an instruction or sleeps, and lets the peripherals catch up. Several instructions
     /// may run in one step, but never past `until`, except by the length of the last one.
     pub(super) fn step(&mut self, until: u64) -> Result<(), Stop> {
         let avr = self.chip.as_ptr();
         let uart = self.recorder().uart;
         let measuring = self.interrupt_statistics().is_some();
+        let counting_turns = self.turns().is_some();
+        let one_by_one = measuring || counting_turns || self.stalled_at.is_some();
         // SAFETY: the chip is valid, this is the only place that runs it, and no reference into it or into the recorder is alive
         // while it does. This is `avr_callback_run_raw` without its two waits on the host's clock.
         unsafe {
@@ -224,8 +263,8 @@ impl Core {
             if (*avr).interrupt_state != 0 {
                 simavr::avr_service_interrupts(avr);
             }
-            // Between instructions that a measurement must see one by one, the limit is the shortest possible.
-            let limit = match measuring {
+            // Where every instruction must be seen, the limit is the shortest possible.
+            let limit = match one_by_one {
                 true => 1,
                 false => until.saturating_sub((*avr).cycle).max(1),
             };
@@ -233,7 +272,14 @@ impl Core {
             (*avr).run_cycle_count = (*avr).run_cycle_count.min(limit);
 
             if (*avr).state as u32 == simavr::cpu_Running {
-                (*avr).pc = avr_run_one(avr);
+                if counting_turns && self.next_instruction() == WDR {
+                    self.recorder_mut().turns.watchdog_is_fed((*avr).cycle);
+                }
+                if self.stalled_at == Some((*avr).pc) && !self.is_in_handler() {
+                    (*avr).cycle += LOOP_CYCLES;
+                } else {
+                    (*avr).pc = avr_run_one(avr);
+                }
             }
             let until_next_timer = simavr::avr_cycle_timer_process(avr);
             match (*avr).state as u32 {
@@ -261,13 +307,36 @@ impl Core {
 
     /// Pulls the reset pin low for a moment.
     pub(super) fn reset(&mut self) {
+        self.reset_by(EXTRF, ResetCause::External);
+    }
+
+    /// Lets the supply sag for a moment, too low to run and high enough for SRAM. The byte that was being written to the EEPROM
+    /// is torn.
+    pub(super) fn brown_out(&mut self) {
+        let eeprom = self.eeprom();
+        self.set_eeprom(&eeprom);
+        self.reset_by(BORF, ResetCause::BrownOut);
+    }
+
+    fn reset_by(&mut self, flag: u8, cause: ResetCause) {
         let avr = self.chip.as_ptr();
         // SAFETY: as in `step`; MCUSR is an address inside `data`, and simavr keeps its bits over a reset.
         unsafe {
-            *(*avr).data.add(MCUSR.into()) |= EXTRF;
+            *(*avr).data.add(MCUSR.into()) |= flag;
             simavr::avr_reset(avr);
         }
-        self.finish_reset(ResetCause::External);
+        self.finish_reset(cause);
+    }
+
+    /// The instruction that comes next, as far as it is one word.
+    fn next_instruction(&self) -> u16 {
+        // SAFETY: as in `cycle`; simavr's flash has room behind its last word, and the program counter lies inside it, or the
+        // chip has crashed before.
+        unsafe {
+            let avr = self.chip.as_ptr();
+            let word = (*avr).flash.add((*avr).pc as usize);
+            u16::from_le_bytes([*word, *word.add(1)])
+        }
     }
 
     /// Takes over from the chip that has lost its power: what was recorded, and the levels at its pins.
@@ -279,6 +348,8 @@ impl Core {
         new.resets = std::mem::take(&mut old.resets);
         new.interrupts = std::mem::take(&mut old.interrupts);
         new.interrupts.reset();
+        new.turns = std::mem::take(&mut old.turns);
+        new.turns.reset();
         self.held = before.held;
         self.hold_inputs();
     }
@@ -298,6 +369,7 @@ impl Core {
             return;
         };
         self.asleep = false;
+        self.stalled_at = None;
         // SAFETY: as in `cycle`. The watchdog's timer, the only one that can run now, was set from this cycle.
         unsafe { (*self.chip.as_ptr()).cycle = cycle };
         let recorder = self.recorder_mut();
@@ -305,6 +377,8 @@ impl Core {
         recorder.record_level(Pin::Servo, false, cycle);
         recorder.record_level(Pin::Led, false, cycle);
         recorder.interrupts.reset();
+        recorder.turns.reset();
+        recorder.eeprom.reset();
         recorder.resets.push(Reset { cycle, cause });
         self.hold_inputs();
     }
@@ -372,13 +446,16 @@ impl Core {
         unsafe { simavr::avr_raise_irq(self.input.as_ptr(), byte.into()) };
     }
 
-    /// The EEPROM's content.
+    /// The EEPROM's content, as it is left where power goes now.
     pub(super) fn eeprom(&self) -> Vec<u8> {
         let mut content = vec![0; EEPROM_BYTES];
         let mut description =
             simavr::avr_eeprom_desc_t { ee: content.as_mut_ptr(), offset: 0, size: EEPROM_BYTES as u32 };
         // SAFETY: `description` names a buffer of the size it gives, and simavr copies into it.
         unsafe { simavr::avr_ioctl(self.chip.as_ptr(), request(b"eegp"), (&raw mut description).cast()) };
+        if let Some(torn) = self.recorder().eeprom.torn_byte(self.cycle()) {
+            content[torn.address] |= torn.ones;
+        }
         content
     }
 
@@ -401,12 +478,26 @@ impl Core {
         }
     }
 
-    /// The most bytes that the stack has taken since power-up, where `static_bytes` of SRAM lie below it for good. Bytes that
-    /// were reserved but never written are not seen.
+    /// Puts bytes into SRAM from `address`; they must fit.
+    pub(super) fn set_sram(&mut self, address: u16, bytes: &[u8]) {
+        assert!(self.sram(address, bytes.len() as u16).len() == bytes.len(), "SRAM is from 0x0100 to 0x08ff");
+        // SAFETY: as in `step`; the bytes fit into SRAM, which lies inside `data`.
+        unsafe {
+            let sram = (*self.chip.as_ptr()).data.add(address.into());
+            ptr::copy_nonoverlapping(bytes.as_ptr(), sram, bytes.len());
+        }
+    }
+
+    /// All of SRAM.
+    pub(super) const SRAM_BYTES: usize = (SRAM_END - SRAM_START + 1) as usize;
+
+    /// The most bytes that the stack has taken, where `static_bytes` of SRAM lie below it for good. Below it SRAM still holds
+    /// one and the same byte, from power-up or from a firmware that painted it at its start. Bytes that were reserved
+    /// but never written are not seen.
     pub(super) fn deepest_stack(&self, static_bytes: u16) -> usize {
         let start = SRAM_START.saturating_add(static_bytes);
         let above = self.sram(start, (SRAM_END + 1).saturating_sub(start));
-        let untouched = above.iter().take_while(|&&byte| byte == SRAM_AT_POWER_UP).count();
+        let untouched = above.iter().take_while(|&&byte| byte == above[0]).count();
         above.len() - untouched
     }
 }

@@ -9,8 +9,10 @@ use std::ffi::c_void;
 use simavr_ffi as simavr;
 
 use super::core::{UCSR0A, UCSR0B};
+use super::eeprom::Eeprom;
 use super::interrupts::InterruptRecorder;
 use super::timer::Timer1;
+use super::turns::TurnRecorder;
 use super::{ReceivedByte, Reset};
 use crate::signal::{Pin, PinChange};
 
@@ -37,6 +39,7 @@ pub(super) struct Recorder {
     pub(super) chip: *mut simavr::avr_t,
     pub(super) uart: *mut simavr::avr_uart_t,
     pub(super) timer: Timer1,
+    pub(super) eeprom: Eeprom,
     pub(super) servo_high: bool,
     pub(super) led_high: bool,
     /// Edges of the output pins, oldest first.
@@ -46,6 +49,7 @@ pub(super) struct Recorder {
     /// Resets since the first power-up, oldest first.
     pub(super) resets: Vec<Reset>,
     pub(super) interrupts: InterruptRecorder,
+    pub(super) turns: TurnRecorder,
     /// Cycle of a reset that simavr is in the middle of.
     pub(super) reset_at: Option<u64>,
 }

@@ -35,11 +35,11 @@ const CS1: u8 = 0b111;
 const LAST_PRESCALER: u8 = 5;
 
 /// Address of the first I/O register, from which simavr counts them.
-const FIRST_IO: u16 = 0x20;
+pub(super) const FIRST_IO: u16 = 0x20;
 
 /// simavr's function for writes of a register, and its parameter.
 #[derive(Clone, Copy)]
-struct Writer {
+pub(super) struct Writer {
     function: simavr::avr_io_write_t,
     parameter: *mut c_void,
 }
@@ -48,7 +48,7 @@ impl Writer {
     /// # Safety
     ///
     /// `avr` must be an initialised chip, and `register` an I/O register.
-    unsafe fn of(avr: *mut simavr::avr_t, register: u16) -> Writer {
+    pub(super) unsafe fn of(avr: *mut simavr::avr_t, register: u16) -> Writer {
         // SAFETY: the caller vouches for both.
         let write = unsafe { &(*avr).io[usize::from(register - FIRST_IO)].w };
         Writer { function: write.c, parameter: write.param }
@@ -57,7 +57,7 @@ impl Writer {
     /// # Safety
     ///
     /// `avr` must be the chip that this writer is of.
-    unsafe fn write(self, avr: *mut simavr::avr_t, register: u16, value: u8) {
+    pub(super) unsafe fn write(self, avr: *mut simavr::avr_t, register: u16, value: u8) {
         if let Some(function) = self.function {
             // SAFETY: the caller vouches for `avr`; function and parameter are simavr's own pair.
             unsafe { function(avr, register, value, self.parameter) };

@@ -1,0 +1,54 @@
+//! How long the firmware's main loop takes to turn: the cycles from one `wdr` instruction to the next.
+//!
+//! A loop that feeds the watchdog once a turn shows its turns by that, whatever else it does; interrupts that come meanwhile
+//! are part of a turn. The recorder is off until asked for, because watching every instruction makes the simulation slower.
+
+/// Cycles of the main loop's turns.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Turns {
+    /// Turns that were complete.
+    pub count: u64,
+    /// Cycles of the longest.
+    pub longest: u64,
+    /// Cycles of all.
+    pub total: u64,
+}
+
+impl Turns {
+    /// Mean cycles of a turn.
+    pub fn mean(&self) -> f64 {
+        self.total as f64 / self.count as f64
+    }
+}
+
+/// Counts the turns.
+#[derive(Default)]
+pub(super) struct TurnRecorder {
+    turns: Option<Turns>,
+    begun: Option<u64>,
+}
+
+impl TurnRecorder {
+    pub(super) fn turn_on(&mut self) {
+        *self = Self { turns: Some(Turns::default()), begun: None };
+    }
+
+    pub(super) fn turns(&self) -> Option<&Turns> {
+        self.turns.as_ref()
+    }
+
+    /// A `wdr` begins.
+    pub(super) fn watchdog_is_fed(&mut self, cycle: u64) {
+        let begun = self.begun.replace(cycle);
+        if let (Some(turns), Some(begun)) = (&mut self.turns, begun) {
+            turns.count += 1;
+            turns.longest = turns.longest.max(cycle - begun);
+            turns.total += cycle - begun;
+        }
+    }
+
+    /// A reset ends a turn that is not counted.
+    pub(super) fn reset(&mut self) {
+        self.begun = None;
+    }
+}
