@@ -1,7 +1,7 @@
-//! The pins that are read and set by the loop: work switch (D4) and status LED (D13).
+//! The pins that are read and set by the loop: work switch (D4), end switch (D5) and status LED (D13).
 //!
 //! Encoder (D2, D3) and beam (D8) belong to their interrupts, D9 to the servo's timer, D0 and D1 to the USART. The
-//! encoder's and the beam's pull-ups stand outside, on the board; only the switch uses the one inside the chip.
+//! encoder's and the beam's pull-ups stand outside, on the board; only the switches use those inside the chip.
 
 use avr_device::atmega328p::{PORTB, PORTD, portb, portd};
 use core::convert::Infallible;
@@ -10,14 +10,28 @@ use embedded_hal::digital::{ErrorType, InputPin, OutputPin, PinState};
 /// The status LED on D13 (PB5), lit when high.
 pub struct Lamp<'a>(&'a portb::RegisterBlock);
 
-/// The work switch on D4 (PD4), low = work.
-pub struct WorkSwitch<'a>(&'a portd::RegisterBlock);
+/// A switch that pulls its pin to ground when it is closed.
+pub struct Switch<'a> {
+    port: &'a portd::RegisterBlock,
+    mask: u8,
+}
 
-/// Sets the pins up: the LED dark, the switch pulled up.
-pub fn pins<'a>(port_b: &'a PORTB, port_d: &'a PORTD) -> (Lamp<'a>, WorkSwitch<'a>) {
+/// The pins, set up.
+pub struct Pins<'a> {
+    /// The status LED, dark.
+    pub lamp: Lamp<'a>,
+    /// The work switch on D4 (PD4), low = work.
+    pub work_switch: Switch<'a>,
+    /// The end switch on D5 (PD5), low = the tool is out.
+    pub end_switch: Switch<'a>,
+}
+
+/// Sets the pins up.
+pub fn pins<'a>(port_b: &'a PORTB, port_d: &'a PORTD) -> Pins<'a> {
     port_b.ddrb().modify(|_, w| w.pb5().set_bit());
-    port_d.portd().modify(|_, w| w.pd4().set_bit());
-    (Lamp(port_b), WorkSwitch(port_d))
+    port_d.portd().modify(|_, w| w.pd4().set_bit().pd5().set_bit());
+    let switch = |mask| Switch { port: port_d, mask };
+    Pins { lamp: Lamp(port_b), work_switch: switch(1 << 4), end_switch: switch(1 << 5) }
 }
 
 impl ErrorType for Lamp<'_> {
@@ -43,16 +57,16 @@ impl OutputPin for Lamp<'_> {
     }
 }
 
-impl ErrorType for WorkSwitch<'_> {
+impl ErrorType for Switch<'_> {
     type Error = Infallible;
 }
 
-impl InputPin for WorkSwitch<'_> {
+impl InputPin for Switch<'_> {
     fn is_high(&mut self) -> Result<bool, Infallible> {
-        Ok(self.0.pind().read().pd4().bit_is_set())
+        self.is_low().map(|low| !low)
     }
 
     fn is_low(&mut self) -> Result<bool, Infallible> {
-        Ok(self.0.pind().read().pd4().bit_is_clear())
+        Ok(self.port.pind().read().bits() & self.mask == 0)
     }
 }

@@ -24,10 +24,10 @@ use avr_device::{atmega328p::Peripherals, interrupt};
 use control::{
     classifier::Nearest,
     console::LineBuffer,
-    controller::{Controller, Readings},
+    controller::{Controller, Readings, WakeUp},
     lamp,
     reply::{self, Answer},
-    settings::{Setting, Settings},
+    reset::Cause,
     units::Position,
 };
 use embedded_hal::digital::{InputPin, OutputPin};
@@ -36,13 +36,12 @@ use static_cell::StaticCell;
 
 #[avr_device::entry]
 fn main() -> ! {
-    static CONTROLLER: StaticCell<Controller<Nearest<examples::InFlash, eeprom::Eeprom>>> = StaticCell::new();
+    static CONTROLLER: StaticCell<Controller<Nearest<examples::InFlash, eeprom::Half>, eeprom::Half>> =
+        StaticCell::new();
 
     // SAFETY: the entry point is the first code to run and runs once, so nobody else holds the peripherals.
     let peripherals = unsafe { Peripherals::steal() };
-    let out = control::servo::from_us(Settings::new().get(Setting::ServoOutUs));
-    let mut servo = servo::Servo::new(peripherals.TC1, &peripherals.PORTB, out);
-    let (mut lamp, mut work_switch) = board::pins(&peripherals.PORTB, &peripherals.PORTD);
+    let board::Pins { mut lamp, mut work_switch, mut end_switch } = board::pins(&peripherals.PORTB, &peripherals.PORTD);
     let clock = clock::Clock::new(peripherals.TC0);
     encoder::watch(&peripherals.EXINT, &peripherals.PORTD, &peripherals.CPU);
     let mut beam = beam::Beam::new(&peripherals.EXINT, &peripherals.PORTB);
@@ -52,12 +51,17 @@ fn main() -> ! {
 
     let mut read = move || {
         let now = clock.now();
-        let (position, lost) = encoder::position_and_lost();
-        let Ok(switch_on) = work_switch.is_low();
-        Readings { now, position: Position::new(position), switch_on, lost }
+        let encoder::Counts { position, lost, .. } = encoder::counts();
+        let (Ok(switch_on), Ok(end_switch_on)) = (work_switch.is_low(), end_switch.is_low());
+        Readings { switch_on, end_switch_on, lost, ..Readings::new(now, Position::new(position)) }
     };
-    let classifier = Nearest::new(examples::built_in(), eeprom::Eeprom::new(peripherals.EEPROM));
-    let controller = CONTROLLER.init(Controller::new(classifier, read(), beam.is_broken()));
+    let (settings_memory, examples_memory) = eeprom::halves(peripherals.EEPROM);
+    let classifier = Nearest::new(examples::built_in(), examples_memory);
+    let wake_up = WakeUp { readings: read(), beam_broken: beam.is_broken(), cause: Cause::Unknown };
+    let controller = CONTROLLER.init(Controller::new(classifier, settings_memory, wake_up));
+    // The settings say which pulse has the tool out, so there is none before they are loaded.
+    let mut servo = servo::Servo::new(peripherals.TC1, &peripherals.PORTB, controller.orders().pulse);
+
     let mut line = LineBuffer::new();
     let mut answer = Answer::Greeting;
     watchdog::start();
@@ -84,7 +88,7 @@ fn main() -> ! {
             }
         }
         // An answer waits for what its command wrote to the EEPROM: `ok` means that it is there.
-        if controller.classifier_mut().carry_on() && serial.room() >= reply::LINE {
+        if controller.carry_on() && serial.room() >= reply::LINE {
             if !answer.is_done() {
                 let Ok(()) = answer.write_line(controller, &mut serial);
             } else if let Some(event) = controller.next_event() {

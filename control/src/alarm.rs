@@ -1,25 +1,79 @@
-//! Alarms: faults after which the machine no longer knows enough to have its tool in the row.
+//! Alarms and warnings: faults after which the machine no longer knows enough to have its tool in the row, and what it
+//! can live with but the operator should know.
 //!
-//! An alarm puts the tool out, empties the schedule and stays until the operator clears it. Its code, counted from 1, is
-//! what the status LED blinks; its name is what the console says.
+//! An alarm puts the tool out, empties the schedule and stays until the operator clears it. Its code has two digits, which
+//! the status LED blinks one after the other: the first says where to look, the second which fault it is. Its name is
+//! what the console says. A warning is counted and told, and changes nothing else.
 
 use crate::text::words;
 
 words! {
-    /// A latched fault, in the order of the LED's codes.
+    /// A latched fault, in the order of the codes.
     pub enum Alarm {
         /// The beam was broken over more ground than any plant covers: something hangs in it, or it is out of line.
         BeamBlocked = "beam_blocked",
+        /// The beam breaks and clears more often than plants and their leaves can make it: dust, or a loose wire.
+        BeamFlickers = "beam_flickers",
+        /// Edges of the beam came faster than they could be taken.
+        BeamEdgesLost = "beam_edges_lost",
+        /// Plants pass the beam, and the encoder says that the machine stands.
+        EncoderSilent = "encoder_silent",
+        /// Edges without progress: only one of the encoder's channels is alive.
+        EncoderChannelDead = "encoder_channel_dead",
+        /// Both channels keep changing at once, which a turning wheel does not do.
+        EncoderJumps = "encoder_jumps",
+        /// The machine works faster than its settings allow.
+        TooFast = "too_fast",
+        /// The tool was rolled back to ground that has been forgotten.
+        RolledBackTooFar = "rolled_back_too_far",
         /// More plants stand between beam and tool than the schedule can hold.
         ScheduleFull = "schedule_full",
-        /// Edges of the beam came faster than they could be taken: dust, or a loose wire.
-        BeamEdgesLost = "beam_edges_lost",
+        /// The end switch does not say what the tool was told.
+        ToolStuck = "tool_stuck",
+        /// No copy of the settings in the EEPROM is whole and of this firmware: the defaults are in use.
+        SettingsLost = "settings_lost",
+        /// The saved settings cannot be right together.
+        SettingsContradict = "settings_contradict",
+        /// The stack has come too near to the variables.
+        StackLow = "stack_low",
     }
 }
 
 impl Alarm {
-    /// The number of flashes with which the LED tells it.
+    /// The code that the LED blinks. First digit: 1 beam, 2 encoder, 3 driving, 4 tool, 5 settings, 6 the controller itself.
     pub const fn code(self) -> u8 {
-        self as u8 + 1
+        // The first alarm of each digit. A list of codes would cost SRAM.
+        let (tens, first) = match self as u8 {
+            place if place < Self::EncoderSilent as u8 => (10, Self::BeamBlocked),
+            place if place < Self::TooFast as u8 => (20, Self::EncoderSilent),
+            place if place < Self::ToolStuck as u8 => (30, Self::TooFast),
+            place if place < Self::SettingsLost as u8 => (40, Self::ToolStuck),
+            place if place < Self::StackLow as u8 => (50, Self::SettingsLost),
+            _ => (60, Self::StackLow),
+        };
+        tens + 1 + self as u8 - first as u8
+    }
+}
+
+words! {
+    /// Something that the operator should know of.
+    pub enum Warning {
+        /// The tool was told to leave the row later than it needed: the speed jumped, or a plant came up too near.
+        LateCommand = "late_command",
+        /// The machine has worked for a long way without the beam being broken: it may be blind, or too high.
+        NoPlants = "no_plants",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use std::vec::Vec;
+
+    #[test]
+    fn codes_rise_with_the_order_and_have_digits_that_can_be_counted() {
+        let codes: Vec<u8> = (0..).map_while(Alarm::from_index).map(Alarm::code).collect();
+        assert_eq!(codes, [11, 12, 13, 21, 22, 23, 31, 32, 33, 41, 51, 52, 61]);
     }
 }

@@ -7,7 +7,8 @@
 use crate::{
     examples,
     features::{self, Features},
-    taught::{self, FieldExamples, Memory},
+    memory::Memory,
+    taught::{self, FieldExamples},
 };
 use knn::{Answer, Example, Examples, Kind};
 
@@ -75,6 +76,9 @@ pub trait Classifier {
 
     /// Examples that were found spoiled, and dropped, when the machine woke up.
     fn spoiled(&self) -> u8;
+
+    /// Carries on with what is being kept for good, without waiting; whether all has been written.
+    fn carry_on(&mut self) -> bool;
 }
 
 /// Classifies by the nearest of the built-in examples in `B` and those taught in the field, kept in `M`.
@@ -88,11 +92,6 @@ impl<B: Examples<{ features::COUNT }>, M: Memory> Nearest<B, M> {
     /// A classifier with the built-in examples and those that the memory holds.
     pub fn new(built_in: B, memory: M) -> Self {
         Self { built_in, field: FieldExamples::new(memory) }
-    }
-
-    /// Carries on with what is being written to the memory, without waiting; whether all has been written.
-    pub fn carry_on(&mut self) -> bool {
-        self.field.carry_on()
     }
 }
 
@@ -138,6 +137,10 @@ impl<B: Examples<{ features::COUNT }>, M: Memory> Classifier for Nearest<B, M> {
     fn spoiled(&self) -> u8 {
         self.field.spoiled()
     }
+
+    fn carry_on(&mut self) -> bool {
+        self.field.carry_on()
+    }
 }
 
 const _: () = assert!(examples::COUNT + taught::CAPACITY as usize <= u8::MAX as usize, "a byte counts the examples");
@@ -145,7 +148,7 @@ const _: () = assert!(examples::COUNT + taught::CAPACITY as usize <= u8::MAX as 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::taught::Volatile;
+    use crate::memory::Volatile;
 
     #[test]
     fn examples_in_flash_and_from_the_field_are_searched_as_one_set() {

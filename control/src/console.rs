@@ -24,6 +24,8 @@ words! {
         Get = "get",
         /// Changes a setting.
         Set = "set",
+        /// Keeps the settings.
+        Save = "save",
         /// Goes to work.
         Start = "start",
         /// Takes the tool out.
@@ -60,6 +62,8 @@ pub enum Command {
     Get(Setting),
     /// `set name value`.
     Set(Setting, u16),
+    /// `save`.
+    Save,
     /// `start`, or `start now`.
     Start {
         /// At once, over unseen ground.
@@ -109,9 +113,9 @@ words! {
     pub enum Argument {
         /// Of `start`.
         Now = "now",
-        /// Of `events`.
+        /// Of `events`, and of settings that are switched.
         On = "on",
-        /// Of `events`.
+        /// As `on`.
         Off = "off",
         /// Of `forget`.
         All = "all",
@@ -141,6 +145,7 @@ pub fn parse(line: &[u8]) -> Result<Command, Mistake> {
             Word::Help => Ok(Command::Help),
             Word::Status => Ok(Command::Status),
             Word::Get => Ok(Command::GetAll),
+            Word::Save => Ok(Command::Save),
             Word::Start => Ok(Command::Start { now: false }),
             Word::Hold => Ok(Command::Hold),
             Word::Clear => Ok(Command::Clear),
@@ -155,7 +160,7 @@ pub fn parse(line: &[u8]) -> Result<Command, Mistake> {
         return match word {
             Word::Help => Ok(Command::Explain(setting)),
             Word::Get => Ok(Command::Get(setting)),
-            _ => number(second).map(|value| Command::Set(setting, value)).ok_or(Mistake::Value(setting)),
+            _ => value(setting, second).map(|value| Command::Set(setting, value)).ok_or(Mistake::Value(setting)),
         };
     }
     match (word, Argument::find(first)) {
@@ -170,6 +175,15 @@ pub fn parse(line: &[u8]) -> Result<Command, Mistake> {
             _ => usage,
         },
         _ => usage,
+    }
+}
+
+/// What a word says for a setting: a number, or `on` or `off` for one that is switched.
+fn value(setting: Setting, word: &[u8]) -> Option<u16> {
+    match Argument::find(word) {
+        Some(Argument::On) if setting.is_switched() => Some(1),
+        Some(Argument::Off) if setting.is_switched() => Some(0),
+        _ => number(word),
     }
 }
 
@@ -262,6 +276,10 @@ mod tests {
             (b"get wheel_mm", Command::Get(Setting::WheelMm)),
             (b"set wheel_mm 405", Command::Set(Setting::WheelMm, 405)),
             (b"  set \t wheel_mm   405 ", Command::Set(Setting::WheelMm, 405)),
+            (b"set end_switch on", Command::Set(Setting::EndSwitch, 1)),
+            (b"set end_switch off", Command::Set(Setting::EndSwitch, 0)),
+            (b"set end_switch 1", Command::Set(Setting::EndSwitch, 1)),
+            (b"save", Command::Save),
             (b"start", Command::Start { now: false }),
             (b"start now", Command::Start { now: true }),
             (b"hold", Command::Hold),
@@ -293,6 +311,8 @@ mod tests {
             (b"set wheel 400", Mistake::UnknownSetting),
             (b"set wheel_mm 4oo", Mistake::Value(Setting::WheelMm)),
             (b"set wheel_mm -400", Mistake::Value(Setting::WheelMm)),
+            (b"set wheel_mm on", Mistake::Value(Setting::WheelMm)),
+            (b"set end_switch yes", Mistake::Value(Setting::EndSwitch)),
             (b"set wheel_mm 65936", Mistake::Value(Setting::WheelMm)),
             (b"start later", Mistake::Usage(Word::Start)),
             (b"events", Mistake::Usage(Word::Events)),

@@ -6,18 +6,23 @@
 //! the machine is and how fast it rolls.
 
 use crate::{
-    alarm::Alarm,
+    alarm::{Alarm, Warning},
     classifier::{Class, Classifier, Full, Vote},
     event::Event,
     features::{self, Features},
+    memory::Memory,
+    monitor::{BeamMonitor, EncoderMonitor},
     object::{Object, Watch},
+    reset::Cause,
+    saved::SavedSettings,
     schedule::{Plan, Schedule},
     servo::{self, HalfMicros},
-    settings::{Setting, Settings},
+    settings::{Contradiction, Setting, Settings},
     speed::SpeedMeter,
     switch::Switch,
     taught,
-    units::{Instant, Position, Ticks, TicksPerSecond},
+    text::words,
+    units::{Instant, Interval, Position, Ticks, TicksPerSecond},
 };
 use heapless::Vec;
 
@@ -26,6 +31,12 @@ const OBJECTS: usize = 16;
 
 /// Events that wait to be told. They are short-lived: a plant gives three in half a second.
 const EVENTS: usize = 6;
+
+/// What the end switch may take longer than the lead: a servo frame, the contacts' bouncing, and some patience.
+const END_SWITCH_GRACE_MS: u32 = 100;
+
+/// Free bytes of stack below which the machine does not work on: two interrupts' worth.
+const STACK_RESERVE: u16 = 48;
 
 /// What the machine is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,8 +58,32 @@ pub struct Readings {
     pub position: Position,
     /// Whether the work switch is at work.
     pub switch_on: bool,
-    /// Encoder ticks known to be lost since power-up.
+    /// Encoder ticks known to be lost since power-up, modulo 65,536.
     pub lost: u16,
+    /// Times that both of the encoder's channels had changed at once, modulo 65,536.
+    pub jumps: u16,
+    /// Whether the end switch, if there is one, says that the tool is out.
+    pub end_switch_on: bool,
+    /// Bytes of the stack that were never used.
+    pub stack_free: u16,
+}
+
+impl Readings {
+    /// Readings of a machine with its switches off and nothing wrong.
+    pub const fn new(now: Instant, position: Position) -> Self {
+        Self { now, position, switch_on: false, lost: 0, jumps: 0, end_switch_on: false, stack_free: u16::MAX }
+    }
+}
+
+/// How the machine woke up.
+#[derive(Clone, Copy, Debug)]
+pub struct WakeUp {
+    /// The first readings.
+    pub readings: Readings,
+    /// Whether something is in the beam.
+    pub beam_broken: bool,
+    /// Why the machine was reset.
+    pub cause: Cause,
 }
 
 /// What the machine is to do after a step.
@@ -67,6 +102,10 @@ struct Geometry {
     margin: Ticks,
     max_width: Ticks,
     merge_gap: Ticks,
+    /// As ticks a second.
+    top_speed: Ticks,
+    /// Zero for none.
+    no_plant: Ticks,
 }
 
 /// Distances rolled at the present speed while something answers; negative when rolling backwards.
@@ -85,16 +124,32 @@ struct Leads {
 pub enum Refusal {
     /// An alarm is latched.
     AlarmLatched,
-    /// The setting changes where the tool is, and the machine is at work.
+    /// The setting changes where the tool is, or is to be saved, and the machine is at work.
     NotInHold,
     /// The value lies outside the setting's range.
     OutOfRange,
+    /// The settings would contradict each other.
+    Contradiction(Contradiction),
     /// There is no object to label yet, or the last one has its label.
     NothingToLabel,
     /// All places for examples are taken.
     ExamplesFull,
     /// No example from the field has this number.
     NoSuchExample,
+}
+
+words! {
+    /// Why the tool is out of the row while the machine works.
+    pub enum Reason {
+        /// A plant is there, or comes up.
+        Plant = "plant",
+        /// The beam has not seen the ground.
+        UnseenGround = "unseen_ground",
+        /// A plant just behind the beam would be reached before the tool is out.
+        TooFast = "too_fast",
+        /// The beam broke and the encoder says that the machine stands.
+        EncoderDoubtful = "encoder_doubtful",
+    }
 }
 
 /// An object as it was judged: what its features follow from, in less room than they take.
@@ -118,18 +173,34 @@ impl Judged {
 
 /// The machine's decisions and all that they rest on.
 #[derive(Clone, Debug)]
-pub struct Controller<C> {
+pub struct Controller<C, M> {
     classifier: C,
     settings: Settings,
+    saved: SavedSettings<M>,
     geometry: Geometry,
     leads: Leads,
+    cause: Cause,
     readings: Readings,
     switch: Switch,
+    end_switch: Switch,
+    encoder: EncoderMonitor,
+    beam: BeamMonitor,
     meter: SpeedMeter,
     watch: Watch,
     schedule: Schedule,
     state: State,
     tool_out: bool,
+    /// When the tool was last told to swing.
+    told_at: Instant,
+    /// Whether the ground for which the tool was told to leave the row is yet to come.
+    awaits_ground: bool,
+    /// Times that it came sooner than the tool could be out.
+    late: u16,
+    /// Lines that were not understood, or came with a hole in them.
+    mistakes: u16,
+    /// Where the last object ended, or work began, and whether the operator was warned since.
+    last_seen: Position,
+    warned: bool,
     /// The last plant's leading edge, or where watching began.
     last_plant: Position,
     /// The last objects, the oldest first.
@@ -139,23 +210,43 @@ pub struct Controller<C> {
     events_missed: u16,
 }
 
-impl<C: Classifier> Controller<C> {
-    /// A controller for a machine that just woke up: in HOLD, with the tool out, and with no ground known.
-    pub fn new(classifier: C, readings: Readings, beam_broken: bool) -> Self {
-        let settings = Settings::new();
+impl<C: Classifier, M: Memory> Controller<C, M> {
+    /// A controller for a machine that just woke up: in HOLD, with the tool out, and with no ground known. Where the memory
+    /// holds no settings, or some that cannot be right, that is an alarm.
+    pub fn new(classifier: C, memory: M, wake_up: WakeUp) -> Self {
+        let WakeUp { readings, beam_broken, cause } = wake_up;
+        let Readings { now, position, jumps, .. } = readings;
+        let mut saved = SavedSettings::new(memory);
+        let loaded = saved.load();
+        let fault = match &loaded {
+            None => Some(Alarm::SettingsLost),
+            Some(settings) => settings.contradiction().map(|_| Alarm::SettingsContradict),
+        };
+        let settings = loaded.unwrap_or_default();
         Self {
             classifier,
             geometry: Geometry::of(&settings),
             settings,
+            saved,
             leads: Leads::default(),
+            cause,
             readings,
             switch: Switch::new(readings.switch_on),
-            meter: SpeedMeter::new(readings.position, readings.now),
-            watch: Watch::start(readings.position, beam_broken),
-            schedule: Schedule::new(readings.position),
-            state: State::Hold,
+            end_switch: Switch::new(readings.end_switch_on),
+            encoder: EncoderMonitor::new(now, position, jumps),
+            beam: BeamMonitor::new(now),
+            meter: SpeedMeter::new(position, now),
+            watch: Watch::start(position, beam_broken),
+            schedule: Schedule::new(position),
+            state: fault.map_or(State::Hold, State::Alarm),
             tool_out: true,
-            last_plant: readings.position,
+            told_at: now,
+            awaits_ground: false,
+            late: 0,
+            mistakes: 0,
+            last_seen: position,
+            warned: false,
+            last_plant: position,
             objects: Vec::new(),
             events: Vec::new(),
             events_on: false,
@@ -165,6 +256,16 @@ impl<C: Classifier> Controller<C> {
 
     /// Takes an edge of the beam, with the position at which it came.
     pub fn beam_edge(&mut self, position: Position, broken: bool) {
+        let now = self.readings.now;
+        if let Some(alarm) = self.beam.edge(now) {
+            self.raise(alarm);
+        }
+        if broken
+            && self.state == State::Work
+            && let Some(alarm) = self.encoder.beam_broke(now)
+        {
+            self.raise(alarm);
+        }
         let ground = position - self.leads.response;
         if let Some(object) = self.watch.edge(ground, broken, self.geometry.merge_gap) {
             self.judge(object);
@@ -180,13 +281,14 @@ impl<C: Classifier> Controller<C> {
     /// Takes the machine's readings and decides where the tool is to be.
     #[inline(never)]
     pub fn step(&mut self, readings: Readings) -> Orders {
+        let tool_was_at = self.tool();
         self.readings = readings;
         if let Some(speed) = self.meter.read(readings.now, readings.position) {
             self.leads = Leads::at(speed, &self.settings);
         }
         match self.switch.read(readings.now, readings.switch_on) {
             // An alarm wants to be cleared first, if by nothing else then by the switch going off.
-            Some(true) if self.state == State::Hold => self.enter(State::Work),
+            Some(true) if self.state == State::Hold => self.go_to_work(),
             Some(false) => self.enter(State::Hold),
             _ => {}
         }
@@ -194,20 +296,25 @@ impl<C: Classifier> Controller<C> {
         if let Some(object) = self.watch.roll_to(ground, self.geometry.merge_gap) {
             self.judge(object);
         }
-        if let Some(leading) = self.watch.open()
-            && self.watch.is_broken()
-            && self.watch.frontier() - leading > self.geometry.max_width
-        {
-            self.raise(Alarm::BeamBlocked);
+        if let Some(alarm) = self.fault(tool_was_at) {
+            self.raise(alarm);
         }
         let tool = self.tool();
         self.schedule.forget_behind(tool);
         let out = self.state != State::Work || self.must_be_out(tool);
         if out != self.tool_out {
             self.tool_out = out;
+            self.told_at = readings.now;
+            self.awaits_ground = out && self.state == State::Work;
             self.tell(Event::Swing { out, position: readings.position });
         }
-        let pulse = if out { Setting::ServoOutUs } else { Setting::ServoInUs };
+        self.warn(tool);
+        self.orders()
+    }
+
+    /// What the machine is to do as of the last step.
+    pub fn orders(&self) -> Orders {
+        let pulse = if self.tool_out { Setting::ServoOutUs } else { Setting::ServoInUs };
         Orders { pulse: servo::from_us(self.settings.get(pulse)), gap_ms: self.settings.get(Setting::ServoGapMs) as u8 }
     }
 
@@ -219,11 +326,14 @@ impl<C: Classifier> Controller<C> {
         if let State::Alarm(_) = self.state {
             return Err(Refusal::AlarmLatched);
         }
+        if let Some(contradiction) = self.settings.contradiction() {
+            return Err(Refusal::Contradiction(contradiction));
+        }
         if now {
             // A margin behind the tool as well, so that it does not stand on the border of what is known.
             self.schedule.trust_from(self.tool() - self.geometry.margin);
         }
-        self.enter(State::Work);
+        self.go_to_work();
         Ok(())
     }
 
@@ -244,15 +354,44 @@ impl<C: Classifier> Controller<C> {
     /// Sets a setting.
     ///
     /// # Errors
-    /// [`Refusal::NotInHold`] and [`Refusal::OutOfRange`]; nothing is changed then.
+    /// [`Refusal::NotInHold`], [`Refusal::OutOfRange`], and [`Refusal::Contradiction`] where there was none before; nothing
+    /// is changed then.
     pub fn set(&mut self, setting: Setting, value: u16) -> Result<(), Refusal> {
         if setting.description().hold_only && self.state == State::Work {
             return Err(Refusal::NotInHold);
         }
-        self.settings.set(setting, value).map_err(|_| Refusal::OutOfRange)?;
+        let mut settings = self.settings.clone();
+        settings.set(setting, value).map_err(|_| Refusal::OutOfRange)?;
+        // Settings that contradict each other already are mended one at a time.
+        if let Some(contradiction) = settings.contradiction()
+            && self.settings.contradiction().is_none()
+        {
+            return Err(Refusal::Contradiction(contradiction));
+        }
+        self.settings = settings;
         self.geometry = Geometry::of(&self.settings);
         self.leads = Leads::at(self.meter.speed(), &self.settings);
         Ok(())
+    }
+
+    /// Begins to save the settings, which [`carry_on`](Self::carry_on) finishes.
+    ///
+    /// # Errors
+    /// [`Refusal::NotInHold`] and [`Refusal::Contradiction`].
+    pub fn save(&mut self) -> Result<(), Refusal> {
+        if self.state == State::Work {
+            return Err(Refusal::NotInHold);
+        }
+        if let Some(contradiction) = self.settings.contradiction() {
+            return Err(Refusal::Contradiction(contradiction));
+        }
+        self.saved.save();
+        Ok(())
+    }
+
+    /// Carries on with what is being kept for good, settings and examples, without waiting; whether all has been written.
+    pub fn carry_on(&mut self) -> bool {
+        self.saved.carry_on(&self.settings) && self.classifier.carry_on()
     }
 
     /// Labels the last object and teaches it to the classifier.
@@ -292,11 +431,6 @@ impl<C: Classifier> Controller<C> {
         &self.classifier
     }
 
-    /// What tells plants from weeds, to carry on with what it writes.
-    pub fn classifier_mut(&mut self) -> &mut C {
-        &mut self.classifier
-    }
-
     /// The settings in use.
     pub fn settings(&self) -> &Settings {
         &self.settings
@@ -305,6 +439,11 @@ impl<C: Classifier> Controller<C> {
     /// What the machine is doing.
     pub fn state(&self) -> State {
         self.state
+    }
+
+    /// Why the machine was reset.
+    pub fn cause(&self) -> Cause {
+        self.cause
     }
 
     /// Whether the tool is to be out of the row.
@@ -331,6 +470,39 @@ impl<C: Classifier> Controller<C> {
     pub fn unseen_mm(&self) -> i16 {
         let unseen = self.schedule.known_from() - self.tool();
         self.settings.wheel().millimetres(unseen.max(Ticks::ZERO))
+    }
+
+    /// Why the tool is out of the row although the machine works.
+    pub fn reason(&self) -> Option<Reason> {
+        let tool = self.tool();
+        match self.state {
+            State::Work if !self.tool_out => None,
+            State::Work if self.encoder.is_doubtful() => Some(Reason::EncoderDoubtful),
+            State::Work if self.schedule.known_from().is_ahead_of(tool) => Some(Reason::UnseenGround),
+            State::Work if self.outruns_the_beam(tool) => Some(Reason::TooFast),
+            State::Work => Some(Reason::Plant),
+            _ => None,
+        }
+    }
+
+    /// Times that closed ground reached the tool sooner than it could be out.
+    pub fn late(&self) -> u16 {
+        self.late
+    }
+
+    /// Lines that were not understood.
+    pub fn mistakes(&self) -> u16 {
+        self.mistakes
+    }
+
+    /// Counts a line that was not understood.
+    pub fn count_mistake(&mut self) {
+        self.mistakes = self.mistakes.saturating_add(1);
+    }
+
+    /// Whether the machine has worked for a long way without seeing a plant.
+    pub fn sees_no_plants(&self) -> bool {
+        self.warned
     }
 
     /// Turns the telling of events on or off.
@@ -368,10 +540,7 @@ impl<C: Classifier> Controller<C> {
             // A window once left stays left while the measured speed wavers by less than a quarter.
             (back + Ticks(back.0 / 4), out)
         };
-        let margin = self.geometry.margin;
-        self.schedule.is_closed(tool + near, tool + far, margin)
-            || self.watch.open().is_some_and(|leading| (tool + far.max(near)) - leading >= -margin)
-            || self.outruns_the_beam(tool)
+        self.encoder.is_doubtful() || self.is_closed(tool + near, tool + far) || self.outruns_the_beam(tool)
     }
 
     /// Whether the machine is so fast that a plant just behind the beam would be reached before the tool is out.
@@ -382,8 +551,73 @@ impl<C: Classifier> Controller<C> {
         (tool + lead) - self.watch.frontier() >= -self.geometry.margin
     }
 
+    /// The fault that the readings show, if any; the tool was at `tool_was_at` before them.
+    #[inline(never)]
+    fn fault(&mut self, tool_was_at: Position) -> Option<Alarm> {
+        let Readings { now, position, jumps, end_switch_on, stack_free, .. } = self.readings;
+        let working = self.state == State::Work;
+        match self.encoder.read(now, position, jumps) {
+            // A machine at rest may tremble.
+            Some(Alarm::EncoderChannelDead) if !working => {}
+            None => {}
+            fault => return fault,
+        }
+        if let Some(leading) = self.watch.open()
+            && self.watch.is_broken()
+            && self.watch.frontier() - leading > self.geometry.max_width
+        {
+            return Some(Alarm::BeamBlocked);
+        }
+        if working && Ticks(self.meter.speed().0.abs()) > self.geometry.top_speed {
+            return Some(Alarm::TooFast);
+        }
+        let forgotten = |tool| self.schedule.has_forgotten() && self.schedule.known_from().is_ahead_of(tool);
+        if working && forgotten(self.tool()) && !forgotten(tool_was_at) {
+            return Some(Alarm::RolledBackTooFar);
+        }
+        self.end_switch.read(now, end_switch_on);
+        let swing = Interval::from_ms(u32::from(self.settings.get(Setting::LeadOutMs)) + END_SWITCH_GRACE_MS);
+        if self.settings.get(Setting::EndSwitch) != 0
+            && self.end_switch.is_on() != self.tool_out
+            && now - self.told_at > swing
+        {
+            return Some(Alarm::ToolStuck);
+        }
+        (stack_free < STACK_RESERVE).then_some(Alarm::StackLow)
+    }
+
+    /// Tells what the operator should know, once.
+    fn warn(&mut self, tool: Position) {
+        if self.state != State::Work {
+            return;
+        }
+        if self.awaits_ground && self.is_closed(tool, tool) {
+            self.awaits_ground = false;
+            // An eighth of the lead is what the speed may waver by.
+            let lead_ms = u32::from(self.settings.get(Setting::LeadOutMs));
+            if self.readings.now - self.told_at < Interval::from_ms(lead_ms - lead_ms / 8) {
+                self.late = self.late.saturating_add(1);
+                self.tell(Event::Warning(Warning::LateCommand));
+            }
+        }
+        let no_plant = self.geometry.no_plant;
+        if !self.warned && no_plant > Ticks::ZERO && self.watch.frontier() - self.last_seen > no_plant {
+            self.warned = true;
+            self.tell(Event::Warning(Warning::NoPlants));
+        }
+    }
+
+    /// Whether any of the ground between two places is closed: unknown, or within the margin of a canopy, the one that is
+    /// still being seen included.
+    fn is_closed(&self, one: Position, other: Position) -> bool {
+        let margin = self.geometry.margin;
+        let far = if one.is_ahead_of(other) { one } else { other };
+        self.schedule.is_closed(one, other, margin) || self.watch.open().is_some_and(|leading| far - leading >= -margin)
+    }
+
     /// Classifies a complete object and schedules it unless it is a weed.
     fn judge(&mut self, object: Object) {
+        (self.last_seen, self.warned) = (object.trailing, false);
         let wheel = self.settings.wheel();
         let spacing = object.leading - self.last_plant;
         let speed_class_mm_s = features::speed_class(self.speed_mm_s());
@@ -424,6 +658,15 @@ impl<C: Classifier> Controller<C> {
         self.enter(State::Alarm(alarm));
     }
 
+    fn go_to_work(&mut self) {
+        if self.settings.contradiction().is_some() {
+            self.raise(Alarm::SettingsContradict);
+            return;
+        }
+        (self.last_seen, self.warned) = (self.watch.frontier(), false);
+        self.enter(State::Work);
+    }
+
     fn enter(&mut self, state: State) {
         if state != self.state {
             self.state = state;
@@ -445,6 +688,8 @@ impl Geometry {
             margin: settings.ticks(Setting::MarginMm),
             max_width: settings.ticks(Setting::MaxWidthMm),
             merge_gap: Ticks(i32::from(settings.get(Setting::MergeGapTicks))),
+            top_speed: settings.ticks(Setting::TopSpeedMmS),
+            no_plant: Ticks(settings.wheel().ticks(1000).0 * i32::from(settings.get(Setting::NoPlantM))),
         }
     }
 }

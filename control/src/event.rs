@@ -1,7 +1,7 @@
 //! Events: what the machine has to tell while it works, one line each.
 
 use crate::{
-    alarm::Alarm,
+    alarm::{Alarm, Warning},
     classifier::Vote,
     controller::State,
     schedule::Plan,
@@ -38,4 +38,6 @@ pub enum Event {
         /// The machine's position.
         position: Position,
     },
+    /// Something happened that the operator should know of.
+    Warning(Warning),
 }

@@ -67,8 +67,8 @@ mod tests {
     use crate::{
         classifier::{Class, Classifier, Nearest},
         features::{Features, SPEED_CLASSES_MM_S},
+        memory::Volatile,
         settings::Setting,
-        taught::Volatile,
     };
 
     fn class(speed: i16, spacing_mm: i16, width_mm: i16) -> Class {

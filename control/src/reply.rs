@@ -5,12 +5,13 @@
 //! included, fits in [`LINE`] bytes.
 
 use crate::{
-    alarm::Alarm,
+    alarm::Warning,
     classifier::{self, Class, Classifier, label},
-    console::{Command, Mistake, Word},
+    console::{Argument, Command, Mistake, Word},
     controller::{Controller, Judged, Refusal, State},
     event::Event,
-    settings::{Description, Setting},
+    memory::Memory,
+    settings::{Contradiction, Setting},
     text::{Listed, Text, list, text},
 };
 use ufmt::{uWrite, uwrite};
@@ -48,11 +49,13 @@ commands! {
     Help "help [name]",
         "this list, or what a setting is";
     Status "status",
-        "state, position, speed and windows in one line";
+        "state, position, speed and windows, and what was counted";
     Get "get [name]",
         "one setting, or all";
     Set "set name value",
-        "change a setting, until the next reset";
+        "change a setting; save keeps it";
+    Save "save",
+        "keep the settings for good";
     Start "start [now]",
         "weed; now, at once over ground the beam has not seen";
     Hold "hold",
@@ -85,8 +88,10 @@ pub enum Answer {
     Help(u8),
     /// What a setting is.
     Explain(Setting),
-    /// The status line.
+    /// The status: where the machine is.
     Status,
+    /// The status: what was counted.
+    Counts,
     /// A setting's value.
     Get(Setting),
     /// All settings, from the one at this place on.
@@ -109,10 +114,17 @@ pub enum Answer {
 
 /// Carries a line out and begins its answer.
 #[inline(never)]
-pub fn answer<C: Classifier>(line: Result<Command, Mistake>, controller: &mut Controller<C>) -> Answer {
+pub fn answer<C, M>(line: Result<Command, Mistake>, controller: &mut Controller<C, M>) -> Answer
+where
+    C: Classifier,
+    M: Memory,
+{
     let command = match line {
         Ok(command) => command,
-        Err(mistake) => return Answer::Wrong(mistake),
+        Err(mistake) => {
+            controller.count_mistake();
+            return Answer::Wrong(mistake);
+        }
     };
     match command {
         Command::Help => Answer::Help(0),
@@ -124,6 +136,7 @@ pub fn answer<C: Classifier>(line: Result<Command, Mistake>, controller: &mut Co
         Command::Examples => Answer::Examples(0),
         Command::Dump => Answer::DumpHeading,
         Command::Set(setting, value) => done(controller.set(setting, value), Some(setting)),
+        Command::Save => done(controller.save(), None),
         Command::Start { now } => done(controller.start(now), None),
         Command::Label(label) => done(controller.label(label), None),
         Command::Forget(number) => done(controller.forget(number), None),
@@ -165,16 +178,21 @@ impl Answer {
     /// # Errors
     /// What `out` reports.
     #[inline(never)]
-    pub fn write_line<C, W>(&mut self, controller: &Controller<C>, out: &mut W) -> Result<(), W::Error>
+    pub fn write_line<C, M, W>(&mut self, controller: &Controller<C, M>, out: &mut W) -> Result<(), W::Error>
     where
         C: Classifier,
+        M: Memory,
         W: uWrite + ?Sized,
     {
         *self = match *self {
             Self::Done => return Ok(()),
             Self::Greeting => {
                 write_version(out)?;
-                say(out, text!(" in hold, tool out; help lists the commands"))?;
+                say(out, text!(", reset by "))?;
+                say_listed(out, controller.cause().text())?;
+                say(out, text!(", state "))?;
+                write_state(controller.state(), out)?;
+                say(out, text!(", tool out; help lists the commands"))?;
                 Self::Done
             }
             Self::Help(place) => {
@@ -189,6 +207,10 @@ impl Answer {
             }
             Self::Status => {
                 write_status(controller, out)?;
+                Self::Counts
+            }
+            Self::Counts => {
+                write_counts(controller, out)?;
                 Self::Ok
             }
             Self::Get(setting) => {
@@ -267,6 +289,10 @@ pub fn write_event<W: uWrite + ?Sized>(event: &Event, out: &mut W) -> Result<(),
             say(out, text!("state is="))?;
             say(out, state_name(state))?;
         }
+        Event::Warning(warning) => {
+            say(out, text!("warning name="))?;
+            say_listed(out, warning.text())?;
+        }
         Event::Alarm { alarm, position } => {
             say(out, text!("alarm name="))?;
             say_listed(out, alarm.text())?;
@@ -277,9 +303,10 @@ pub fn write_event<W: uWrite + ?Sized>(event: &Event, out: &mut W) -> Result<(),
     say(out, text!("\r\n"))
 }
 
-fn write_status<C, W>(controller: &Controller<C>, out: &mut W) -> Result<(), W::Error>
+fn write_status<C, M, W>(controller: &Controller<C, M>, out: &mut W) -> Result<(), W::Error>
 where
     C: Classifier,
+    M: Memory,
     W: uWrite + ?Sized,
 {
     let readings = controller.readings();
@@ -291,27 +318,64 @@ where
     }
     say(out, text!(" tool="))?;
     say(out, place_name(controller.tool_out()))?;
+    if let Some(reason) = controller.reason() {
+        say(out, text!(" for="))?;
+        say_listed(out, reason.text())?;
+    }
     say_number(out, text!(" pos="), readings.position.count())?;
     say_number(out, text!(" speed_mm_s="), controller.speed_mm_s().into())?;
     say_number(out, text!(" windows="), controller.windows().into())?;
-    say_number(out, text!(" lost="), readings.lost.into())?;
-    say_number(out, text!(" unseen_mm="), controller.unseen_mm().into())?;
-    say_number(out, text!(" missed="), controller.events_missed().into())
+    say_number(out, text!(" unseen_mm="), controller.unseen_mm().into())
 }
 
-fn write_setting<C, W>(controller: &Controller<C>, setting: Setting, out: &mut W) -> Result<(), W::Error>
+fn write_counts<C, M, W>(controller: &Controller<C, M>, out: &mut W) -> Result<(), W::Error>
 where
     C: Classifier,
+    M: Memory,
     W: uWrite + ?Sized,
 {
-    let description = setting.description();
-    say_listed(out, setting.text())?;
-    say_number(out, text!("="), controller.settings().get(setting).into())?;
-    write_range(description, out)?;
-    say_number(out, text!(", default "), description.default.into())
+    let readings = controller.readings();
+    say_number(out, text!("lost="), readings.lost.into())?;
+    say_number(out, text!(" jumps="), readings.jumps.into())?;
+    say_number(out, text!(" late="), controller.late().into())?;
+    say_number(out, text!(" missed="), controller.events_missed().into())?;
+    say_number(out, text!(" mistakes="), controller.mistakes().into())?;
+    say_number(out, text!(" stack_free="), readings.stack_free.into())?;
+    say(out, text!(" reset="))?;
+    say_listed(out, controller.cause().text())?;
+    if controller.sees_no_plants() {
+        say(out, text!(" warning="))?;
+        say_listed(out, Warning::NoPlants.text())?;
+    }
+    Ok(())
 }
 
-fn write_range<W: uWrite + ?Sized>(description: Description, out: &mut W) -> Result<(), W::Error> {
+fn write_setting<C, M, W>(controller: &Controller<C, M>, setting: Setting, out: &mut W) -> Result<(), W::Error>
+where
+    C: Classifier,
+    M: Memory,
+    W: uWrite + ?Sized,
+{
+    say_listed(out, setting.text())?;
+    write_value(text!("="), setting, controller.settings().get(setting), out)?;
+    write_range(setting, out)?;
+    write_value(text!(", default "), setting, setting.description().default, out)
+}
+
+/// A text and a setting's value after it.
+fn write_value<W: uWrite + ?Sized>(text: Text, setting: Setting, value: u16, out: &mut W) -> Result<(), W::Error> {
+    if !setting.is_switched() {
+        return say_number(out, text, value.into());
+    }
+    say(out, text)?;
+    say_listed(out, if value == 0 { Argument::Off } else { Argument::On }.text())
+}
+
+fn write_range<W: uWrite + ?Sized>(setting: Setting, out: &mut W) -> Result<(), W::Error> {
+    if setting.is_switched() {
+        return say(out, text!(" on or off"));
+    }
+    let description = setting.description();
     say_number(out, text!(" from "), description.least.into())?;
     say_number(out, text!(" to "), description.greatest.into())
 }
@@ -363,6 +427,14 @@ where
             say_listed(out, setting.text())?;
             say(out, text!(" changes where the tool is, hold first"))
         }
+        (Refusal::NotInHold, None) => say(out, text!("the machine is at work, hold first")),
+        (Refusal::Contradiction(Contradiction::PulsesEqual), _) => {
+            say(out, text!("servo_in_us and servo_out_us would be equal, and the tool would not move"))
+        }
+        (Refusal::Contradiction(Contradiction::BeamTooNear { needed_mm }), _) => {
+            say_number(out, text!("margin, leads and top speed would need beam_to_tool_mm "), needed_mm.into())?;
+            say(out, text!(" or more, change one of them first"))
+        }
         (Refusal::NothingToLabel, _) => {
             say(out, text!("there is no object without a label, let the beam see one first"))
         }
@@ -374,8 +446,8 @@ where
 
 fn write_allowed<W: uWrite + ?Sized>(setting: Setting, out: &mut W) -> Result<(), W::Error> {
     say_listed(out, setting.text())?;
-    say(out, text!(" takes a whole number"))?;
-    write_range(setting.description(), out)
+    say(out, if setting.is_switched() { text!(" takes") } else { text!(" takes a whole number") })?;
+    write_range(setting, out)
 }
 
 fn write_version<W: uWrite + ?Sized>(out: &mut W) -> Result<(), W::Error> {
@@ -409,6 +481,16 @@ fn say_listed<W: uWrite + ?Sized>(out: &mut W, text: Listed) -> Result<(), W::Er
     text.bytes().try_for_each(|byte| out.write_char(char::from(byte)))
 }
 
+/// The state, and which alarm.
+fn write_state<W: uWrite + ?Sized>(state: State, out: &mut W) -> Result<(), W::Error> {
+    say(out, state_name(state))?;
+    if let State::Alarm(alarm) = state {
+        say(out, text!(" "))?;
+        say_listed(out, alarm.text())?;
+    }
+    Ok(())
+}
+
 fn state_name(state: State) -> Text {
     match state {
         State::Hold => text!("hold"),
@@ -432,5 +514,3 @@ fn class_name(class: Class) -> Text {
         Class::Unknown => text!("unknown"),
     }
 }
-
-const _: () = assert!(Alarm::COUNT < 10, "a code of more flashes could not be counted in the field");

@@ -28,6 +28,8 @@ pub struct Schedule {
     canopies: Vec<Object, CAPACITY>,
     /// Everything behind this place is unknown.
     known_from: Position,
+    /// Whether ground behind that place was known once.
+    has_forgotten: bool,
 }
 
 /// The schedule holds as many canopies ahead of the tool as it can; one more would have to be forgotten.
@@ -37,12 +39,17 @@ pub struct Full;
 impl Schedule {
     /// An empty schedule that knows the ground from `known_from` on.
     pub const fn new(known_from: Position) -> Self {
-        Self { canopies: Vec::new(), known_from }
+        Self { canopies: Vec::new(), known_from, has_forgotten: false }
     }
 
     /// The place from which on the ground is known.
     pub fn known_from(&self) -> Position {
         self.known_from
+    }
+
+    /// Whether ground behind [`known_from`](Self::known_from) was known once, and had to be forgotten.
+    pub fn has_forgotten(&self) -> bool {
+        self.has_forgotten
     }
 
     /// Declares the ground from `place` on known although the beam has not seen all of it.
@@ -64,7 +71,7 @@ impl Schedule {
             if !tool.is_ahead_of(end) {
                 return Err(Full);
             }
-            self.known_from = end;
+            self.forget_up_to(end);
             self.canopies.remove(0);
         }
         self.canopies.push(canopy).map_err(|_| Full)
@@ -74,12 +81,17 @@ impl Schedule {
     pub fn forget_behind(&mut self, tool: Position) {
         let horizon = tool - MEMORY;
         if horizon.is_ahead_of(self.known_from) {
-            self.known_from = horizon;
+            self.forget_up_to(horizon);
             // They stand in order, so that only the first can lie behind.
             while self.canopies.first().is_some_and(|canopy| horizon.is_ahead_of(canopy.trailing)) {
                 self.canopies.remove(0);
             }
         }
+    }
+
+    fn forget_up_to(&mut self, place: Position) {
+        self.known_from = place;
+        self.has_forgotten = true;
     }
 
     /// Whether any of the ground between two places is closed: unknown, or within `margin` of a canopy.
@@ -165,6 +177,7 @@ mod tests {
         }
         assert_eq!(schedule.push(canopy(20_000, 20_200), Position::new(295), MARGIN), Err(Full));
         assert_eq!(schedule.push(canopy(20_000, 20_200), Position::new(296), MARGIN), Ok(()));
+        assert!(schedule.has_forgotten());
         assert!(closed(&schedule, 294, 294), "what was forgotten is unknown");
         assert!(!closed(&schedule, 295, 295));
         assert!(closed(&schedule, 20_000, 20_000));

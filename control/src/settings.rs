@@ -4,8 +4,9 @@
 //! name carries its unit.
 
 use crate::{
-    text::{Listed, list, words},
-    units::{Ticks, Wheel},
+    memory::CHECK,
+    text::{Listed, list, list_bytes, list_length, words},
+    units::{Ticks, TicksPerSecond, Wheel},
 };
 
 /// The numbers that the table gives for a setting.
@@ -50,6 +51,8 @@ macro_rules! settings {
         }
 
         $(const _: () = assert!($least <= $default && $default <= $greatest, $name);)*
+
+        const NAMES: &[&str] = &[$($name),*];
     };
 }
 
@@ -93,9 +96,43 @@ settings! {
     /// The sensor's response time.
     BeamResponseMs "beam_response_ms": 0 to 50, 1, false,
         "time the beam's sensor takes to answer";
+    /// Speed above which the machine must not work.
+    TopSpeedMmS "top_speed_mm_s": 100 to 3000, 1400, false,
+        "working faster than this raises an alarm; 1400 is 5 km/h";
+    /// Ground without a plant that is worth a warning.
+    NoPlantM "no_plant_m": 0 to 100, 10, false,
+        "so many metres without a plant give a warning; 0 never";
+    /// Whether an end switch tells that the tool is out.
+    EndSwitch "end_switch": 0 to 1, 0, false,
+        "whether a switch on D5 closes when the tool is out, and is to be watched";
+}
+
+/// Stands for this table wherever values are kept without their names: the CRC-16 of the names in their order.
+pub const TABLE_MARK: u16 = CHECK.checksum(&list_bytes::<{ list_length(NAMES) }>(NAMES));
+
+/// Settings that cannot be right together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Contradiction {
+    /// The beam stands so near that a plant could reach the tool's margin before the tool is out of the row.
+    BeamTooNear {
+        /// The least X for margin, lead and top speed.
+        needed_mm: u16,
+    },
+    /// Both pulses are the same: the tool would not move.
+    PulsesEqual,
 }
 
 impl Setting {
+    /// All settings, in the table's order.
+    pub fn all() -> impl Iterator<Item = Self> {
+        (0..).map_while(Self::from_index)
+    }
+
+    /// Whether it is switched on and off, as 1 and 0.
+    pub fn is_switched(self) -> bool {
+        self.description().greatest == 1
+    }
+
     /// The numbers that the table gives for it.
     #[inline(never)]
     pub fn description(self) -> Description {
@@ -104,7 +141,7 @@ impl Setting {
 }
 
 /// The values in use.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Settings {
     values: [u16; Setting::COUNT as usize],
 }
@@ -117,7 +154,7 @@ impl Settings {
     /// The defaults.
     pub fn new() -> Self {
         let mut settings = Self { values: [0; Setting::COUNT as usize] };
-        for (value, setting) in settings.values.iter_mut().zip((0..).map_while(Setting::from_index)) {
+        for (value, setting) in settings.values.iter_mut().zip(Setting::all()) {
             *value = setting.description().default;
         }
         settings
@@ -139,6 +176,22 @@ impl Settings {
         }
         self.values[setting as usize] = value;
         Ok(())
+    }
+
+    /// What cannot be right together, if anything.
+    ///
+    /// At the top speed the machine rolls the lead, an eighth of it for the speed's wavering, and what the sensor takes to
+    /// answer, before a plant that the beam has just seen may come to the tool's margin.
+    #[inline(never)]
+    pub fn contradiction(&self) -> Option<Contradiction> {
+        if self.get(Setting::ServoInUs) == self.get(Setting::ServoOutUs) {
+            return Some(Contradiction::PulsesEqual);
+        }
+        let lead_out_ms = self.get(Setting::LeadOutMs);
+        let notice_ms = lead_out_ms + lead_out_ms / 8 + self.get(Setting::BeamResponseMs) + 1;
+        let rolled = TicksPerSecond(self.get(Setting::TopSpeedMmS).into()).distance_in_ms(notice_ms);
+        let needed_mm = self.get(Setting::MarginMm) + rolled.0 as u16 + 1;
+        (self.get(Setting::BeamToToolMm) < needed_mm).then_some(Contradiction::BeamTooNear { needed_mm })
     }
 
     /// The ground wheel with its encoder.

@@ -1,4 +1,4 @@
-//! The work switch, freed of its contacts' bouncing.
+//! A switch, freed of its contacts' bouncing: the work switch, or the tool's end switch.
 //!
 //! Only a change counts: a switch that is on when the machine wakes up starts nothing until it has been off.
 
@@ -7,7 +7,7 @@ use crate::units::{Instant, Interval};
 /// Contacts bounce for a few milliseconds; a level that lasts this long is meant.
 const SETTLE: Interval = Interval::from_ms(20);
 
-/// The work switch.
+/// A switch.
 #[derive(Clone, Debug)]
 pub struct Switch {
     on: bool,
@@ -19,6 +19,11 @@ impl Switch {
     /// A switch as it is found at power-up.
     pub const fn new(on: bool) -> Self {
         Self { on, differs_since: None }
+    }
+
+    /// Whether it is on.
+    pub const fn is_on(&self) -> bool {
+        self.on
     }
 
     /// Takes the switch's level; returns its new position when it was thrown.

@@ -1,72 +1,28 @@
 //! Examples taught in the field, in memory that outlives the power.
 //!
 //! Each of [`CAPACITY`] examples has a slot of eight bytes: five features, the label, and a CRC-16 of both and of the scale
-//! by which the features became bytes, as under another scale they would mean something else. An erased slot reads as ones. A slot whose CRC does not fit, because the power went away while it was written or a bit fell over, is
-//! dropped, and counted so that it can be told. Which slots hold an example is kept in SRAM, as checking them all takes
-//! longer than searching them.
+//! by which the features became bytes, as under another scale they would mean something else. An erased slot reads as ones.
+//! A slot whose CRC does not fit, because the power went away while it was written or a bit fell over, is dropped, and
+//! counted so that it can be told. Which slots hold an example is kept in SRAM, as checking them all takes longer than
+//! searching them. The bytes of a slot go to the memory one at a time, whenever it can take one.
 
-use crate::{examples, features};
-use crc::{CRC_16_IBM_SDLC, Crc, NoTable};
+use crate::{
+    examples, features,
+    memory::{CHECK, ERASED, Memory},
+};
 use knn::{Example, Examples};
 
 /// Examples that can be taught.
 pub const CAPACITY: u8 = 32;
 
 /// Bytes of a slot.
-pub const SLOT: usize = features::COUNT + 3;
+const SLOT: usize = features::COUNT + 3;
 
 /// An example as it was taught.
 type Taught = Example<{ features::COUNT }>;
 
-/// The CRC, without a table: a byte at a time is fast enough for eight bytes, and tables cost flash.
-const CHECK: Crc<u16, NoTable> = Crc::<u16, NoTable>::new(&CRC_16_IBM_SDLC);
-
 /// Stands for the scale in each slot's CRC.
 const SCALE_MARK: [u8; 2] = CHECK.checksum(&examples::SCALE_BYTES).to_le_bytes();
-
-/// Memory that keeps slots without power.
-pub trait Memory {
-    /// What lies in a slot, or will lie there once it is written.
-    fn read(&self, slot: u8) -> [u8; SLOT];
-
-    /// Begins to write a slot. Whatever is still being written is finished first, which may take time: ask
-    /// [`carry_on`](Self::carry_on) before.
-    fn write(&mut self, slot: u8, bytes: [u8; SLOT]);
-
-    /// Carries on with a write, without waiting; whether all has been written.
-    fn carry_on(&mut self) -> bool;
-}
-
-/// A memory that forgets when the power goes: for the host.
-#[derive(Clone, Debug)]
-pub struct Volatile([[u8; SLOT]; CAPACITY as usize]);
-
-impl Volatile {
-    /// A memory with nothing in it.
-    pub const fn new() -> Self {
-        Self([[ERASED; SLOT]; CAPACITY as usize])
-    }
-}
-
-impl Default for Volatile {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl Memory for Volatile {
-    fn read(&self, slot: u8) -> [u8; SLOT] {
-        self.0[usize::from(slot)]
-    }
-
-    fn write(&mut self, slot: u8, bytes: [u8; SLOT]) {
-        self.0[usize::from(slot)] = bytes;
-    }
-
-    fn carry_on(&mut self) -> bool {
-        true
-    }
-}
 
 /// The store of examples taught in the field.
 #[derive(Clone, Debug)]
@@ -74,6 +30,11 @@ pub struct FieldExamples<M> {
     memory: M,
     slots: [Slot; CAPACITY as usize],
     spoiled: u8,
+    /// The slot that is being written.
+    writing: u8,
+    bytes: [u8; SLOT],
+    /// Bytes of it that are still to go.
+    left: u8,
 }
 
 /// What a slot is known to be.
@@ -90,11 +51,12 @@ enum Slot {
 impl<M: Memory> FieldExamples<M> {
     /// Looks through a memory for the examples that it holds.
     pub fn new(memory: M) -> Self {
-        let mut store = Self { memory, slots: [Slot::Free; CAPACITY as usize], spoiled: 0 };
-        for (number, slot) in (0..).zip(&mut store.slots) {
-            let bytes = store.memory.read(number);
+        let slots = [Slot::Free; CAPACITY as usize];
+        let mut store = Self { memory, slots, spoiled: 0, writing: 0, bytes: [ERASED; SLOT], left: 0 };
+        for number in 0..CAPACITY {
+            let bytes = store.read(number);
             if bytes == encode(example_in(bytes)) {
-                *slot = Slot::Held;
+                store.slots[usize::from(number)] = Slot::Held;
             } else if bytes != [ERASED; SLOT] {
                 store.spoiled += 1;
             }
@@ -110,24 +72,24 @@ impl<M: Memory> FieldExamples<M> {
     /// The example in a slot.
     pub fn slot(&self, number: u8) -> Option<Taught> {
         match self.slots.get(usize::from(number)) {
-            Some(Slot::Held) => Some(example_in(self.memory.read(number))),
+            Some(Slot::Held) => Some(example_in(self.read(number))),
             _ => None,
         }
     }
 
-    /// Adds an example; returns its slot.
+    /// Adds an example; returns its slot. What is still being written is finished first, which may take time: ask
+    /// [`carry_on`](Self::carry_on) before.
     ///
     /// # Errors
     /// The example, when all slots are taken.
     pub fn add(&mut self, example: Taught) -> Result<u8, Taught> {
-        for (number, slot) in (0..).zip(&mut self.slots) {
-            if *slot != Slot::Held {
-                *slot = Slot::Held;
-                self.memory.write(number, encode(example));
-                return Ok(number);
-            }
-        }
-        Err(example)
+        let Some(number) = self.slots.iter().position(|&slot| slot != Slot::Held) else {
+            return Err(example);
+        };
+        while !self.write_next_byte() {}
+        self.slots[number] = Slot::Held;
+        self.begin(number as u8, encode(example));
+        Ok(number as u8)
     }
 
     /// Forgets the example in a slot, which [`carry_on`](Self::carry_on) will erase; whether there was one.
@@ -143,18 +105,55 @@ impl<M: Memory> FieldExamples<M> {
 
     /// Carries on with what is to be written, without waiting; whether all has been.
     pub fn carry_on(&mut self) -> bool {
-        if !self.memory.carry_on() {
+        if !self.write_next_byte() {
             return false;
         }
-        for (number, slot) in (0..).zip(&mut self.slots) {
-            if *slot == Slot::Forgotten {
-                *slot = Slot::Free;
-                self.memory.write(number, [ERASED; SLOT]);
-                return false;
+        match self.slots.iter().position(|&slot| slot == Slot::Forgotten) {
+            Some(number) => {
+                self.slots[number] = Slot::Free;
+                self.begin(number as u8, [ERASED; SLOT]);
+                false
             }
+            None => true,
         }
-        true
     }
+
+    /// What lies in a slot, or will lie there once it is written.
+    fn read(&self, number: u8) -> [u8; SLOT] {
+        if self.left > 0 && number == self.writing {
+            return self.bytes;
+        }
+        let mut bytes = [0; SLOT];
+        for (address, byte) in (address(number)..).zip(&mut bytes) {
+            *byte = self.memory.read(address);
+        }
+        bytes
+    }
+
+    fn begin(&mut self, number: u8, bytes: [u8; SLOT]) {
+        self.writing = number;
+        self.bytes = bytes;
+        self.left = SLOT as u8;
+    }
+
+    /// Writes a byte if the memory can take one; whether the last one has been written.
+    fn write_next_byte(&mut self) -> bool {
+        if !self.memory.is_ready() {
+            return false;
+        }
+        let Some(left) = self.left.checked_sub(1) else {
+            return true;
+        };
+        let place = SLOT as u8 - self.left;
+        self.memory.write(address(self.writing) + u16::from(place), self.bytes[usize::from(place)]);
+        self.left = left;
+        false
+    }
+}
+
+/// Where a slot begins.
+const fn address(number: u8) -> u16 {
+    number as u16 * SLOT as u16
 }
 
 impl<M: Memory> Examples<{ features::COUNT }> for FieldExamples<M> {
@@ -178,9 +177,6 @@ impl<M: Memory> Examples<{ features::COUNT }> for FieldExamples<M> {
     }
 }
 
-/// What erased memory reads as.
-const ERASED: u8 = 0xFF;
-
 fn encode(example: Taught) -> [u8; SLOT] {
     let [a, b, c, d, e] = example.features;
     let [mark, scale] = SCALE_MARK;
@@ -198,44 +194,19 @@ fn example_in(bytes: [u8; SLOT]) -> Taught {
 mod tests {
     extern crate std;
     use super::*;
-    use std::{vec, vec::Vec};
+    use crate::memory::Volatile;
+    use std::vec::Vec;
 
-    /// A memory whose power goes away after so many bytes.
-    #[derive(Clone, Debug)]
-    struct Flaky {
-        bytes: Vec<[u8; SLOT]>,
-        power: usize,
-    }
-
-    impl Memory for Flaky {
-        fn read(&self, slot: u8) -> [u8; SLOT] {
-            self.bytes[usize::from(slot)]
-        }
-
-        fn write(&mut self, slot: u8, bytes: [u8; SLOT]) {
-            for (old, new) in self.bytes[usize::from(slot)].iter_mut().zip(bytes) {
-                if self.power > 0 {
-                    *old = new;
-                    self.power -= 1;
-                }
-            }
-        }
-
-        fn carry_on(&mut self) -> bool {
-            true
-        }
-    }
-
-    fn store() -> FieldExamples<Flaky> {
-        FieldExamples::new(Flaky { bytes: vec![[ERASED; SLOT]; usize::from(CAPACITY)], power: usize::MAX })
+    fn store() -> FieldExamples<Volatile> {
+        FieldExamples::new(Volatile::new())
     }
 
     fn example(number: u8) -> Taught {
         Example::new([number, 2, 3, 4, 5], number % 2)
     }
 
-    fn restart(store: FieldExamples<Flaky>) -> FieldExamples<Flaky> {
-        FieldExamples::new(Flaky { power: usize::MAX, ..store.memory })
+    fn restart(store: FieldExamples<Volatile>) -> FieldExamples<Volatile> {
+        FieldExamples::new(store.memory.with_power())
     }
 
     #[test]
@@ -245,6 +216,7 @@ mod tests {
             assert_eq!(store.add(example(number)), Ok(number));
         }
         assert_eq!(store.add(example(99)), Err(example(99)), "a full store hands the example back");
+        while !store.carry_on() {}
         let mut store = restart(store);
         assert_eq!(store.len(), usize::from(CAPACITY));
         assert!(store.forget(7));
@@ -263,7 +235,8 @@ mod tests {
                 for number in 0..4 {
                     store.add(example(number)).unwrap();
                 }
-                store.memory.power = power;
+                while !store.carry_on() {}
+                store.memory.lose_power_after(power);
                 if forgetting {
                     store.forget(2);
                 } else {
@@ -293,7 +266,8 @@ mod tests {
                 let mut store = store();
                 store.add(example(0)).unwrap();
                 store.add(example(1)).unwrap();
-                store.memory.bytes[0][byte] ^= 1 << bit;
+                while !store.carry_on() {}
+                store.memory.bytes[byte] ^= 1 << bit;
                 let store = restart(store);
                 assert_eq!((store.slot(0), store.slot(1), store.spoiled()), (None, Some(example(1)), 1));
             }
@@ -304,9 +278,10 @@ mod tests {
     fn an_example_of_another_scale_is_spoiled() {
         let mut store = store();
         store.add(example(0)).unwrap();
-        let [a, b, c, d, e, label, ..] = store.memory.bytes[0];
+        while !store.carry_on() {}
+        let [a, b, c, d, e, label, ..] = store.read(0);
         let [low, high] = CHECK.checksum(&[a, b, c, d, e, label, !SCALE_MARK[0], SCALE_MARK[1]]).to_le_bytes();
-        store.memory.bytes[0][6..].copy_from_slice(&[low, high]);
+        store.memory.bytes[6..SLOT].copy_from_slice(&[low, high]);
         let store = restart(store);
         assert_eq!((store.slot(0), store.spoiled()), (None, 1));
     }

@@ -2,20 +2,20 @@
 
 mod common;
 
-use common::{ByWidth, readings};
+use common::{ByWidth, Machine, machine, readings, woken_up};
 use control::{
-    alarm::Alarm,
+    alarm::{Alarm, Warning},
     classifier::{Class, Vote},
     console::{LineBuffer, Word},
     controller::{Controller, Readings, State},
     event::Event,
+    memory::Volatile,
     reply::{self, LINE},
+    reset::Cause,
     schedule::Plan,
     settings::Setting,
     units::{Position, Ticks},
 };
-
-type Machine = Controller<ByWidth>;
 
 /// Text that the machine said.
 #[derive(Default)]
@@ -27,10 +27,6 @@ impl ufmt::uWrite for Said {
         self.0.push_str(text);
         Ok(())
     }
-}
-
-fn machine() -> Machine {
-    Controller::new(ByWidth, readings(0, 0), false)
 }
 
 /// Types a line and returns the answer's lines.
@@ -101,10 +97,22 @@ fn a_setting_takes_every_value_of_its_range_and_no_other() {
         let name = String::from_utf8(setting.text().bytes().collect()).unwrap();
         let description = setting.description();
         let mut machine = machine();
+        // Nothing of this contradicts any value of another setting.
+        for line in ["set lead_out_ms 0", "set margin_mm 0", "set beam_to_tool_mm 2000"] {
+            assert_eq!(ask(&mut machine, line), ["ok"]);
+        }
         for value in [description.least, description.greatest] {
             assert_eq!(ask(&mut machine, &format!("set {name} {value}")), ["ok"]);
             assert_eq!(machine.settings().get(setting), value);
-            assert!(ask(&mut machine, &format!("get {name}"))[0].starts_with(&format!("{name}={value} ")));
+            if !setting.is_switched() {
+                assert!(ask(&mut machine, &format!("get {name}"))[0].starts_with(&format!("{name}={value} ")));
+            }
+        }
+        if setting.is_switched() {
+            let refusal = [format!("error: {name} takes on or off")];
+            assert_eq!(ask(&mut machine, &format!("set {name} 2")), refusal);
+            assert_eq!(ask(&mut machine, &format!("get {name}"))[0], format!("{name}=on on or off, default off"));
+            continue;
         }
         let outside = [description.least.checked_sub(1), description.greatest.checked_add(1)];
         for value in outside.into_iter().flatten() {
@@ -146,11 +154,18 @@ fn an_alarm_is_named_and_keeps_the_machine_from_starting_until_it_is_cleared() {
 fn status_says_how_far_the_ground_that_was_seen_still_is() {
     let mut machine = machine();
     assert_eq!(
-        ask(&mut machine, "status")[0],
-        "state=hold tool=out pos=0 speed_mm_s=0 windows=0 lost=0 unseen_mm=400 missed=0"
+        ask(&mut machine, "status"),
+        [
+            "state=hold tool=out pos=0 speed_mm_s=0 windows=0 unseen_mm=400",
+            "lost=0 jumps=0 late=0 missed=0 mistakes=0 stack_free=65535 reset=power_on",
+            "ok"
+        ]
     );
+    assert_eq!(ask(&mut machine, "start"), ["ok"]);
+    machine.step(readings(1000, 0));
+    assert!(ask(&mut machine, "status")[0].starts_with("state=work tool=out for=unseen_ground "));
     assert_eq!(ask(&mut machine, "start now"), ["ok"]);
-    assert!(ask(&mut machine, "status")[0].contains("unseen_mm=0 "));
+    assert!(ask(&mut machine, "status")[0].ends_with("unseen_mm=0"));
 }
 
 #[test]
@@ -159,7 +174,7 @@ fn the_longest_numbers_fit_on_the_status_line() {
     ask(&mut machine, "start");
     machine.beam_edges_lost(false);
     let mut readings = readings(1000, i32::MIN);
-    readings.lost = u16::MAX;
+    (readings.lost, readings.jumps) = (u16::MAX, u16::MAX);
     machine.step(readings);
     ask(&mut machine, "status");
 }
@@ -175,6 +190,7 @@ fn every_event_fits_on_a_line() {
         Event::Swing { out: true, position: far },
         Event::State(State::Hold),
     ];
+    events.extend((0..).map_while(Warning::from_index).map(Event::Warning));
     events.extend((0..).map_while(Alarm::from_index).map(|alarm| Event::Alarm { alarm, position: far }));
     for event in events {
         let mut said = Said::default();
@@ -207,7 +223,9 @@ fn the_readme_names_every_setting_with_its_default() {
         let name = String::from_utf8(setting.text().bytes().collect()).unwrap();
         let row = readme.lines().find(|line| line.starts_with('|') && line.contains(&format!("`{name}`")));
         let row = row.unwrap_or_else(|| panic!("the README has no row for {name}"));
-        assert!(row.contains(&setting.description().default.to_string()), "{name}: {row}");
+        let line = ask(&mut machine(), &format!("get {name}")).remove(0);
+        let (_, default) = line.split_once(", default ").expect("get tells the default");
+        assert!(row.contains(default), "{name}: {row}");
     }
 }
 
@@ -218,4 +236,45 @@ fn after_lost_edges_the_beam_is_what_it_is_now_and_not_what_the_last_edge_said()
         machine.beam_edges_lost(broken);
         assert_eq!(machine.windows(), u8::from(broken));
     }
+}
+
+#[test]
+fn settings_that_contradict_each_other_are_refused_with_what_would_be_right() {
+    let mut machine = machine();
+    let refusal = "error: margin, leads and top speed would need beam_to_tool_mm 336 or more, change one of them first";
+    assert_eq!(ask(&mut machine, "set beam_to_tool_mm 335"), [refusal]);
+    assert_eq!(ask(&mut machine, "set beam_to_tool_mm 336"), ["ok"]);
+    for line in ["set margin_mm 51", "set lead_out_ms 190", "set top_speed_mm_s 1410", "set beam_response_ms 3"] {
+        assert!(ask(&mut machine, line)[0].starts_with("error: margin, leads and top speed would need"), "{line}");
+    }
+    assert_eq!(ask(&mut machine, "set top_speed_mm_s 1000"), ["ok"]);
+    assert_eq!(ask(&mut machine, "set margin_mm 60"), ["ok"]);
+    let refusal = "error: servo_in_us and servo_out_us would be equal, and the tool would not move";
+    assert_eq!(ask(&mut machine, "set servo_in_us 2000"), [refusal]);
+}
+
+#[test]
+fn settings_are_saved_in_hold_only() {
+    let mut machine = machine();
+    assert_eq!(ask(&mut machine, "save"), ["ok"]);
+    ask(&mut machine, "start");
+    assert_eq!(ask(&mut machine, "save"), ["error: the machine is at work, hold first"]);
+}
+
+#[test]
+fn a_machine_without_saved_settings_says_so_and_does_not_start_until_that_is_cleared() {
+    let mut machine = Controller::new(ByWidth, Volatile::new(), woken_up(Cause::BrownOut));
+    assert_eq!(machine.state(), State::Alarm(Alarm::SettingsLost));
+    assert_eq!(ask(&mut machine, "start"), ["error: an alarm is latched, see status, then clear it"]);
+    assert_eq!(ask(&mut machine, "clear"), ["ok"]);
+    assert_eq!(ask(&mut machine, "start"), ["ok"]);
+}
+
+#[test]
+fn lines_that_are_not_understood_are_counted() {
+    let mut machine = machine();
+    for line in ["nonsense", "set", "\u{7}"] {
+        ask(&mut machine, line);
+    }
+    assert!(ask(&mut machine, "status")[1].contains(" mistakes=3 "));
 }

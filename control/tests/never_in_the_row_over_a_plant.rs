@@ -5,8 +5,8 @@
 
 mod common;
 
-use common::{ByWidth, readings};
-use control::{controller::Controller, event::Event, servo, settings::Setting, units::Ticks};
+use common::{machine, readings};
+use control::{event::Event, servo, settings::Setting, units::Ticks};
 use proptest::prelude::*;
 
 /// Ticks a metre of the default wheel.
@@ -57,14 +57,23 @@ fn roll(distance_mm: u16, plants: &[(f64, f64)], legs: &[Leg], paper: bool) -> R
         .collect();
     let broken_at = |count: i32| canopies.iter().any(|&(from, to)| (from..to).contains(&f64::from(count)));
 
-    let mut machine = Controller::new(ByWidth, readings(0, 0), false);
-    machine.set(Setting::BeamToToolMm, distance_mm).unwrap();
-    // The beam of this test answers at once.
-    machine.set(Setting::BeamResponseMs, 0).unwrap();
-    machine.set(Setting::MaxWidthMm, 1500).unwrap();
+    let mut machine = machine();
     let (lead_out_s, lead_in_s) = if paper { (0.0, 0.0) } else { (0.180, 0.040) };
-    machine.set(Setting::LeadOutMs, (lead_out_s * 1000.0) as u16).unwrap();
-    machine.set(Setting::LeadInMs, (lead_in_s * 1000.0) as u16).unwrap();
+    // As fast as the beam's distance allows.
+    let notice_s = lead_out_s * 9.0 / 8.0 + 0.001;
+    let top_speed_mm_s = ((f64::from(distance_mm) - 52.0) / notice_s).min(3000.0).floor();
+    for (setting, value) in [
+        (Setting::TopSpeedMmS, 100),
+        (Setting::BeamToToolMm, distance_mm),
+        // The beam of this test answers at once.
+        (Setting::BeamResponseMs, 0),
+        (Setting::MaxWidthMm, 1500),
+        (Setting::LeadOutMs, (lead_out_s * 1000.0) as u16),
+        (Setting::LeadInMs, (lead_in_s * 1000.0) as u16),
+        (Setting::TopSpeedMmS, top_speed_mm_s as u16),
+    ] {
+        machine.set(setting, value).unwrap();
+    }
     machine.tell_events(true);
     machine.start(true).unwrap();
     let distance = f64::from(machine.settings().ticks(Setting::BeamToToolMm).0);
@@ -76,7 +85,7 @@ fn roll(distance_mm: u16, plants: &[(f64, f64)], legs: &[Leg], paper: bool) -> R
     let mut speed = 0.0_f64;
     let mut out_since_us = None;
     for leg in legs {
-        let target = leg.speed_mm_s * TICKS_A_METRE / 1000.0;
+        let target = leg.speed_mm_s.min(0.95 * top_speed_mm_s) * TICKS_A_METRE / 1000.0;
         let mut left = leg.length_mm * TICKS_A_METRE / 1000.0;
         while left > 0.0 {
             // A person pushes: 1 m/s2.
@@ -161,7 +170,7 @@ proptest! {
 
 #[test]
 fn the_tool_is_in_the_row_wherever_nothing_keeps_it_out() {
-    let mut machine = Controller::new(ByWidth, readings(0, 0), false);
+    let mut machine = machine();
     machine.start(false).unwrap();
     let mut orders = machine.step(readings(0, 0));
     let out = servo::from_us(machine.settings().get(Setting::ServoOutUs));

@@ -99,6 +99,9 @@ const SWITCH_MS: u64 = 100;
 /// Time between the start and the first movement, and between the last one and the final question.
 const STILL_MS: u64 = 50;
 
+/// The top speed that a machine is set to where its beam stands far enough ahead, 10.8 km/h: the firmware's greatest.
+const TOP_SPEED_MM_S: f64 = 3000.0;
+
 /// Simulated time between two reports of progress.
 const PROGRESS_CYCLES: u64 = CYCLES_PER_SECOND / 20;
 
@@ -106,12 +109,23 @@ const PROGRESS_CYCLES: u64 = CYCLES_PER_SECOND / 20;
 ///
 /// # Errors
 /// Where the ELF cannot be run, or no line comes.
-pub fn boot(elf: &Path, levels: &[PinChange]) -> Result<Uno, UnoError> {
+pub fn power_up(elf: &Path, levels: &[PinChange]) -> Result<Uno, UnoError> {
     let mut uno = Uno::boot(elf)?;
     for level in levels {
         uno.set(level.pin, level.high);
     }
     uno.run_until_serial("\n", BOOT_CYCLES)?;
+    Ok(uno)
+}
+
+/// As [`power_up`], and clears the alarm by which the firmware says that its EEPROM holds no settings yet.
+///
+/// # Errors
+/// As [`power_up`].
+pub fn boot(elf: &Path, levels: &[PinChange]) -> Result<Uno, UnoError> {
+    let mut uno = power_up(elf, levels)?;
+    uno.send(b"clear\n");
+    uno.run_until_serial("ok\r\n", BOOT_CYCLES)?;
     Ok(uno)
 }
 
@@ -185,10 +199,15 @@ impl Trial {
         })
     }
 
-    /// The settings by which the firmware knows machine and timing.
-    fn settings(&self) -> [(&'static str, u32); 8] {
+    /// The settings by which the firmware knows machine and timing, in an order in which none contradicts the others.
+    fn settings(&self) -> [(&'static str, u32); 10] {
         let Machine { wheel_mm, ticks_per_rev, beam_to_tool_mm, servo, .. } = self.machine;
+        let notice_mm = beam_to_tool_mm - f64::from(self.timing.margin_mm) - 2.0;
+        // As the firmware counts: the lead, an eighth of it, and what the sensor may take.
+        let notice_s = f64::from(self.timing.lead_out_ms) * 1.125e-3 + 0.002;
+        let top_speed_mm_s = (notice_mm / notice_s).clamp(100.0, TOP_SPEED_MM_S).floor();
         [
+            ("top_speed_mm_s", 100),
             ("ticks_per_rev", ticks_per_rev),
             ("wheel_mm", wheel_mm.round() as u32),
             ("beam_to_tool_mm", beam_to_tool_mm.round() as u32),
@@ -197,6 +216,7 @@ impl Trial {
             ("lead_in_ms", self.timing.lead_in_ms),
             ("servo_in_us", servo.in_us.round() as u32),
             ("servo_out_us", servo.out_us.round() as u32),
+            ("top_speed_mm_s", top_speed_mm_s as u32),
         ]
     }
 }

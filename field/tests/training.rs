@@ -3,7 +3,7 @@
 use control::classifier::{Class, Classifier, Nearest};
 use control::examples::{EXAMPLES, K};
 use control::features::{Features, SPEED_CLASSES_MM_S};
-use control::taught::Volatile;
+use control::memory::Volatile;
 use field::row::Kind;
 use field::training::table::{read, read_labelled};
 use field::training::{DEFAULT_MOST_EXAMPLES, Labelled, Model, TrainingError, listing, regions, synthetic, train};

@@ -23,7 +23,8 @@ pub fn elf() -> PathBuf {
     firmware::build().expect("the firmware builds")
 }
 
-/// An Uno that has woken up with its inputs at rest: the switch off, the beam clear.
+/// An Uno that has woken up with its inputs at rest, the switch off and the beam clear, and was told that its settings are
+/// right although none are saved.
 pub fn woken_up() -> Uno {
     trial::boot(&elf(), &[]).expect("the firmware wakes up")
 }
@@ -43,12 +44,13 @@ pub fn refusal(uno: &mut Uno, command: &str) -> String {
     }
 }
 
-/// The status line.
+/// The status, its lines joined to one.
 #[track_caller]
 pub fn status(uno: &mut Uno) -> String {
     let lines = ask(uno, "status");
     // The end of an event's line may come before it.
-    lines.into_iter().find(|line| line.starts_with("state=")).expect("a status line")
+    let start = lines.iter().position(|line| line.starts_with("state=")).expect("a status line");
+    lines[start..].join(" ")
 }
 
 /// The word behind `key=` in a line.

@@ -113,7 +113,7 @@ fn a_plant_in_the_beam_at_power_up_is_kept() {
 fn nothing_that_was_scheduled_survives_a_reset() {
     for restart in [Uno::reset, Uno::power_cycle] {
         let row = Row::new(vec![Thing::plant(300.0, 150.0)]).expect("a plant is a row");
-        let mut run = Run::begin(trial(row, steady(mm_s(2.0), 500.0)), &["set margin_mm 60"]);
+        let mut run = Run::begin(trial(row, steady(mm_s(2.0), 500.0)), &["set margin_mm 60", "save"]);
         run.roll_to_the_end();
         let before = status(&mut run.uno);
         assert_eq!((value(&before, "state"), number(&before, "windows")), ("work", 1), "{before}");

@@ -2,8 +2,10 @@
 
 use control::{
     classifier::{Class, Classifier, Full, Listed, Vote},
-    controller::Readings,
+    controller::{Controller, Readings, WakeUp},
     features::Features,
+    memory::Volatile,
+    reset::Cause,
     units::{Instant, Interval, Position},
 };
 
@@ -32,14 +34,29 @@ impl Classifier for ByWidth {
     fn spoiled(&self) -> u8 {
         0
     }
+
+    fn carry_on(&mut self) -> bool {
+        true
+    }
+}
+
+/// A machine in HOLD that woke up without saved settings and was told that this is right.
+pub fn machine() -> Machine {
+    let mut machine = Controller::new(ByWidth, Volatile::new(), woken_up(Cause::PowerOn));
+    machine.clear();
+    machine
+}
+
+/// A machine as the tests have it.
+pub type Machine = Controller<ByWidth, Volatile>;
+
+/// Waking up at rest, with nothing in the beam.
+pub fn woken_up(cause: Cause) -> WakeUp {
+    WakeUp { readings: readings(0, 0), beam_broken: false, cause }
 }
 
 /// Readings of a machine at `count`, `microseconds` after the first moment.
 pub fn readings(microseconds: u64, count: i32) -> Readings {
-    Readings {
-        now: Instant::default() + Interval::from_steps((microseconds / 4) as u32),
-        position: Position::new(count),
-        switch_on: false,
-        lost: 0,
-    }
+    let now = Instant::default() + Interval::from_steps((microseconds / 4) as u32);
+    Readings::new(now, Position::new(count))
 }

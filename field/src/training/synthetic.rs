@@ -18,9 +18,11 @@ use crate::planting::{Planting, PlantingError};
 use crate::row::{Kind, Problem, Row, Thing};
 use crate::signal::{CYCLES_PER_SECOND, Pin, PinChange};
 use control::classifier::{Class, Classifier, Full, Listed, Vote};
-use control::controller::{Controller, Readings};
+use control::controller::{Controller, Readings, WakeUp};
 use control::features::{Features, SPEED_CLASSES_MM_S};
+use control::memory::Volatile;
 use control::quadrature::{Quadrature, Step};
+use control::reset::Cause;
 use control::units::{Instant, Interval, Position, Ticks};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -184,6 +186,10 @@ impl Classifier for &Recorder<'_> {
     fn spoiled(&self) -> u8 {
         0
     }
+
+    fn carry_on(&mut self) -> bool {
+        true
+    }
 }
 
 /// What the controller sees of a row.
@@ -193,8 +199,9 @@ fn roll_past(row: &Row, speed_mm_s: f64, slip: f64) -> Result<Vec<Labelled>, Syn
     let machine = Machine { wheel_mm: standard.wheel_mm * (1.0 + slip), ..standard };
     let motion = Motion::steady(-HEADLAND_MM, ACCELERATION_MM_S2, speed_mm_s, row.span_mm().end + RUN_OUT_MM);
     let recorder = Recorder { row, seen: RefCell::new(Vec::new()) };
-    let start = readings(0, Position::default());
-    let mut controller = Controller::new(&recorder, start, !machine.beam_before(row, &motion).high);
+    let beam_broken = !machine.beam_before(row, &motion).high;
+    let wake_up = WakeUp { readings: readings(0, Position::default()), beam_broken, cause: Cause::PowerOn };
+    let mut controller = Controller::new(&recorder, Volatile::new(), wake_up);
 
     let mut wheel = Encoder::default();
     let mut next_loop = LOOP_CYCLES;
@@ -218,7 +225,7 @@ fn roll_past(row: &Row, speed_mm_s: f64, slip: f64) -> Result<Vec<Labelled>, Syn
 
 fn readings(cycle: u64, position: Position) -> Readings {
     let now = Instant::new((cycle / CYCLES_PER_STEP) as u32);
-    Readings { now, position, switch_on: false, lost: 0 }
+    Readings::new(now, position)
 }
 
 /// The encoder's two channels, and the position that the firmware's decoder makes of them.

@@ -1,0 +1,82 @@
+//! Memory that outlives the power, a byte at a time, and the check on what it keeps.
+//!
+//! The EEPROM takes 3.4 ms to write a byte. So whoever keeps something there writes one byte whenever the memory can take
+//! one, and nothing waits. What the bytes mean is the business of [`saved`](crate::saved) and [`taught`](crate::taught),
+//! each of which has a memory of [`SIZE`] bytes to itself.
+
+use crc::{CRC_16_IBM_SDLC, Crc, NoTable};
+
+/// Bytes of a memory: half an ATmega328P's EEPROM.
+pub const SIZE: usize = 512;
+
+/// What erased memory reads as.
+pub const ERASED: u8 = 0xFF;
+
+/// The CRC over what is kept, without a table: a byte at a time is fast enough for so few, and tables cost flash.
+pub(crate) const CHECK: Crc<u16, NoTable> = Crc::<u16, NoTable>::new(&CRC_16_IBM_SDLC);
+
+/// Memory that keeps bytes without power.
+pub trait Memory {
+    /// The byte at an address, which may have to wait for a byte under way.
+    fn read(&self, address: u16) -> u8;
+
+    /// Whether a byte can be written now.
+    fn is_ready(&self) -> bool;
+
+    /// Begins to write a byte; only when [`is_ready`](Self::is_ready).
+    fn write(&mut self, address: u16, byte: u8);
+}
+
+/// A memory for the host, which forgets with the program, and whose power can be made to fail.
+#[derive(Clone, Debug)]
+pub struct Volatile {
+    /// What it holds.
+    pub bytes: [u8; SIZE],
+    /// Bytes that can be written until the power fails.
+    power: usize,
+}
+
+impl Volatile {
+    /// An erased memory.
+    pub const fn new() -> Self {
+        Self::holding([ERASED; SIZE])
+    }
+
+    /// A memory that holds these bytes.
+    pub const fn holding(bytes: [u8; SIZE]) -> Self {
+        Self { bytes, power: usize::MAX }
+    }
+
+    /// Takes the power away after so many more bytes: what is written then is lost.
+    pub const fn lose_power_after(&mut self, bytes: usize) {
+        self.power = bytes;
+    }
+
+    /// The memory as it is found when the power is back.
+    pub const fn with_power(self) -> Self {
+        Self::holding(self.bytes)
+    }
+}
+
+impl Default for Volatile {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Memory for Volatile {
+    fn read(&self, address: u16) -> u8 {
+        self.bytes[usize::from(address)]
+    }
+
+    fn is_ready(&self) -> bool {
+        true
+    }
+
+    fn write(&mut self, address: u16, byte: u8) {
+        if self.power > 0 {
+            self.bytes[usize::from(address)] = byte;
+            self.power -= 1;
+        }
+    }
+}

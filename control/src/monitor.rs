@@ -1,0 +1,119 @@
+//! What encoder and beam show when they fail.
+//!
+//! Neither sensor says that it is broken; it shows in what they say together. A machine that rolls makes progress, so edges
+//! of the encoder that lead nowhere come from one live channel, and plants that pass a machine at rest come from a dead
+//! encoder. A canopy has so many leaves and no more, so a beam that flickers sees dust. These monitors count; what a fault
+//! means for the tool is decided by the [`controller`](crate::controller).
+
+use crate::{
+    alarm::Alarm,
+    units::{Instant, Interval, Position, Ticks},
+};
+
+/// A step farther than this is progress: a wheel that trembles on an edge moves by one, and one dead channel by one.
+const PROGRESS: Ticks = Ticks(2);
+
+/// The time in which edges are counted.
+const PERIOD: Interval = Interval::from_ms(500);
+
+/// Edges without progress in a period that no tremble gives: one channel alone shows them from 0.6 km/h on, and an
+/// engine's vibration of 50 Hz, which makes 50 of them, does not.
+const DEAD_CHANNEL_EDGES: u8 = 80;
+
+/// Jumps of two ticks in a period. At 10 km/h the edges stand 188 us apart, and the interrupt answers in 20: there are none.
+const JUMPS: u16 = 20;
+
+/// Without progress for so long, the machine stands: slower than 0.05 km/h.
+const STANDS: Interval = Interval::from_ms(100);
+
+/// Times that the beam may break while the machine stands: leaves move in the wind, but plants do not pass.
+const BREAKS: u8 = 3;
+
+/// Watches the encoder.
+#[derive(Clone, Debug)]
+pub struct EncoderMonitor {
+    /// Where the machine last made progress, and when.
+    anchor: Position,
+    progress_at: Instant,
+    last: Position,
+    /// Edges since the period began, all of them without progress.
+    edges: u8,
+    /// Times that the beam broke since the machine stands.
+    breaks: u8,
+    period_since: Instant,
+    /// The count of jumps when the period began.
+    jumps: u16,
+}
+
+impl EncoderMonitor {
+    /// A monitor for a machine that stands at `position`.
+    pub const fn new(now: Instant, position: Position, jumps: u16) -> Self {
+        Self { anchor: position, progress_at: now, last: position, edges: 0, breaks: 0, period_since: now, jumps }
+    }
+
+    /// Takes a reading, with the count of jumps since power-up; returns the fault that it shows.
+    pub fn read(&mut self, now: Instant, position: Position, jumps: u16) -> Option<Alarm> {
+        if now - self.period_since >= PERIOD {
+            self.period_since = now;
+            self.edges = 0;
+            self.jumps = jumps;
+        }
+        let moved = position - self.anchor;
+        if moved > PROGRESS || moved < -PROGRESS {
+            self.anchor = position;
+            self.progress_at = now;
+            self.edges = 0;
+            self.breaks = 0;
+        } else if position != self.last {
+            self.edges = self.edges.saturating_add(1);
+        }
+        self.last = position;
+        if jumps.wrapping_sub(self.jumps) > JUMPS {
+            return Some(Alarm::EncoderJumps);
+        }
+        (self.edges > DEAD_CHANNEL_EDGES).then_some(Alarm::EncoderChannelDead)
+    }
+
+    /// The beam broke; returns the fault that this shows.
+    pub fn beam_broke(&mut self, now: Instant) -> Option<Alarm> {
+        if now - self.progress_at < STANDS {
+            return None;
+        }
+        self.breaks = self.breaks.saturating_add(1);
+        (self.breaks >= BREAKS).then_some(Alarm::EncoderSilent)
+    }
+
+    /// Whether the beam broke while the machine stands: perhaps it rolls, and nobody sees it.
+    pub const fn is_doubtful(&self) -> bool {
+        self.breaks > 0
+    }
+}
+
+/// The time in which the beam's edges are counted.
+const FLICKER_PERIOD: Interval = Interval::from_ms(100);
+
+/// Edges in that time that no canopy makes: at 10 km/h a clear stretch every 14 mm.
+const FLICKER_EDGES: u8 = 40;
+
+/// Watches the beam.
+#[derive(Clone, Debug)]
+pub struct BeamMonitor {
+    edges: u8,
+    since: Instant,
+}
+
+impl BeamMonitor {
+    /// A monitor that has seen no edge.
+    pub const fn new(now: Instant) -> Self {
+        Self { edges: 0, since: now }
+    }
+
+    /// The beam's level changed; returns the fault that this shows.
+    pub fn edge(&mut self, now: Instant) -> Option<Alarm> {
+        if now - self.since >= FLICKER_PERIOD {
+            *self = Self::new(now);
+        }
+        self.edges = self.edges.saturating_add(1);
+        (self.edges > FLICKER_EDGES).then_some(Alarm::BeamFlickers)
+    }
+}

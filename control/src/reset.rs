@@ -1,0 +1,104 @@
+//! Why the machine started: what the chip's reset flags tell, and what the firmware left behind for its next start.
+//!
+//! A bootloader may clear the flags before the firmware starts, as optiboot does. The mark in SRAM, which a reset leaves
+//! alone, still tells then of a loop that stalled and of a panic; everything else is [`Cause::Unknown`].
+
+use crate::text::words;
+
+words! {
+    /// What started the machine.
+    pub enum Cause {
+        /// The power came on.
+        PowerOn = "power_on",
+        /// The reset pin was pulled: by the button, or by a computer that opened the serial line.
+        ResetPin = "reset_pin",
+        /// The supply was too low for a moment.
+        BrownOut = "brown_out",
+        /// The watchdog ran out and nothing tells why.
+        Watchdog = "watchdog",
+        /// The loop stopped turning.
+        LoopStalled = "loop_stalled",
+        /// The firmware met what cannot be, and gave up.
+        Panic = "panic",
+        /// The flags were cleared before the firmware saw them.
+        Unknown = "unknown",
+    }
+}
+
+/// Marks that the firmware leaves in SRAM. At power-up SRAM holds either by a chance of one in 32,768.
+pub mod mark {
+    /// Nothing to tell.
+    pub const NONE: u16 = 0;
+    /// The loop stopped turning.
+    pub const LOOP_STALLED: u16 = 0x5AC3;
+    /// The firmware panicked.
+    pub const PANIC: u16 = 0xA53C;
+}
+
+/// Bits of MCUSR (data sheet, section 11.9.1).
+mod flag {
+    pub const POWER_ON: u8 = 1 << 0;
+    pub const RESET_PIN: u8 = 1 << 1;
+    pub const BROWN_OUT: u8 = 1 << 2;
+    pub const WATCHDOG: u8 = 1 << 3;
+}
+
+impl Cause {
+    /// The cause, from MCUSR as the start-up code found it and the mark that lay in SRAM.
+    ///
+    /// A supply that was too low may have spoiled the mark, which counts for nothing then. Otherwise a mark comes first: it was
+    /// left on the way to a reset, whatever has pulled that forward. Where several flags stand, the one that can have
+    /// caused the others is told.
+    pub const fn of(mcusr: u8, mark: u16) -> Self {
+        if mcusr & flag::POWER_ON != 0 {
+            Self::PowerOn
+        } else if mcusr & flag::BROWN_OUT != 0 {
+            Self::BrownOut
+        } else if mark == mark::LOOP_STALLED {
+            Self::LoopStalled
+        } else if mark == mark::PANIC {
+            Self::Panic
+        } else if mcusr & flag::WATCHDOG != 0 {
+            Self::Watchdog
+        } else if mcusr & flag::RESET_PIN != 0 {
+            Self::ResetPin
+        } else {
+            Self::Unknown
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MARKS: [u16; 4] = [mark::NONE, mark::LOOP_STALLED, mark::PANIC, 0xC5C5];
+
+    #[test]
+    fn a_low_supply_makes_every_mark_worthless() {
+        for mark in MARKS {
+            for others in [0, flag::RESET_PIN, flag::WATCHDOG] {
+                assert_eq!(Cause::of(flag::POWER_ON | flag::BROWN_OUT | others, mark), Cause::PowerOn);
+                assert_eq!(Cause::of(flag::BROWN_OUT | others, mark), Cause::BrownOut);
+            }
+        }
+    }
+
+    #[test]
+    fn a_mark_tells_more_than_the_watchdog_and_more_than_cleared_flags() {
+        for mcusr in [flag::WATCHDOG, flag::RESET_PIN, 0] {
+            assert_eq!(Cause::of(mcusr, mark::LOOP_STALLED), Cause::LoopStalled);
+            assert_eq!(Cause::of(mcusr, mark::PANIC), Cause::Panic);
+        }
+    }
+
+    #[test]
+    fn without_a_mark_the_flags_tell() {
+        for mark in [mark::NONE, 0xC5C5, mark::PANIC ^ 1] {
+            assert_eq!(Cause::of(flag::WATCHDOG, mark), Cause::Watchdog);
+            assert_eq!(Cause::of(flag::WATCHDOG | flag::RESET_PIN, mark), Cause::Watchdog);
+            assert_eq!(Cause::of(flag::RESET_PIN, mark), Cause::ResetPin);
+            assert_eq!(Cause::of(0, mark), Cause::Unknown);
+        }
+    }
+}

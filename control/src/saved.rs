@@ -1,0 +1,235 @@
+//! The settings as they are kept without power: two copies, written in turn.
+//!
+//! A copy is the table's mark, the number of values, a sequence number, the values, and a CRC-16 of all that. A save
+//! overwrites the older copy, a byte at a time, so that the power may go away at any moment: the newer one is still whole.
+//! On waking up the newest copy counts that is whole, of this firmware's table, and within its ranges.
+
+use crate::{
+    memory::{CHECK, Memory, SIZE},
+    settings::{Setting, Settings, TABLE_MARK},
+};
+
+/// Bytes before the values: the table's mark (2), their number, the sequence number.
+const HEADER: usize = 4;
+
+/// Where the values end.
+const END: usize = HEADER + 2 * Setting::COUNT as usize;
+
+/// Bytes of a copy, its CRC included.
+pub const COPY: usize = END + 2;
+
+/// Each copy has half the memory, so that the table may grow without moving them.
+const STRIDE: u16 = SIZE as u16 / 2;
+
+const _: () = assert!(COPY <= STRIDE as usize && COPY <= u8::MAX as usize);
+
+/// The settings in the memory.
+#[derive(Clone, Debug)]
+pub struct SavedSettings<M> {
+    memory: M,
+    /// The newest copy, 0 or 1, and its sequence number.
+    newest: u8,
+    sequence: u8,
+    /// The byte of that copy that is to be written next; [`COPY`] when all are.
+    next: u8,
+}
+
+impl<M: Memory> SavedSettings<M> {
+    /// The settings in a memory, which are yet to be loaded.
+    pub const fn new(memory: M) -> Self {
+        Self { memory, newest: 1, sequence: 0, next: COPY as u8 }
+    }
+
+    /// Loads the newest copy that is whole; `None` where neither is.
+    #[inline(never)]
+    pub fn load(&mut self) -> Option<Settings> {
+        let mut newest = None;
+        for copy in 0..2 {
+            if let Some((settings, sequence)) = self.read(copy)
+                && (newest.is_none() || sequence.wrapping_sub(self.sequence).cast_signed() > 0)
+            {
+                (self.newest, self.sequence) = (copy, sequence);
+                newest = Some(settings);
+            }
+        }
+        newest
+    }
+
+    /// Begins to save. The settings must not change until [`carry_on`](Self::carry_on) has finished.
+    pub const fn save(&mut self) {
+        self.newest ^= 1;
+        self.sequence = self.sequence.wrapping_add(1);
+        self.next = 0;
+    }
+
+    /// Carries on with a save, without waiting; whether all has been written.
+    #[inline(never)]
+    pub fn carry_on(&mut self, settings: &Settings) -> bool {
+        if !self.memory.is_ready() {
+            return false;
+        }
+        if usize::from(self.next) < COPY {
+            for (place, &byte) in image(settings, self.sequence).iter().enumerate().skip(usize::from(self.next)) {
+                self.next += 1;
+                let address = address(self.newest) + place as u16;
+                // What is right already is left alone: an EEPROM wears out.
+                if self.memory.read(address) != byte {
+                    self.memory.write(address, byte);
+                    return false;
+                }
+            }
+        }
+        true
+    }
+
+    /// A copy, and its sequence number; `None` unless it is whole.
+    fn read(&self, copy: u8) -> Option<(Settings, u8)> {
+        let mut bytes = [0; COPY];
+        for (address, byte) in (address(copy)..).zip(&mut bytes) {
+            *byte = self.memory.read(address);
+        }
+        let mut settings = Settings::new();
+        for (setting, value) in Setting::all().zip(bytes[HEADER..END].chunks_exact(2)) {
+            settings.set(setting, u16::from_le_bytes([value[0], value[1]])).ok()?;
+        }
+        let sequence = bytes[HEADER - 1];
+        (bytes == image(&settings, sequence)).then_some((settings, sequence))
+    }
+}
+
+/// The bytes of a copy.
+#[inline(never)]
+fn image(settings: &Settings, sequence: u8) -> [u8; COPY] {
+    let mut bytes = [0; COPY];
+    let [low, high] = TABLE_MARK.to_le_bytes();
+    bytes[..HEADER].copy_from_slice(&[low, high, Setting::COUNT, sequence]);
+    for (setting, value) in Setting::all().zip(bytes[HEADER..END].chunks_exact_mut(2)) {
+        value.copy_from_slice(&settings.get(setting).to_le_bytes());
+    }
+    let check = CHECK.checksum(&bytes[..END]).to_le_bytes();
+    bytes[END..].copy_from_slice(&check);
+    bytes
+}
+
+/// Where a copy begins.
+const fn address(copy: u8) -> u16 {
+    copy as u16 * STRIDE
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use crate::memory::{ERASED, Volatile};
+
+    fn with_k(k: u16) -> Settings {
+        let mut settings = Settings::new();
+        settings.set(Setting::K, k).expect("within its range");
+        settings
+    }
+
+    fn save(memory: Volatile, settings: &Settings) -> Volatile {
+        let mut saved = SavedSettings::new(memory);
+        saved.load();
+        saved.save();
+        while !saved.carry_on(settings) {}
+        saved.memory
+    }
+
+    fn load(memory: &Volatile) -> Option<Settings> {
+        SavedSettings::new(memory.clone()).load()
+    }
+
+    #[test]
+    fn an_erased_memory_holds_no_settings() {
+        assert_eq!(load(&Volatile::new()), None);
+        assert_eq!(load(&Volatile::holding([0; SIZE])), None);
+    }
+
+    #[test]
+    fn the_last_save_counts_however_often_the_sequence_wraps() {
+        let mut memory = Volatile::new();
+        for time in 0..600 {
+            memory = save(memory, &with_k(1 + time % 15));
+            assert_eq!(load(&memory), Some(with_k(1 + time % 15)), "{time}");
+        }
+    }
+
+    #[test]
+    fn power_lost_at_any_byte_of_a_save_leaves_the_old_settings_or_the_new() {
+        for before in 1..4 {
+            let mut memory = Volatile::new();
+            for k in 0..before {
+                memory = save(memory, &with_k(k + 1));
+            }
+            for power in 0..=COPY {
+                let mut failing = memory.clone();
+                failing.lose_power_after(power);
+                let after = load(&save(failing, &with_k(9)).with_power());
+                assert!(after == Some(with_k(before)) || after == Some(with_k(9)), "{power}: {after:?}");
+                assert!(power < COPY || after == Some(with_k(9)), "nothing was lost");
+            }
+        }
+    }
+
+    #[test]
+    fn a_spoiled_copy_gives_way_to_the_other() {
+        let memory = save(save(Volatile::new(), &with_k(5)), &with_k(7));
+        for (copy, left) in [(0, 7), (1, 5)] {
+            for place in 0..COPY {
+                for bit in 0..8 {
+                    let mut spoiled = memory.clone();
+                    spoiled.bytes[usize::from(address(copy)) + place] ^= 1 << bit;
+                    assert_eq!(load(&spoiled), Some(with_k(left)), "byte {place}, bit {bit}");
+                    // The copy that is left is never the one to be overwritten.
+                    let mut failing = spoiled;
+                    failing.lose_power_after(2);
+                    let after = load(&save(failing, &with_k(9)).with_power());
+                    assert!([5, 7].map(|k| Some(with_k(k))).contains(&after), "byte {place}, bit {bit}: {after:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn two_spoiled_copies_are_no_settings() {
+        let mut memory = save(save(Volatile::new(), &with_k(5)), &with_k(7));
+        memory.bytes[10] ^= 1;
+        memory.bytes[usize::from(STRIDE) + 20] ^= 0x80;
+        assert_eq!(load(&memory), None);
+    }
+
+    #[test]
+    fn settings_of_another_table_or_length_are_none_although_their_crc_is_right() {
+        for place in 0..HEADER - 1 {
+            let mut bytes = image(&with_k(5), 1);
+            bytes[place] ^= 1;
+            let check = CHECK.checksum(&bytes[..END]).to_le_bytes();
+            bytes[END..].copy_from_slice(&check);
+            let mut memory = Volatile::new();
+            memory.bytes[..COPY].copy_from_slice(&bytes);
+            assert_eq!(load(&memory), None, "{place}");
+        }
+    }
+
+    #[test]
+    fn values_out_of_their_range_are_no_settings_although_their_crc_is_right() {
+        let mut bytes = image(&Settings::new(), 1);
+        bytes[HEADER..HEADER + 2].copy_from_slice(&u16::MAX.to_le_bytes());
+        let check = CHECK.checksum(&bytes[..END]).to_le_bytes();
+        bytes[END..].copy_from_slice(&check);
+        let mut memory = Volatile::new();
+        memory.bytes[..COPY].copy_from_slice(&bytes);
+        assert_eq!(load(&memory), None);
+    }
+
+    #[test]
+    fn bytes_that_are_right_are_not_written_again() {
+        let memory = save(save(Volatile::new(), &with_k(5)), &with_k(5));
+        let mut writes_few = memory.clone();
+        // The sequence number and the CRC.
+        writes_few.lose_power_after(3);
+        assert_eq!(save(writes_few, &with_k(5)).bytes, save(memory, &with_k(5)).bytes);
+        assert_eq!(Volatile::new().bytes[0], ERASED);
+    }
+}
