@@ -16,8 +16,13 @@ mod clock;
 mod eeprom;
 mod encoder;
 mod examples;
+mod heartbeat;
+mod reset;
+mod ring;
 mod serial;
 mod servo;
+mod shared;
+mod stack;
 mod watchdog;
 
 use avr_device::{atmega328p::Peripherals, interrupt};
@@ -27,7 +32,6 @@ use control::{
     controller::{Controller, Readings, WakeUp},
     lamp,
     reply::{self, Answer},
-    reset::Cause,
     units::Position,
 };
 use embedded_hal::digital::{InputPin, OutputPin};
@@ -49,15 +53,18 @@ fn main() -> ! {
     // SAFETY: every interrupt's peripheral is set up, and no critical section is open.
     unsafe { interrupt::enable() };
 
+    let mut stack = stack::Stack::new();
     let mut read = move || {
         let now = clock.now();
-        let encoder::Counts { position, lost, .. } = encoder::counts();
+        let encoder::Counts { position, lost, jumps } = encoder::counts();
         let (Ok(switch_on), Ok(end_switch_on)) = (work_switch.is_low(), end_switch.is_low());
-        Readings { switch_on, end_switch_on, lost, ..Readings::new(now, Position::new(position)) }
+        let stack_free = stack.free();
+        Readings { now, position: Position::new(position), switch_on, lost, jumps, end_switch_on, stack_free }
     };
     let (settings_memory, examples_memory) = eeprom::halves(peripherals.EEPROM);
     let classifier = Nearest::new(examples::built_in(), examples_memory);
-    let wake_up = WakeUp { readings: read(), beam_broken: beam.is_broken(), cause: Cause::Unknown };
+    let cause = reset::cause(&peripherals.CPU);
+    let wake_up = WakeUp { readings: read(), beam_broken: beam.is_broken(), cause };
     let controller = CONTROLLER.init(Controller::new(classifier, settings_memory, wake_up));
     // The settings say which pulse has the tool out, so there is none before they are loaded.
     let mut servo = servo::Servo::new(peripherals.TC1, &peripherals.PORTB, controller.orders().pulse);
@@ -76,6 +83,7 @@ fn main() -> ! {
             controller.beam_edges_lost(beam.is_broken());
         }
         let orders = controller.step(readings);
+        heartbeat::beat(orders.pulse_out);
         servo.command(orders.pulse, orders.gap_ms);
         let Ok(()) = lamp.set_state(lamp::is_lit(controller.state(), readings.now).into());
 
@@ -96,10 +104,4 @@ fn main() -> ! {
             }
         }
     }
-}
-
-/// A panic is a fault like any other: the watchdog resets the machine, which wakes up in HOLD with the tool out.
-#[panic_handler]
-fn panic(_: &core::panic::PanicInfo) -> ! {
-    watchdog::reset()
 }

@@ -91,6 +91,8 @@ pub struct WakeUp {
 pub struct Orders {
     /// The servo's pulse width.
     pub pulse: HalfMicros,
+    /// The pulse width that has the tool out, for an emergency in which nobody can be asked.
+    pub pulse_out: HalfMicros,
     /// The shortest gap between servo pulses in milliseconds; 0 for fixed frames.
     pub gap_ms: u8,
 }
@@ -315,7 +317,12 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// What the machine is to do as of the last step.
     pub fn orders(&self) -> Orders {
         let pulse = if self.tool_out { Setting::ServoOutUs } else { Setting::ServoInUs };
-        Orders { pulse: servo::from_us(self.settings.get(pulse)), gap_ms: self.settings.get(Setting::ServoGapMs) as u8 }
+        let pulse_of = |setting| servo::from_us(self.settings.get(setting));
+        Orders {
+            pulse: pulse_of(pulse),
+            pulse_out: pulse_of(Setting::ServoOutUs),
+            gap_ms: self.settings.get(Setting::ServoGapMs) as u8,
+        }
     }
 
     /// Goes to work; with `now`, at once and over ground that the beam has not seen.
