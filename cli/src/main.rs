@@ -6,6 +6,7 @@
 
 mod bench;
 mod classify;
+mod design;
 mod flash;
 mod progress;
 mod sim;
@@ -34,6 +35,8 @@ enum Command {
     Train(train::Arguments),
     /// Say what the firmware's classifier takes recorded objects for.
     Classify(classify::Arguments),
+    /// Calculate what a machine's engine, servo, shanks, chain, wheels and handle have to be like.
+    Design(design::Arguments),
 }
 
 /// Whether the plants are alive.
@@ -52,6 +55,7 @@ fn main() -> ExitCode {
         Command::BenchUno => bench::run().map(|()| Harm::None),
         Command::Train(arguments) => train::run(&arguments),
         Command::Classify(arguments) => classify::run(&arguments),
+        Command::Design(arguments) => design::run(&arguments).map(|()| Harm::None),
     };
     match result {
         Ok(Harm::None) => ExitCode::SUCCESS,

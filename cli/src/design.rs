@@ -1,0 +1,73 @@
+//! `weeder design`: what a machine's engine, servo, shanks, chain, wheels and handle have to be like.
+
+use anyhow::Result;
+use clap::Args;
+use mechanics::design::Design;
+use mechanics::machine::Machine;
+use mechanics::{file, paper, report};
+use serde_json::json;
+use std::path::PathBuf;
+
+/// What the user asks of the design calculations.
+#[derive(Args)]
+pub struct Arguments {
+    /// The machine; what the file leaves out, or all without it, is as on the paper's machine.
+    #[arg(long, value_name = "FILE.toml")]
+    machine: Option<PathBuf>,
+    /// Show the paper's printed figures beside ours, with a verdict on each.
+    #[arg(long)]
+    against_paper: bool,
+    /// Print JSON for programs instead of a table.
+    #[arg(long)]
+    json: bool,
+    /// Print the machine as a commented file, to start one's own from.
+    #[arg(long, conflicts_with_all = ["against_paper", "json"])]
+    print_machine: bool,
+}
+
+/// Calculates and prints.
+///
+/// # Errors
+/// Where the machine's file cannot be read, or makes no machine that could be calculated.
+pub fn run(arguments: &Arguments) -> Result<()> {
+    let own = arguments.machine.as_deref().map(file::read).transpose()?;
+    let machine = own.unwrap_or_default();
+    if arguments.print_machine {
+        print!("{}", machine.to_toml());
+    } else if arguments.against_paper {
+        against_paper(own.as_ref(), arguments.json)?;
+    } else {
+        design(&machine, arguments.json)?;
+    }
+    Ok(())
+}
+
+fn design(machine: &Machine, json: bool) -> Result<()> {
+    let figures = Design::of(machine)?.figures(machine);
+    if json {
+        println!("{:#}", json!({ "inputs": machine.inputs(), "figures": figures }));
+        return Ok(());
+    }
+    println!("{}\n", report::design_table(&figures));
+    let concerns = figures.iter().filter(|figure| figure.concern).count();
+    println!("{concerns} of {} figures ask for a change.", figures.len());
+    Ok(())
+}
+
+fn against_paper(own: Option<&Machine>, json: bool) -> Result<()> {
+    let comparisons = paper::compare(own)?;
+    if json {
+        println!("{:#}", json!({ "comparisons": comparisons }));
+        return Ok(());
+    }
+    println!("{}\n", report::comparison_table(&comparisons));
+    let count = |verdict| comparisons.iter().filter(|comparison| comparison.verdict == verdict).count();
+    println!(
+        "Of {} printed figures {} are right, {} follow from an error before them, and {} are wrong.",
+        comparisons.len(),
+        count(paper::Verdict::Right),
+        count(paper::Verdict::Follows),
+        count(paper::Verdict::Wrong)
+    );
+    Ok(())
+}

@@ -1,0 +1,304 @@
+//! The machine: what its design calculations start from, with the range of each value and the paper's as default.
+//!
+//! One table below declares every input once: its section and key in a machine file, its kind, the paper's value, the
+//! range and what it is. The structures, their defaults, the check of the ranges and the commented file come from it.
+
+use crate::unit::{
+    COUNT, DEGREE, FACTOR, HP, KG, KG_CM, KM_H, KPA, MM, MPA, PERCENT, RPM, SECOND, Unit, Written, read,
+};
+use serde::{Deserialize, Serialize};
+use std::fmt::Write;
+use thiserror::Error;
+use uom::si::f64::{Angle, AngularVelocity, Length, Mass, Power, Pressure, Ratio, Time, Torque, Velocity};
+
+/// One input of a machine, as it stands in a machine file.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Input {
+    /// Section of the file.
+    pub section: &'static str,
+    /// Key within it.
+    pub key: &'static str,
+    /// What it is.
+    pub about: &'static str,
+    /// Its value in `unit`.
+    pub value: f64,
+    /// Its unit; empty for plain numbers.
+    pub unit: &'static str,
+    /// Least value in `unit`.
+    pub least: f64,
+    /// Greatest value in `unit`.
+    pub most: f64,
+}
+
+impl Input {
+    fn new<Q: Written>(section: &'static str, quantity: Q, unit: Unit<Q>, least: f64, most: f64) -> Self {
+        Self { section, key: "", about: "", value: unit.value(quantity), unit: unit.name, least, most }
+    }
+
+    /// The value as it is written in a machine file.
+    pub fn written(&self) -> String {
+        // Conversion into the unit leaves an error in the last digits.
+        let value = (self.value * 1e9).round() / 1e9;
+        if self.unit.is_empty() { value.to_string() } else { format!("\"{value} {}\"", self.unit) }
+    }
+
+    /// The range in words.
+    pub fn range(&self) -> String {
+        format!("from {} to {} {}", self.least, self.most, self.unit).trim_end().to_owned()
+    }
+
+    /// Whether the value lies in its range, but for the rounding of conversions. NaN does not.
+    fn is_in_range(&self) -> bool {
+        let rounding = 1e-9 * self.most.abs();
+        (self.least - rounding..=self.most + rounding).contains(&self.value)
+    }
+}
+
+/// Why a machine cannot be calculated.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum MachineError {
+    /// A value is out of its range.
+    #[error("{}.{} is {}: it has to be {}", .0.section, .0.key, .0.written().replace('"', ""), .0.range())]
+    OutOfRange(Input),
+    /// The crop's protection zones and the soil that breaks beside a sweep take all of the row spacing.
+    #[error(
+        "crop.row_spacing leaves no room for a sweep: between the protection zones the soil breaks over {failure_zone_mm:.0} mm, \
+         of which {beside_mm:.0} mm lie beside the sweep; widen crop.row_spacing, or lessen crop.protection_zone or soil.depth"
+    )]
+    NoRoomForSweep {
+        /// Eq. 11.
+        failure_zone_mm: f64,
+        /// The second term of Eq. 12.
+        beside_mm: f64,
+    },
+    /// The wheel's rim has no thickness.
+    #[error("wheel.inner_diameter is {inner_mm:.1} mm: it has to be less than wheel.diameter, {outer_mm:.1} mm")]
+    NoRim {
+        /// Inner diameter.
+        inner_mm: f64,
+        /// Outer diameter.
+        outer_mm: f64,
+    },
+}
+
+impl MachineError {
+    /// Section and key of the value that is to be changed first.
+    pub fn place(&self) -> (&'static str, &'static str) {
+        match self {
+            Self::OutOfRange(input) => (input.section, input.key),
+            Self::NoRoomForSweep { .. } => ("crop", "row_spacing"),
+            Self::NoRim { .. } => ("wheel", "inner_diameter"),
+        }
+    }
+}
+
+/// Declares the sections of a machine file, their values, and what is made of them.
+macro_rules! sections {
+    ($($(#[doc = $title:literal])+ $section:ident: $name:ident {$(
+        $(#[doc = $about:literal])+
+        $key:ident: $quantity:ty = $value:literal, $unit:ident, $least:literal to $most:literal;
+    )+})+) => {
+        $(
+            $(#[doc = $title])+
+            #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+            #[serde(default, deny_unknown_fields, expecting = "a section with keys below its name in brackets")]
+            pub struct $name {
+                $($(#[doc = $about])+ #[serde(deserialize_with = "read")] pub $key: $quantity,)+
+            }
+
+            impl Default for $name {
+                fn default() -> Self {
+                    Self { $($key: $unit.of($value)),+ }
+                }
+            }
+        )+
+
+        /// A machine. Its default is the paper's.
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
+        #[serde(default, deny_unknown_fields)]
+        pub struct Machine {
+            $($(#[doc = $title])+ pub $section: $name,)+
+        }
+
+        impl Machine {
+            /// All inputs, in the order of the file.
+            pub fn inputs(&self) -> Vec<Input> {
+                vec![$($(
+                    Input {
+                        key: stringify!($key),
+                        about: concat!($($about),+),
+                        ..Input::new(stringify!($section), self.$section.$key, $unit, $least as f64, $most as f64)
+                    },
+                )+)+]
+            }
+        }
+
+        /// What each section of the file is.
+        const TITLES: &[(&str, &str)] = &[$((stringify!($section), concat!($($title),+))),+];
+    };
+}
+
+sections! {
+    /// The weeder as a whole, and the pace of its work.
+    weeder: Weeder {
+        /// Mass, ready for work (Table 1, no. 5).
+        mass: Mass = 65.0, KG, 1.0 to 5000.0;
+        /// Speed of work.
+        speed: Velocity = 2.5, KM_H, 0.1 to 15.0;
+        /// Time from rest to that speed.
+        acceleration_time: Time = 2.0, SECOND, 0.1 to 60.0;
+        /// Width that all tools weed together.
+        working_width: Length = 400.0, MM, 50.0 to 10000.0;
+        /// Share of the theoretical capacity that is reached, turns and stops included.
+        field_efficiency: Ratio = 86.25, PERCENT, 1.0 to 100.0;
+    }
+    /// The soil, and how deep it is weeded.
+    soil: Soil {
+        /// Cone index: how firm the soil is; 500 kPa is wet stubble.
+        cone_index: Pressure = 500.0, KPA, 50.0 to 5000.0;
+        /// Unit draft: resistance of the soil against an area that is pulled through it.
+        unit_draft: Pressure = 49.05, KPA, 1.0 to 500.0;
+        /// Angle of the soil's internal friction.
+        internal_friction: Angle = 30.0, DEGREE, 0.0 to 60.0;
+        /// Depth of weeding.
+        depth: Length = 25.0, MM, 1.0 to 300.0;
+    }
+    /// The crop's rows.
+    crop: Crop {
+        /// Distance from row to row.
+        row_spacing: Length = 300.0, MM, 50.0 to 3000.0;
+        /// Ground that is left alone on each side of a row.
+        protection_zone: Length = 50.0, MM, 0.0 to 500.0;
+        /// Angle of friction between weeds and a cutting edge; 30 to 50 degrees are usual.
+        weed_friction: Angle = 50.0, DEGREE, 5.0 to 85.0;
+    }
+    /// The tools between the rows.
+    inter_row: InterRow {
+        /// Number of tools.
+        tools: u32 = 4.0, COUNT, 0.0 to 50.0;
+        /// Width of a sweep (Table 1, no. 9).
+        width: Length = 80.0, MM, 5.0 to 1000.0;
+        /// Apex angle of a sweep: the angle between its two edges.
+        apex_angle: Angle = 120.0, DEGREE, 10.0 to 170.0;
+        /// Length of a shank from its holder to the tip; the rod of Table 1 is longer.
+        shank_length: Length = 400.0, MM, 20.0 to 2000.0;
+        /// Diameter of a shank (Table 1, no. 9).
+        shank_diameter: Length = 16.0, MM, 2.0 to 200.0;
+    }
+    /// The tool in the row, of which there is one, and its servo.
+    intra_row: IntraRow {
+        /// Width of cut; Eq. 7 takes 50 mm, though the sweep of Table 1 has 55 mm.
+        width: Length = 50.0, MM, 5.0 to 1000.0;
+        /// Base of the triangle that the blade shows to the soil when it swings (b in Eq. 10).
+        blade_base: Length = 45.0, MM, 1.0 to 500.0;
+        /// Height of that triangle (h in Eq. 10).
+        blade_height: Length = 10.0, MM, 1.0 to 300.0;
+        /// Length of the shank, the arm on which the servo turns the blade (Table 1, no. 9).
+        shank_length: Length = 350.0, MM, 20.0 to 2000.0;
+        /// Diameter of the shank (Table 1, no. 9).
+        shank_diameter: Length = 14.0, MM, 2.0 to 200.0;
+        /// Torque that the servo holds.
+        servo_torque: Torque = 60.0, KG_CM, 0.1 to 5000.0;
+    }
+    /// The steel of the shanks, and what they are to bear.
+    shank: Shank {
+        /// Bending stress that the steel may see; 56 MPa is the paper's for mild steel.
+        allowed_stress: Pressure = 56.0, MPA, 1.0 to 2000.0;
+        /// Factor of safety.
+        safety_factor: f64 = 2.0, FACTOR, 1.0 to 10.0;
+        /// Times the steady draft that a stone or root hits with.
+        impact_factor: f64 = 2.0, FACTOR, 1.0 to 10.0;
+    }
+    /// The engine, and the way to the wheels.
+    engine: Engine {
+        /// Rated power (Table 1, no. 3).
+        power: Power = 2.5, HP, 0.01 to 200.0;
+        /// Rated speed.
+        speed: AngularVelocity = 3600.0, RPM, 10.0 to 20000.0;
+        /// Turns of the engine for one of the gear box's output shaft.
+        gear_box_ratio: f64 = 40.0, FACTOR, 1.0 to 1000.0;
+        /// Share of the engine's power that reaches the wheels.
+        transmission_efficiency: Ratio = 90.0, PERCENT, 10.0 to 100.0;
+        /// Factor of safety of the power (Eq. 9).
+        safety_factor: f64 = 2.0, FACTOR, 1.0 to 10.0;
+    }
+    /// The roller chain from the gear box to the wheels; the default is an 08B.
+    chain: Chain {
+        /// Pitch.
+        pitch: Length = 12.7, MM, 3.0 to 80.0;
+        /// Teeth of the sprocket on the gear box.
+        drive_teeth: u32 = 14.0, COUNT, 6.0 to 150.0;
+        /// Distance of the shafts in pitches; 30 to 50 is good practice.
+        centre_distance_pitches: f64 = 30.0, FACTOR, 10.0 to 100.0;
+        /// By how much the shafts are set closer, so that the chain sags a little.
+        sag: Length = 2.0, MM, 0.0 to 20.0;
+    }
+    /// The driven ground wheels.
+    wheel: Wheel {
+        /// Number of wheels that carry the weight.
+        number: u32 = 2.0, COUNT, 1.0 to 8.0;
+        /// Outer diameter (Table 1, no. 7).
+        diameter: Length = 400.0, MM, 50.0 to 3000.0;
+        /// Inner diameter of the rim; 394 mm make the 3 mm of Table 1, no. 7, the paper's text has 397 mm.
+        inner_diameter: Length = 394.0, MM, 40.0 to 2999.0;
+        /// Width (Table 1, no. 7).
+        width: Length = 35.0, MM, 5.0 to 1000.0;
+        /// Shear stress that the rim's steel bears at most.
+        shear_strength: Pressure = 80.0, MPA, 1.0 to 2000.0;
+    }
+    /// The handle.
+    handle: Handle {
+        /// Height of the operator's elbow above the wheel's centre.
+        elbow_height: Length = 800.0, MM, 100.0 to 2000.0;
+        /// Horizontal distance from the wheel's centre to the operator.
+        operator_distance: Length = 400.0, MM, 50.0 to 3000.0;
+    }
+}
+
+impl Machine {
+    /// Checks every value against its range, and those that depend on each other.
+    ///
+    /// # Errors
+    /// The first value that is out of its range, or what does not go together; it says what would be right.
+    pub fn check(&self) -> Result<(), MachineError> {
+        if let Some(input) = self.inputs().into_iter().find(|input| !input.is_in_range()) {
+            return Err(MachineError::OutOfRange(input));
+        }
+        let failure_zone = crate::tool::failure_zone(self.crop.row_spacing, self.crop.protection_zone);
+        let sweep = crate::tool::sweep_width(failure_zone, self.soil.depth, self.soil.internal_friction);
+        if MM.value(sweep) <= 0.0 {
+            return Err(MachineError::NoRoomForSweep {
+                failure_zone_mm: MM.value(failure_zone),
+                beside_mm: MM.value(failure_zone - sweep),
+            });
+        }
+        let (inner_mm, outer_mm) = (MM.value(self.wheel.inner_diameter), MM.value(self.wheel.diameter));
+        if inner_mm >= outer_mm {
+            return Err(MachineError::NoRim { inner_mm, outer_mm });
+        }
+        Ok(())
+    }
+
+    /// The machine as a machine file, with a comment of meaning and range above each value.
+    pub fn to_toml(&self) -> String {
+        let mut file = String::from(
+            "# A machine for `weeder design --machine FILE.toml`.\n\
+             # What is left out is as on the paper's machine. Units may be changed with their values: \"0.4 m\" is \"400 mm\".\n",
+        );
+        let inputs = self.inputs();
+        for (section, title) in TITLES {
+            // Writing to a String cannot fail.
+            let _ = write!(file, "\n#{title}\n[{section}]\n");
+            for input in inputs.iter().filter(|input| input.section == *section) {
+                let _ = writeln!(file, "#{} {}.", input.about, capitalised(&input.range()));
+                let _ = writeln!(file, "{} = {}", input.key, input.written());
+            }
+        }
+        file
+    }
+}
+
+fn capitalised(words: &str) -> String {
+    let mut letters = words.chars();
+    letters.next().map(|first| first.to_uppercase().chain(letters).collect()).unwrap_or_default()
+}

@@ -1,0 +1,87 @@
+//! Designs and comparisons as tables for people. Programs serialise the figures themselves.
+
+use crate::figure::{Figure, digits, digits_beside};
+use crate::paper::{Comparison, Verdict};
+use comfy_table::{Attribute, Cell, CellAlignment, Color, ContentArrangement, Table, presets};
+use std::fmt::{self, Display, Formatter};
+
+impl Display for Verdict {
+    fn fmt(&self, formatter: &mut Formatter<'_>) -> fmt::Result {
+        formatter.pad(match self {
+            Self::Right => "right",
+            Self::Follows => "follows from an error",
+            Self::Wrong => "wrong",
+        })
+    }
+}
+
+/// Every figure with its equation and its sense.
+pub fn design_table(figures: &[Figure]) -> Table {
+    let mut table = table(&["", "equation", "it gives", "", "which means"]);
+    for figure in figures {
+        let sense = Cell::new(&figure.sense);
+        table.add_row([
+            Cell::new(figure.name),
+            Cell::new(figure.equation),
+            Cell::new(digits(figure.value)),
+            Cell::new(figure.unit),
+            if figure.concern { sense.fg(Color::Red).add_attribute(Attribute::Bold) } else { sense },
+        ]);
+    }
+    align_right(&mut table, 2..3);
+    table
+}
+
+/// The paper's figures beside ours, and beside those of a machine of one's own, if there is one.
+pub fn comparison_table(comparisons: &[Comparison]) -> Table {
+    let own = comparisons.iter().any(|comparison| comparison.own.is_some());
+    let mut header = vec!["", "equation", "printed", "from the\nprinted inputs", "calculated\nall through"];
+    if own {
+        header.push("your\nmachine");
+    }
+    header.extend(["", "verdict", "remark"]);
+    let mut table = table(&header);
+    for comparison in comparisons {
+        let number = |value| Cell::new(digits_beside(value, comparison.decimals));
+        let mut row = vec![
+            Cell::new(comparison.name),
+            Cell::new(comparison.equation),
+            Cell::new(format!("{:.*}", comparison.decimals, comparison.printed)),
+            number(comparison.from_printed_inputs),
+            number(comparison.calculated),
+        ];
+        if own {
+            row.push(comparison.own.map_or_else(|| Cell::new(""), number));
+        }
+        row.extend([Cell::new(comparison.unit), verdict_cell(comparison.verdict), Cell::new(&comparison.remark)]);
+        table.add_row(row);
+    }
+    align_right(&mut table, 2..5 + usize::from(own));
+    table
+}
+
+fn table(header: &[&str]) -> Table {
+    let mut table = Table::new();
+    table
+        .load_style(presets::UTF8_BORDERS_ONLY)
+        .set_content_arrangement(ContentArrangement::Dynamic)
+        .set_header(header);
+    table
+}
+
+fn align_right(table: &mut Table, columns: std::ops::Range<usize>) {
+    for column in columns {
+        if let Some(column) = table.column_mut(column) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+}
+
+fn verdict_cell(verdict: Verdict) -> Cell {
+    let cell = Cell::new(verdict);
+    match verdict {
+        Verdict::Right => cell.fg(Color::Green),
+        Verdict::Follows => cell.fg(Color::Yellow),
+        Verdict::Wrong => cell.fg(Color::Red).add_attribute(Attribute::Bold),
+    }
+}

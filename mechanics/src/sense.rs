@@ -1,0 +1,384 @@
+//! What a design means for its machine: each figure with a line in plain words, worked out from its values.
+
+use crate::design::{Design, ShankDesign};
+use crate::figure::{Figure, digits, written};
+use crate::machine::Machine;
+use crate::traction::TYRE_TRACTION_LIMIT;
+use crate::unit::{
+    CM, COUNT, DEGREE, FACTOR, HECTARE_PER_HOUR, HP, KG_CM, KM_H, KPA, M, MM, MPA, NEWTON, NEWTON_METRE, RPM, Unit,
+    WATT,
+};
+use crate::{tool, unit};
+use uom::si::f64::{Force, Length, Ratio};
+
+/// Teeth below which a sprocket wears its chain out quickly.
+const FEWEST_TEETH: u32 = 9;
+
+/// Share by which the speed may miss the wanted one before it is worth a word.
+const SPEED_TOLERANCE: f64 = 0.05;
+
+/// Times the needed power from which an engine is too large.
+const ENGINE_EXCESS: f64 = 2.0;
+
+/// Wheel numerics up to which soil is soft or tilled; above these it is firm.
+const SOFT_WHEEL_NUMERIC: f64 = 15.0;
+const TILLED_WHEEL_NUMERIC: f64 = 25.0;
+
+/// A line of sense, and whether it asks for a change.
+struct Sense {
+    words: String,
+    concern: bool,
+}
+
+/// All is well.
+fn fine(words: String) -> Sense {
+    Sense { words, concern: false }
+}
+
+/// The machine should be changed.
+fn concern(words: String) -> Sense {
+    Sense { words, concern: true }
+}
+
+/// A figure from its parts.
+fn figure<Q>(
+    key: &'static str,
+    name: &'static str,
+    equation: &'static str,
+    quantity: Q,
+    unit: Unit<Q>,
+    Sense { words, concern }: Sense,
+) -> Figure {
+    Figure { key, name, equation, value: unit.value(quantity), unit: unit.name, sense: words, concern }
+}
+
+/// A share in whole percents.
+fn percent(share: Ratio) -> String {
+    format!("{:.0} %", unit::PERCENT.value(share))
+}
+
+impl Design {
+    /// Every result with its equation and its sense, in the order of the paper. `machine` is the one that was calculated.
+    pub fn figures(&self, machine: &Machine) -> Vec<Figure> {
+        let mut figures = self.traction(machine);
+        figures.extend(self.tools(machine));
+        figures.extend(self.shanks(machine));
+        figures.extend(self.drive(machine));
+        figures.extend(self.wheel_and_handle(machine));
+        figures.extend(self.capacity(machine));
+        figures
+    }
+
+    fn traction(&self, machine: &Machine) -> Vec<Figure> {
+        let numeric = f64::from(self.wheel_numeric);
+        let ground = match numeric {
+            ..SOFT_WHEEL_NUMERIC => {
+                concern("soft ground under this load: the wheels sink in; take wider or larger ones".into())
+            }
+            ..TILLED_WHEEL_NUMERIC => fine("the wheels run as on tilled soil".into()),
+            _ => fine("the wheels run as on firm soil".into()),
+        };
+        let soil_part = (self.rolling_resistance_coefficient - Ratio::from(0.04)) / self.rolling_resistance_coefficient;
+        let part = |force: Force| fine(format!("{} of the tractive force", percent(force / self.tractive_force)));
+        let pull = self.tractive_force / self.weight;
+        let grip = if f64::from(pull) > TYRE_TRACTION_LIMIT {
+            concern(format!(
+                "{} of the weight; a tyre slips above {:.0} %: it needs pegs, less depth or more mass",
+                percent(pull),
+                TYRE_TRACTION_LIMIT * 100.0
+            ))
+        } else {
+            fine(format!("{} of the weight: wheels can pull that", percent(pull)))
+        };
+        let steady = self.power / machine.engine.safety_factor;
+        vec![
+            figure("wheel_numeric", "wheel numeric", "Eq. 6", numeric, FACTOR, ground),
+            figure(
+                "rolling_resistance_coefficient",
+                "rolling resistance coefficient",
+                "Eq. 5",
+                f64::from(self.rolling_resistance_coefficient),
+                FACTOR,
+                fine(format!("{} of it is the soil's, the rest the wheel's own", percent(soil_part))),
+            ),
+            figure(
+                "rolling_resistance",
+                "rolling resistance",
+                "Eq. 4",
+                self.rolling_resistance,
+                NEWTON,
+                part(self.rolling_resistance),
+            ),
+            figure("draft", "draft of all tools", "Eq. 7", self.draft, NEWTON, part(self.draft)),
+            figure(
+                "acceleration_force",
+                "acceleration force",
+                "Eq. 8",
+                self.acceleration_force,
+                NEWTON,
+                part(self.acceleration_force),
+            ),
+            figure("tractive_force", "tractive force", "below Eq. 8", self.tractive_force, NEWTON, grip),
+            figure(
+                "power",
+                "power at the wheels",
+                "Eq. 9",
+                self.power,
+                WATT,
+                fine(format!("{} are used, the rest is the factor of safety", written(steady, WATT))),
+            ),
+            figure("engine_power", "engine", "below Eq. 9", self.engine_power, HP, self.engine(machine)),
+        ]
+    }
+
+    fn engine(&self, machine: &Machine) -> Sense {
+        let ratio = f64::from(machine.engine.power / self.engine_power);
+        let given = written(machine.engine.power, HP);
+        if ratio < 1.0 {
+            concern(format!("the engine's {given} are only {} of that: too small", percent(ratio.into())))
+        } else if ratio >= ENGINE_EXCESS {
+            concern(format!("the engine's {given} are {ratio:.2} times that: too large"))
+        } else {
+            fine(format!("the engine's {given} are {ratio:.2} times that: large enough"))
+        }
+    }
+
+    fn tools(&self, machine: &Machine) -> Vec<Figure> {
+        let servo = machine.intra_row.servo_torque;
+        let ratio = f64::from(servo / self.servo_torque);
+        let servo_sense = if ratio < 1.0 {
+            concern(format!("the servo's {} are {} of that: too weak", written(servo, KG_CM), percent(ratio.into())))
+        } else {
+            fine(format!("the servo's {} are {ratio:.2} times that: strong enough", written(servo, KG_CM)))
+        };
+        let at_depth = tool::servo_torque(self.soil_force_at_depth, machine.intra_row.shank_length);
+        let depth = written(machine.soil.depth, MM);
+        let depth_words = format!("a blade {depth} high, as deep as it weeds, would ask {}", written(at_depth, KG_CM));
+        let depth_sense = if at_depth > servo {
+            concern(format!("{depth_words}: too much for the servo"))
+        } else {
+            fine(format!("{depth_words}: the servo bears that too"))
+        };
+
+        let width = machine.inter_row.width;
+        let sweep_sense = if width > self.sweep_width {
+            concern(format!("the sweeps' {} break soil in the protection zone", written(width, MM)))
+        } else {
+            let left = written(self.sweep_width - width, MM);
+            fine(format!("the sweeps' {} keep off the crop, and leave {left} of it unused", written(width, MM)))
+        };
+        let apex = machine.inter_row.apex_angle;
+        let apex_sense = if apex > self.apex_angle {
+            let friction = written(tool::weed_friction_for(apex), DEGREE);
+            concern(format!("the sweeps' {} are too blunt: right for a friction of {friction}", written(apex, DEGREE)))
+        } else {
+            fine(format!("weeds slide along the sweeps' {}", written(apex, DEGREE)))
+        };
+        let fit_sense = if self.tools > self.tools_that_fit {
+            concern(format!("the machine has {}: they do not fit into its working width", self.tools))
+        } else {
+            fine(format!("the machine has {}: they fit into its working width", self.tools))
+        };
+        let draft_alone = written(self.draft / f64::from(self.tools), NEWTON);
+        let rows = written(machine.crop.row_spacing, MM);
+        vec![
+            figure("soil_force", "soil on the blade in the row", "Eq. 10", self.soil_force, NEWTON, depth_sense),
+            figure("servo_torque", "servo torque", "above Eq. 10", self.servo_torque, KG_CM, servo_sense),
+            figure(
+                "failure_zone",
+                "soil failure zone",
+                "Eq. 11",
+                self.failure_zone,
+                MM,
+                fine(format!("what the protection zones leave of {rows} between rows")),
+            ),
+            figure("sweep_width", "widest sweep", "Eq. 12", self.sweep_width, MM, sweep_sense),
+            figure("apex_angle", "bluntest apex angle", "Eq. 13", self.apex_angle, DEGREE, apex_sense),
+            figure("tools", "tools that fit", "above Eq. 13", self.tools_that_fit, COUNT, fit_sense),
+            figure(
+                "tool_draft",
+                "draft of one tool",
+                "Eq. 14",
+                self.tool_draft,
+                NEWTON,
+                fine(format!("of the whole tractive force; the soil alone pulls with {draft_alone}")),
+            ),
+        ]
+    }
+
+    fn shanks(&self, machine: &Machine) -> Vec<Figure> {
+        let Machine { inter_row, intra_row, shank, .. } = machine;
+        let times = digits(shank.impact_factor * shank.safety_factor);
+        let moment = |length: Length| fine(format!("{times} times the draft, on {}", written(length, MM)));
+        let bend = |design: &ShankDesign, diameter: Length| {
+            let (given, stress) = (written(diameter, MM), written(design.stress, MPA));
+            let ratio = f64::from(design.stress / shank.allowed_stress);
+            if ratio > 1.0 {
+                concern(format!("the shank's {given} would bear {stress}, {ratio:.1} times what is allowed: it bends"))
+            } else {
+                fine(format!("the shank's {given} bear {stress}, {} of what is allowed", percent(ratio.into())))
+            }
+        };
+        let (inter, intra) = (&self.inter_row_shank, &self.intra_row_shank);
+        vec![
+            figure(
+                "inter_row_bending_moment",
+                "bending moment, between rows",
+                "above Eq. 15",
+                inter.bending_moment,
+                NEWTON_METRE,
+                moment(inter_row.shank_length),
+            ),
+            figure(
+                "intra_row_bending_moment",
+                "bending moment, in the row",
+                "above Eq. 15",
+                intra.bending_moment,
+                NEWTON_METRE,
+                moment(intra_row.shank_length),
+            ),
+            figure(
+                "inter_row_shank_diameter",
+                "shank, between rows",
+                "Eq. 15, 16",
+                inter.diameter,
+                MM,
+                bend(inter, inter_row.shank_diameter),
+            ),
+            figure(
+                "intra_row_shank_diameter",
+                "shank, in the row",
+                "Eq. 15, 16",
+                intra.diameter,
+                MM,
+                bend(intra, intra_row.shank_diameter),
+            ),
+        ]
+    }
+
+    fn drive(&self, machine: &Machine) -> Vec<Figure> {
+        let speed = written(self.ground_speed, KM_H);
+        let miss = f64::from(self.ground_speed / machine.weeder.speed) - 1.0;
+        let teeth = self.driven_teeth;
+        let teeth_sense = if teeth < FEWEST_TEETH {
+            concern(format!("{teeth} teeth are too few for a chain: take a larger gear box ratio"))
+        } else if miss.abs() > SPEED_TOLERANCE {
+            concern(format!("{teeth} teeth give {speed}, {:+.0} % off: take more drive teeth", miss * 100.0))
+        } else {
+            fine(format!("{teeth} teeth give {speed}"))
+        };
+        let spare = (f64::from(self.chain_links) - self.exact_chain_links) / 2.0 * machine.chain.pitch;
+        vec![
+            figure(
+                "wheel_speed",
+                "wheel speed",
+                "Eq. 17",
+                self.wheel_speed,
+                RPM,
+                fine(format!("a turn every {} s", digits(60.0 / RPM.value(self.wheel_speed)))),
+            ),
+            figure(
+                "chain_reduction",
+                "reduction by the chain",
+                "below Eq. 17",
+                self.chain_reduction,
+                FACTOR,
+                fine(format!("from the {} of the gear box's shaft", written(self.gear_box_speed, RPM))),
+            ),
+            figure("driven_teeth", "driven sprocket", "below Eq. 17", self.exact_driven_teeth, FACTOR, teeth_sense),
+            figure(
+                "chain_links",
+                "chain links",
+                "Eq. 18",
+                self.chain_links,
+                COUNT,
+                fine(format!("{} links, rounded up to an even number", digits(self.exact_chain_links))),
+            ),
+            figure(
+                "chain_length",
+                "chain length",
+                "Eq. 19",
+                self.chain_length,
+                MM,
+                fine(format!(
+                    "taut with the shafts {} apart: {} more than planned",
+                    written(self.centre_distance + spare, MM),
+                    written(spare, MM)
+                )),
+            ),
+        ]
+    }
+
+    fn wheel_and_handle(&self, machine: &Machine) -> Vec<Figure> {
+        let strength = machine.wheel.shear_strength;
+        let ratio = f64::from(strength / self.shear_stress);
+        let safe = if ratio < 1.0 {
+            concern(format!("more than the steel's {}: the wheel fails", written(strength, MPA)))
+        } else {
+            fine(format!("the steel's {} are {} times that: the wheel is safe", written(strength, MPA), digits(ratio)))
+        };
+        let share = written(self.rim_thickness / machine.wheel.diameter, unit::PERCENT);
+        let hands = machine.handle.elbow_height + machine.wheel.diameter / 2.0;
+        vec![
+            figure(
+                "rim_thickness",
+                "wheel thickness",
+                "below Eq. 20",
+                self.rim_thickness,
+                MM,
+                fine(format!("{share} of the wheel's {}", written(machine.wheel.diameter, MM))),
+            ),
+            figure(
+                "wheel_torque",
+                "torque on a wheel",
+                "below Eq. 20",
+                self.wheel_torque,
+                NEWTON_METRE,
+                fine("as if one wheel gave the whole tractive force".into()),
+            ),
+            figure("shear_stress", "shear stress in the wheel", "Eq. 20", self.shear_stress, KPA, safe),
+            figure(
+                "handle_angle",
+                "slope of the handle",
+                "Eq. 21",
+                self.handle_angle,
+                DEGREE,
+                fine(format!("it rises {} on each metre", written(M.of(f64::from(self.handle_angle.tan())), M))),
+            ),
+            figure(
+                "handle_length",
+                "length of the handle",
+                "below Eq. 21",
+                self.handle_length,
+                CM,
+                fine(format!("from the wheel's centre to hands {} above the ground", written(hands, CM))),
+            ),
+        ]
+    }
+
+    fn capacity(&self, machine: &Machine) -> Vec<Figure> {
+        let hours = |rate| digits(1.0 / HECTARE_PER_HOUR.value(rate));
+        vec![
+            figure(
+                "theoretical_capacity",
+                "theoretical field capacity",
+                "Eq. 25",
+                self.theoretical_capacity,
+                HECTARE_PER_HOUR,
+                fine(format!("{} h a hectare without a turn or stop", hours(self.theoretical_capacity))),
+            ),
+            figure(
+                "effective_capacity",
+                "effective field capacity",
+                "Eq. 24",
+                self.effective_capacity,
+                HECTARE_PER_HOUR,
+                fine(format!(
+                    "{} h a hectare at {} field efficiency",
+                    hours(self.effective_capacity),
+                    written(machine.weeder.field_efficiency, unit::PERCENT)
+                )),
+            ),
+        ]
+    }
+}

@@ -1,0 +1,278 @@
+//! Quantities as people write them: a number and a unit, such as `"400 mm"`.
+//!
+//! The quantities themselves are those of [`uom`], so that a force cannot be added to a length. A [`Unit`] ties a name to
+//! one of them, and [`Written`] lists the units that a kind of quantity may be written in. Numbers without a unit, such as
+//! a number of teeth, are read by the same way. It knows nothing of what a value is for: ranges are the machine's.
+
+use serde::Deserializer;
+use serde::de::Visitor;
+use std::fmt::{self, Display, Formatter};
+use std::marker::PhantomData;
+use thiserror::Error;
+use uom::si::diffusion_coefficient::square_meter_per_second;
+use uom::si::f64::{
+    Angle, AngularVelocity, DiffusionCoefficient, Force, Length, Mass, Power, Pressure, Ratio, Time, Torque, Velocity,
+};
+use uom::si::{angle, angular_velocity, force, length, mass, power, pressure, ratio, time, torque, velocity};
+
+/// Area in a time, which `uom` knows by the name of another quantity of the same dimension.
+pub type AreaRate = DiffusionCoefficient;
+
+/// A unit that a quantity may be written in.
+#[derive(Clone, Copy, Debug)]
+pub struct Unit<Q> {
+    /// As it is written behind the number; empty for plain numbers.
+    pub name: &'static str,
+    of: fn(f64) -> Q,
+    value: fn(Q) -> f64,
+}
+
+impl<Q> Unit<Q> {
+    /// The quantity that is `value` of this unit.
+    pub fn of(&self, value: f64) -> Q {
+        (self.of)(value)
+    }
+
+    /// How many of this unit a quantity is.
+    pub fn value(&self, quantity: Q) -> f64 {
+        (self.value)(quantity)
+    }
+}
+
+/// A kind of quantity that can be read from text.
+pub trait Written: Copy + 'static {
+    /// The kind, with its article.
+    const KIND: &'static str;
+    /// The units that it may be written in; a single nameless one for plain numbers.
+    const UNITS: &'static [Unit<Self>];
+
+    /// Whether it is a plain number.
+    fn is_plain() -> bool {
+        Self::UNITS.iter().all(|unit| unit.name.is_empty())
+    }
+}
+
+/// Declares units by the names of `uom`'s, and the quantities that are written in them.
+macro_rules! units {
+    ($($quantity:ident, $kind:literal {$($(#[$doc:meta])* $constant:ident = $name:literal, $unit:path;)+})+) => {$(
+        $($(#[$doc])* pub const $constant: Unit<$quantity> =
+            Unit { name: $name, of: $quantity::new::<$unit>, value: |quantity| quantity.get::<$unit>() };)+
+
+        impl Written for $quantity {
+            const KIND: &'static str = $kind;
+            const UNITS: &'static [Unit<Self>] = &[$($constant),+];
+        }
+    )+};
+}
+
+units! {
+    Length, "a length" {
+        /// Millimetre.
+        MM = "mm", length::millimeter;
+        /// Centimetre.
+        CM = "cm", length::centimeter;
+        /// Metre.
+        M = "m", length::meter;
+    }
+    Mass, "a mass" {
+        /// Kilogram.
+        KG = "kg", mass::kilogram;
+        /// Gram.
+        GRAM = "g", mass::gram;
+    }
+    Time, "a time" {
+        /// Second.
+        SECOND = "s", time::second;
+        /// Millisecond.
+        MS = "ms", time::millisecond;
+    }
+    Velocity, "a speed" {
+        /// Kilometre per hour.
+        KM_H = "km/h", velocity::kilometer_per_hour;
+        /// Metre per second.
+        M_S = "m/s", velocity::meter_per_second;
+    }
+    AngularVelocity, "a speed of rotation" {
+        /// Turn per minute.
+        RPM = "rpm", angular_velocity::revolution_per_minute;
+    }
+    Angle, "an angle" {
+        /// Degree.
+        DEGREE = "degrees", angle::degree;
+        /// Degree, as a sign.
+        DEGREE_SIGN = "°", angle::degree;
+        /// Radian.
+        RADIAN = "rad", angle::radian;
+    }
+    Pressure, "a pressure or stress" {
+        /// Kilopascal.
+        KPA = "kPa", pressure::kilopascal;
+        /// Megapascal.
+        MPA = "MPa", pressure::megapascal;
+        /// Pascal.
+        PA = "Pa", pressure::pascal;
+    }
+    Power, "a power" {
+        /// Watt.
+        WATT = "W", power::watt;
+        /// Kilowatt.
+        KW = "kW", power::kilowatt;
+        /// Mechanical horsepower, 745.7 W.
+        HP = "hp", power::horsepower;
+    }
+    Force, "a force" {
+        /// Newton.
+        NEWTON = "N", force::newton;
+    }
+    Ratio, "a share" {
+        /// Hundredth.
+        PERCENT = "%", ratio::percent;
+    }
+}
+
+/// Newton metre.
+pub const NEWTON_METRE: Unit<Torque> =
+    Unit { name: "N m", of: Torque::new::<torque::newton_meter>, value: |torque| torque.get::<torque::newton_meter>() };
+
+/// The weight of a kilogram on an arm of a centimetre, in which makers of servos give their torque.
+pub const KG_CM: Unit<Torque> = Unit {
+    name: "kg cm",
+    of: |value| Torque::new::<torque::kilogram_force_meter>(value / 100.0),
+    value: |torque| torque.get::<torque::kilogram_force_meter>() * 100.0,
+};
+
+impl Written for Torque {
+    const KIND: &'static str = "a torque";
+    const UNITS: &'static [Unit<Self>] = &[KG_CM, NEWTON_METRE];
+}
+
+/// Hectare per hour.
+pub const HECTARE_PER_HOUR: Unit<AreaRate> = Unit {
+    name: "ha/h",
+    of: |value| AreaRate::new::<square_meter_per_second>(value * 10_000.0 / 3600.0),
+    value: |rate| rate.get::<square_meter_per_second>() * 3600.0 / 10_000.0,
+};
+
+/// A ratio or factor, as a plain number.
+pub const FACTOR: Unit<f64> = Unit { name: "", of: |value| value, value: |factor| factor };
+
+impl Written for f64 {
+    const KIND: &'static str = "a plain number";
+    const UNITS: &'static [Unit<Self>] = &[FACTOR];
+}
+
+/// A number of things.
+pub const COUNT: Unit<u32> = Unit { name: "", of: |value| value as u32, value: f64::from };
+
+impl Written for u32 {
+    const KIND: &'static str = "a whole number from 0";
+    const UNITS: &'static [Unit<Self>] = &[COUNT];
+}
+
+/// Why a text is no quantity.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("{written} is not {kind}: write {right}")]
+pub struct WrittenError {
+    written: String,
+    kind: &'static str,
+    right: String,
+}
+
+impl WrittenError {
+    fn new<Q: Written>(written: impl Display) -> Self {
+        let right = match Q::UNITS {
+            _ if Q::is_plain() => format!("{}, without quotes and unit", Q::KIND),
+            [only] => format!("a number and {}, in quotes", only.name),
+            [first @ .., last] => {
+                let first: Vec<_> = first.iter().map(|unit| unit.name).collect();
+                format!("a number and {} or {}, in quotes", first.join(", "), last.name)
+            }
+            [] => Q::KIND.to_owned(),
+        };
+        Self { written: written.to_string(), kind: Q::KIND, right }
+    }
+}
+
+/// Reads a number and a unit. Spaces between them, and within the unit, do not matter.
+///
+/// # Errors
+/// Where there is no number, or the unit is missing or of another kind of quantity; it says which units there are.
+pub fn parse<Q: Written>(text: &str) -> Result<Q, WrittenError> {
+    let error = || WrittenError::new::<Q>(format_args!("\"{text}\""));
+    let unit_start = text.find(|c: char| c.is_alphabetic() || "%°".contains(c)).unwrap_or(text.len());
+    let (number, name) = text.split_at(unit_start);
+    let number: f64 = number.trim().parse().map_err(|_| error())?;
+    let unit = Q::UNITS.iter().find(|unit| !unit.name.is_empty() && closed_up(unit.name) == closed_up(name));
+    unit.map(|unit| unit.of(number)).ok_or_else(error)
+}
+
+fn closed_up(name: &str) -> String {
+    name.split_whitespace().collect()
+}
+
+/// Reads a quantity as a string with its unit, and a plain number as such; for serde's `deserialize_with`.
+///
+/// # Errors
+/// Those of [`parse`].
+pub(crate) fn read<'de, Q: Written, D: Deserializer<'de>>(deserializer: D) -> Result<Q, D::Error> {
+    deserializer.deserialize_any(WrittenVisitor(PhantomData))
+}
+
+struct WrittenVisitor<Q>(PhantomData<Q>);
+
+impl<Q: Written> Visitor<'_> for WrittenVisitor<Q> {
+    type Value = Q;
+
+    fn expecting(&self, formatter: &mut Formatter<'_>) -> fmt::Result {
+        formatter.write_str(Q::KIND)
+    }
+
+    fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<Q, E> {
+        parse(text).map_err(E::custom)
+    }
+
+    fn visit_f64<E: serde::de::Error>(self, number: f64) -> Result<Q, E> {
+        // What comes out of a whole number's unit is another number than what went in, where that was not whole.
+        let plain = Q::UNITS.first().filter(|unit| unit.name.is_empty());
+        let read = plain.map(|unit| (unit.of(number), unit)).filter(|(read, unit)| unit.value(*read) == number);
+        read.map(|(read, _)| read).ok_or_else(|| E::custom(WrittenError::new::<Q>(number)))
+    }
+
+    fn visit_i64<E: serde::de::Error>(self, number: i64) -> Result<Q, E> {
+        self.visit_f64(number as f64)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    #[test]
+    fn a_length_is_the_same_in_every_unit() {
+        for text in ["0.4 m", "40 cm", "400 mm", "400mm", " 400  mm "] {
+            assert_relative_eq!(M.value(parse(text).unwrap()), 0.4, epsilon = 1e-12);
+        }
+    }
+
+    #[test]
+    fn torque_is_read_as_servo_makers_write_it() {
+        assert_relative_eq!(NEWTON_METRE.value(parse("60 kg cm").unwrap()), 5.884, epsilon = 1e-3);
+        assert_relative_eq!(KG_CM.value(parse("5.884 Nm").unwrap()), 60.0, epsilon = 1e-2);
+    }
+
+    #[test]
+    fn a_wrong_unit_is_answered_with_the_right_ones() {
+        let error = parse::<Length>("0.4 kg").unwrap_err();
+        assert_eq!(error.to_string(), "\"0.4 kg\" is not a length: write a number and mm, cm or m, in quotes");
+        let error = parse::<Ratio>("0.9").unwrap_err();
+        assert_eq!(error.to_string(), "\"0.9\" is not a share: write a number and %, in quotes");
+    }
+
+    #[test]
+    fn what_is_no_number_is_refused() {
+        for text in ["", "mm", "nan mm", "inf mm", "4oo mm", "1,5 mm"] {
+            assert!(parse::<Length>(text).is_err(), "{text}");
+        }
+    }
+}
