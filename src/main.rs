@@ -25,7 +25,10 @@ mod shared;
 mod stack;
 mod watchdog;
 
-use avr_device::{atmega328p::Peripherals, interrupt};
+use avr_device::{
+    atmega328p::{EEPROM, Peripherals},
+    interrupt,
+};
 use control::{
     classifier::Nearest,
     console::LineBuffer,
@@ -38,11 +41,11 @@ use embedded_hal::digital::{InputPin, OutputPin};
 use embedded_hal_nb::serial::Read;
 use static_cell::StaticCell;
 
+/// The decisions, with the memories of this machine.
+type Weeder = Controller<Nearest<examples::InFlash, eeprom::Half>, eeprom::Half>;
+
 #[avr_device::entry]
 fn main() -> ! {
-    static CONTROLLER: StaticCell<Controller<Nearest<examples::InFlash, eeprom::Half>, eeprom::Half>> =
-        StaticCell::new();
-
     // SAFETY: the entry point is the first code to run and runs once, so nobody else holds the peripherals.
     let peripherals = unsafe { Peripherals::steal() };
     let board::Pins { mut lamp, mut work_switch, mut end_switch } = board::pins(&peripherals.PORTB, &peripherals.PORTD);
@@ -61,11 +64,8 @@ fn main() -> ! {
         let stack_free = stack.free();
         Readings { now, position: Position::new(position), switch_on, lost, jumps, end_switch_on, stack_free }
     };
-    let (settings_memory, examples_memory) = eeprom::halves(peripherals.EEPROM);
-    let classifier = Nearest::new(examples::built_in(), examples_memory);
     let cause = reset::cause(&peripherals.CPU);
-    let wake_up = WakeUp { readings: read(), beam_broken: beam.is_broken(), cause };
-    let controller = CONTROLLER.init(Controller::new(classifier, settings_memory, wake_up));
+    let controller = wake_up(peripherals.EEPROM, WakeUp { readings: read(), beam_broken: beam.is_broken(), cause });
     // The settings say which pulse has the tool out, so there is none before they are loaded.
     let mut servo = servo::Servo::new(peripherals.TC1, &peripherals.PORTB, controller.orders().pulse);
 
@@ -104,4 +104,13 @@ fn main() -> ! {
             }
         }
     }
+}
+
+/// Wakes the decisions up, with what the EEPROM holds. A function of its own, so that the loop's stack does not hold for
+/// ever what only this needs.
+#[inline(never)]
+fn wake_up(eeprom: EEPROM, wake_up: WakeUp) -> &'static mut Weeder {
+    static WEEDER: StaticCell<Weeder> = StaticCell::new();
+    let (for_settings, for_examples) = eeprom::halves(eeprom);
+    WEEDER.init_with(|| Controller::new(Nearest::new(examples::built_in(), for_examples), for_settings, wake_up))
 }
