@@ -82,6 +82,11 @@ impl<M: Memory> SavedSettings<M> {
         true
     }
 
+    /// The memory, to be looked at or put into another machine.
+    pub fn into_memory(self) -> M {
+        self.memory
+    }
+
     /// A copy, and its sequence number; `None` unless it is whole.
     fn read(&self, copy: u8) -> Option<(Settings, u8)> {
         let mut bytes = [0; COPY];
@@ -133,7 +138,7 @@ mod tests {
         saved.load();
         saved.save();
         while !saved.carry_on(settings) {}
-        saved.memory
+        saved.into_memory()
     }
 
     fn load(memory: &Volatile) -> Option<Settings> {

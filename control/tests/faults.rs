@@ -1,0 +1,435 @@
+//! Each fault that the decisions know of: what shows it, what does not, and that the tool is out of the row then.
+
+mod common;
+
+use common::{ByWidth, Machine, machine, readings, woken_up};
+use control::{
+    alarm::{Alarm, Warning},
+    controller::{Controller, Orders, Readings, Reason, Refusal, State},
+    event::Event,
+    memory::Volatile,
+    reset::Cause,
+    saved::SavedSettings,
+    settings::{Contradiction, Setting, Settings},
+    units::{Instant, Interval, Position, Ticks},
+};
+
+/// Ticks a metre of the default wheel.
+const TICKS_A_METRE: f64 = 1909.86;
+
+/// A turn of the main loop.
+const TURN_US: u64 = 500;
+
+/// A machine with its clock and its place.
+struct Drive {
+    machine: Machine,
+    time_us: u64,
+    place: f64,
+    /// What every reading has besides time and place.
+    readings: Readings,
+}
+
+impl Drive {
+    /// At work, with the tool in the row, at 1.8 km/h.
+    fn at_work() -> Self {
+        let mut drive = Self { machine: machine(), time_us: 0, place: 0.0, readings: readings(0, 0) };
+        drive.machine.start(false).unwrap();
+        drive.machine.tell_events(true);
+        drive.roll(0.5, 1.0);
+        assert!(drive.tool_is_in());
+        drive.events();
+        drive
+    }
+
+    /// In HOLD, at rest.
+    fn in_hold() -> Self {
+        Self { machine: machine(), time_us: 0, place: 0.0, readings: readings(0, 0) }
+    }
+
+    fn tool_is_in(&self) -> bool {
+        !self.machine.tool_out()
+    }
+
+    /// A turn of the loop, with the encoder at a count.
+    fn turn_at(&mut self, count: i32) -> Orders {
+        self.time_us += TURN_US;
+        let now = readings(self.time_us, count);
+        self.machine.step(Readings { now: now.now, position: now.position, ..self.readings })
+    }
+
+    /// Rolls so many metres at a speed, or stands for so many seconds at none.
+    fn roll(&mut self, speed_m_s: f64, metres_or_seconds: f64) {
+        let seconds = if speed_m_s == 0.0 { metres_or_seconds } else { metres_or_seconds / speed_m_s.abs() };
+        for _ in 0..(seconds * 1e6) as u64 / TURN_US {
+            self.place += speed_m_s * TICKS_A_METRE * TURN_US as f64 / 1e6;
+            self.turn_at(self.place.floor() as i32);
+        }
+    }
+
+    fn beam(&mut self, broken: bool) {
+        let position = readings(0, self.place.floor() as i32).position;
+        self.machine.beam_edge(position, broken);
+    }
+
+    /// A plant of 150 mm passes the beam.
+    fn pass_a_plant(&mut self, speed_m_s: f64) {
+        self.beam(true);
+        self.roll(speed_m_s, 0.15);
+        self.beam(false);
+    }
+
+    fn alarm(&self) -> Option<Alarm> {
+        match self.machine.state() {
+            State::Alarm(alarm) => {
+                assert!(self.machine.tool_out(), "an alarm with the tool in the row");
+                Some(alarm)
+            }
+            _ => None,
+        }
+    }
+
+    fn events(&mut self) -> Vec<Event> {
+        std::iter::from_fn(|| self.machine.next_event()).collect()
+    }
+}
+
+#[test]
+fn a_silent_encoder_has_the_tool_out_at_the_first_plant_and_is_an_alarm_at_the_third() {
+    let mut drive = Drive::at_work();
+    drive.roll(0.0, 0.2);
+    assert!(drive.tool_is_in(), "the machine may just stand");
+    for plant in 1..=3 {
+        drive.beam(true);
+        drive.roll(0.0, 0.3);
+        assert!(!drive.tool_is_in(), "plant {plant}");
+        drive.beam(false);
+        drive.roll(0.0, 0.7);
+        assert_eq!(drive.alarm(), (plant == 3).then_some(Alarm::EncoderSilent), "plant {plant}");
+    }
+}
+
+#[test]
+fn leaves_that_move_while_the_machine_stands_keep_the_tool_out_until_it_rolls_on() {
+    let mut drive = Drive::at_work();
+    for _ in 0..5 {
+        drive.roll(0.0, 0.2);
+        drive.beam(true);
+        drive.beam(false);
+        drive.roll(0.0, 0.1);
+        assert_eq!(drive.machine.reason(), Some(Reason::EncoderDoubtful));
+        drive.roll(0.5, 0.5);
+        assert!(drive.tool_is_in());
+    }
+    assert_eq!(drive.alarm(), None);
+}
+
+#[test]
+fn plants_that_pass_a_rolling_machine_raise_no_doubt_in_the_encoder() {
+    for speed_m_s in [0.02, 0.5, 1.3] {
+        let mut drive = Drive::at_work();
+        for _ in 0..6 {
+            drive.roll(speed_m_s, 0.35);
+            drive.pass_a_plant(speed_m_s);
+            assert_ne!(drive.machine.reason(), Some(Reason::EncoderDoubtful), "{speed_m_s} m/s");
+        }
+        assert_eq!(drive.alarm(), None, "{speed_m_s} m/s");
+    }
+}
+
+/// Has the encoder go to and fro between two counts, so many edges a second, for two seconds.
+fn tremble(drive: &mut Drive, edges_a_second: u64) {
+    let count = drive.place.floor() as i32;
+    for turn in 0..2_000_000 / TURN_US {
+        let edges = turn * TURN_US * edges_a_second / 1_000_000;
+        drive.turn_at(count + (edges % 2) as i32);
+    }
+}
+
+#[test]
+fn edges_without_progress_are_an_alarm_at_work() {
+    // One channel of two at 1 and at 2.5 km/h.
+    for edges_a_second in [265, 663] {
+        let mut drive = Drive::at_work();
+        tremble(&mut drive, edges_a_second);
+        assert_eq!(drive.alarm(), Some(Alarm::EncoderChannelDead), "{edges_a_second}");
+        let mut drive = Drive::in_hold();
+        tremble(&mut drive, edges_a_second);
+        assert_eq!(drive.alarm(), None);
+    }
+}
+
+#[test]
+fn a_wheel_that_trembles_on_an_edge_with_the_engine_is_no_alarm() {
+    let mut drive = Drive::at_work();
+    tremble(&mut drive, 100);
+    assert_eq!(drive.alarm(), None);
+}
+
+#[test]
+fn jumps_above_a_rate_are_an_alarm_and_a_rare_one_is_none() {
+    // From one side of the count's wrap to the other.
+    let mut wake_up = woken_up(Cause::PowerOn);
+    wake_up.readings.jumps = u16::MAX - 10;
+    for (jumps, every_ms, alarm) in [(30, 10, Some(Alarm::EncoderJumps)), (300, 40, None)] {
+        let mut machine = Controller::new(ByWidth, Volatile::new(), wake_up);
+        machine.clear();
+        let mut drive = Drive { machine, time_us: 0, place: 0.0, readings: wake_up.readings };
+        for _ in 0..jumps {
+            drive.readings.jumps = drive.readings.jumps.wrapping_add(1);
+            drive.roll(0.0, f64::from(every_ms) / 1000.0);
+        }
+        assert_eq!(drive.alarm(), alarm, "a jump every {every_ms} ms");
+    }
+}
+
+#[test]
+fn working_faster_than_the_limit_is_an_alarm_in_both_directions() {
+    for (speed_m_s, alarm) in [(1.35, None), (1.45, Some(Alarm::TooFast)), (-1.35, None), (-1.45, Some(Alarm::TooFast))]
+    {
+        let mut drive = Drive::at_work();
+        drive.roll(speed_m_s, 0.8);
+        assert_eq!(drive.alarm(), alarm, "{speed_m_s} m/s");
+    }
+    let mut drive = Drive::in_hold();
+    drive.roll(5.0, 2.0);
+    assert_eq!(drive.alarm(), None, "on the way to the field");
+}
+
+#[test]
+fn a_beam_that_flickers_is_an_alarm_and_a_ragged_canopy_is_none() {
+    let mut drive = Drive::at_work();
+    for _ in 0..60 {
+        drive.beam(true);
+        drive.roll(0.5, 0.0005);
+        drive.beam(false);
+        drive.roll(0.5, 0.0005);
+    }
+    assert_eq!(drive.alarm(), Some(Alarm::BeamFlickers));
+    // At 5 km/h, a clear stretch every 14 mm.
+    let mut drive = Drive::at_work();
+    drive.roll(1.39, 0.3);
+    for _ in 0..10 {
+        drive.beam(true);
+        drive.roll(1.39, 0.008);
+        drive.beam(false);
+        drive.roll(1.39, 0.006);
+    }
+    assert_eq!(drive.alarm(), None);
+}
+
+#[test]
+fn a_long_way_without_a_plant_is_a_warning_once() {
+    let mut drive = Drive::at_work();
+    drive.machine.set(Setting::NoPlantM, 3).unwrap();
+    let warned = |drive: &mut Drive| {
+        let events = drive.events();
+        events.iter().filter(|event| **event == Event::Warning(Warning::NoPlants)).count()
+    };
+    drive.roll(0.5, 1.9);
+    assert!(!drive.machine.sees_no_plants());
+    drive.roll(0.5, 0.2);
+    assert!(drive.machine.sees_no_plants());
+    assert_eq!(warned(&mut drive), 1);
+    drive.roll(0.5, 5.0);
+    assert_eq!((warned(&mut drive), drive.machine.state()), (0, State::Work), "once is enough");
+    drive.pass_a_plant(0.5);
+    drive.roll(0.5, 0.2);
+    assert!(!drive.machine.sees_no_plants(), "a plant ends it");
+    drive.roll(0.5, 3.0);
+    assert_eq!(warned(&mut drive), 1);
+
+    let mut never = Drive::at_work();
+    never.machine.set(Setting::NoPlantM, 0).unwrap();
+    never.roll(1.3, 150.0);
+    assert!(!never.machine.sees_no_plants());
+}
+
+#[test]
+fn a_jump_in_speed_just_before_a_window_is_counted_as_late_and_the_tool_leaves_at_once() {
+    // The plant's margin is 350 mm behind the beam's place; the lead at 0.3 m/s is 54 mm, at 1.3 m/s 234 mm.
+    for (jumps, late) in [(false, 0), (true, 1)] {
+        let mut drive = Drive::at_work();
+        drive.roll(0.3, 0.5);
+        drive.pass_a_plant(0.3);
+        drive.roll(0.3, 0.1);
+        assert!(drive.tool_is_in());
+        drive.events();
+        drive.roll(if jumps { 1.3 } else { 0.3 }, 0.12);
+        assert!(!drive.tool_is_in());
+        assert_eq!(drive.machine.late(), late);
+        let told = drive.events().contains(&Event::Warning(Warning::LateCommand));
+        assert_eq!(told, jumps);
+        assert_eq!(drive.machine.state(), State::Work);
+    }
+}
+
+#[test]
+fn in_paper_mode_no_command_is_late() {
+    let mut drive = Drive::at_work();
+    drive.machine.set(Setting::LeadInMs, 0).unwrap();
+    drive.machine.set(Setting::LeadOutMs, 0).unwrap();
+    drive.pass_a_plant(0.7);
+    drive.roll(0.7, 1.0);
+    assert_eq!(drive.machine.late(), 0);
+}
+
+#[test]
+fn rolling_back_to_forgotten_ground_is_an_alarm() {
+    let mut drive = Drive::at_work();
+    for _ in 0..20 {
+        drive.pass_a_plant(0.5);
+        drive.roll(0.5, 0.35);
+    }
+    // The 16 canopies that are remembered go back 8 m; the oldest of them was not the first.
+    drive.roll(-0.5, 6.0);
+    assert_eq!(drive.alarm(), None);
+    drive.roll(-0.5, 3.0);
+    assert_eq!(drive.alarm(), Some(Alarm::RolledBackTooFar));
+}
+
+#[test]
+fn rolling_back_to_ground_that_was_never_seen_has_the_tool_out_and_is_no_alarm() {
+    let mut drive = Drive::at_work();
+    drive.roll(-0.5, 2.0);
+    assert_eq!((drive.alarm(), drive.machine.reason()), (None, Some(Reason::UnseenGround)));
+    drive.roll(0.5, 2.0);
+    assert!(drive.tool_is_in());
+}
+
+#[test]
+fn a_tool_that_does_not_follow_is_an_alarm_where_an_end_switch_tells() {
+    // The switch never closes, though the tool is to be out.
+    let mut drive = Drive::in_hold();
+    drive.roll(0.0, 1.0);
+    assert_eq!(drive.alarm(), None, "without a switch nobody knows");
+    drive.machine.set(Setting::EndSwitch, 1).unwrap();
+    drive.roll(0.0, 0.1);
+    assert_eq!(drive.alarm(), Some(Alarm::ToolStuck));
+
+    // The switch stays closed, though the tool is to be in the row.
+    let mut drive = Drive::at_work();
+    drive.machine.set(Setting::EndSwitch, 1).unwrap();
+    drive.roll(0.5, 1.0);
+    assert_eq!(drive.alarm(), None, "open, and the tool is in the row");
+    drive.pass_a_plant(0.5);
+    drive.roll(0.5, 0.4);
+    assert_eq!(drive.alarm(), Some(Alarm::ToolStuck), "it should have closed");
+
+    let mut drive = Drive::at_work();
+    drive.machine.set(Setting::EndSwitch, 1).unwrap();
+    drive.readings.end_switch_on = true;
+    drive.roll(0.5, 0.05);
+    assert_eq!(drive.alarm(), Some(Alarm::ToolStuck), "closed, and the tool is told to be in the row");
+}
+
+#[test]
+fn a_tool_that_follows_within_its_time_is_no_alarm() {
+    let mut drive = Drive::at_work();
+    drive.machine.set(Setting::EndSwitch, 1).unwrap();
+    let mut is_out = [drive.machine.tool_out(); 360];
+    for turn in 0..40_000 {
+        if turn % 2_000 == 500 {
+            drive.beam(true);
+        }
+        if turn % 2_000 == 1_000 {
+            drive.beam(false);
+        }
+        // 180 ms behind the command, and the contacts bounce.
+        let place = turn % is_out.len();
+        drive.readings.end_switch_on = is_out[place] ^ (turn % 50 == 0);
+        drive.roll(0.5, 0.5 * TURN_US as f64 / 1e6);
+        is_out[place] = drive.machine.tool_out();
+    }
+    assert_eq!(drive.alarm(), None);
+}
+
+#[test]
+fn a_stack_that_is_nearly_used_up_is_an_alarm() {
+    let mut drive = Drive::at_work();
+    drive.readings.stack_free = 48;
+    drive.roll(0.5, 0.1);
+    assert_eq!(drive.alarm(), None);
+    drive.readings.stack_free = 47;
+    drive.roll(0.5, 0.1);
+    assert_eq!(drive.alarm(), Some(Alarm::StackLow));
+}
+
+#[test]
+fn saved_settings_are_in_use_after_a_restart() {
+    let mut settings = Settings::new();
+    settings.set(Setting::K, 7).unwrap();
+    let machine = Controller::new(ByWidth, saved(&settings), woken_up(Cause::PowerOn));
+    assert_eq!((machine.state(), machine.settings()), (State::Hold, &settings));
+}
+
+/// A memory with these settings, right or not.
+fn saved(settings: &Settings) -> Volatile {
+    let mut saved = SavedSettings::new(Volatile::new());
+    saved.save();
+    while !saved.carry_on(settings) {}
+    saved.into_memory()
+}
+
+#[test]
+fn saved_settings_that_contradict_each_other_are_an_alarm_and_do_not_start() {
+    let mut settings = Settings::new();
+    settings.set(Setting::ServoInUs, 2000).unwrap();
+    settings.set(Setting::BeamToToolMm, 200).unwrap();
+    let mut machine = Controller::new(ByWidth, saved(&settings), woken_up(Cause::PowerOn));
+    assert_eq!(machine.state(), State::Alarm(Alarm::SettingsContradict));
+    machine.clear();
+    assert_eq!(machine.start(false), Err(Refusal::Contradiction(Contradiction::PulsesEqual)));
+    assert_eq!(machine.save(), Err(Refusal::Contradiction(Contradiction::PulsesEqual)));
+    // The switch does not start it either.
+    for millisecond in 0..100 {
+        machine.step(Readings { switch_on: true, ..readings(millisecond * 1000, 0) });
+    }
+    assert_eq!(machine.state(), State::Alarm(Alarm::SettingsContradict));
+    machine.clear();
+    // They can be mended one at a time.
+    machine.set(Setting::ServoInUs, 1500).unwrap();
+    assert_eq!(machine.start(false), Err(Refusal::Contradiction(Contradiction::BeamTooNear { needed_mm: 336 })));
+    machine.set(Setting::BeamToToolMm, 400).unwrap();
+    assert_eq!(machine.start(false), Ok(()));
+}
+
+#[test]
+fn nothing_happens_where_time_and_place_wrap() {
+    // Both counters pass their end in the middle of a row.
+    let ticks_before = 3000;
+    let steps_before = 1_000_000;
+    let moved = |now: Readings| {
+        Readings {
+            now: Instant::new(0_u32.wrapping_sub(steps_before)) + Interval::from_steps(now.now.steps()),
+            position: Position::new(i32::MAX - ticks_before) + Ticks(now.position.count()),
+            ..now
+        }
+    };
+    let swings = |wraps: bool| {
+        let place = |now: Readings| if wraps { moved(now) } else { now };
+        let mut wake_up = woken_up(Cause::PowerOn);
+        wake_up.readings = place(readings(0, 0));
+        let mut machine = Controller::new(ByWidth, Volatile::new(), wake_up);
+        machine.clear();
+        machine.start(false).unwrap();
+        let (mut swings, mut was_out) = (Vec::new(), true);
+        for turn in 0..24_000_u64 {
+            let count = (turn as f64 * 0.53) as i32;
+            let broken = count % 1000 >= 700 && count > 1000;
+            let now = place(readings(turn * TURN_US, count));
+            if count > 1000 && broken != ((count - 1) % 1000 >= 700 && count - 1 > 1000) {
+                machine.beam_edge(now.position, broken);
+            }
+            machine.step(now);
+            if machine.tool_out() != was_out {
+                was_out = !was_out;
+                swings.push((turn, was_out));
+            }
+        }
+        assert_eq!(machine.state(), State::Work);
+        swings
+    };
+    let plain = swings(false);
+    assert!(plain.len() > 15, "{plain:?}");
+    assert_eq!(swings(true), plain);
+}
