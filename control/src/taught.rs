@@ -118,6 +118,11 @@ impl<M: Memory> FieldExamples<M> {
         }
     }
 
+    /// The memory, to be looked at or put into another machine.
+    pub fn into_memory(self) -> M {
+        self.memory
+    }
+
     /// What lies in a slot, or will lie there once it is written.
     fn read(&self, number: u8) -> [u8; SLOT] {
         if self.left > 0 && number == self.writing {
@@ -206,7 +211,7 @@ mod tests {
     }
 
     fn restart(store: FieldExamples<Volatile>) -> FieldExamples<Volatile> {
-        FieldExamples::new(store.memory.with_power())
+        FieldExamples::new(store.into_memory().with_power())
     }
 
     #[test]

@@ -1,17 +1,17 @@
 //! Examples taught in the field: they change what the next object is taken for, and outlive the power.
 
 use crate::common::{ask, elf, refusal, run_for_ms, woken_up};
-use control::taught;
+use control::memory::{ERASED, SIZE, Volatile};
+use control::taught::{self, FieldExamples};
 use field::machine::Machine;
 use field::motion::Motion;
 use field::row::{Row, Thing};
 use field::signal::CYCLES_PER_SECOND;
 use field::uno::Uno;
 use knn::Example;
-use std::cell::RefCell;
 
 /// Where the firmware keeps the slots in EEPROM.
-const SLOTS_BEGIN: usize = 512;
+const SLOTS_BEGIN: usize = SIZE;
 
 /// A width that is neither a plant's nor a weed's to the built-in examples.
 const ODD_WIDTH_MM: f64 = 55.0;
@@ -37,33 +37,16 @@ fn greeted(uno: &mut Uno) {
     uno.run_until_serial("\n", CYCLES_PER_SECOND).expect("the firmware greets");
 }
 
-/// EEPROM as a memory for examples, to fill it with the firmware's own code.
-struct Image<'a>(&'a RefCell<Vec<u8>>);
-
-impl taught::Memory for Image<'_> {
-    fn read(&self, slot: u8) -> [u8; taught::SLOT] {
-        let begin = SLOTS_BEGIN + usize::from(slot) * taught::SLOT;
-        self.0.borrow()[begin..begin + taught::SLOT].try_into().expect("a slot's bytes")
-    }
-
-    fn write(&mut self, slot: u8, bytes: [u8; taught::SLOT]) {
-        let begin = SLOTS_BEGIN + usize::from(slot) * taught::SLOT;
-        self.0.borrow_mut()[begin..begin + taught::SLOT].copy_from_slice(&bytes);
-    }
-
-    fn carry_on(&mut self) -> bool {
-        true
-    }
-}
-
 /// An EEPROM with an example in every slot.
 fn full_eeprom() -> Vec<u8> {
-    let bytes = RefCell::new(vec![0xFF; 1024]);
-    let mut store = taught::FieldExamples::new(Image(&bytes));
+    let mut store = FieldExamples::new(Volatile::new());
     for number in 0..taught::CAPACITY {
         store.add(Example::new([number, 1, 2, 3, 4], number % 2)).expect("there is room");
     }
-    bytes.into_inner()
+    while !store.carry_on() {}
+    let mut eeprom = vec![ERASED; SLOTS_BEGIN];
+    eeprom.extend(store.into_memory().bytes);
+    eeprom
 }
 
 fn answers(uno: &mut Uno) -> Vec<String> {
