@@ -2,22 +2,34 @@
 //!
 //! The pin-change interrupt PCINT0 stamps an edge and queues it; the loop takes it from there. A queue that is full loses
 //! the edge and says so. What the edges mean is not known here. Low = broken. This is the one file beside main.rs that
-//! uses another peripheral's: what the handler stamps is the encoder's count.
+//! looks into another peripheral's: what the handler stamps is the encoder's count.
+//!
+//! An edge is kept as the lower 15 bits of the count, and one for the level. The loop takes it long before the wheel has
+//! turned on by half of what 15 bits hold, 16,384 ticks, and so knows the rest: that is three seconds at 10 km/h, where
+//! a loop that hangs is reset after a quarter of one.
 
-use crate::encoder;
-use avr_device::{
-    atmega328p::{EXINT, PORTB, portb},
-    interrupt::{self, CriticalSection, Mutex},
+use crate::{
+    encoder,
+    ring::Ring,
+    shared::{Byte, Shared},
 };
-use core::cell::{Cell, RefCell};
-use heapless::spsc::Queue;
+use avr_device::atmega328p::{EXINT, PORTB, portb};
 
 /// Position and level of an edge: the beam is broken from here on, or clear.
 pub type Edge = (i32, bool);
 
-/// Edges that wait for the loop: 15 of them, which a sensor with a response of 1 ms cannot make in less than 15 ms.
-static EDGES: Mutex<RefCell<Queue<Edge, 16>>> = Mutex::new(RefCell::new(Queue::new()));
-static LOST: Mutex<Cell<bool>> = Mutex::new(Cell::new(false));
+/// Edges that can wait for the loop, which a sensor with a response of 1 ms cannot make in less than 16 ms.
+const SLOTS: usize = 16;
+
+/// Edges that wait for the loop: twice the count, and 1 where the beam is clear.
+static EDGES: Ring<SLOTS> = Ring::new();
+static STAMPS: [Shared<u16>; SLOTS] = [const { Shared::new(0) }; SLOTS];
+
+/// Not 0 when an edge found no room.
+static LOST: Byte = Byte::new(0);
+
+/// The beam's bit, of port B and of a stamp.
+const BEAM: u8 = 1;
 
 /// The beam, as the loop sees it.
 pub struct Beam<'a>(&'a portb::RegisterBlock);
@@ -26,37 +38,50 @@ impl<'a> Beam<'a> {
     /// Begins to watch the beam.
     pub fn new(interrupts: &EXINT, port: &'a PORTB) -> Self {
         // SAFETY: this is the mask bit of PCINT0.
-        interrupts.pcmsk0().write(|w| unsafe { w.pcint().bits(1) });
-        // SAFETY: bit 0 is PCIE0; the other bits are kept.
-        interrupts.pcicr().modify(|r, w| unsafe { w.pcie().bits(r.pcie().bits() | 1) });
+        interrupts.pcmsk0().write(|w| unsafe { w.pcint().bits(BEAM) });
+        // SAFETY: bit 0 is PCIE0, and no other group of pins is watched.
+        interrupts.pcicr().write(|w| unsafe { w.pcie().bits(1) });
         Self(port)
     }
 
     /// Whether the beam is broken now.
     pub fn is_broken(&self) -> bool {
-        self.0.pinb().read().pb0().bit_is_clear()
+        is_broken(self.0.pinb().read().bits())
     }
 
     /// The oldest edge that was not taken yet.
     pub fn next_edge(&mut self) -> Option<Edge> {
-        interrupt::free(|cs| EDGES.borrow(cs).borrow_mut().dequeue())
+        let stamp = EDGES.take(|slot| STAMPS[slot].get())?;
+        let now = encoder::position();
+        // Both in half ticks, which leaves the sign to the machine.
+        let rolled_since = ((now as u16) << 1).wrapping_sub(stamp & !u16::from(BEAM)) as i16 >> 1;
+        Some((now.wrapping_sub(rolled_since.into()), is_broken(stamp as u8)))
     }
 
     /// Whether edges were lost since this was last asked.
     pub fn take_lost(&mut self) -> bool {
-        interrupt::free(|cs| LOST.borrow(cs).replace(false))
+        let lost = LOST.get() != 0;
+        if lost {
+            // An edge that is lost right before this is among those that the answer tells of.
+            LOST.set(0);
+        }
+        lost
     }
+}
+
+/// Whether the beam is broken, from its bit.
+fn is_broken(levels: u8) -> bool {
+    levels & BEAM == 0
 }
 
 // The beam's level changed.
 #[avr_device::interrupt(atmega328p)]
 fn PCINT0() {
-    // SAFETY: the chip turns interrupts off while a handler runs, and this one does not turn them on.
-    let cs = unsafe { CriticalSection::new() };
-    let position = encoder::position(cs);
     // SAFETY: PINB is only read here, which has no side effect on anybody.
-    let broken = unsafe { (*PORTB::ptr()).pinb().read().pb0().bit_is_clear() };
-    if EDGES.borrow(cs).borrow_mut().enqueue((position, broken)).is_err() {
-        LOST.borrow(cs).set(true);
+    let levels = unsafe { (*PORTB::ptr()).pinb().read().bits() };
+    let stamp = encoder::lower_position() << 1 | u16::from(levels & BEAM);
+    let kept = EDGES.push(|slot, _| STAMPS[slot].set(stamp));
+    if !kept {
+        LOST.set(1);
     }
 }

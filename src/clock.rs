@@ -1,16 +1,18 @@
 //! The clock: Timer0 in steps of 4 us, carried on to 32 bits by its overflow interrupt.
 //!
 //! Timer0 counts freely behind a prescaler of 64 (data sheet, 15.9) and runs over every 1.024 ms; the interrupt counts
-//! the overflows. The clock wraps after 4.77 hours, which `control` is made for.
+//! the overflows, and the loop's heartbeat down. The clock wraps after 4.77 hours, which `control` is made for.
 
-use avr_device::{
-    atmega328p::TC0,
-    interrupt::{self, CriticalSection, Mutex},
+use crate::{
+    heartbeat,
+    shared::{Byte, Shared},
 };
+use avr_device::{atmega328p::TC0, interrupt};
 use control::units::Instant;
-use core::cell::Cell;
 
-static OVERFLOWS: Mutex<Cell<u32>> = Mutex::new(Cell::new(0));
+/// Overflows since power-up, modulo 2^24: the lowest byte, and the others.
+static OVERFLOWS_LOW: Byte = Byte::new(0);
+static OVERFLOWS_HIGH: Shared<u16> = Shared::new(0);
 
 /// The running clock.
 pub struct Clock(TC0);
@@ -25,23 +27,24 @@ impl Clock {
 
     /// The time.
     pub fn now(&self) -> Instant {
-        let (overflows, steps) = interrupt::free(|cs| {
-            let overflows = OVERFLOWS.borrow(cs).get();
-            let steps = self.0.tcnt0().read().bits();
-            // An overflow that happened in here waits for its interrupt; it belongs to the count when the steps were
-            // read after it, which a small number tells.
-            let pending = self.0.tifr0().read().tov0().bit_is_set() && steps < 128;
-            (overflows.wrapping_add(u32::from(pending)), steps)
+        let (high, low, steps, flags) = interrupt::free(|_| {
+            (OVERFLOWS_HIGH.get(), OVERFLOWS_LOW.get(), self.0.tcnt0().read().bits(), self.0.tifr0().read())
         });
-        Instant::new(overflows << 8 | u32::from(steps))
+        let instant = u32::from(high) << 16 | u32::from(low) << 8 | u32::from(steps);
+        // An overflow that happened in there waits for its interrupt; it belongs to the count when the steps were read
+        // after it, which a small number tells.
+        let is_pending = flags.tov0().bit_is_set() && steps < 128;
+        Instant::new(if is_pending { instant.wrapping_add(1 << 8) } else { instant })
     }
 }
 
 // The clock's counter ran over.
 #[avr_device::interrupt(atmega328p)]
 fn TIMER0_OVF() {
-    // SAFETY: the chip turns interrupts off while a handler runs, and this one does not turn them on.
-    let cs = unsafe { CriticalSection::new() };
-    let overflows = OVERFLOWS.borrow(cs);
-    overflows.set(overflows.get().wrapping_add(1));
+    heartbeat::count_down();
+    let low = OVERFLOWS_LOW.get().wrapping_add(1);
+    OVERFLOWS_LOW.set(low);
+    if low == 0 {
+        OVERFLOWS_HIGH.set(OVERFLOWS_HIGH.get().wrapping_add(1));
+    }
 }

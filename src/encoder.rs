@@ -1,39 +1,41 @@
 //! The wheel encoder on D2 and D3: four counts a cycle, signed, 32 bits.
 //!
-//! Both channels raise one pin-change interrupt, PCINT18 and PCINT19 (data sheet, 13.2.4), which reads both levels at
-//! once: two edges that come together are one interrupt, not two. How often it can run decides how fast the wheel may
-//! turn, so its handler is written in assembly: it looks the step up in a table and adds it to the count, and goes on to
-//! the count's upper bytes only when they change. The table is the decoder of `control`, worked out by the compiler for
+//! Both channels' interrupts, INT0 and INT1 (data sheet, 13.2.1), have one handler, which reads both levels at once. How
+//! often it can look decides how fast the wheel may turn: two edges between two looks are resolved by their direction,
+//! three are not. No interrupt goes before these two. The pins' other interrupt, PCINT2, is one for both, but the beam's
+//! PCINT0 goes before it: a look could then be held up by a handler that has just begun and by the beam's as well, where
+//! it is by one of the two here.
+//!
+//! The handler is written in assembly: it looks the step up in a table and adds it to the count, and goes on to the
+//! count's upper bytes only when they change. The table is the decoder of `control`, worked out by the compiler for
 //! every state and every pair of levels, so there is no second decoder that could differ from it.
 
+use crate::shared::Shared;
 use avr_device::{
     atmega328p::{CPU, EXINT, PORTD},
-    interrupt::{self, CriticalSection},
+    interrupt,
 };
 use control::quadrature::{Quadrature, Step};
-use core::{arch::naked_asm, cell::UnsafeCell};
+use core::arch::naked_asm;
 
-/// What the handler and the loop share. Only whole critical sections and the handler touch it.
-#[repr(transparent)]
-struct Shared<T>(UnsafeCell<T>);
-
-// SAFETY: the loop reads inside critical sections, and the handler cannot be interrupted.
-unsafe impl<T> Sync for Shared<T> {}
-
-impl<T: Copy> Shared<T> {
-    const fn new(value: T) -> Self {
-        Self(UnsafeCell::new(value))
-    }
-
-    fn get(&self, _: CriticalSection) -> T {
-        // SAFETY: with interrupts off, as the argument shows, the handler does not write.
-        unsafe { self.0.get().read_volatile() }
-    }
-}
-
-static COUNT: Shared<i32> = Shared::new(0);
-/// Ticks lost in jumps that nothing resolved, modulo 65,536.
+/// The count's lower half, and its upper.
+static COUNT_LOW: Shared<u16> = Shared::new(0);
+static COUNT_HIGH: Shared<u16> = Shared::new(0);
+/// Ticks lost in jumps that nothing resolved.
 static LOST: Shared<u16> = Shared::new(0);
+/// Jumps, resolved or not.
+static JUMPS: Shared<u16> = Shared::new(0);
+
+/// What the encoder has counted since power-up.
+#[derive(Clone, Copy)]
+pub struct Counts {
+    /// Ticks forward less ticks backward.
+    pub position: i32,
+    /// Ticks lost in jumps of two that nothing resolved, modulo 65,536.
+    pub lost: u16,
+    /// Jumps of two ticks, resolved or not, modulo 65,536. An encoder that is slow enough and whole makes none.
+    pub jumps: u16,
+}
 
 /// The decoder's memory, in GPIOR1, where the handler reaches it in a cycle: the channels' last levels in bits 0 (A) and
 /// 1 (B), the last step's direction in bits 4 and 5. The new levels come from the port in bits 2 and 3, right between,
@@ -41,11 +43,12 @@ static LOST: Shared<u16> = Shared::new(0);
 mod state {
     pub const LEVELS: u8 = 0b11;
     pub const DIRECTION_SHIFT: u8 = 4;
-    /// Set in a table entry, never in the memory: ticks were lost.
-    pub const LOST: u8 = 0x80;
+    /// Set in a table entry, never in the memory: both channels changed.
+    pub const JUMP: u8 = 0x80;
 }
 
-/// For each memory and each new pair of levels: the new memory, and the step in ticks.
+/// For each memory and each new pair of levels: the new memory, and the step in ticks; a jump of 0 ticks is one that
+/// nothing resolved.
 type Table = [[u8; 2]; 64];
 
 /// The table in flash, to be read by LPM alone.
@@ -65,16 +68,17 @@ const fn table() -> Table {
             _ => 0,
         };
         let mut decoder = Quadrature::moving(channels(last), direction);
-        let (lost, ticks) = match decoder.step(channels(new)) {
-            Step::Ticks(ticks) => (0, ticks),
-            Step::Lost => (state::LOST, 0),
+        let ticks = match decoder.step(channels(new)) {
+            Step::Ticks(ticks) => ticks,
+            Step::Lost => 0,
         };
+        let jump = if last ^ new == state::LEVELS { state::JUMP } else { 0 };
         let direction = match decoder.direction() {
             1 => 1,
             -1 => 2,
             _ => 0,
         };
-        table[index] = [new | direction << state::DIRECTION_SHIFT | lost, ticks as u8];
+        table[index] = [new | direction << state::DIRECTION_SHIFT | jump, ticks as u8];
         index += 1;
     }
     table
@@ -89,36 +93,55 @@ const fn channels(levels: u8) -> u8 {
 pub fn watch(interrupts: &EXINT, port: &PORTD, cpu: &CPU) {
     let levels = port.pind().read().bits() >> 2 & state::LEVELS;
     cpu.gpior1().write(|w| w.set(levels));
-    // SAFETY: these are the mask bits of PCINT18 and PCINT19.
-    interrupts.pcmsk2().write(|w| unsafe { w.pcint().bits(1 << 2 | 1 << 3) });
-    // SAFETY: bit 2 is PCIE2; the other bits are kept.
-    interrupts.pcicr().modify(|r, w| unsafe { w.pcie().bits(r.pcie().bits() | 1 << 2) });
+    interrupts.eicra().write(|w| w.isc0().val_0x01().isc1().val_0x01());
+    interrupts.eimsk().write(|w| w.int0().set_bit().int1().set_bit());
 }
 
-/// The position and the ticks known to be lost, from the loop.
-pub fn position_and_lost() -> (i32, u16) {
-    interrupt::free(|cs| (position(cs), LOST.get(cs)))
+/// What was counted, from the loop.
+pub fn counts() -> Counts {
+    interrupt::free(|_| Counts { position: count(), lost: LOST.get(), jumps: JUMPS.get() })
 }
 
-/// The position.
-pub fn position(cs: CriticalSection) -> i32 {
-    COUNT.get(cs)
+/// The position, from the loop.
+pub fn position() -> i32 {
+    interrupt::free(|_| count())
 }
 
-/// The handler of PCINT2: 55 cycles from the interrupt's response to its return, 74 where all four bytes change.
+/// The position's lower half, from another handler.
+#[inline(always)]
+pub fn lower_position() -> u16 {
+    COUNT_LOW.get()
+}
+
+/// The whole count, with interrupts off.
+#[inline(always)]
+fn count() -> i32 {
+    i32::from(COUNT_HIGH.get() as i16) << 16 | i32::from(COUNT_LOW.get())
+}
+
+/// The handler of INT0 and INT1: 55 cycles from the interrupt's response to its return, 74 where all four bytes change,
+/// and up to 16 more for a jump.
+///
+/// SREG waits in GPIOR0, which this handler has to itself, as it has GPIOR1; that is two cycles faster than the stack.
 ///
 /// # Safety
 /// To be called by the chip, through its vector table, alone.
 #[unsafe(naked)]
-// SAFETY: this is vector 5, PCINT2 (data sheet, table 12-6), and nobody else defines it.
-#[unsafe(export_name = "__vector_5")]
+// SAFETY: these are vectors 1 and 2, INT0 and INT1 (data sheet, table 12-6), and nobody else defines them.
+#[unsafe(export_name = "__vector_1")]
 unsafe extern "C" fn on_change() {
     naked_asm!(
+        ".globl __vector_2",
+        "__vector_2:",
         "push r24",
         "in   r24, 0x3f", // SREG
-        "push r24",
+        "out  0x1e, r24", // GPIOR0
         "push r30",
         "push r31",
+        // Both requests are met by what PIND shows now. The edge that asks comes through the same synchroniser, a
+        // cycle behind the level; one that comes later asks again.
+        "ldi  r30, 3",
+        "out  0x1c, r30", // EIFR
         // Z = TABLE + 2 * (memory | new levels)
         "in   r24, 0x09", // PIND
         "andi r24, 0x0c",
@@ -132,11 +155,12 @@ unsafe extern "C" fn on_change() {
         "lpm  r31, Z",  // the step
         "sbrc r24, 7",
         "rjmp 3f",
+        "6:",
         "out  0x2a, r24",
         // The lowest byte. Above it something changes only if the step and its carry disagree.
-        "lds  r30, {count}",
+        "lds  r30, {low}",
         "add  r30, r31",
-        "sts  {count}, r30",
+        "sts  {low}, r30",
         "brcs 1f",
         "sbrc r31, 7",
         "rjmp 4f",
@@ -147,13 +171,24 @@ unsafe extern "C" fn on_change() {
         "2:",
         "pop  r31",
         "pop  r30",
-        "pop  r24",
+        "in   r24, 0x1e",
         "out  0x3f, r24",
         "pop  r24",
         "reti",
-        // Two ticks are lost.
+        // A jump of two ticks.
         "3:",
         "andi r24, 0x7f",
+        "lds  r30, {jumps}",
+        "subi r30, 0xff",
+        "sts  {jumps}, r30",
+        "brcs 7f",
+        "lds  r30, {jumps}+1",
+        "subi r30, 0xff",
+        "sts  {jumps}+1, r30",
+        "7:",
+        "tst  r31",
+        "brne 6b",
+        // Nothing resolves it: its ticks are lost.
         "out  0x2a, r24",
         "lds  r30, {lost}",
         "lds  r31, {lost}+1",
@@ -163,34 +198,36 @@ unsafe extern "C" fn on_change() {
         "rjmp 2b",
         // A step back took the lowest byte below 0: one less in the upper three.
         "4:",
-        "lds  r30, {count}+1",
+        "lds  r30, {low}+1",
         "subi r30, 1",
-        "sts  {count}+1, r30",
+        "sts  {low}+1, r30",
         "brcc 2b",
-        "lds  r30, {count}+2",
+        "lds  r30, {high}",
         "subi r30, 1",
-        "sts  {count}+2, r30",
+        "sts  {high}, r30",
         "brcc 2b",
-        "lds  r30, {count}+3",
+        "lds  r30, {high}+1",
         "subi r30, 1",
-        "sts  {count}+3, r30",
+        "sts  {high}+1, r30",
         "rjmp 2b",
         // A step forward took it above 255: one more.
         "5:",
-        "lds  r30, {count}+1",
+        "lds  r30, {low}+1",
         "subi r30, 0xff",
-        "sts  {count}+1, r30",
+        "sts  {low}+1, r30",
         "brcs 2b",
-        "lds  r30, {count}+2",
+        "lds  r30, {high}",
         "subi r30, 0xff",
-        "sts  {count}+2, r30",
+        "sts  {high}, r30",
         "brcs 2b",
-        "lds  r30, {count}+3",
+        "lds  r30, {high}+1",
         "subi r30, 0xff",
-        "sts  {count}+3, r30",
+        "sts  {high}+1, r30",
         "rjmp 2b",
         table = sym TABLE,
-        count = sym COUNT,
+        low = sym COUNT_LOW,
+        high = sym COUNT_HIGH,
         lost = sym LOST,
+        jumps = sym JUMPS,
     )
 }

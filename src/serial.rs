@@ -2,32 +2,30 @@
 //!
 //! Received bytes wait in one queue for the loop, bytes to send in another for the line. Nothing here ever waits: what
 //! cannot be read or written at once is `WouldBlock`. A byte that comes in while its queue is full is lost, and
-//! [`GAP_MARK`] stands where it would have been, so that a line with a hole in it is never taken for a whole one.
+//! [`GAP_MARK`] stands where the first such byte would have been, so that a line with a hole in it is never taken for a
+//! whole one.
 
-use avr_device::{
-    atmega328p::{USART0, usart0},
-    interrupt::{self, CriticalSection, Mutex},
-};
-use control::console::GAP_MARK;
-use core::{
-    cell::{Cell, RefCell},
-    convert::Infallible,
-};
+use crate::{ring::Ring, shared::Byte};
+use avr_device::atmega328p::{USART0, usart0};
+use control::{console::GAP_MARK, reply};
+use core::convert::Infallible;
 use embedded_hal_nb::serial::{ErrorType, Read, Write};
-use heapless::spsc::Queue;
 
 /// Divisor for 115200 baud at double speed; off by 2.1 %, as on every Uno (data sheet, table 20-6).
 const BAUD_DIVISOR: u16 = 16;
 
-/// Bytes received and not yet read: 5 ms of a full line. The queues are used as they are, not split into their ends: an end
-/// does not know at compile time that its length is a power of two, and divides.
-static RECEIVED: Mutex<RefCell<Queue<u8, 64>>> = Mutex::new(RefCell::new(Queue::new()));
+/// Bytes received and not yet read: 5 ms of a full line. The last slot is kept for a mark.
+static RECEIVED: Ring<RECEIVED_SLOTS> = Ring::new();
+static RECEIVED_BYTES: [Byte; RECEIVED_SLOTS] = [const { Byte::new(0) }; RECEIVED_SLOTS];
+const RECEIVED_SLOTS: usize = 64;
 
 /// Bytes to be sent: the longest line.
-static TO_SEND: Mutex<RefCell<Queue<u8, { control::reply::LINE + 1 }>>> = Mutex::new(RefCell::new(Queue::new()));
+static TO_SEND: Ring<TO_SEND_SLOTS> = Ring::new();
+static TO_SEND_BYTES: [Byte; TO_SEND_SLOTS] = [const { Byte::new(0) }; TO_SEND_SLOTS];
+const TO_SEND_SLOTS: usize = reply::LINE.next_power_of_two();
 
-/// Whether the last byte received found no room.
-static GAP: Mutex<Cell<bool>> = Mutex::new(Cell::new(false));
+/// Times that received bytes were lost, modulo 256.
+static LOST: Byte = Byte::new(0);
 
 /// The serial line, as the loop sees it.
 pub struct Serial {
@@ -46,10 +44,12 @@ impl Serial {
 
     /// Bytes that can be written now.
     pub fn room(&self) -> usize {
-        interrupt::free(|cs| {
-            let queue = TO_SEND.borrow(cs).borrow();
-            queue.capacity() - queue.len()
-        })
+        TO_SEND.room().into()
+    }
+
+    /// How often received bytes were lost since power-up, modulo 256.
+    pub fn lost(&self) -> u8 {
+        LOST.get()
     }
 }
 
@@ -59,22 +59,22 @@ impl ErrorType for Serial {
 
 impl Read for Serial {
     fn read(&mut self) -> nb::Result<u8, Infallible> {
-        interrupt::free(|cs| RECEIVED.borrow(cs).borrow_mut().dequeue()).ok_or(nb::Error::WouldBlock)
+        RECEIVED.take(|slot| RECEIVED_BYTES[slot].get()).ok_or(nb::Error::WouldBlock)
     }
 }
 
 impl Write for Serial {
     fn write(&mut self, byte: u8) -> nb::Result<(), Infallible> {
-        interrupt::free(|cs| {
-            TO_SEND.borrow(cs).borrow_mut().enqueue(byte).map_err(|_| nb::Error::WouldBlock)?;
-            self.usart.ucsr0b().modify(|_, w| w.udrie0().set_bit());
-            Ok(())
-        })
+        if !TO_SEND.push(|slot, _| TO_SEND_BYTES[slot].set(byte)) {
+            return Err(nb::Error::WouldBlock);
+        }
+        // Should the handler come in here and turn itself off, it is called once more and finds the queue empty.
+        self.usart.ucsr0b().modify(|_, w| w.udrie0().set_bit());
+        Ok(())
     }
 
     fn flush(&mut self) -> nb::Result<(), Infallible> {
-        let sent = interrupt::free(|cs| TO_SEND.borrow(cs).borrow().is_empty());
-        if sent { Ok(()) } else { Err(nb::Error::WouldBlock) }
+        if TO_SEND.is_empty() { Ok(()) } else { Err(nb::Error::WouldBlock) }
     }
 }
 
@@ -97,30 +97,40 @@ impl ufmt::uWrite for Serial {
 }
 
 /// The handlers' view of the USART.
+#[inline(always)]
 fn usart() -> &'static usart0::RegisterBlock {
-    // SAFETY: the handlers use UDR0, which the loop does not touch, and UDRIE0, which it sets with interrupts off.
+    // SAFETY: the handlers use UDR0, which the loop does not touch, and UDRIE0, which the loop only ever sets.
     unsafe { &*USART0::ptr() }
 }
 
 // A byte has come in.
 #[avr_device::interrupt(atmega328p)]
 fn USART_RX() {
-    // SAFETY: the chip turns interrupts off while a handler runs, and this one does not turn them on.
-    let cs = unsafe { CriticalSection::new() };
-    // An overrun of the hardware's own two bytes shows until UDR0 is read.
+    // An overrun of the hardware's own two bytes shows until UDR0 is read. The byte is then not the next one of its line,
+    // and a mark in its place tells so as well as one before it.
     let overrun = usart().ucsr0a().read().dor0().bit_is_set();
-    let byte = usart().udr0().read().bits();
-    let mut queue = RECEIVED.borrow(cs).borrow_mut();
-    let gap = (overrun || GAP.borrow(cs).get()) && queue.enqueue(GAP_MARK).is_err();
-    GAP.borrow(cs).set(gap || queue.enqueue(byte).is_err());
+    let mut byte = usart().udr0().read().bits();
+    let kept = RECEIVED.push(|slot, room| {
+        if overrun || room == 1 {
+            count_lost();
+            byte = GAP_MARK;
+        }
+        RECEIVED_BYTES[slot].set(byte);
+    });
+    if !kept {
+        count_lost();
+    }
+}
+
+#[inline(always)]
+fn count_lost() {
+    LOST.set(LOST.get().wrapping_add(1));
 }
 
 // The line can take a byte.
 #[avr_device::interrupt(atmega328p)]
 fn USART_UDRE() {
-    // SAFETY: the chip turns interrupts off while a handler runs, and this one does not turn them on.
-    let cs = unsafe { CriticalSection::new() };
-    match TO_SEND.borrow(cs).borrow_mut().dequeue() {
+    match TO_SEND.take(|slot| TO_SEND_BYTES[slot].get()) {
         Some(byte) => usart().udr0().write(|w| w.set(byte)),
         None => usart().ucsr0b().modify(|_, w| w.udrie0().clear_bit()),
     };

@@ -4,7 +4,8 @@
 //! code runs for a pulse. OCR1A takes effect at the next bottom. To bring a command to the servo at once, the counter is
 //! put just below the top as soon as the line has been low for the gap that the servo needs. A running pulse is left alone.
 //!
-//! Timer1's 16-bit registers share a byte of temporary storage (16.3): no interrupt may touch them, and none does.
+//! Timer1's 16-bit registers share a byte of temporary storage (16.3): no interrupt may touch them, but one that never
+//! returns ([`take_over`]).
 
 use avr_device::{
     atmega328p::{PORTB, TC1},
@@ -13,6 +14,9 @@ use avr_device::{
 use control::servo::{self, Action, FRAME, HalfMicros};
 use core::convert::Infallible;
 use embedded_hal::pwm::{ErrorType, SetDutyCycle};
+
+/// So close to its end a frame ends by itself: 5 us, more than setting the counter takes from reading it.
+const TOO_LATE: HalfMicros = FRAME - 10;
 
 /// The servo's signal.
 pub struct Servo {
@@ -43,21 +47,38 @@ impl Servo {
         if width == self.width {
             return;
         }
-        // No interrupt may come between reading the counter and setting it: the frame could end in the meantime.
+        let since_rise = self.timer.tcnt1().read().bits();
+        let action = servo::action(since_rise, self.width, gap_ms);
+        if action == Action::Wait {
+            return;
+        }
+        // No interrupt may come between reading the counter and setting it. One that came before this may have let the frame
+        // end: the line then shows a new pulse, and the command waits for that one.
         let changed = interrupt::free(|_| {
-            let action = servo::action(self.timer.tcnt1().read().bits(), self.width, gap_ms);
-            if action != Action::Wait {
-                self.timer.ocr1a().write(|w| w.set(compare(width)));
+            let now = self.timer.tcnt1().read().bits();
+            if now < since_rise {
+                return false;
             }
-            if action == Action::Restart {
+            self.timer.ocr1a().write(|w| w.set(compare(width)));
+            if action == Action::Restart && now < TOO_LATE {
                 self.timer.tcnt1().write(|w| w.set(FRAME - 2));
             }
-            action != Action::Wait
+            true
         });
         if changed {
             self.width = width;
         }
     }
+}
+
+/// Shows pulses of `width` from the next frame on.
+///
+/// # Safety
+///
+/// To be called where the loop never goes on: it may stand between two halves of a register of Timer1.
+pub unsafe fn take_over(width: HalfMicros) {
+    // SAFETY: the caller vouches that nobody else uses the timer any more.
+    unsafe { (*TC1::ptr()).ocr1a().write(|w| w.set(compare(width))) };
 }
 
 /// OCR1A for a pulse of `width`: the pin is high from 0 up to and with the match.

@@ -17,7 +17,7 @@ const RESET_LATER: u8 = 0x0C;
 
 /// Switches the watchdog off in the start-up code, before SRAM is cleared and long before `main`.
 ///
-/// MCUSR is cleared first: while it tells of a watchdog reset, the watchdog cannot go off.
+/// MCUSR is cleared first: while it tells of a watchdog reset, the watchdog cannot go off. GPIOR2 keeps what it told.
 #[unsafe(naked)]
 #[unsafe(no_mangle)]
 // SAFETY: .init3 is run through, not called; the code falls into the next start-up section and changes r24 alone,
@@ -25,7 +25,9 @@ const RESET_LATER: u8 = 0x0C;
 #[unsafe(link_section = ".init3")]
 unsafe extern "C" fn switch_watchdog_off() {
     naked_asm!(
-        "out 0x34, r1",  // MCUSR
+        "in  r24, 0x34", // MCUSR
+        "out 0x2b, r24", // GPIOR2
+        "out 0x34, r1",
         "ldi r24, 0x18", // WDCE and WDE open the four cycles in which WDE may be cleared
         "wdr",
         "sts 0x60, r24", // WDTCSR
