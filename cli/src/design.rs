@@ -48,9 +48,12 @@ fn design(machine: &Machine, json: bool) -> Result<()> {
         println!("{:#}", json!({ "inputs": machine.inputs(), "figures": figures }));
         return Ok(());
     }
+    let (inputs, paper) = (machine.inputs(), Machine::default().inputs());
+    let differing = inputs.iter().zip(&paper).filter(|(input, paper)| input.value != paper.value).count();
+    println!("{differing} of the machine's {} values differ from the paper's machine.", inputs.len());
     println!("{}\n", report::design_table(&figures));
     let concerns = figures.iter().filter(|figure| figure.concern).count();
-    println!("{concerns} of {} figures ask for a change.", figures.len());
+    println!("{concerns} of {} figures ask for a change (!).", figures.len());
     Ok(())
 }
 

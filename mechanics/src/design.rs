@@ -60,7 +60,7 @@ pub struct Design {
     pub chain_reduction: f64,
     /// Teeth of the sprocket on the wheels' shaft, before rounding.
     pub exact_driven_teeth: f64,
-    /// The same, rounded, but at least one.
+    /// The same, rounded.
     pub driven_teeth: u32,
     /// Speed of the machine with these teeth, its engine at the rated speed.
     pub ground_speed: Velocity,
@@ -139,7 +139,7 @@ impl Design {
         let gear_box_speed = engine.speed / engine.gear_box_ratio;
         let chain_reduction = drive::chain_reduction(engine.speed, engine.gear_box_ratio, wheel_speed);
         let exact_driven_teeth = drive::driven_teeth(chain.drive_teeth, chain_reduction);
-        let driven_teeth = (exact_driven_teeth.round() as u32).max(1);
+        let driven_teeth = exact_driven_teeth.round() as u32;
         let wheel_speed_with_teeth = gear_box_speed * f64::from(chain.drive_teeth) / f64::from(driven_teeth);
         let centre_distance = drive::centre_distance(chain.pitch, chain.centre_distance_pitches, chain.sag);
         let exact_chain_links = drive::chain_links(chain.drive_teeth, driven_teeth, centre_distance, chain.pitch);

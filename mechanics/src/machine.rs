@@ -3,9 +3,11 @@
 //! One table below declares every input once: its section and key in a machine file, its kind, the paper's value, the
 //! range and what it is. The structures, their defaults, the check of the ranges and the commented file come from it.
 
+use crate::figure::digits;
 use crate::unit::{
     COUNT, DEGREE, FACTOR, HP, KG, KG_CM, KM_H, KPA, MM, MPA, PERCENT, RPM, SECOND, Unit, Written, read,
 };
+use crate::{drive, tool};
 use serde::{Deserialize, Serialize};
 use std::fmt::Write;
 use thiserror::Error;
@@ -79,7 +81,26 @@ pub enum MachineError {
         /// Outer diameter.
         outer_mm: f64,
     },
+    /// No sprocket makes the wheels turn as fast as they have to.
+    #[error(
+        "engine.gear_box_ratio is {ratio}: the driven sprocket would need {} teeth and can have 1 to {MOST_TEETH}; \
+         at these speeds a ratio near {} makes it {USUAL_TEETH} teeth",
+        digits(*.teeth),
+        digits(.ratio * .teeth / f64::from(USUAL_TEETH))
+    )]
+    NoSprocket {
+        /// Ratio of the gear box.
+        ratio: f64,
+        /// Teeth that the speeds ask for.
+        teeth: f64,
+    },
 }
+
+/// Teeth of the largest sprocket that is taken for one.
+const MOST_TEETH: u32 = 1000;
+
+/// Teeth of a driven sprocket as there are many.
+const USUAL_TEETH: u32 = 40;
 
 impl MachineError {
     /// Section and key of the value that is to be changed first.
@@ -88,6 +109,7 @@ impl MachineError {
             Self::OutOfRange(input) => (input.section, input.key),
             Self::NoRoomForSweep { .. } => ("crop", "row_spacing"),
             Self::NoRim { .. } => ("wheel", "inner_diameter"),
+            Self::NoSprocket { .. } => ("engine", "gear_box_ratio"),
         }
     }
 }
@@ -264,8 +286,8 @@ impl Machine {
         if let Some(input) = self.inputs().into_iter().find(|input| !input.is_in_range()) {
             return Err(MachineError::OutOfRange(input));
         }
-        let failure_zone = crate::tool::failure_zone(self.crop.row_spacing, self.crop.protection_zone);
-        let sweep = crate::tool::sweep_width(failure_zone, self.soil.depth, self.soil.internal_friction);
+        let failure_zone = tool::failure_zone(self.crop.row_spacing, self.crop.protection_zone);
+        let sweep = tool::sweep_width(failure_zone, self.soil.depth, self.soil.internal_friction);
         if MM.value(sweep) <= 0.0 {
             return Err(MachineError::NoRoomForSweep {
                 failure_zone_mm: MM.value(failure_zone),
@@ -275,6 +297,13 @@ impl Machine {
         let (inner_mm, outer_mm) = (MM.value(self.wheel.inner_diameter), MM.value(self.wheel.diameter));
         if inner_mm >= outer_mm {
             return Err(MachineError::NoRim { inner_mm, outer_mm });
+        }
+        let ratio = self.engine.gear_box_ratio;
+        let wheel_speed = drive::wheel_speed(self.weeder.speed, self.wheel.diameter);
+        let reduction = drive::chain_reduction(self.engine.speed, ratio, wheel_speed);
+        let teeth = drive::driven_teeth(self.chain.drive_teeth, reduction);
+        if !(1.0..=f64::from(MOST_TEETH)).contains(&teeth) {
+            return Err(MachineError::NoSprocket { ratio, teeth });
         }
         Ok(())
     }

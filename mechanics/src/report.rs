@@ -15,9 +15,9 @@ impl Display for Verdict {
     }
 }
 
-/// Every figure with its equation and its sense.
+/// Every figure with its equation and its sense, and a `!` where the machine should be changed.
 pub fn design_table(figures: &[Figure]) -> Table {
-    let mut table = table(&["", "equation", "it gives", "", "which means"]);
+    let mut table = table(&["quantity", "equation", "it gives", "unit", "", "which means"]);
     for figure in figures {
         let sense = Cell::new(&figure.sense);
         table.add_row([
@@ -25,6 +25,7 @@ pub fn design_table(figures: &[Figure]) -> Table {
             Cell::new(figure.equation),
             Cell::new(digits(figure.value)),
             Cell::new(figure.unit),
+            Cell::new(if figure.concern { "!" } else { "" }),
             if figure.concern { sense.fg(Color::Red).add_attribute(Attribute::Bold) } else { sense },
         ]);
     }
@@ -35,11 +36,11 @@ pub fn design_table(figures: &[Figure]) -> Table {
 /// The paper's figures beside ours, and beside those of a machine of one's own, if there is one.
 pub fn comparison_table(comparisons: &[Comparison]) -> Table {
     let own = comparisons.iter().any(|comparison| comparison.own.is_some());
-    let mut header = vec!["", "equation", "printed", "from the\nprinted inputs", "calculated\nall through"];
+    let mut header = vec!["quantity", "equation", "printed", "from the\nprinted inputs", "calculated\nall through"];
     if own {
         header.push("your\nmachine");
     }
-    header.extend(["", "verdict", "remark"]);
+    header.extend(["unit", "verdict", "remark"]);
     let mut table = table(&header);
     for comparison in comparisons {
         let number = |value| Cell::new(digits_beside(value, comparison.decimals));

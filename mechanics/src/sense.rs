@@ -9,10 +9,11 @@ use crate::unit::{
     WATT,
 };
 use crate::{tool, unit};
+use std::ops::RangeInclusive;
 use uom::si::f64::{Force, Length, Ratio};
 
-/// Teeth below which a sprocket wears its chain out quickly.
-const FEWEST_TEETH: u32 = 9;
+/// Teeth of a good sprocket: fewer wear the chain out quickly, on more a worn chain climbs.
+const GOOD_TEETH: RangeInclusive<u32> = 9..=120;
 
 /// Share by which the speed may miss the wanted one before it is worth a word.
 const SPEED_TOLERANCE: f64 = 0.05;
@@ -71,12 +72,13 @@ impl Design {
 
     fn traction(&self, machine: &Machine) -> Vec<Figure> {
         let numeric = f64::from(self.wheel_numeric);
+        let load = written(self.wheel_load, NEWTON);
         let ground = match numeric {
             ..SOFT_WHEEL_NUMERIC => {
-                concern("soft ground under this load: the wheels sink in; take wider or larger ones".into())
+                concern(format!("under {load} the wheels sink in as on soft soil: take wider ones"))
             }
-            ..TILLED_WHEEL_NUMERIC => fine("the wheels run as on tilled soil".into()),
-            _ => fine("the wheels run as on firm soil".into()),
+            ..TILLED_WHEEL_NUMERIC => fine(format!("under {load} each, the wheels run as on tilled soil")),
+            _ => fine(format!("under {load} each, the wheels run as on firm soil")),
         };
         let soil_part = (self.rolling_resistance_coefficient - Ratio::from(0.04)) / self.rolling_resistance_coefficient;
         let part = |force: Force| fine(format!("{} of the tractive force", percent(force / self.tractive_force)));
@@ -260,8 +262,10 @@ impl Design {
         let speed = written(self.ground_speed, KM_H);
         let miss = f64::from(self.ground_speed / machine.weeder.speed) - 1.0;
         let teeth = self.driven_teeth;
-        let teeth_sense = if teeth < FEWEST_TEETH {
-            concern(format!("{teeth} teeth are too few for a chain: take a larger gear box ratio"))
+        let teeth_sense = if teeth < *GOOD_TEETH.start() {
+            concern(format!("{teeth} teeth are too few for a chain: take a smaller gear box ratio"))
+        } else if teeth > *GOOD_TEETH.end() {
+            concern(format!("{teeth} teeth are too many for a chain: take a larger gear box ratio"))
         } else if miss.abs() > SPEED_TOLERANCE {
             concern(format!("{teeth} teeth give {speed}, {:+.0} % off: take more drive teeth", miss * 100.0))
         } else {

@@ -16,11 +16,11 @@ pub fn section_modulus(diameter: Length) -> Volume {
 
 /// Bending stress in a round rod, Eq. 15 and 16.
 pub fn bending_stress(moment: Torque, diameter: Length) -> Pressure {
-    (moment / section_modulus(diameter)).into()
+    moment / section_modulus(diameter)
 }
 
 /// Diameter of the round rod in which a moment makes no more than a stress: Eq. 15 and 16 the other way round.
 pub fn diameter(moment: Torque, stress: Pressure) -> Length {
-    let section_modulus: Volume = (moment / stress).into();
+    let section_modulus: Volume = moment / stress;
     (section_modulus * (32.0 / PI)).cbrt()
 }

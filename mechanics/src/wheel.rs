@@ -17,5 +17,5 @@ pub fn torque(tractive_force: Force, outer_diameter: Length) -> Torque {
 pub fn shear_stress(torque: Torque, outer_diameter: Length, inner_diameter: Length) -> Pressure {
     let fourth_power = |length: Length| length * length * length * length;
     let polar_moment = (fourth_power(outer_diameter) - fourth_power(inner_diameter)) * (PI / 32.0);
-    (torque * (outer_diameter / 2.0) / polar_moment).into()
+    torque * (outer_diameter / 2.0) / polar_moment
 }
