@@ -15,7 +15,7 @@ use toml::de::{DeTable, DeValue};
 #[derive(Debug, Error)]
 pub enum FileError {
     /// The file cannot be read.
-    #[error("{}: {source}", path.display())]
+    #[error("{} cannot be read", path.display())]
     Unreadable {
         /// The file.
         path: PathBuf,
@@ -168,7 +168,7 @@ mod tests {
     #[test]
     fn a_number_without_its_unit_is_refused() {
         assert_refused("[wheel]\ndiameter = 400", 2, "wheel.diameter: 400 is not a length: write a number and mm");
-        assert_refused("[engine]\nsafety_factor = \"2 N\"", 2, "write a plain number, without quotes and unit");
+        assert_refused("[engine]\nsafety_factor = \"2 N\"", 2, "write one without quotes and unit");
         assert_refused("[chain]\ndrive_teeth = 14.5", 2, "14.5 is not a whole number");
         assert_refused("[inter_row]\ntools = -1", 2, "-1 is not a whole number from 0");
     }

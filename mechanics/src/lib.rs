@@ -1,7 +1,7 @@
 //! The design calculations of an intra-row weeder, for anyone's machine: what its engine, servo, shanks, chain, wheels
 //! and handle have to be like, and whether those that it has are enough.
 //!
-//! The data's way: a [`machine::Machine`], the paper's or one from a [`file`], is checked against its ranges and becomes
+//! The data's way: a [`machine::Machine`], the paper's or one from a [`mod@file`], is checked against its ranges and becomes
 //! a [`design::Design`] by the equations of [`traction`], [`tool`], [`shank`], [`drive`], [`mod@wheel`], [`handle`] and
 //! [`capacity`]; [`sense`] says what it means, and [`report`] shows it. [`paper`] holds the paper's printed figures beside
 //! ours. All quantities are those of `uom`, in f64.

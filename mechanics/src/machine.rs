@@ -64,11 +64,12 @@ pub enum MachineError {
     OutOfRange(Input),
     /// The crop's protection zones and the soil that breaks beside a sweep take all of the row spacing.
     #[error(
-        "crop.row_spacing leaves no room for a sweep: between the protection zones the soil breaks over {failure_zone_mm:.0} mm, \
-         of which {beside_mm:.0} mm lie beside the sweep; widen crop.row_spacing, or lessen crop.protection_zone or soil.depth"
+        "crop.row_spacing leaves no room for a sweep: the protection zones leave {:.0} mm, and soil breaks over {beside_mm:.0} mm \
+         beside a sweep; widen crop.row_spacing, or lessen crop.protection_zone or soil.depth",
+        .failure_zone_mm.max(0.0)
     )]
     NoRoomForSweep {
-        /// Eq. 11.
+        /// Eq. 11; negative where the protection zones overlap.
         failure_zone_mm: f64,
         /// The second term of Eq. 12.
         beside_mm: f64,

@@ -137,7 +137,10 @@ impl Design {
         let ratio = f64::from(machine.engine.power / self.engine_power);
         let given = written(machine.engine.power, HP);
         if ratio < 1.0 {
-            concern(format!("the engine's {given} are only {} of that: too small", percent(ratio.into())))
+            concern(format!(
+                "the engine's {given} are only {} of that: too small",
+                written(ratio.into(), unit::PERCENT)
+            ))
         } else if ratio >= ENGINE_EXCESS {
             concern(format!("the engine's {given} are {ratio:.2} times that: too large"))
         } else {
@@ -149,7 +152,11 @@ impl Design {
         let servo = machine.intra_row.servo_torque;
         let ratio = f64::from(servo / self.servo_torque);
         let servo_sense = if ratio < 1.0 {
-            concern(format!("the servo's {} are {} of that: too weak", written(servo, KG_CM), percent(ratio.into())))
+            concern(format!(
+                "the servo's {} are {} of that: too weak",
+                written(servo, KG_CM),
+                written(ratio.into(), unit::PERCENT)
+            ))
         } else {
             fine(format!("the servo's {} are {ratio:.2} times that: strong enough", written(servo, KG_CM)))
         };

@@ -181,7 +181,7 @@ pub struct WrittenError {
 impl WrittenError {
     fn new<Q: Written>(written: impl Display) -> Self {
         let right = match Q::UNITS {
-            _ if Q::is_plain() => format!("{}, without quotes and unit", Q::KIND),
+            _ if Q::is_plain() => "one without quotes and unit".to_owned(),
             [only] => format!("a number and {}, in quotes", only.name),
             [first @ .., last] => {
                 let first: Vec<_> = first.iter().map(|unit| unit.name).collect();
@@ -193,7 +193,7 @@ impl WrittenError {
     }
 }
 
-/// Reads a number and a unit. Spaces between them, and within the unit, do not matter.
+/// Reads a number and a unit. Spaces between them, and spaces and dots within the unit, do not matter.
 ///
 /// # Errors
 /// Where there is no number, or the unit is missing or of another kind of quantity; it says which units there are.
@@ -207,7 +207,7 @@ pub fn parse<Q: Written>(text: &str) -> Result<Q, WrittenError> {
 }
 
 fn closed_up(name: &str) -> String {
-    name.split_whitespace().collect()
+    name.chars().filter(|c| !c.is_whitespace() && *c != '·').collect()
 }
 
 /// Reads a quantity as a string with its unit, and a plain number as such; for serde's `deserialize_with`.
@@ -258,7 +258,9 @@ mod tests {
     #[test]
     fn torque_is_read_as_servo_makers_write_it() {
         assert_relative_eq!(NEWTON_METRE.value(parse("60 kg cm").unwrap()), 5.884, epsilon = 1e-3);
-        assert_relative_eq!(KG_CM.value(parse("5.884 Nm").unwrap()), 60.0, epsilon = 1e-2);
+        for text in ["5.884 N m", "5.884 Nm", "5.884 N·m"] {
+            assert_relative_eq!(KG_CM.value(parse(text).unwrap()), 60.0, epsilon = 1e-2);
+        }
     }
 
     #[test]

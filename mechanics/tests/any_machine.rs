@@ -86,7 +86,7 @@ proptest! {
     #[test]
     fn a_chain_is_even_and_less_than_two_links_longer_than_it_has_to_be(links in 1.0..5000.0) {
         let even = drive::even_links(links);
-        prop_assert!(even % 2 == 0 && f64::from(even) >= links && f64::from(even) - links < 2.0);
+        prop_assert!(even.is_multiple_of(2) && f64::from(even) >= links && f64::from(even) - links < 2.0);
     }
 
     #[test]
