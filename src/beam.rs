@@ -19,7 +19,7 @@ use avr_device::atmega328p::{EXINT, PORTB, portb};
 pub type Edge = (i32, bool);
 
 /// Edges that can wait for the loop, which a sensor with a response of 1 ms cannot make in less than 16 ms.
-const SLOTS: usize = 16;
+pub const SLOTS: usize = 16;
 
 /// Edges that wait for the loop: twice the count, and 1 where the beam is clear.
 static EDGES: Ring<SLOTS> = Ring::new();

@@ -55,6 +55,7 @@ fn main() -> ! {
     let mut serial = serial::Serial::new(peripherals.USART0);
     // SAFETY: every interrupt's peripheral is set up, and no critical section is open.
     unsafe { interrupt::enable() };
+    watchdog::start();
 
     let mut stack = stack::Stack::new();
     let mut read = move || {
@@ -71,12 +72,12 @@ fn main() -> ! {
 
     let mut line = LineBuffer::new();
     let mut answer = Answer::Greeting;
-    watchdog::start();
     loop {
         watchdog::feed();
         // The readings come first: an edge that is still in the queue is then never farther than the next readings.
         let readings = read();
-        while let Some((position, broken)) = beam.next_edge() {
+        // No more edges than can wait: those that keep coming must not keep the loop from turning.
+        for (position, broken) in core::iter::from_fn(|| beam.next_edge()).take(beam::SLOTS) {
             controller.beam_edge(Position::new(position), broken);
         }
         if beam.take_lost() {

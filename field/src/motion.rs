@@ -171,6 +171,15 @@ impl Motion {
             .map_or(0.0, |piece| piece.speed_mm_s + piece.acceleration_mm_s2 * (time_s - piece.start_s))
     }
 
+    /// The highest speed, forward or back.
+    pub fn top_speed_mm_s(&self) -> f64 {
+        let ends = self.pieces.iter().flat_map(|piece| {
+            let end_speed = piece.speed_mm_s + piece.acceleration_mm_s2 * (piece.end_s - piece.start_s);
+            [piece.speed_mm_s.abs(), end_speed.abs()]
+        });
+        ends.fold(0.0, f64::max)
+    }
+
     /// The stretch that the machine rolled over during a time.
     pub fn stretch_mm(&self, times_s: &Range<f64>) -> Range<f64> {
         let turns = self.pieces.iter().filter(|piece| times_s.contains(&piece.start_s)).map(|piece| piece.start_mm);

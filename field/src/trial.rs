@@ -99,7 +99,8 @@ const SWITCH_MS: u64 = 100;
 /// Time between the start and the first movement, and between the last one and the final question.
 const STILL_MS: u64 = 50;
 
-/// The top speed that a machine is set to where its beam stands far enough ahead, 10.8 km/h: the firmware's greatest.
+/// The highest top speed that the firmware takes, 10.8 km/h. A machine is set to a quarter more than it drives, as far as its
+/// beam stands ahead for that.
 const TOP_SPEED_MM_S: f64 = 3000.0;
 
 /// Simulated time between two reports of progress.
@@ -150,9 +151,7 @@ impl Trial {
     pub fn run(&self, elf: &Path, mut progress: impl FnMut(f64)) -> Result<Outcome, TrialError> {
         let mut inputs = vec![self.machine.beam_before(&self.row, &self.motion)];
         let mut uno = boot(elf, &inputs)?;
-        for (name, value) in self.settings() {
-            ask(&mut uno, &format!("set {name} {value}"))?;
-        }
+        self.set_up(&mut uno)?;
         match self.start {
             Start::Command => {
                 ask(&mut uno, "start")?;
@@ -199,13 +198,25 @@ impl Trial {
         })
     }
 
+    /// Tells the firmware what it has to know of machine and timing, by its settings.
+    ///
+    /// # Errors
+    /// Where it refuses one of them, or does not answer.
+    pub fn set_up(&self, uno: &mut Uno) -> Result<(), ConsoleError> {
+        for (name, value) in self.settings() {
+            ask(uno, &format!("set {name} {value}"))?;
+        }
+        Ok(())
+    }
+
     /// The settings by which the firmware knows machine and timing, in an order in which none contradicts the others.
     fn settings(&self) -> [(&'static str, u32); 10] {
         let Machine { wheel_mm, ticks_per_rev, beam_to_tool_mm, servo, .. } = self.machine;
         let notice_mm = beam_to_tool_mm - f64::from(self.timing.margin_mm) - 2.0;
         // As the firmware counts: the lead, an eighth of it, and what the sensor may take.
         let notice_s = f64::from(self.timing.lead_out_ms) * 1.125e-3 + 0.002;
-        let top_speed_mm_s = (notice_mm / notice_s).clamp(100.0, TOP_SPEED_MM_S).floor();
+        let wanted_mm_s = (1.25 * self.motion.top_speed_mm_s()).max(100.0);
+        let top_speed_mm_s = wanted_mm_s.min(notice_mm / notice_s).min(TOP_SPEED_MM_S).floor();
         [
             ("top_speed_mm_s", 100),
             ("ticks_per_rev", ticks_per_rev),

@@ -10,8 +10,12 @@ use field::signal::{CYCLES_PER_SECOND, Pin, PinChange};
 use field::trial::{Start, Trial};
 use field::uno::Uno;
 
-/// What the LED's code is parted by: longer than the quarter of a second within a code.
-const PAUSE_CYCLES: u64 = CYCLES_PER_SECOND / 2;
+/// A flash and the dark behind it, within a digit.
+const FLASH_CYCLES: u64 = CYCLES_PER_SECOND * 524 / 1000;
+
+/// From a digit's last flash to the next digit's first, and to the next code's.
+const GAP_CYCLES: u64 = 2 * FLASH_CYCLES;
+const PAUSE_CYCLES: u64 = 4 * FLASH_CYCLES;
 
 /// A run in which the beam is broken for 600 mm, more than any plant covers, while the tool is far behind in the row.
 fn with_a_blocked_beam(start: Start) -> Run {
@@ -38,34 +42,36 @@ fn assert_alarm(run: &mut Run, name: &str, code: i64) {
     assert_eq!(said, ["alarm", name, "out"], "{status}");
 }
 
-/// The codes that the LED blinks during some seconds, the first and the last one, which may be cut, left out.
-fn blinked_codes(uno: &mut Uno) -> Vec<usize> {
+/// The codes that the LED blinks during some seconds, as their digits; the first and the last code, which may be cut, left
+/// out.
+fn blinked_codes(uno: &mut Uno) -> Vec<Vec<usize>> {
     let begin = uno.cycle();
-    run_for_ms(uno, 10_000);
+    run_for_ms(uno, 16_000);
     let flashes: Vec<u64> = uno
         .changes()
         .iter()
         .filter(|change| change.pin == Pin::Led && change.high && change.cycle > begin)
         .map(|change| change.cycle)
         .collect();
-    // A flash and the dark behind it take half a second; the pause comes on top.
-    let codes = flashes.chunk_by(|one, next| next - one < CYCLES_PER_SECOND * 6 / 10 + PAUSE_CYCLES / 10);
-    let mut codes: Vec<usize> = codes.map(<[u64]>::len).collect();
+    let parted_by = |cycles: u64| move |one: &u64, next: &u64| next - one < cycles - FLASH_CYCLES / 4;
+    let codes = flashes.chunk_by(parted_by(PAUSE_CYCLES));
+    let mut codes: Vec<Vec<usize>> =
+        codes.map(|code| code.chunk_by(parted_by(GAP_CYCLES)).map(<[u64]>::len).collect()).collect();
     codes.pop();
     codes.drain(..1);
     codes
 }
 
 #[track_caller]
-fn assert_blinks(uno: &mut Uno, code: usize) {
+fn assert_blinks(uno: &mut Uno, code: [usize; 2]) {
     let codes = blinked_codes(uno);
-    assert!(!codes.is_empty() && codes.iter().all(|&blinked| blinked == code), "{codes:?}");
+    assert!(!codes.is_empty() && codes.iter().all(|blinked| *blinked == code), "{codes:?}");
 }
 
 #[test]
 fn a_beam_that_stays_broken_is_an_alarm_that_puts_the_tool_out() {
     let mut run = with_a_blocked_beam(Start::Now);
-    assert_alarm(&mut run, "beam_blocked", 1);
+    assert_alarm(&mut run, "beam_blocked", 11);
     let command = run.commands().pop().expect("a command");
     let place_mm = run.place_mm(command.rise_cycle);
     assert!(command.is_out() && (1395.0..1410.0).contains(&place_mm), "{place_mm} mm");
@@ -87,8 +93,8 @@ fn more_plants_than_the_schedule_holds_are_an_alarm() {
     let machine = Machine { beam_to_tool_mm: 2000.0, ..Machine::default() };
     let mut run = Run::begin(Trial { machine, ..trial(row, steady(mm_s(2.5), 2300.0)) }, &["set merge_gap_ticks 5"]);
     run.roll_to_the_end();
-    assert_alarm(&mut run, "schedule_full", 2);
-    assert_blinks(&mut run.uno, 2);
+    assert_alarm(&mut run, "schedule_full", 33);
+    assert_blinks(&mut run.uno, [3, 3]);
 }
 
 #[test]
@@ -99,8 +105,8 @@ fn a_beam_that_flickers_faster_than_it_can_be_followed_is_an_alarm() {
     let begin = run.uno.cycle();
     run.uno.drive((0..400).map(|edge| PinChange { cycle: begin + edge * 160, pin: Pin::Beam, high: edge % 2 == 1 }));
     run.roll_to_the_end();
-    assert_alarm(&mut run, "beam_edges_lost", 3);
-    assert_blinks(&mut run.uno, 3);
+    assert_alarm(&mut run, "beam_edges_lost", 13);
+    assert_blinks(&mut run.uno, [1, 3]);
 }
 
 #[test]
@@ -113,7 +119,7 @@ fn an_alarm_refuses_to_start_and_blinks_its_code_until_it_is_cleared() {
     }
     ask(&mut run.uno, "hold");
     assert_eq!(value(&status(&mut run.uno), "state"), "alarm");
-    assert_blinks(&mut run.uno, 1);
+    assert_blinks(&mut run.uno, [1, 1]);
     assert!(is_out_at_the_pin(&run.uno));
 
     ask(&mut run.uno, "clear");

@@ -168,10 +168,7 @@ impl Run {
     pub fn begin(trial: Trial, commands: &[&str]) -> Self {
         let mut uno =
             trial::boot(&elf(), &[trial.machine.beam_before(&trial.row, &trial.motion)]).expect("it wakes up");
-        let Machine { wheel_mm, ticks_per_rev, beam_to_tool_mm, .. } = trial.machine;
-        ask(&mut uno, &format!("set wheel_mm {wheel_mm}"));
-        ask(&mut uno, &format!("set ticks_per_rev {ticks_per_rev}"));
-        ask(&mut uno, &format!("set beam_to_tool_mm {beam_to_tool_mm}"));
+        trial.set_up(&mut uno).expect("the firmware takes the trial's settings");
         ask(&mut uno, "events on");
         for command in commands {
             ask(&mut uno, command);

@@ -1,6 +1,6 @@
 //! The console's grammar, as it comes over the serial line.
 
-use crate::common::{exchange, refusal, run_for_ms, value, woken_up};
+use crate::common::{exchange, refusal, run_for_ms, status, value, woken_up};
 use control::console::Word;
 use control::settings::Setting;
 use field::uno::Uno;
@@ -25,7 +25,7 @@ fn every_command_is_answered_by_its_lines_and_one_ok() {
         ("help", Word::COUNT),
         ("help wheel_mm", 1),
         ("version", 1),
-        ("status", 1),
+        ("status", 2),
         ("get", Setting::COUNT),
         ("get wheel_mm", 1),
         ("set wheel_mm 405", 0),
@@ -33,6 +33,7 @@ fn every_command_is_answered_by_its_lines_and_one_ok() {
         ("hold", 0),
         ("start now", 0),
         ("hold", 0),
+        ("save", 0),
         ("clear", 0),
         ("events on", 0),
         ("events off", 0),
@@ -47,7 +48,13 @@ fn the_firmware_names_itself_and_its_state_when_it_wakes_up() {
     let mut uno = Uno::boot(&crate::common::elf()).expect("the firmware can be run");
     run_for_ms(&mut uno, 300);
     let greeting = uno.received();
-    assert!(greeting.starts_with("weeder ") && greeting.contains("hold") && greeting.contains("help"), "{greeting:?}");
+    assert!(
+        greeting.starts_with("weeder ")
+            && greeting.contains("power_on")
+            && greeting.contains("settings_lost")
+            && greeting.contains("help"),
+        "{greeting:?}"
+    );
     assert_eq!(greeting.lines().count(), 1, "{greeting:?}");
     let version = exchange(&mut uno, b"version\n");
     assert_eq!(version[0], format!("weeder {}", env!("CARGO_PKG_VERSION")));
@@ -56,7 +63,7 @@ fn the_firmware_names_itself_and_its_state_when_it_wakes_up() {
 #[test]
 fn the_status_has_every_figure() {
     let mut uno = woken_up();
-    let status = &exchange(&mut uno, b"status\n")[0];
+    let status = &status(&mut uno);
     for (key, expected) in [
         ("state", "hold"),
         ("tool", "out"),
@@ -65,7 +72,11 @@ fn the_status_has_every_figure() {
         ("windows", "0"),
         ("lost", "0"),
         ("unseen_mm", "400"),
+        ("jumps", "0"),
+        ("late", "0"),
         ("missed", "0"),
+        ("mistakes", "0"),
+        ("reset", "power_on"),
     ] {
         assert_eq!(value(status, key), expected, "{status}");
     }
@@ -178,7 +189,7 @@ fn every_line_ends_with_carriage_return_and_line_feed_and_is_plain_text() {
     run_for_ms(&mut uno, 400);
     let text = uno.received();
     let lines: Vec<&str> = text.split_terminator("\r\n").collect();
-    assert_eq!(lines.len(), usize::from(Word::COUNT + Setting::COUNT) + 5);
+    assert_eq!(lines.len(), usize::from(Word::COUNT + Setting::COUNT) + 6);
     for line in lines {
         assert!(!line.is_empty() && line.bytes().all(|byte| matches!(byte, b' '..=b'~')), "{line:?}");
     }

@@ -52,8 +52,9 @@ fn with_the_beam_2000_mm_ahead_four_plants_wait_in_the_schedule() {
 #[test]
 fn a_beam_too_near_for_the_speed_keeps_the_tool_out() {
     // 180 ms are 125 mm at 2.5 km/h: a plant just behind the beam could not be left in time.
-    let run = run_with_beam_at(120.0, 2.5);
+    let mut run = run_with_beam_at(120.0, 2.5);
     assert_all_kept(&run.judgement());
+    assert!(run.events("alarm")[0].starts_with("alarm name=too_fast code=31 "), "{:?}", run.lines());
     let cycles = run.cycles();
     let swings = run.commands().into_iter().filter(|command| cycles.contains(&command.rise_cycle));
     assert_eq!(swings.collect::<Vec<_>>(), []);

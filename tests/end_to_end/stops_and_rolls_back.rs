@@ -30,7 +30,7 @@ fn assert_unharmed_and_counted_once(run: &mut Run) -> Judgement {
     let counted = run.events("plant").len() + run.events("unknown").len();
     assert_eq!(counted, PLACES_MM.len(), "{:#?}", run.lines());
     let lines = run.lines();
-    let status = lines.iter().rev().find(|line| line.starts_with("state=")).expect("a status");
+    let status = lines.iter().rev().find(|line| line.starts_with("lost=")).expect("a status");
     assert_eq!((number(status, "lost"), number(status, "missed")), (0, 0), "{status}");
     judgement
 }
