@@ -2,7 +2,7 @@
 //!
 //! It calculates only. What the results mean is said in [`crate::sense`].
 
-use crate::machine::{Handle, Machine, MachineError};
+use crate::machine::{Handle, Machine, MachineError, Wheel};
 use crate::unit::AreaRate;
 use crate::{capacity, drive, handle, shank, tool, traction, wheel};
 use uom::si::f64::{Angle, AngularVelocity, Force, Length, Power, Pressure, Ratio, Torque, Velocity};
@@ -72,8 +72,10 @@ pub struct Design {
     pub chain_links: u32,
     /// Length of the chain, Eq. 19.
     pub chain_length: Length,
-    /// Thickness of the wheel's rim, below Eq. 20.
+    /// Thickness of the wheel's rim.
     pub rim_thickness: Length,
+    /// Thickness that it needs at least, below Eq. 20.
+    pub least_rim_thickness: Length,
     /// Torque on a wheel that gives all of the tractive force, below Eq. 20.
     pub wheel_torque: Torque,
     /// Shear stress in the rim, Eq. 20.
@@ -110,7 +112,7 @@ impl Design {
 
         let weight = traction::weight(weeder.mass);
         let wheel_load = weight / f64::from(machine.wheel.number);
-        let (wheel_diameter, inner_diameter) = (machine.wheel.diameter, machine.wheel.inner_diameter);
+        let Wheel { diameter: wheel_diameter, rim_thickness, .. } = machine.wheel;
         let wheel_numeric = traction::wheel_numeric(soil.cone_index, machine.wheel.width, wheel_diameter, wheel_load);
         let rolling_resistance_coefficient = traction::rolling_resistance_coefficient(wheel_numeric);
         let rolling_resistance = traction::rolling_resistance(rolling_resistance_coefficient, weight);
@@ -145,6 +147,7 @@ impl Design {
         let exact_chain_links = drive::chain_links(chain.drive_teeth, driven_teeth, centre_distance, chain.pitch);
         let chain_links = drive::even_links(exact_chain_links);
 
+        let inner_diameter = wheel::inner_diameter(wheel_diameter, rim_thickness);
         let wheel_torque = wheel::torque(tractive_force, wheel_diameter);
         let theoretical_capacity = capacity::theoretical(weeder.speed, weeder.working_width);
         let Handle { elbow_height, operator_distance } = machine.handle;
@@ -181,7 +184,8 @@ impl Design {
             exact_chain_links,
             chain_links,
             chain_length: drive::chain_length(chain_links, chain.pitch),
-            rim_thickness: wheel::thickness(wheel_diameter, inner_diameter),
+            rim_thickness,
+            least_rim_thickness: wheel::least_thickness(wheel_torque, wheel_diameter, machine.wheel.shear_strength),
             wheel_torque,
             shear_stress: wheel::shear_stress(wheel_torque, wheel_diameter, inner_diameter),
             handle_angle: handle::angle(elbow_height, operator_distance),

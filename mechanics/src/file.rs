@@ -66,8 +66,9 @@ fn parse(text: &str) -> Result<Machine, Mistake> {
 fn unreadable(text: &str, error: &toml::de::Error) -> Mistake {
     let Some(span) = error.span() else { return Mistake { line: None, message: error.message().to_owned() } };
     let mut message = String::new();
-    // The entry within a section comes after the section's own, which spans it.
-    let entry = entries(text).into_iter().rfind(|entry| (entry.start..entry.end).contains(&span.start));
+    // A section may span its entries, and others' too where its keys are scattered.
+    let around = entries(text).into_iter().filter(|entry| (entry.start..entry.end).contains(&span.start));
+    let entry = around.min_by_key(|entry| entry.end - entry.start);
     if let Some(entry) = entry {
         let dotted = entry.key.as_ref().map(|key| format!(".{key}")).unwrap_or_default();
         // Writing to a String cannot fail.
@@ -166,6 +167,12 @@ mod tests {
     }
 
     #[test]
+    fn a_mistake_between_the_keys_of_another_section_is_found() {
+        let scattered = "wheel.width = \"35 mm\"\nsoil.depth = \"2 kg\"\nwheel.diameter = \"400 mm\"";
+        assert_refused(scattered, 2, "soil.depth: \"2 kg\" is not a length");
+    }
+
+    #[test]
     fn a_number_without_its_unit_is_refused() {
         assert_refused("[wheel]\ndiameter = 400", 2, "wheel.diameter: 400 is not a length: write a number and mm");
         assert_refused("[engine]\nsafety_factor = \"2 N\"", 2, "write one without quotes and unit");
@@ -188,7 +195,8 @@ mod tests {
     #[test]
     fn values_that_do_not_go_together_are_refused() {
         assert_refused("[crop]\nrow_spacing = \"100 mm\"", 2, "leaves no room for a sweep");
-        assert_refused("[wheel]\ninner_diameter = \"450 mm\"", 2, "it has to be less than wheel.diameter, 400.0 mm");
+        let thick = "[wheel]\ndiameter = \"80 mm\"\nrim_thickness = \"40 mm\"";
+        assert_refused(thick, 3, "it has to be less than half of wheel.diameter, 80 mm");
         assert_eq!(parse("[crop]\nprotection_zone = \"140 mm\"").unwrap_err().line, None);
     }
 

@@ -1,13 +1,13 @@
 //! The design calculations of an intra-row weeder, for anyone's machine: what its engine, servo, shanks, chain, wheels
 //! and handle have to be like, and whether those that it has are enough.
 //!
-//! The data's way: a [`machine::Machine`], the paper's or one from a [`mod@file`], is checked against its ranges and becomes
-//! a [`design::Design`] by the equations of [`traction`], [`tool`], [`shank`], [`drive`], [`mod@wheel`], [`handle`] and
-//! [`capacity`]; [`sense`] says what it means, and [`report`] shows it. [`paper`] holds the paper's printed figures beside
-//! ours. All quantities are those of `uom`, in f64.
+//! The data's way: a [`machine::Machine`], the paper's or one from a [`mod@file`], is checked against its ranges and
+//! becomes a [`design::Design`] by the equations of [`traction`], [`tool`], [`shank`], [`drive`], [`mod@wheel`],
+//! [`handle`] and [`capacity`]; [`sense`] says what it means, and [`report`] shows it. [`paper`] holds the paper's
+//! printed figures beside ours. All quantities are those of `uom`, in f64.
 //!
-//! The equations are the paper's, Eq. 4 to 21, 24 and 25. They are a first dimensioning: they know nothing of fatigue, of
-//! slopes, or of how the soil changes with speed.
+//! The equations are the paper's, Eq. 4 to 21, 24 and 25. They are a first dimensioning: they know nothing of fatigue,
+//! of slopes, or of how the soil changes with speed.
 //!
 //! ```
 //! use mechanics::{design::Design, machine::Machine, unit::{KG, NEWTON}};

@@ -64,8 +64,8 @@ pub enum MachineError {
     OutOfRange(Input),
     /// The crop's protection zones and the soil that breaks beside a sweep take all of the row spacing.
     #[error(
-        "crop.row_spacing leaves no room for a sweep: the protection zones leave {:.0} mm, and soil breaks over {beside_mm:.0} mm \
-         beside a sweep; widen crop.row_spacing, or lessen crop.protection_zone or soil.depth",
+        "crop.row_spacing leaves no room for a sweep: the protection zones leave {:.0} mm, and soil breaks over \
+         {beside_mm:.0} mm beside a sweep; widen crop.row_spacing, or lessen crop.protection_zone or soil.depth",
         .failure_zone_mm.max(0.0)
     )]
     NoRoomForSweep {
@@ -74,13 +74,15 @@ pub enum MachineError {
         /// The second term of Eq. 12.
         beside_mm: f64,
     },
-    /// The wheel's rim has no thickness.
-    #[error("wheel.inner_diameter is {inner_mm:.1} mm: it has to be less than wheel.diameter, {outer_mm:.1} mm")]
-    NoRim {
-        /// Inner diameter.
-        inner_mm: f64,
-        /// Outer diameter.
-        outer_mm: f64,
+    /// The wheel's rim is thicker than the wheel has room for.
+    #[error(
+        "wheel.rim_thickness is {thickness_mm} mm: it has to be less than half of wheel.diameter, {diameter_mm} mm"
+    )]
+    ThickRim {
+        /// Thickness of the rim.
+        thickness_mm: f64,
+        /// Outer diameter of the wheel.
+        diameter_mm: f64,
     },
     /// No sprocket makes the wheels turn as fast as they have to.
     #[error(
@@ -100,7 +102,7 @@ pub enum MachineError {
 /// Teeth of the largest sprocket that is taken for one.
 const MOST_TEETH: u32 = 1000;
 
-/// Teeth of a driven sprocket as there are many.
+/// Teeth of a common driven sprocket.
 const USUAL_TEETH: u32 = 40;
 
 impl MachineError {
@@ -109,7 +111,7 @@ impl MachineError {
         match self {
             Self::OutOfRange(input) => (input.section, input.key),
             Self::NoRoomForSweep { .. } => ("crop", "row_spacing"),
-            Self::NoRim { .. } => ("wheel", "inner_diameter"),
+            Self::ThickRim { .. } => ("wheel", "rim_thickness"),
             Self::NoSprocket { .. } => ("engine", "gear_box_ratio"),
         }
     }
@@ -262,8 +264,8 @@ sections! {
         number: u32 = 2.0, COUNT, 1.0 to 8.0;
         /// Outer diameter (Table 1, no. 7).
         diameter: Length = 400.0, MM, 50.0 to 3000.0;
-        /// Inner diameter of the rim; 394 mm make the 3 mm of Table 1, no. 7, the paper's text has 397 mm.
-        inner_diameter: Length = 394.0, MM, 40.0 to 2999.0;
+        /// Thickness of the rim (Table 1, no. 7).
+        rim_thickness: Length = 3.0, MM, 0.1 to 100.0;
         /// Width (Table 1, no. 7).
         width: Length = 35.0, MM, 5.0 to 1000.0;
         /// Shear stress that the rim's steel bears at most.
@@ -295,9 +297,9 @@ impl Machine {
                 beside_mm: MM.value(failure_zone - sweep),
             });
         }
-        let (inner_mm, outer_mm) = (MM.value(self.wheel.inner_diameter), MM.value(self.wheel.diameter));
-        if inner_mm >= outer_mm {
-            return Err(MachineError::NoRim { inner_mm, outer_mm });
+        let (thickness_mm, diameter_mm) = (MM.value(self.wheel.rim_thickness), MM.value(self.wheel.diameter));
+        if 2.0 * thickness_mm >= diameter_mm {
+            return Err(MachineError::ThickRim { thickness_mm, diameter_mm });
         }
         let ratio = self.engine.gear_box_ratio;
         let wheel_speed = drive::wheel_speed(self.weeder.speed, self.wheel.diameter);
@@ -313,7 +315,8 @@ impl Machine {
     pub fn to_toml(&self) -> String {
         let mut file = String::from(
             "# A machine for `weeder design --machine FILE.toml`.\n\
-             # What is left out is as on the paper's machine. Units may be changed with their values: \"0.4 m\" is \"400 mm\".\n",
+             # What is left out is as on the paper's machine. Units may be changed with their values:\n\
+             # \"0.4 m\" is \"400 mm\".\n",
         );
         let inputs = self.inputs();
         for (section, title) in TITLES {

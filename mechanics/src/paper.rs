@@ -1,7 +1,7 @@
 //! The paper's printed figures beside what its equations give, with a verdict on each.
 //!
-//! Each figure is calculated twice: from the inputs that the paper prints for it, its own earlier results among them, and
-//! all through, from the machine alone. So a slip is told from what merely follows from an earlier one.
+//! Each figure is calculated twice: from the inputs that the paper prints for it, its own earlier results among them,
+//! and all through, from the machine alone. So a slip is told from what merely follows from an earlier one.
 
 use crate::design::Design;
 use crate::figure::{digits, written};
@@ -360,7 +360,8 @@ fn drive(machines: &Machines) -> Vec<Comparison> {
 fn wheel_and_handle(machines: &Machines) -> Vec<Comparison> {
     let (outer, inner) = (M.of(0.400), M.of(0.397));
     let torque = wheel::torque(NEWTON.of(1082.0), outer);
-    let stress = |thickness_mm: f64| wheel::shear_stress(torque, outer, outer - 2.0 * MM.of(thickness_mm));
+    let stress =
+        |thickness_mm: f64| wheel::shear_stress(torque, outer, wheel::inner_diameter(outer, MM.of(thickness_mm)));
     let thickness = wheel::thickness(outer, inner);
     let (elbow_height, operator_distance) = (CM.of(80.0), CM.of(40.0));
     vec![

@@ -59,7 +59,8 @@ fn percent(share: Ratio) -> String {
 }
 
 impl Design {
-    /// Every result with its equation and its sense, in the order of the paper. `machine` is the one that was calculated.
+    /// Every result with its equation and its sense, in the order of the paper. `machine` is the one that was
+    /// calculated.
     pub fn figures(&self, machine: &Machine) -> Vec<Figure> {
         let mut figures = self.traction(machine);
         figures.extend(self.tools(machine));
@@ -328,16 +329,21 @@ impl Design {
         } else {
             fine(format!("the steel's {} are {} times that: the wheel is safe", written(strength, MPA), digits(ratio)))
         };
-        let share = written(self.rim_thickness / machine.wheel.diameter, unit::PERCENT);
+        let rim = written(self.rim_thickness, MM);
+        let rim_sense = if self.rim_thickness < self.least_rim_thickness {
+            concern(format!("the rim's {rim} are too thin"))
+        } else {
+            fine(format!("by shear alone; the rim's {rim} are enough"))
+        };
         let hands = machine.handle.elbow_height + machine.wheel.diameter / 2.0;
         vec![
             figure(
-                "rim_thickness",
-                "wheel thickness",
+                "least_rim_thickness",
+                "least wheel thickness",
                 "below Eq. 20",
-                self.rim_thickness,
+                self.least_rim_thickness,
                 MM,
-                fine(format!("{share} of the wheel's {}", written(machine.wheel.diameter, MM))),
+                rim_sense,
             ),
             figure(
                 "wheel_torque",

@@ -3,7 +3,8 @@
 use uom::si::angle::degree;
 use uom::si::f64::{Angle, Force, Length, Pressure, Torque};
 
-/// Force of the soil on the blade in the row, Eq. 10: the unit draft times the triangle that the blade shows to the soil.
+/// Force of the soil on the blade in the row, Eq. 10: the unit draft times the triangle that the blade shows to the
+/// soil.
 ///
 /// `base` and `height` are the triangle's.
 pub fn soil_force(base: Length, height: Length, unit_draft: Pressure) -> Force {

@@ -1,8 +1,9 @@
 //! Quantities as people write them: a number and a unit, such as `"400 mm"`.
 //!
-//! The quantities themselves are those of [`uom`], so that a force cannot be added to a length. A [`Unit`] ties a name to
-//! one of them, and [`Written`] lists the units that a kind of quantity may be written in. Numbers without a unit, such as
-//! a number of teeth, are read by the same way. It knows nothing of what a value is for: ranges are the machine's.
+//! The quantities themselves are those of [`uom`], so that a force cannot be added to a length. A [`Unit`] ties a name
+//! to one of them, and [`Written`] lists the units that a kind of quantity may be written in. Numbers without a unit,
+//! such as a number of teeth, are read by the same way. It knows nothing of what a value is for: ranges are the
+//! machine's.
 
 use serde::Deserializer;
 use serde::de::Visitor;

@@ -3,9 +3,23 @@
 use std::f64::consts::PI;
 use uom::si::f64::{Force, Length, Pressure, Torque};
 
-/// Thickness of the rim (below Eq. 20).
+/// Thickness of a rim from its diameters (below Eq. 20).
 pub fn thickness(outer_diameter: Length, inner_diameter: Length) -> Length {
     (outer_diameter - inner_diameter) / 2.0
+}
+
+/// Inner diameter of a rim: the thickness' equation the other way round.
+pub fn inner_diameter(outer_diameter: Length, thickness: Length) -> Length {
+    outer_diameter - 2.0 * thickness
+}
+
+/// Thickness at which a torque makes just a shear stress: Eq. 20 the other way round. A wheel that is too weak as a solid
+/// disc gets half of its diameter.
+pub fn least_thickness(torque: Torque, outer_diameter: Length, shear_strength: Pressure) -> Length {
+    // Of the outer diameter to the fourth power, the share that the rim has to make up.
+    let solid_stress = shear_stress(torque, outer_diameter, outer_diameter * 0.0);
+    let hollow_share = 1.0 - f64::from(solid_stress / shear_strength);
+    thickness(outer_diameter, outer_diameter * hollow_share.max(0.0).powf(0.25))
 }
 
 /// Torque on a wheel that gives all of the tractive force (below Eq. 20).

@@ -4,7 +4,7 @@ use approx::relative_eq;
 use mechanics::design::Design;
 use mechanics::machine::{Input, Machine, MachineError};
 use mechanics::unit::{DEGREE, KG, KM_H, M, MM, MPA, NEWTON_METRE};
-use mechanics::{drive, shank, tool};
+use mechanics::{drive, shank, tool, wheel};
 use proptest::prelude::*;
 use std::fmt::Write;
 
@@ -69,6 +69,17 @@ proptest! {
         let (moment, stress) = (NEWTON_METRE.of(moment), MPA.of(stress));
         let found = shank::bending_stress(moment, shank::diameter(moment, stress));
         prop_assert!(relative_eq!(MPA.value(found), MPA.value(stress), max_relative = 1e-9));
+    }
+
+    #[test]
+    fn a_wheel_of_the_least_thickness_bears_just_its_shear_strength(machine in any_machine()) {
+        let design = Design::of(&machine).unwrap();
+        let (diameter, strength) = (machine.wheel.diameter, machine.wheel.shear_strength);
+        // Below, the difference of the diameters drowns in their rounding; at a half, the wheel is a disc.
+        prop_assume!((1e-6..0.5).contains(&f64::from(design.least_rim_thickness / diameter)));
+        let inner_diameter = wheel::inner_diameter(diameter, design.least_rim_thickness);
+        let found = wheel::shear_stress(design.wheel_torque, diameter, inner_diameter);
+        prop_assert!(relative_eq!(MPA.value(found), MPA.value(strength), max_relative = 1e-6));
     }
 
     #[test]
