@@ -1,13 +1,38 @@
-//! The encoder at 20,000 counts a second, fifteen times walking speed, with the rest of the firmware busy.
+//! The encoder at its full rate, a hundred times walking speed, with the rest of the firmware busy.
 
-use crate::common::{ask, encoder_steps, number, run_for_ms, status, woken_up};
+use crate::common::{ask, elf, encoder_steps, number, run_for_ms, status, woken_up};
+use field::bench::encoder::{self, Direction, JITTER, Load, Turning};
 use field::signal::{CYCLES_PER_SECOND, Pin, PinChange};
 
-/// Cycles between two counts.
+/// Counts in a second that the firmware follows while its status streams at 115200 baud and the beam flickers.
+const FULL_RATE_PER_S: f64 = 200_000.0;
+
+/// Turns the encoder forward and backward beside all the rest.
+#[track_caller]
+fn assert_no_count_is_lost(counts_per_s: f64, jitter: f64) {
+    for direction in [Direction::Forward, Direction::Backward] {
+        let turning = Turning { load: Load::Telemetry, direction, jitter };
+        let counted = encoder::turn(&elf(), turning, counts_per_s).expect("the firmware runs");
+        assert!(counted.is_exact(), "{direction:?} at {counts_per_s} counts/s: {counted:?}");
+        assert!(counted.line_share > 0.1, "the status streamed: {counted:?}");
+    }
+}
+
+#[test]
+fn no_count_is_lost_at_the_full_rate_beside_telemetry_and_a_flickering_beam() {
+    assert_no_count_is_lost(FULL_RATE_PER_S, 0.0);
+}
+
+#[test]
+fn no_count_is_lost_at_three_quarters_of_it_when_edges_come_early_and_late() {
+    assert_no_count_is_lost(0.75 * FULL_RATE_PER_S, JITTER);
+}
+
+/// Cycles between two counts at 20,000 a second.
 const STEP_CYCLES: u64 = CYCLES_PER_SECOND / 20_000;
 
 #[test]
-fn no_count_is_lost_while_the_console_streams_and_the_beam_flickers() {
+fn no_count_is_lost_when_a_fast_wheel_turns_back() {
     let mut uno = woken_up();
     ask(&mut uno, "events on");
     ask(&mut uno, "start now");

@@ -14,6 +14,8 @@ mod leaves_the_row_when_told;
 mod long_beam_distance;
 mod memory_budget;
 mod paper_mode;
+mod performance_servo_jitter;
+mod performance_swing_commands;
 mod recordings;
 mod serial_noise;
 mod servo_pulses;

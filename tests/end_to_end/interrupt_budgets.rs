@@ -1,0 +1,80 @@
+//! What each interrupt and each critical section may take, and the encoder at the rate that follows from it.
+//!
+//! Two looks at the encoder may not lie further apart than two of its counts. Between them lie the rest of the handler
+//! that has looked, and the longest of the other handlers or of the critical sections. So each has a budget in cycles,
+//! entry and return included.
+
+use crate::common::{ask, encoder_steps, number, run_for_ms, status, woken_up};
+use field::signal::{CYCLES_PER_SECOND, Pin, PinChange};
+use field::uno::{InterruptStatistics, Uno};
+
+/// Vector, name and budget in cycles; the encoder's two last.
+const BUDGETS: [(u8, &str, u64); 6] = [
+    (3, "PCINT0, the beam", 90),
+    (16, "TIMER0_OVF, clock and heartbeat", 70),
+    (18, "USART_RX", 90),
+    (19, "USART_UDRE", 70),
+    (1, "INT0, the encoder", 90),
+    (2, "INT1, the encoder", 90),
+];
+
+/// Budget of a stretch with interrupts off outside the handlers, in cycles.
+const CRITICAL_SECTION: u64 = 60;
+
+/// Rolls for two seconds at so many counts a second, forward and then back, with the console asked without end and a beam
+/// that flickers.
+fn roll(uno: &mut Uno, counts_per_second: u64) -> String {
+    const MILLISECONDS: u64 = 2000;
+    ask(uno, "events on");
+    ask(uno, "start now");
+    let begin = uno.cycle() + 1000;
+    let counts = counts_per_second * MILLISECONDS / 1000;
+    let steps = (0..counts).map(|number| if number < counts * 3 / 4 { 1 } else { -1 });
+    // The fraction of a cycle is carried on, so that every phase between encoder and loop comes up.
+    uno.drive(encoder_steps((0..).map(|number| begin + number * CYCLES_PER_SECOND / counts_per_second).zip(steps)));
+    uno.drive((0..MILLISECONDS).map(|edge| PinChange {
+        cycle: begin + edge * (CYCLES_PER_SECOND / 1000) + edge % 7 * 111,
+        pin: Pin::Beam,
+        high: edge % 2 == 1,
+    }));
+    let mut received = String::new();
+    for _ in 0..MILLISECONDS / 50 + 1 {
+        uno.send(b"help\nstatus\n");
+        run_for_ms(uno, 50);
+        received += &uno.received();
+    }
+    // Its line carries eleven times as many, but the encoder leaves the loop little time.
+    assert!(received.len() as u64 > MILLISECONDS, "the console streamed: {} bytes", received.len());
+    run_for_ms(uno, 500);
+    uno.received();
+    let status = status(uno);
+    assert_eq!(number(&status, "pos"), counts as i64 / 2, "{status}");
+    assert_eq!(number(&status, "lost"), 0, "{status}");
+    assert_eq!(uno.resets(), []);
+    status
+}
+
+#[test]
+fn no_interrupt_and_no_critical_section_exceeds_its_budget() {
+    let mut uno = woken_up();
+    uno.measure_interrupts();
+    roll(&mut uno, 150_000);
+    let InterruptStatistics { handlers, longest_off, longest_critical_section } =
+        uno.interrupt_statistics().expect("they were measured");
+    for (vector, name, budget) in BUDGETS {
+        let handler = handlers.get(&vector).expect("it ran");
+        println!("{name}: {} to {} of {budget} cycles, {} times", handler.fewest, handler.most, handler.count);
+        assert!(handler.most <= budget, "{name} took {} cycles", handler.most);
+    }
+    println!("critical section: {longest_critical_section} of {CRITICAL_SECTION} cycles; off: {longest_off}");
+    assert!(*longest_critical_section <= CRITICAL_SECTION, "{longest_critical_section} cycles");
+    assert_eq!(handlers.len(), BUDGETS.len(), "every interrupt has a budget: {handlers:?}");
+}
+
+#[test]
+fn no_count_is_lost_at_210_000_a_second() {
+    let mut uno = woken_up();
+    let status = roll(&mut uno, 210_000);
+    // Were every look in time, the jumps that are resolved would go untested.
+    assert!(number(&status, "jumps") > 0, "{status}");
+}

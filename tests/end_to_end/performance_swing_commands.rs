@@ -1,0 +1,46 @@
+//! How late a swing's command comes to the servo's pin: hundreds of rows that grow by chance, and a machine four times as fast
+//! as it was made for.
+
+use crate::common::elf;
+use field::bench::swings::{Lateness, Rows, lateness};
+use field::machine::Machine;
+
+/// Greatest and mean distance of a command from its ideal place at 2.5 km/h, in ticks.
+const WORST_TICKS: f64 = 9.0;
+const MEAN_TICKS: f64 = 3.0;
+
+/// The same as times: a tick takes 0.754 ms at 2.5 km/h.
+const WORST_MS: f64 = WORST_TICKS * 0.754;
+const MEAN_MS: f64 = MEAN_TICKS * 0.754;
+
+#[track_caller]
+fn lateness_without_damage(rows: &Rows) -> Lateness {
+    let lateness = lateness(&elf(), rows, |_| {}).expect("the firmware runs");
+    assert_eq!((lateness.damaged, lateness.wrong_positions), (0, 0), "of {} plants", lateness.plants);
+    let swings = lateness.errors_ticks.len();
+    assert!(swings >= 5 * rows.seeds.clone().count(), "{swings} swings");
+    lateness
+}
+
+#[test]
+fn over_200_rows_at_2_5_km_h_commands_come_within_9_ticks_and_within_3_in_the_mean() {
+    let lateness = lateness_without_damage(&Rows::at_walking_speed(1000..1200));
+    assert_eq!(lateness.not_kept, 0, "of {} plants", lateness.plants);
+    let (worst, mean) = (lateness.worst_ticks(), lateness.mean_ticks());
+    println!("{} swings, {worst:.2} ticks at worst, {mean:.2} in the mean", lateness.errors_ticks.len());
+    assert!(worst <= WORST_TICKS, "{worst} ticks");
+    assert!(mean <= MEAN_TICKS, "{mean} ticks");
+}
+
+#[test]
+fn at_10_km_h_no_plant_is_damaged_and_commands_are_as_exact_in_time() {
+    // 180 ms are half a metre at this speed: the beam has to look farther ahead, and the plants need more room between them.
+    let machine = Machine { beam_to_tool_mm: 800.0, ..Machine::default() };
+    let rows = Rows { seeds: 0..20, machine, speed_km_h: 10.0, spacing_mm: 1400.0..1800.0, weeds: 0 };
+    let lateness = lateness_without_damage(&rows);
+    let worst = lateness.milliseconds(lateness.worst_ticks());
+    let mean = lateness.milliseconds(lateness.mean_ticks());
+    println!("{} swings, {worst:.2} ms at worst, {mean:.2} ms in the mean", lateness.errors_ticks.len());
+    assert!(worst <= WORST_MS, "{worst} ms");
+    assert!(mean <= MEAN_MS, "{mean} ms");
+}
