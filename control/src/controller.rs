@@ -563,7 +563,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     fn fault(&mut self, tool_was_at: Position) -> Option<Alarm> {
         let Readings { now, position, jumps, end_switch_on, stack_free, .. } = self.readings;
         let working = self.state == State::Work;
-        match self.encoder.read(now, position, jumps) {
+        match self.encoder.read(now, position, self.meter.speed(), jumps) {
             // A machine at rest may tremble.
             Some(Alarm::EncoderChannelDead) if !working => {}
             None => {}

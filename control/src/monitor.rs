@@ -7,7 +7,7 @@
 
 use crate::{
     alarm::Alarm,
-    units::{Instant, Interval, Position, Ticks},
+    units::{Instant, Interval, Position, Ticks, TicksPerSecond},
 };
 
 /// A step farther than this is progress: a wheel that trembles on an edge moves by one, and one dead channel by one.
@@ -29,12 +29,20 @@ const STANDS: Interval = Interval::from_ms(100);
 /// Times that the beam may break while the machine stands: leaves move in the wind, but plants do not pass.
 const BREAKS: u8 = 3;
 
+/// A machine that rolled faster than this, 0.25 m/s with an encoder of 0.5 mm, and makes no progress for so long, has either
+/// braked with more than 5 m/s2 or lost its encoder. At 2.5 km/h it rolls 21 mm in that time, less than the margin.
+const ROLLS: TicksPerSecond = TicksPerSecond(480);
+const SUDDEN: Interval = Interval::from_ms(30);
+
 /// Watches the encoder.
 #[derive(Clone, Debug)]
 pub struct EncoderMonitor {
-    /// Where the machine last made progress, and when.
+    /// Where the machine last made progress, when, and whether it rolled then.
     anchor: Position,
     progress_at: Instant,
+    rolled: bool,
+    /// Whether it fell silent too suddenly since.
+    fell_silent: bool,
     last: Position,
     /// Edges since the period began, all of them without progress.
     edges: u8,
@@ -48,11 +56,22 @@ pub struct EncoderMonitor {
 impl EncoderMonitor {
     /// A monitor for a machine that stands at `position`.
     pub const fn new(now: Instant, position: Position, jumps: u16) -> Self {
-        Self { anchor: position, progress_at: now, last: position, edges: 0, breaks: 0, period_since: now, jumps }
+        Self {
+            anchor: position,
+            progress_at: now,
+            rolled: false,
+            fell_silent: false,
+            last: position,
+            edges: 0,
+            breaks: 0,
+            period_since: now,
+            jumps,
+        }
     }
 
-    /// Takes a reading, with the count of jumps since power-up; returns the fault that it shows.
-    pub fn read(&mut self, now: Instant, position: Position, jumps: u16) -> Option<Alarm> {
+    /// Takes a reading, with the speed as it was measured and the count of jumps since power-up; returns the fault that it
+    /// shows.
+    pub fn read(&mut self, now: Instant, position: Position, speed: TicksPerSecond, jumps: u16) -> Option<Alarm> {
         if now - self.period_since >= PERIOD {
             self.period_since = now;
             self.edges = 0;
@@ -62,9 +81,14 @@ impl EncoderMonitor {
         if moved > PROGRESS || moved < -PROGRESS {
             self.anchor = position;
             self.progress_at = now;
+            self.rolled = speed > ROLLS || speed < -ROLLS;
+            self.fell_silent = false;
             self.edges = 0;
             self.breaks = 0;
-        } else if position != self.last {
+        } else if self.rolled && now - self.progress_at >= SUDDEN {
+            self.fell_silent = true;
+        }
+        if position != self.last {
             self.edges = self.edges.saturating_add(1);
         }
         self.last = position;
@@ -83,9 +107,10 @@ impl EncoderMonitor {
         (self.breaks >= BREAKS).then_some(Alarm::EncoderSilent)
     }
 
-    /// Whether the beam broke while the machine stands: perhaps it rolls, and nobody sees it.
+    /// Whether the machine may roll although the encoder says that it stands: it fell silent from one moment to the next, or
+    /// the beam has been broken since.
     pub const fn is_doubtful(&self) -> bool {
-        self.breaks > 0
+        self.fell_silent || self.breaks > 0
     }
 }
 

@@ -139,6 +139,13 @@ impl Add<Interval> for Instant {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct TicksPerSecond(pub i32);
 
+impl Neg for TicksPerSecond {
+    type Output = Self;
+    fn neg(self) -> Self {
+        Self(self.0.wrapping_neg())
+    }
+}
+
 impl TicksPerSecond {
     /// How far the machine rolls at this speed, in so many milliseconds.
     ///

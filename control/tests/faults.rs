@@ -66,6 +66,16 @@ impl Drive {
         }
     }
 
+    /// Comes to rest as a machine does, with 3 m/s2.
+    fn brake(&mut self, speed_m_s: f64) {
+        let mut speed = speed_m_s;
+        while speed > 0.0 {
+            speed -= 3.0 * TURN_US as f64 / 1e6;
+            self.place += speed * TICKS_A_METRE * TURN_US as f64 / 1e6;
+            self.turn_at(self.place.floor() as i32);
+        }
+    }
+
     fn beam(&mut self, broken: bool) {
         let position = readings(0, self.place.floor() as i32).position;
         self.machine.beam_edge(position, broken);
@@ -94,8 +104,38 @@ impl Drive {
 }
 
 #[test]
-fn a_silent_encoder_has_the_tool_out_at_the_first_plant_and_is_an_alarm_at_the_third() {
+fn an_encoder_that_falls_silent_from_one_moment_to_the_next_has_the_tool_out_until_it_speaks() {
+    for speed_m_s in [0.3, 0.7, 1.3] {
+        let mut drive = Drive::at_work();
+        drive.roll(speed_m_s, 0.5);
+        drive.roll(0.0, 0.025);
+        assert!(drive.tool_is_in(), "{speed_m_s} m/s");
+        drive.roll(0.0, 0.010);
+        assert!(!drive.tool_is_in(), "{speed_m_s} m/s");
+        assert_eq!(drive.machine.reason(), Some(Reason::EncoderDoubtful));
+        drive.roll(0.0, 10.0);
+        assert!(!drive.tool_is_in(), "{speed_m_s} m/s");
+        drive.roll(0.5, 0.2);
+        assert!(drive.tool_is_in(), "{speed_m_s} m/s");
+        assert_eq!(drive.alarm(), None);
+    }
+}
+
+#[test]
+fn a_machine_that_brakes_keeps_its_tool_in_the_row() {
+    for speed_m_s in [0.3, 0.7, 1.3] {
+        let mut drive = Drive::at_work();
+        drive.roll(speed_m_s, 0.5);
+        drive.brake(speed_m_s);
+        drive.roll(0.0, 5.0);
+        assert!(drive.tool_is_in(), "{speed_m_s} m/s");
+    }
+}
+
+#[test]
+fn an_encoder_that_dies_at_rest_has_the_tool_out_at_the_first_plant_and_is_an_alarm_at_the_third() {
     let mut drive = Drive::at_work();
+    drive.brake(0.5);
     drive.roll(0.0, 0.2);
     assert!(drive.tool_is_in(), "the machine may just stand");
     for plant in 1..=3 {
@@ -112,6 +152,7 @@ fn a_silent_encoder_has_the_tool_out_at_the_first_plant_and_is_an_alarm_at_the_t
 fn leaves_that_move_while_the_machine_stands_keep_the_tool_out_until_it_rolls_on() {
     let mut drive = Drive::at_work();
     for _ in 0..5 {
+        drive.brake(0.5);
         drive.roll(0.0, 0.2);
         drive.beam(true);
         drive.beam(false);
@@ -398,12 +439,10 @@ fn nothing_happens_where_time_and_place_wrap() {
     // Both counters pass their end in the middle of a row.
     let ticks_before = 3000;
     let steps_before = 1_000_000;
-    let moved = |now: Readings| {
-        Readings {
-            now: Instant::new(0_u32.wrapping_sub(steps_before)) + Interval::from_steps(now.now.steps()),
-            position: Position::new(i32::MAX - ticks_before) + Ticks(now.position.count()),
-            ..now
-        }
+    let moved = |now: Readings| Readings {
+        now: Instant::new(0_u32.wrapping_sub(steps_before)) + Interval::from_steps(now.now.steps()),
+        position: Position::new(i32::MAX - ticks_before) + Ticks(now.position.count()),
+        ..now
     };
     let swings = |wraps: bool| {
         let place = |now: Readings| if wraps { moved(now) } else { now };

@@ -87,6 +87,9 @@ const SWING_IN_S: f64 = 0.6;
 /// How fast the machine gains its speed.
 const ACCELERATION_MM_S2: f64 = 1000.0;
 
+/// How fast it brakes at the end.
+const BRAKING_MM_S2: f64 = 3000.0;
+
 /// Distance that the tool rolls on behind the row.
 const RUN_OUT_MM: f64 = 100.0;
 
@@ -141,6 +144,8 @@ impl Trial {
             speed_mm_s,
             span.end + machine.beam_to_tool_mm + RUN_OUT_MM,
         );
+        // No machine stops dead, and one that did would look like one whose encoder has failed.
+        let motion = motion.change_speed(0.0, BRAKING_MM_S2);
         Self { row, machine, motion, timing, start: Start::Command }
     }
 

@@ -86,9 +86,9 @@ pub fn is_out_at_the_pin(uno: &Uno) -> bool {
     (pulse.width_us() - 2000.0).abs() < 1.0
 }
 
-/// The machine rolls at a steady speed from 0 to `end_mm`; it has its speed after a few centimetres.
+/// The machine rolls at a steady speed from 0 to `end_mm`; it has its speed after a few centimetres, and brakes as fast.
 pub fn steady(speed_mm_s: f64, end_mm: f64) -> Motion {
-    Motion::steady(0.0, 3000.0, speed_mm_s, end_mm)
+    Motion::steady(0.0, 3000.0, speed_mm_s, end_mm).change_speed(0.0, 3000.0)
 }
 
 /// A row that begins far beyond where the machine ever comes.
@@ -166,8 +166,29 @@ impl Run {
     /// Wakes the firmware up, gives it these commands and those of the trial's start, and sets the machine in motion.
     #[track_caller]
     pub fn begin(trial: Trial, commands: &[&str]) -> Self {
-        let mut uno =
-            trial::boot(&elf(), &[trial.machine.beam_before(&trial.row, &trial.motion)]).expect("it wakes up");
+        Self::begin_altered(trial, commands, |_, changes| changes)
+    }
+
+    /// As [`Run::begin`], with other levels on the pins than the motion gives: `alter` gets the cycle at which the motion
+    /// begins, and what a sound machine would show.
+    #[track_caller]
+    pub fn begin_altered(
+        trial: Trial,
+        commands: &[&str],
+        alter: impl FnOnce(u64, Vec<PinChange>) -> Vec<PinChange>,
+    ) -> Self {
+        let inputs = [trial.machine.beam_before(&trial.row, &trial.motion)];
+        Self::set_off(trial::boot(&elf(), &inputs).expect("it wakes up"), trial, commands, alter)
+    }
+
+    /// As [`Run::begin_altered`], with a firmware that has woken up already.
+    #[track_caller]
+    pub fn set_off(
+        mut uno: Uno,
+        trial: Trial,
+        commands: &[&str],
+        alter: impl FnOnce(u64, Vec<PinChange>) -> Vec<PinChange>,
+    ) -> Self {
         trial.set_up(&mut uno).expect("the firmware takes the trial's settings");
         ask(&mut uno, "events on");
         for command in commands {
@@ -181,7 +202,7 @@ impl Run {
         run_for_ms(&mut uno, 100);
         uno.received();
         let start_cycle = uno.cycle();
-        uno.drive(trial.machine.pin_changes(&trial.row, &trial.motion, start_cycle));
+        uno.drive(alter(start_cycle, trial.machine.pin_changes(&trial.row, &trial.motion, start_cycle)));
         Self { uno, trial, start_cycle, heard: String::new() }
     }
 

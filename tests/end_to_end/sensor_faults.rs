@@ -1,0 +1,188 @@
+//! Encoder and beam that fail on the way: the firmware notices, names the fault, and has the tool out of the row.
+
+use crate::common::{Run, ask, bare_ground, is_out_at_the_pin, number, run_for_ms, status, steady, trial, value};
+use field::machine::cycle_at;
+use field::motion::{Motion, mm_s};
+use field::row::{Row, Thing};
+use field::signal::{CYCLES_PER_SECOND, Pin, PinChange};
+use field::trial::{Start, Trial};
+
+/// Where the fault begins: the tool is in the row between the second plant and the third, which the beam has just passed.
+const FAULT_MM: f64 = 1720.0;
+
+/// Plants every 500 mm, the first at 600 mm.
+fn plants() -> Row {
+    Row::new((0..8).map(|number| Thing::plant(600.0 + 500.0 * f64::from(number), 150.0)).collect())
+        .expect("the plants stand apart")
+}
+
+/// A run at work at 2 km/h whose pins `alter` changes from the fault's cycle on.
+fn with_fault(row: Row, length_mm: f64, alter: impl FnOnce(u64, Vec<PinChange>) -> Vec<PinChange>) -> Run {
+    let trial = Trial { start: Start::Now, ..trial(row, steady(mm_s(2.0), length_mm)) };
+    let time_s = trial.motion.passings(FAULT_MM).first().expect("the machine comes there").time_s;
+    Run::begin_altered(trial, &[], |start_cycle, changes| alter(cycle_at(start_cycle, time_s), changes))
+}
+
+/// The alarm of this name and code was told once, and the tool is out.
+#[track_caller]
+fn assert_alarm(run: &mut Run, name: &str, code: i64) {
+    run.roll_to_the_end();
+    let events = run.events("alarm");
+    assert_eq!(events.len(), 1, "{:#?}", run.lines());
+    assert_eq!((value(&events[0], "name"), number(&events[0], "code")), (name, code));
+    let status = status(&mut run.uno);
+    assert_eq!((value(&status, "state"), value(&status, "tool")), ("alarm", "out"), "{status}");
+    assert!(is_out_at_the_pin(&run.uno));
+}
+
+fn is_encoder(change: &PinChange) -> bool {
+    matches!(change.pin, Pin::EncoderA | Pin::EncoderB)
+}
+
+#[test]
+fn an_encoder_that_falls_silent_harms_no_plant_and_is_an_alarm() {
+    let mut run = with_fault(plants(), 4500.0, |fault, mut changes| {
+        changes.retain(|change| change.cycle < fault || !is_encoder(change));
+        changes
+    });
+    run.roll_to(FAULT_MM);
+    assert!(!is_out_at_the_pin(&run.uno));
+    // A machine that rolls does not stop from one moment to the next: the tool is out before it comes to the third plant.
+    run.roll_to(FAULT_MM + 60.0);
+    assert!(is_out_at_the_pin(&run.uno));
+    assert_eq!(value(&status(&mut run.uno), "for"), "encoder_doubtful");
+    assert_alarm(&mut run, "encoder_silent", 21);
+    for plant in run.judgement().plants {
+        assert_ne!(plant.verdict, field::verdict::Verdict::Damaged, "{plant:?}");
+    }
+}
+
+#[test]
+fn an_encoder_with_one_dead_channel_is_an_alarm() {
+    for dead in [Pin::EncoderA, Pin::EncoderB] {
+        let mut run = with_fault(bare_ground(), 2400.0, |fault, mut changes| {
+            changes.retain(|change| change.cycle < fault || change.pin != dead);
+            changes
+        });
+        assert_alarm(&mut run, "encoder_channel_dead", 22);
+        // Within a quarter of a second.
+        let command = run.commands().pop().expect("a command");
+        let place_mm = run.place_mm(command.rise_cycle);
+        assert!(command.is_out() && place_mm < FAULT_MM + 150.0, "{place_mm} mm");
+    }
+}
+
+#[test]
+fn an_encoder_whose_channels_change_at_once_is_an_alarm() {
+    let mut run = with_fault(bare_ground(), 2400.0, |fault, mut changes| {
+        // Both wires pick up the same noise: 40 times in 0.2 s.
+        let noise = (0..80_u64).flat_map(|edge| {
+            let cycle = fault + edge * CYCLES_PER_SECOND / 400;
+            [Pin::EncoderA, Pin::EncoderB].map(|pin| PinChange { cycle, pin, high: edge % 2 == 0 })
+        });
+        changes.retain(|change| change.cycle < fault || !is_encoder(change));
+        changes.extend(noise);
+        changes
+    });
+    assert_alarm(&mut run, "encoder_jumps", 23);
+    assert!(number(&status(&mut run.uno), "jumps") > 20);
+}
+
+#[test]
+fn a_machine_that_is_pushed_faster_than_its_limit_is_an_alarm() {
+    let motion = Motion::steady(0.0, 3000.0, mm_s(2.0), 1000.0).change_speed(mm_s(4.0), 3000.0).roll_to(2500.0);
+    let trial = Trial { start: Start::Now, ..trial(bare_ground(), motion) };
+    let mut run = Run::begin(trial, &["set top_speed_mm_s 900"]);
+    run.roll_to(1000.0);
+    assert!(!is_out_at_the_pin(&run.uno));
+    assert_alarm(&mut run, "too_fast", 31);
+}
+
+#[test]
+fn a_beam_that_flickers_in_dust_is_an_alarm() {
+    let mut run = with_fault(bare_ground(), 2500.0, |fault, mut changes| {
+        // 600 edges a second, each of which can be followed.
+        changes.extend((0..300_u64).map(|edge| PinChange {
+            cycle: fault + edge * CYCLES_PER_SECOND / 600,
+            pin: Pin::Beam,
+            high: edge % 2 == 1,
+        }));
+        changes
+    });
+    assert_alarm(&mut run, "beam_flickers", 12);
+}
+
+#[test]
+fn a_beam_that_is_never_broken_is_a_warning_until_a_plant_comes() {
+    let row = Row::new(vec![Thing::plant(2500.0, 150.0)]).expect("a plant is a row");
+    let mut run =
+        Run::begin(Trial { start: Start::Now, ..trial(row, steady(mm_s(2.5), 3000.0)) }, &["set no_plant_m 1"]);
+    run.roll_to(950.0);
+    assert_eq!(run.events("warning"), [""; 0]);
+    run.roll_to(1100.0);
+    assert_eq!(run.events("warning"), ["warning name=no_plants"]);
+    let said = status(&mut run.uno);
+    assert_eq!((value(&said, "state"), value(&said, "warning")), ("work", "no_plants"), "{said}");
+    run.roll_to_the_end();
+    assert_eq!(run.events("warning").len(), 1);
+    assert!(!status(&mut run.uno).contains("warning="));
+}
+
+#[test]
+fn a_speed_that_jumps_before_a_window_has_its_late_command_counted_and_told() {
+    // The tool's window begins at 1075 - 50 mm; the machine is fast from 60 mm before that on.
+    let row = Row::new(vec![Thing::plant(1150.0, 150.0)]).expect("a plant is a row");
+    let jump_mm = 1150.0 - 75.0 - 50.0 + 400.0 - 60.0;
+    let motion = Motion::starting_at(0.0)
+        .change_speed(mm_s(0.8), 3000.0)
+        .roll_to(jump_mm)
+        .change_speed(mm_s(4.0), 100_000.0)
+        .roll_to(jump_mm + 500.0);
+    let mut run = Run::begin(Trial { start: Start::Now, ..trial(row, motion) }, &[]);
+    run.roll_to(jump_mm);
+    assert!(!is_out_at_the_pin(&run.uno));
+    run.roll_to_the_end();
+    assert_eq!(run.events("warning"), ["warning name=late_command"]);
+    let said = status(&mut run.uno);
+    assert_eq!((value(&said, "state"), number(&said, "late")), ("work", 1), "{said}");
+    let command = run.first_command_after(run.cycles().start);
+    assert!(command.is_out());
+    // At once: within the speed meter's window and a pulse.
+    let late_ms = (run.place_mm(command.rise_cycle) - jump_mm) / mm_s(4.0) * 1000.0;
+    assert!((0.0..60.0).contains(&late_ms), "{late_ms} ms");
+}
+
+#[test]
+fn rolling_back_to_forgotten_ground_is_an_alarm() {
+    // 21 small plants every 160 mm: the 16 that are remembered go back 2.5 m.
+    let plants = (0..21).map(|number| Thing::plant(600.0 + 160.0 * f64::from(number), 70.0));
+    let row = Row::new(plants.collect()).expect("the plants stand apart");
+    let motion = Motion::starting_at(0.0)
+        .change_speed(mm_s(2.5), 1000.0)
+        .stop_at(4600.0, 1000.0)
+        .change_speed(-mm_s(2.5), 1000.0)
+        .stop_at(1200.0, 1000.0);
+    let mut run = Run::begin(Trial { start: Start::Now, ..trial(row, motion) }, &["set k 1"]);
+    run.roll_to(4500.0);
+    assert_eq!(run.events("alarm"), [""; 0]);
+    assert_alarm(&mut run, "rolled_back_too_far", 32);
+}
+
+#[test]
+fn an_end_switch_that_does_not_follow_is_an_alarm() {
+    // In HOLD the tool is out: the switch should be closed.
+    let mut run = Run::begin(trial(bare_ground(), steady(mm_s(1.0), 100.0)), &["hold"]);
+    run.uno.set(Pin::EndSwitch, false);
+    run_for_ms(&mut run.uno, 50);
+    ask(&mut run.uno, "set end_switch on");
+    run_for_ms(&mut run.uno, 500);
+    assert_eq!(run.events("alarm"), [""; 0]);
+    run.uno.set(Pin::EndSwitch, true);
+    run_for_ms(&mut run.uno, 10);
+    run.uno.set(Pin::EndSwitch, false);
+    run_for_ms(&mut run.uno, 500);
+    assert_eq!(run.events("alarm"), [""; 0], "contacts bounce");
+    run.uno.set(Pin::EndSwitch, true);
+    run_for_ms(&mut run.uno, 100);
+    assert_alarm(&mut run, "tool_stuck", 41);
+}
