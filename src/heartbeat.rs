@@ -1,14 +1,18 @@
-//! The loop's heartbeat: who stops turning has the tool put out, and then the machine reset.
+//! The loop's heartbeat: where it stops, the tool is put out, and then the machine reset.
 //!
 //! The loop beats once a turn; the clock's interrupt, every 1.024 ms, counts down from the last beat. Where 200 ms pass
-//! without one, it gives the servo the pulse for out, leaves a mark for the next start and never returns: nothing can
-//! feed the watchdog any more, which lets the servo a frame or two to take the pulse and then resets the machine.
-//! What the watchdog alone would do is to leave the servo without a signal where the tool happens to be.
+//! without one, the interrupt does not return: it has the servo take the pulse for out, leaves a mark for the next
+//! start and has the watchdog reset the machine. A panic ends in the same way.
+//!
+//! The watchdog alone would leave the servo where the tool happens to be, and could cut a pulse short, which a servo may
+//! take for a command.
 
 use crate::{
     reset, servo,
     shared::{Byte, Shared},
+    watchdog,
 };
+use avr_device::interrupt;
 use control::{reset::mark, servo::HalfMicros};
 use core::arch::asm;
 
@@ -18,7 +22,7 @@ const PERIODS: u8 = 195;
 /// Periods left. The first count-down goes from 0 round to 255, so the loop has 262 ms to begin.
 static LEFT: Byte = Byte::new(0);
 
-/// The pulse width that has the tool out.
+/// The pulse width that has the tool out; 0 before the first beat.
 static OUT: Shared<HalfMicros> = Shared::new(0);
 
 /// The loop turns; `out` is the pulse width that has the tool out.
@@ -41,12 +45,28 @@ pub fn count_down() {
     }
 }
 
-/// The loop stands still, and so does everything from here on, until the watchdog resets the machine.
+/// The loop stands still, and so does everything from here on.
 extern "C" fn stalled() -> ! {
-    // SAFETY: this runs in an interrupt handler and never returns, so the servo's owner, the loop, does not go on.
-    unsafe { servo::take_over(OUT.get()) };
-    reset::leave_mark(mark::LOOP_STALLED);
-    loop {
-        core::hint::spin_loop();
+    give_up(mark::LOOP_STALLED)
+}
+
+/// A panic is a fault like any other: the machine is reset, and wakes up in HOLD with the tool out.
+#[panic_handler]
+fn panic(_: &core::panic::PanicInfo) -> ! {
+    give_up(mark::PANIC)
+}
+
+/// Puts the tool out and resets the machine.
+fn give_up(mark: u16) -> ! {
+    interrupt::disable();
+    reset::leave_mark(mark);
+    // The time that this takes is less than the watchdog's, counted from here.
+    watchdog::feed();
+    let out = OUT.get();
+    if out != 0 {
+        // SAFETY: interrupts are off and this never returns, so the servo's owner, the loop, does not go on. It has
+        // beaten, which it does behind the servo's start.
+        unsafe { servo::end_with(out) };
     }
+    watchdog::reset()
 }

@@ -1,9 +1,8 @@
 //! Why the machine started: MCUSR, kept by the start-up code, and a mark that one run leaves for the next.
 //!
-//! The mark lies in SRAM that the start-up code leaves alone. What both mean is worked out in `control`. A panic ends here
-//! too, since a mark is all that it leaves behind.
+//! The mark lies in SRAM that the start-up code leaves alone. What both mean is worked out in `control`.
 
-use crate::{shared::Shared, watchdog};
+use crate::shared::Shared;
 use avr_device::atmega328p::CPU;
 use control::reset::{Cause, mark};
 
@@ -22,11 +21,4 @@ pub fn cause(cpu: &CPU) -> Cause {
 /// Leaves a mark for the next start.
 pub fn leave_mark(mark: u16) {
     MARK.set(mark);
-}
-
-/// A panic is a fault like any other: the watchdog resets the machine, which wakes up in HOLD with the tool out.
-#[panic_handler]
-fn panic(_: &core::panic::PanicInfo) -> ! {
-    leave_mark(mark::PANIC);
-    watchdog::reset()
 }

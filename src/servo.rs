@@ -5,7 +5,7 @@
 //! put just below the top as soon as the line has been low for the gap that the servo needs. A running pulse is left alone.
 //!
 //! Timer1's 16-bit registers share a byte of temporary storage (16.3): no interrupt may touch them, but one that never
-//! returns ([`take_over`]).
+//! returns ([`end_with`]).
 
 use avr_device::{
     atmega328p::{PORTB, TC1},
@@ -71,14 +71,24 @@ impl Servo {
     }
 }
 
-/// Shows pulses of `width` from the next frame on.
+/// Shows a pulse or two of `width` and then no more: the signal ends with a whole pulse, within three frames.
 ///
 /// # Safety
 ///
-/// To be called where the loop never goes on: it may stand between two halves of a register of Timer1.
-pub unsafe fn take_over(width: HalfMicros) {
+/// To be called with interrupts off, where the loop never goes on: it may stand between two halves of a register of Timer1.
+/// The timer must run.
+pub unsafe fn end_with(width: HalfMicros) {
     // SAFETY: the caller vouches that nobody else uses the timer any more.
-    unsafe { (*TC1::ptr()).ocr1a().write(|w| w.set(compare(width))) };
+    let timer = unsafe { &*TC1::ptr() };
+    timer.ocr1a().write(|w| w.set(compare(width)));
+    let since_rise = || timer.tcnt1().read().bits();
+    // The pulse that is on the line, or else the next one, may be the first of this width.
+    for _ in 0..2 {
+        while since_rise() >= width {}
+        while since_rise() < width {}
+    }
+    // SAFETY: without a clock, the timer and the pin stay as they are.
+    timer.tccr1b().write(|w| unsafe { w.bits(0) });
 }
 
 /// OCR1A for a pulse of `width`: the pin is high from 0 up to and with the match.

@@ -50,6 +50,8 @@ pub fn feed() {
 pub fn reset() -> ! {
     interrupt::disable();
     set(RESET_SOON);
+    // The new time counts from here, whatever had passed of the old one.
+    feed();
     loop {
         core::hint::spin_loop();
     }

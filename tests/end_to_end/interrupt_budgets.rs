@@ -38,9 +38,14 @@ fn roll(uno: &mut Uno, counts_per_second: u64) -> String {
         high: edge % 2 == 1,
     }));
     let mut received = String::new();
-    for _ in 0..MILLISECONDS / 50 + 1 {
-        uno.send(b"help\nstatus\n");
-        run_for_ms(uno, 50);
+    let mut asked = 0;
+    while uno.cycle() < begin + MILLISECONDS * (CYCLES_PER_SECOND / 1000) {
+        // Each answer asks for the next, so that the line is never idle and never overrun.
+        if received.lines().filter(|line| *line == "ok").count() == asked {
+            uno.send(b"help\n");
+            asked += 1;
+        }
+        run_for_ms(uno, 5);
         received += &uno.received();
     }
     // Its line carries eleven times as many, but the encoder leaves the loop little time.

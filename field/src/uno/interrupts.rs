@@ -32,6 +32,10 @@ pub struct InterruptStatistics {
     pub handlers: BTreeMap<u8, HandlerCycles>,
     /// Longest stretch of cycles with the interrupt flag of SREG clear, handlers included.
     pub longest_off: u64,
+    /// Longest such stretch that the program made by itself: a critical section outside every handler, from behind the
+    /// instruction that turns interrupts off to behind the one that turns them on. What a reset's start-up code does
+    /// before it first turns them on does not count.
+    pub longest_critical_section: u64,
 }
 
 /// Turns the edges that simavr shows into statistics.
@@ -41,12 +45,17 @@ pub(super) struct InterruptRecorder {
     /// Handlers that have begun and not returned: vector and first cycle.
     running: Vec<(u8, u64)>,
     off_since: Option<u64>,
+    critical_since: Option<u64>,
+    /// Interrupts have been on since measuring began, and since the last reset: what turned them off is known.
+    knows_who: bool,
 }
 
 impl InterruptRecorder {
     pub(super) fn turn_on(&mut self) {
         self.statistics = Some(InterruptStatistics::default());
         self.off_since = None;
+        self.critical_since = None;
+        self.knows_who = false;
     }
 
     pub(super) fn statistics(&self) -> Option<&InterruptStatistics> {
@@ -85,14 +94,26 @@ impl InterruptRecorder {
     pub(super) fn interrupts_enabled(&mut self, enabled: bool, cycle: u64) {
         if !enabled {
             self.off_since.get_or_insert(cycle);
-        } else if let (Some(since), Some(statistics)) = (self.off_since.take(), &mut self.statistics) {
-            statistics.longest_off = statistics.longest_off.max(cycle - since);
+            if self.running.is_empty() && self.knows_who {
+                self.critical_since.get_or_insert(cycle);
+            }
+            return;
         }
+        self.knows_who = true;
+        if let Some(statistics) = &mut self.statistics {
+            let lasted = |since: Option<u64>| since.map_or(0, |since| cycle - since);
+            statistics.longest_off = statistics.longest_off.max(lasted(self.off_since));
+            statistics.longest_critical_section = statistics.longest_critical_section.max(lasted(self.critical_since));
+        }
+        self.off_since = None;
+        self.critical_since = None;
     }
 
     /// A reset ends every handler without a return.
     pub(super) fn reset(&mut self) {
         self.running.clear();
         self.off_since = None;
+        self.critical_since = None;
+        self.knows_who = false;
     }
 }
