@@ -74,7 +74,7 @@ fn is_broken(levels: u8) -> bool {
     levels & BEAM == 0
 }
 
-// The beam's level changed.
+// The beam's level changed. At most 90 cycles.
 #[avr_device::interrupt(atmega328p)]
 fn PCINT0() {
     // SAFETY: PINB is only read here, which has no side effect on anybody.

@@ -38,7 +38,7 @@ impl Clock {
     }
 }
 
-// The clock's counter ran over.
+// The clock's counter ran over. At most 70 cycles, for a loop that turns.
 #[avr_device::interrupt(atmega328p)]
 fn TIMER0_OVF() {
     heartbeat::count_down();

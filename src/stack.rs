@@ -5,7 +5,7 @@
 //! that the stack holds may have the paint's colour by chance; the one beyond it has not, and tells a round later at
 //! the latest.
 
-use core::arch::naked_asm;
+use core::{arch::naked_asm, ptr};
 
 /// The paint, which is also what the virtual Uno fills SRAM with at power-up.
 const PAINT: u8 = 0xC5;
@@ -62,9 +62,10 @@ impl Stack {
         }
         if let Some(probe) = self.probe.checked_sub(1) {
             self.probe = probe;
-            // SAFETY: the byte lies between the static data and the end of SRAM; it is read and nothing else, and any
-            // value will do.
-            let byte = unsafe { (&raw const _end).add(probe.into()).read_volatile() };
+            let place = ptr::with_exposed_provenance::<u8>(start() + usize::from(probe));
+            // SAFETY: the byte lies between the static data and the end of SRAM. It is read and nothing else, by one
+            // instruction, and any value will do.
+            let byte = unsafe { place.read_volatile() };
             if byte != PAINT {
                 self.free = probe;
             }
@@ -75,5 +76,5 @@ impl Stack {
 
 /// The address of the first byte behind the static data.
 fn start() -> usize {
-    (&raw const _end).addr()
+    (&raw const _end).expose_provenance()
 }
