@@ -12,7 +12,7 @@ use crate::{
     event::Event,
     memory::Memory,
     settings::{Contradiction, Setting},
-    text::{Listed, Text, list, text},
+    text::{List, Listed, Text, list, text},
 };
 use ufmt::{uWrite, uwrite};
 
@@ -476,9 +476,15 @@ fn say<W: uWrite + ?Sized>(out: &mut W, text: Text) -> Result<(), W::Error> {
 }
 
 /// A text of a list.
+#[inline(always)]
+fn say_listed<W: uWrite + ?Sized>(out: &mut W, Listed(list, place): Listed) -> Result<(), W::Error> {
+    say_at(out, list, place)
+}
+
+/// The text at a place in a list, both of which find room in registers.
 #[inline(never)]
-fn say_listed<W: uWrite + ?Sized>(out: &mut W, text: Listed) -> Result<(), W::Error> {
-    text.bytes().try_for_each(|byte| out.write_char(char::from(byte)))
+fn say_at<W: uWrite + ?Sized>(out: &mut W, list: List, place: u8) -> Result<(), W::Error> {
+    list.bytes(place).try_for_each(|byte| out.write_char(char::from(byte)))
 }
 
 /// The state, and which alarm.

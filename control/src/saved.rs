@@ -12,6 +12,9 @@ use crate::{
 /// Bytes before the values: the table's mark (2), their number, the sequence number.
 const HEADER: usize = 4;
 
+/// Where the sequence number stands.
+const SEQUENCE: u16 = HEADER as u16 - 1;
+
 /// Where the values end.
 const END: usize = HEADER + 2 * Setting::COUNT as usize;
 
@@ -43,16 +46,17 @@ impl<M: Memory> SavedSettings<M> {
     /// Loads the newest copy that is whole; `None` where neither is.
     #[inline(never)]
     pub fn load(&mut self) -> Option<Settings> {
-        let mut newest = None;
-        for copy in 0..2 {
-            if let Some((settings, sequence)) = self.read(copy)
-                && (newest.is_none() || sequence.wrapping_sub(self.sequence).cast_signed() > 0)
-            {
-                (self.newest, self.sequence) = (copy, sequence);
-                newest = Some(settings);
+        let sequence = |copy| self.memory.read(address(copy) + SEQUENCE);
+        // Where only one copy is whole, it does not matter which of them is tried first.
+        let newer = u8::from(sequence(1).wrapping_sub(sequence(0)).cast_signed() > 0);
+        for turn in 0..2 {
+            let copy = newer ^ turn;
+            if let Some(settings) = self.read(copy) {
+                (self.newest, self.sequence) = (copy, self.memory.read(address(copy) + SEQUENCE));
+                return Some(settings);
             }
         }
-        newest
+        None
     }
 
     /// Begins to save. The settings must not change until [`carry_on`](Self::carry_on) has finished.
@@ -68,10 +72,11 @@ impl<M: Memory> SavedSettings<M> {
         if !self.memory.is_ready() {
             return false;
         }
-        if usize::from(self.next) < COPY {
-            for (place, &byte) in image(settings, self.sequence).iter().enumerate().skip(usize::from(self.next)) {
+        if self.next < COPY as u8 {
+            let copy = image(settings, self.sequence);
+            while let Some(&byte) = copy.get(usize::from(self.next)) {
+                let address = address(self.newest) + u16::from(self.next);
                 self.next += 1;
-                let address = address(self.newest) + place as u16;
                 // What is right already is left alone: an EEPROM wears out.
                 if self.memory.read(address) != byte {
                     self.memory.write(address, byte);
@@ -87,18 +92,16 @@ impl<M: Memory> SavedSettings<M> {
         self.memory
     }
 
-    /// A copy, and its sequence number; `None` unless it is whole.
-    fn read(&self, copy: u8) -> Option<(Settings, u8)> {
-        let mut bytes = [0; COPY];
-        for (address, byte) in (address(copy)..).zip(&mut bytes) {
-            *byte = self.memory.read(address);
-        }
+    /// A copy; `None` unless it is whole.
+    fn read(&self, copy: u8) -> Option<Settings> {
+        let byte = |place| self.memory.read(address(copy) + place);
         let mut settings = Settings::new();
-        for (setting, value) in Setting::all().zip(bytes[HEADER..END].chunks_exact(2)) {
-            settings.set(setting, u16::from_le_bytes([value[0], value[1]])).ok()?;
+        for (setting, place) in Setting::all().zip(0..) {
+            let place = HEADER as u16 + 2 * place;
+            settings.set(setting, u16::from_le_bytes([byte(place), byte(place + 1)])).ok()?;
         }
-        let sequence = bytes[HEADER - 1];
-        (bytes == image(&settings, sequence)).then_some((settings, sequence))
+        let is_whole = (0..).zip(image(&settings, byte(SEQUENCE))).all(|(place, right)| byte(place) == right);
+        is_whole.then_some(settings)
     }
 }
 

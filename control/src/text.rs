@@ -49,6 +49,16 @@ impl List {
         None
     }
 
+    /// The characters of the text at a place.
+    pub fn bytes(self, place: u8) -> impl Iterator<Item = u8> {
+        let mut start = 0;
+        for _ in 0..place {
+            start += 1 + usize::from(self.byte(start));
+        }
+        let end = start + 1 + usize::from(self.byte(start));
+        (start + 1..end).map(move |at| self.byte(at))
+    }
+
     #[inline(never)]
     fn byte(self, at: usize) -> u8 {
         self.0.load_at(at)
@@ -63,12 +73,7 @@ impl Listed {
     /// The characters.
     pub fn bytes(self) -> impl Iterator<Item = u8> {
         let Self(list, place) = self;
-        let mut start = 0;
-        for _ in 0..place {
-            start += 1 + usize::from(list.byte(start));
-        }
-        let length = usize::from(list.byte(start));
-        (start + 1..=start + length).map(move |at| list.byte(at))
+        list.bytes(place)
     }
 }
 
