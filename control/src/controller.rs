@@ -5,11 +5,17 @@
 //! and nothing remembers a time at which something ought to happen: the answer is worked out anew each time, from where
 //! the machine is and how fast it rolls.
 
+mod bench;
+
+use self::bench::Bench;
 use crate::{
     alarm::{Alarm, Warning},
+    calibration::{Distance, Unfit},
     classifier::{Class, Classifier, Full, Vote},
+    console::Plot,
     event::Event,
     features::{self, Features},
+    lamp,
     memory::Memory,
     monitor::{BeamMonitor, EncoderMonitor},
     object::{Object, Watch},
@@ -31,6 +37,9 @@ const OBJECTS: usize = 16;
 
 /// Events that wait to be told. They are short-lived: a plant gives three in half a second.
 const EVENTS: usize = 6;
+
+/// Time between two points of a plotter's curves.
+const PLOT_PERIOD: Interval = Interval::from_ms(50);
 
 /// What the end switch may take longer than the lead: a servo frame, the contacts' bouncing, and some patience.
 const END_SWITCH_GRACE_MS: u32 = 100;
@@ -138,6 +147,15 @@ pub enum Refusal {
     ExamplesFull,
     /// No example from the field has this number.
     NoSuchExample,
+    /// No settings are saved that could be taken back.
+    NothingSaved,
+    /// What was rolled tells nothing of the wheel.
+    Unfit(Unfit),
+    /// A row is not played at such a speed.
+    TestSpeed {
+        /// The highest speed at which it is, in mm/s.
+        fastest: u16,
+    },
 }
 
 words! {
@@ -187,6 +205,9 @@ pub struct Controller<C, M> {
     end_switch: Switch,
     encoder: EncoderMonitor,
     beam: BeamMonitor,
+    beam_broken: bool,
+    bench: Bench,
+    distance: Distance,
     meter: SpeedMeter,
     watch: Watch,
     schedule: Schedule,
@@ -210,6 +231,8 @@ pub struct Controller<C, M> {
     events: Vec<Event, EVENTS>,
     events_on: bool,
     events_missed: u16,
+    plot: Plot,
+    plotted_at: Instant,
 }
 
 impl<C: Classifier, M: Memory> Controller<C, M> {
@@ -237,6 +260,9 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             end_switch: Switch::new(readings.end_switch_on),
             encoder: EncoderMonitor::new(now, position, jumps),
             beam: BeamMonitor::new(now),
+            beam_broken,
+            bench: Bench::Idle,
+            distance: Distance::default(),
             meter: SpeedMeter::new(position, now),
             watch: Watch::start(position, beam_broken),
             schedule: Schedule::new(position),
@@ -253,11 +279,20 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             events: Vec::new(),
             events_on: false,
             events_missed: 0,
+            plot: Plot::Off,
+            plotted_at: now,
         }
     }
 
     /// Takes an edge of the beam, with the position at which it came.
     pub fn beam_edge(&mut self, position: Position, broken: bool) {
+        self.beam_broken = broken;
+        if !matches!(self.bench, Bench::Row(_)) {
+            self.take_edge(position, broken);
+        }
+    }
+
+    fn take_edge(&mut self, position: Position, broken: bool) {
         let now = self.readings.now;
         if let Some(alarm) = self.beam.edge(now) {
             self.raise(alarm);
@@ -284,6 +319,10 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     #[inline(never)]
     pub fn step(&mut self, readings: Readings) -> Orders {
         let tool_was_at = self.tool();
+        let readings = self.try_on(readings);
+        while let Some((position, broken)) = self.next_played_edge() {
+            self.take_edge(position, broken);
+        }
         self.readings = readings;
         if let Some(speed) = self.meter.read(readings.now, readings.position) {
             self.leads = Leads::at(speed, &self.settings);
@@ -303,7 +342,10 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         }
         let tool = self.tool();
         self.schedule.forget_behind(tool);
-        let out = self.state != State::Work || self.must_be_out(tool);
+        let out = match &self.bench {
+            Bench::Swings(swings) => swings.tool_out(),
+            _ => self.state != State::Work || self.must_be_out(tool),
+        };
         if out != self.tool_out {
             self.tool_out = out;
             self.told_at = readings.now;
@@ -319,7 +361,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         let pulse = if self.tool_out { Setting::ServoOutUs } else { Setting::ServoInUs };
         let pulse_of = |setting| servo::from_us(self.settings.get(setting));
         Orders {
-            pulse: pulse_of(pulse),
+            pulse: if let Bench::ByHand(pulse) = self.bench { pulse } else { pulse_of(pulse) },
             pulse_out: pulse_of(Setting::ServoOutUs),
             gap_ms: self.settings.get(Setting::ServoGapMs) as u8,
         }
@@ -375,10 +417,48 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         {
             return Err(Refusal::Contradiction(contradiction));
         }
+        // Another wheel is one that has not been measured.
+        if matches!(setting, Setting::WheelMm | Setting::TicksPerRev) {
+            settings.set(Setting::TicksPerM, 0).map_err(|_| Refusal::OutOfRange)?;
+        }
+        self.take_settings(settings);
+        Ok(())
+    }
+
+    /// Takes all settings back that a new machine has; [`save`](Self::save) makes it last.
+    ///
+    /// # Errors
+    /// [`Refusal::NotInHold`].
+    pub fn take_defaults(&mut self) -> Result<(), Refusal> {
+        if self.state == State::Work {
+            return Err(Refusal::NotInHold);
+        }
+        self.take_settings(Settings::new());
+        Ok(())
+    }
+
+    /// Takes all settings back that are saved.
+    ///
+    /// # Errors
+    /// [`Refusal::NotInHold`] and [`Refusal::NothingSaved`].
+    pub fn take_saved(&mut self) -> Result<(), Refusal> {
+        if self.state == State::Work {
+            return Err(Refusal::NotInHold);
+        }
+        let settings = self.saved.load().ok_or(Refusal::NothingSaved)?;
+        self.take_settings(settings);
+        Ok(())
+    }
+
+    fn take_settings(&mut self, settings: Settings) {
         self.settings = settings;
         self.geometry = Geometry::of(&self.settings);
         self.leads = Leads::at(self.meter.speed(), &self.settings);
-        Ok(())
+    }
+
+    /// The value of a setting that is saved, if any is.
+    pub fn saved(&self, setting: Setting) -> Option<u16> {
+        self.saved.value(setting)
     }
 
     /// Begins to save the settings, which [`carry_on`](Self::carry_on) finishes.
@@ -518,6 +598,33 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         self.events.clear();
     }
 
+    /// Draws curves for a plotter, or no longer.
+    pub fn set_plot(&mut self, plot: Plot) {
+        self.plot = plot;
+    }
+
+    /// The curves of which the next points are due, which are due 20 times a second.
+    pub fn next_plot(&mut self) -> Option<Plot> {
+        if self.plot == Plot::Off || self.readings.now - self.plotted_at < PLOT_PERIOD {
+            return None;
+        }
+        self.plotted_at = self.readings.now;
+        Some(self.plot)
+    }
+
+    /// Whether the beam is broken.
+    pub fn beam_is_broken(&self) -> bool {
+        self.beam_broken
+    }
+
+    /// Whether the status LED shines: while the servo is being timed, it marks the commands.
+    pub fn lamp_is_lit(&self) -> bool {
+        match self.bench {
+            Bench::Swings(_) => self.tool_out,
+            _ => lamp::is_lit(self.state, self.readings.now),
+        }
+    }
+
     /// The next event to be told.
     pub fn next_event(&mut self) -> Option<Event> {
         (!self.events.is_empty()).then(|| self.events.remove(0))
@@ -563,7 +670,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     fn fault(&mut self, tool_was_at: Position) -> Option<Alarm> {
         let Readings { now, position, jumps, end_switch_on, stack_free, .. } = self.readings;
         let working = self.state == State::Work;
-        match self.encoder.read(now, position, self.meter.speed(), jumps) {
+        match self.encoder.read(now, position, jumps) {
             // A machine at rest may tremble.
             Some(Alarm::EncoderChannelDead) if !working => {}
             None => {}
@@ -585,6 +692,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         self.end_switch.read(now, end_switch_on);
         let swing = Interval::from_ms(u32::from(self.settings.get(Setting::LeadOutMs)) + END_SWITCH_GRACE_MS);
         if self.settings.get(Setting::EndSwitch) != 0
+            && !self.bench.moves_the_tool()
             && self.end_switch.is_on() != self.tool_out
             && now - self.told_at > swing
         {
@@ -677,12 +785,20 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     fn enter(&mut self, state: State) {
         if state != self.state {
             self.state = state;
+            self.bench.interrupted(state);
             self.tell(Event::State(state));
         }
     }
 
     fn tell(&mut self, event: Event) {
-        if self.events_on && self.events.push(event).is_err() {
+        if self.events_on {
+            self.announce(event);
+        }
+    }
+
+    /// Tells an event that the operator waits for, whether or not events are told.
+    fn announce(&mut self, event: Event) {
+        if self.events.push(event).is_err() {
             self.events_missed = self.events_missed.saturating_add(1);
         }
     }
