@@ -96,6 +96,7 @@ impl<B: Examples<{ features::COUNT }>, M: Memory> Nearest<B, M> {
 }
 
 impl<B: Examples<{ features::COUNT }>, M: Memory> Classifier for Nearest<B, M> {
+    #[inline(never)]
     fn classify(&self, features: &Features, k: u8) -> Vote {
         let query = examples::scale().quantise(&features.values());
         let all = (&self.built_in, &self.field);

@@ -5,17 +5,11 @@
 //! and nothing remembers a time at which something ought to happen: the answer is worked out anew each time, from where
 //! the machine is and how fast it rolls.
 
-mod bench;
-
-use self::bench::Bench;
 use crate::{
     alarm::{Alarm, Warning},
-    calibration::{Distance, Unfit},
     classifier::{Class, Classifier, Full, Vote},
-    console::Plot,
     event::Event,
     features::{self, Features},
-    lamp,
     memory::Memory,
     monitor::{BeamMonitor, EncoderMonitor},
     object::{Object, Watch},
@@ -37,9 +31,6 @@ const OBJECTS: usize = 16;
 
 /// Events that wait to be told. They are short-lived: a plant gives three in half a second.
 const EVENTS: usize = 6;
-
-/// Time between two points of a plotter's curves.
-const PLOT_PERIOD: Interval = Interval::from_ms(50);
 
 /// What the end switch may take longer than the lead: a servo frame, the contacts' bouncing, and some patience.
 const END_SWITCH_GRACE_MS: u32 = 100;
@@ -147,15 +138,6 @@ pub enum Refusal {
     ExamplesFull,
     /// No example from the field has this number.
     NoSuchExample,
-    /// No settings are saved that could be taken back.
-    NothingSaved,
-    /// What was rolled tells nothing of the wheel.
-    Unfit(Unfit),
-    /// A row is not played at such a speed.
-    TestSpeed {
-        /// The highest speed at which it is, in mm/s.
-        fastest: u16,
-    },
 }
 
 words! {
@@ -205,9 +187,6 @@ pub struct Controller<C, M> {
     end_switch: Switch,
     encoder: EncoderMonitor,
     beam: BeamMonitor,
-    beam_broken: bool,
-    bench: Bench,
-    distance: Distance,
     meter: SpeedMeter,
     watch: Watch,
     schedule: Schedule,
@@ -231,8 +210,6 @@ pub struct Controller<C, M> {
     events: Vec<Event, EVENTS>,
     events_on: bool,
     events_missed: u16,
-    plot: Plot,
-    plotted_at: Instant,
 }
 
 impl<C: Classifier, M: Memory> Controller<C, M> {
@@ -260,9 +237,6 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             end_switch: Switch::new(readings.end_switch_on),
             encoder: EncoderMonitor::new(now, position, jumps),
             beam: BeamMonitor::new(now),
-            beam_broken,
-            bench: Bench::Idle,
-            distance: Distance::default(),
             meter: SpeedMeter::new(position, now),
             watch: Watch::start(position, beam_broken),
             schedule: Schedule::new(position),
@@ -279,26 +253,17 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             events: Vec::new(),
             events_on: false,
             events_missed: 0,
-            plot: Plot::Off,
-            plotted_at: now,
         }
     }
 
     /// Takes an edge of the beam, with the position at which it came.
     pub fn beam_edge(&mut self, position: Position, broken: bool) {
-        self.beam_broken = broken;
-        if !matches!(self.bench, Bench::Row(_)) {
-            self.take_edge(position, broken);
-        }
-    }
-
-    fn take_edge(&mut self, position: Position, broken: bool) {
         let now = self.readings.now;
         if let Some(alarm) = self.beam.edge(now) {
             self.raise(alarm);
         }
         if broken
-            && self.state == State::Work
+            && self.is_working()
             && let Some(alarm) = self.encoder.beam_broke(now)
         {
             self.raise(alarm);
@@ -319,17 +284,13 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     #[inline(never)]
     pub fn step(&mut self, readings: Readings) -> Orders {
         let tool_was_at = self.tool();
-        let readings = self.try_on(readings);
-        while let Some((position, broken)) = self.next_played_edge() {
-            self.take_edge(position, broken);
-        }
         self.readings = readings;
         if let Some(speed) = self.meter.read(readings.now, readings.position) {
             self.leads = Leads::at(speed, &self.settings);
         }
         match self.switch.read(readings.now, readings.switch_on) {
             // An alarm wants to be cleared first, if by nothing else then by the switch going off.
-            Some(true) if self.state == State::Hold => self.go_to_work(),
+            Some(true) if matches!(self.state, State::Hold) => self.go_to_work(),
             Some(false) => self.enter(State::Hold),
             _ => {}
         }
@@ -342,14 +303,11 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         }
         let tool = self.tool();
         self.schedule.forget_behind(tool);
-        let out = match &self.bench {
-            Bench::Swings(swings) => swings.tool_out(),
-            _ => self.state != State::Work || self.must_be_out(tool),
-        };
+        let out = !self.is_working() || self.must_be_out(tool);
         if out != self.tool_out {
             self.tool_out = out;
             self.told_at = readings.now;
-            self.awaits_ground = out && self.state == State::Work;
+            self.awaits_ground = out && self.is_working();
             self.tell(Event::Swing { out, position: readings.position });
         }
         self.warn(tool);
@@ -361,7 +319,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         let pulse = if self.tool_out { Setting::ServoOutUs } else { Setting::ServoInUs };
         let pulse_of = |setting| servo::from_us(self.settings.get(setting));
         Orders {
-            pulse: if let Bench::ByHand(pulse) = self.bench { pulse } else { pulse_of(pulse) },
+            pulse: pulse_of(pulse),
             pulse_out: pulse_of(Setting::ServoOutUs),
             gap_ms: self.settings.get(Setting::ServoGapMs) as u8,
         }
@@ -388,7 +346,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// Takes the tool out of the row. A latched alarm stays.
     pub fn hold(&mut self) {
-        if self.state == State::Work {
+        if self.is_working() {
             self.enter(State::Hold);
         }
     }
@@ -406,7 +364,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// [`Refusal::NotInHold`], [`Refusal::OutOfRange`], and [`Refusal::Contradiction`] where there was none before; nothing
     /// is changed then.
     pub fn set(&mut self, setting: Setting, value: u16) -> Result<(), Refusal> {
-        if setting.description().hold_only && self.state == State::Work {
+        if setting.description().hold_only && self.is_working() {
             return Err(Refusal::NotInHold);
         }
         let mut settings = self.settings.clone();
@@ -417,48 +375,10 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         {
             return Err(Refusal::Contradiction(contradiction));
         }
-        // Another wheel is one that has not been measured.
-        if matches!(setting, Setting::WheelMm | Setting::TicksPerRev) {
-            settings.set(Setting::TicksPerM, 0).map_err(|_| Refusal::OutOfRange)?;
-        }
-        self.take_settings(settings);
-        Ok(())
-    }
-
-    /// Takes all settings back that a new machine has; [`save`](Self::save) makes it last.
-    ///
-    /// # Errors
-    /// [`Refusal::NotInHold`].
-    pub fn take_defaults(&mut self) -> Result<(), Refusal> {
-        if self.state == State::Work {
-            return Err(Refusal::NotInHold);
-        }
-        self.take_settings(Settings::new());
-        Ok(())
-    }
-
-    /// Takes all settings back that are saved.
-    ///
-    /// # Errors
-    /// [`Refusal::NotInHold`] and [`Refusal::NothingSaved`].
-    pub fn take_saved(&mut self) -> Result<(), Refusal> {
-        if self.state == State::Work {
-            return Err(Refusal::NotInHold);
-        }
-        let settings = self.saved.load().ok_or(Refusal::NothingSaved)?;
-        self.take_settings(settings);
-        Ok(())
-    }
-
-    fn take_settings(&mut self, settings: Settings) {
         self.settings = settings;
         self.geometry = Geometry::of(&self.settings);
         self.leads = Leads::at(self.meter.speed(), &self.settings);
-    }
-
-    /// The value of a setting that is saved, if any is.
-    pub fn saved(&self, setting: Setting) -> Option<u16> {
-        self.saved.value(setting)
+        Ok(())
     }
 
     /// Begins to save the settings, which [`carry_on`](Self::carry_on) finishes.
@@ -466,7 +386,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// # Errors
     /// [`Refusal::NotInHold`] and [`Refusal::Contradiction`].
     pub fn save(&mut self) -> Result<(), Refusal> {
-        if self.state == State::Work {
+        if self.is_working() {
             return Err(Refusal::NotInHold);
         }
         if let Some(contradiction) = self.settings.contradiction() {
@@ -562,13 +482,16 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// Why the tool is out of the row although the machine works.
     pub fn reason(&self) -> Option<Reason> {
         let tool = self.tool();
-        match self.state {
-            State::Work if !self.tool_out => None,
-            State::Work if self.encoder.is_doubtful() => Some(Reason::EncoderDoubtful),
-            State::Work if self.schedule.known_from().is_ahead_of(tool) => Some(Reason::UnseenGround),
-            State::Work if self.outruns_the_beam(tool) => Some(Reason::TooFast),
-            State::Work => Some(Reason::Plant),
-            _ => None,
+        if !self.is_working() || !self.tool_out {
+            None
+        } else if self.encoder.is_doubtful() {
+            Some(Reason::EncoderDoubtful)
+        } else if self.schedule.known_from().is_ahead_of(tool) {
+            Some(Reason::UnseenGround)
+        } else if self.outruns_the_beam(tool) {
+            Some(Reason::TooFast)
+        } else {
+            Some(Reason::Plant)
         }
     }
 
@@ -596,33 +519,6 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     pub fn tell_events(&mut self, on: bool) {
         self.events_on = on;
         self.events.clear();
-    }
-
-    /// Draws curves for a plotter, or no longer.
-    pub fn set_plot(&mut self, plot: Plot) {
-        self.plot = plot;
-    }
-
-    /// The curves of which the next points are due, which are due 20 times a second.
-    pub fn next_plot(&mut self) -> Option<Plot> {
-        if self.plot == Plot::Off || self.readings.now - self.plotted_at < PLOT_PERIOD {
-            return None;
-        }
-        self.plotted_at = self.readings.now;
-        Some(self.plot)
-    }
-
-    /// Whether the beam is broken.
-    pub fn beam_is_broken(&self) -> bool {
-        self.beam_broken
-    }
-
-    /// Whether the status LED shines: while the servo is being timed, it marks the commands.
-    pub fn lamp_is_lit(&self) -> bool {
-        match self.bench {
-            Bench::Swings(_) => self.tool_out,
-            _ => lamp::is_lit(self.state, self.readings.now),
-        }
     }
 
     /// The next event to be told.
@@ -669,8 +565,8 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     #[inline(never)]
     fn fault(&mut self, tool_was_at: Position) -> Option<Alarm> {
         let Readings { now, position, jumps, end_switch_on, stack_free, .. } = self.readings;
-        let working = self.state == State::Work;
-        match self.encoder.read(now, position, jumps) {
+        let working = self.is_working();
+        match self.encoder.read(now, position, self.meter.speed(), jumps) {
             // A machine at rest may tremble.
             Some(Alarm::EncoderChannelDead) if !working => {}
             None => {}
@@ -692,7 +588,6 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         self.end_switch.read(now, end_switch_on);
         let swing = Interval::from_ms(u32::from(self.settings.get(Setting::LeadOutMs)) + END_SWITCH_GRACE_MS);
         if self.settings.get(Setting::EndSwitch) != 0
-            && !self.bench.moves_the_tool()
             && self.end_switch.is_on() != self.tool_out
             && now - self.told_at > swing
         {
@@ -703,7 +598,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// Tells what the operator should know, once.
     fn warn(&mut self, tool: Position) {
-        if self.state != State::Work {
+        if !self.is_working() {
             return;
         }
         if self.awaits_ground && self.is_closed(tool, tool) {
@@ -773,6 +668,10 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         self.enter(State::Alarm(alarm));
     }
 
+    fn is_working(&self) -> bool {
+        matches!(self.state, State::Work)
+    }
+
     fn go_to_work(&mut self) {
         if self.settings.contradiction().is_some() {
             self.raise(Alarm::SettingsContradict);
@@ -785,20 +684,12 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     fn enter(&mut self, state: State) {
         if state != self.state {
             self.state = state;
-            self.bench.interrupted(state);
             self.tell(Event::State(state));
         }
     }
 
     fn tell(&mut self, event: Event) {
-        if self.events_on {
-            self.announce(event);
-        }
-    }
-
-    /// Tells an event that the operator waits for, whether or not events are told.
-    fn announce(&mut self, event: Event) {
-        if self.events.push(event).is_err() {
+        if self.events_on && self.events.push(event).is_err() {
             self.events_missed = self.events_missed.saturating_add(1);
         }
     }

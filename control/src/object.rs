@@ -28,31 +28,23 @@ impl Object {
     }
 }
 
-/// What the beam sees at the frontier.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Sight {
-    /// Nothing.
-    Clear,
-    /// An object that began at `leading`, or before it.
-    Broken { leading: Position, cut: bool },
-    /// Clear ground behind an object, which may turn out to be a gap in it.
-    Gap(Object),
-}
-
 /// Watches the row through the beam.
 #[derive(Clone, Debug)]
 pub struct Watch {
     frontier: Position,
     /// The beam's level where the machine now is, at or behind the frontier.
     broken: bool,
-    sight: Sight,
+    /// The beam's level at the frontier.
+    broken_at_frontier: bool,
+    /// The object whose end has not been seen in full. Clear ground behind it may turn out to be a gap in it.
+    object: Option<Object>,
 }
 
 impl Watch {
     /// Begins to watch at `ground`, with the beam broken or not.
     pub fn start(ground: Position, broken: bool) -> Self {
-        let sight = if broken { Sight::Broken { leading: ground, cut: true } } else { Sight::Clear };
-        Self { frontier: ground, broken, sight }
+        let object = broken.then_some(Object { leading: ground, trailing: ground, cut: true });
+        Self { frontier: ground, broken, broken_at_frontier: broken, object }
     }
 
     /// The farthest ground seen.
@@ -67,10 +59,7 @@ impl Watch {
 
     /// Where the object began whose end has not been seen yet.
     pub fn open(&self) -> Option<Position> {
-        match self.sight {
-            Sight::Clear => None,
-            Sight::Broken { leading, .. } | Sight::Gap(Object { leading, .. }) => Some(leading),
-        }
+        self.object.map(|object| object.leading)
     }
 
     /// Takes an edge of the beam at `ground`; returns the object that was complete before it.
@@ -91,23 +80,22 @@ impl Watch {
         // The machine may have come back to the frontier with another level than it left with.
         self.turn();
         self.frontier = ground;
-        match self.sight {
-            Sight::Gap(object) if ground - object.trailing >= merge_gap => {
-                self.sight = Sight::Clear;
-                Some(object)
-            }
-            _ => None,
-        }
+        let clear = !self.broken_at_frontier;
+        self.object.take_if(|object| clear && ground - object.trailing >= merge_gap)
     }
 
     /// Takes the beam's level at the frontier for what is seen there.
     fn turn(&mut self) {
-        self.sight = match (self.sight, self.broken) {
-            (Sight::Clear, true) => Sight::Broken { leading: self.frontier, cut: false },
-            (Sight::Gap(Object { leading, cut, .. }), true) => Sight::Broken { leading, cut },
-            (Sight::Broken { leading, cut }, false) => Sight::Gap(Object { leading, trailing: self.frontier, cut }),
-            (sight, _) => sight,
-        };
+        if self.broken == self.broken_at_frontier {
+            return;
+        }
+        self.broken_at_frontier = self.broken;
+        let here = self.frontier;
+        // Where the beam breaks behind an object, what was clear until now was a gap in it.
+        let object = self.object.get_or_insert(Object { leading: here, trailing: here, cut: false });
+        if !self.broken {
+            object.trailing = here;
+        }
     }
 }
 

@@ -135,6 +135,7 @@ impl<M: Memory> FieldExamples<M> {
         bytes
     }
 
+    #[inline(never)]
     fn begin(&mut self, number: u8, bytes: [u8; SLOT]) {
         self.writing = number;
         self.bytes = bytes;
