@@ -33,7 +33,6 @@ use control::{
     classifier::Nearest,
     console::LineBuffer,
     controller::{Controller, Readings, WakeUp},
-    lamp,
     reply::{self, Answer},
     units::Position,
 };
@@ -86,7 +85,7 @@ fn main() -> ! {
         let orders = controller.step(readings);
         heartbeat::beat(orders.pulse_out);
         servo.command(orders.pulse, orders.gap_ms);
-        let Ok(()) = lamp.set_state(lamp::is_lit(controller.state(), readings.now).into());
+        let Ok(()) = lamp.set_state(controller.lamp_is_lit().into());
 
         // A line is carried out only when the one before it has been answered in full; until then the bytes wait.
         while answer.is_done()
@@ -102,6 +101,8 @@ fn main() -> ! {
                 let Ok(()) = answer.write_line(controller, &mut serial);
             } else if let Some(event) = controller.next_event() {
                 let Ok(()) = reply::write_event(&event, &mut serial);
+            } else if let Some(plot) = controller.next_plot() {
+                let Ok(()) = reply::write_plot(controller, plot, &mut serial);
             }
         }
     }

@@ -26,6 +26,16 @@ words! {
         Set = "set",
         /// Keeps the settings.
         Save = "save",
+        /// Takes the settings back that are kept.
+        Revert = "revert",
+        /// Takes the settings back that a new machine has.
+        Defaults = "defaults",
+        /// Measures the wheel or the servo.
+        Calibrate = "calibrate",
+        /// Moves the tool by hand.
+        Servo = "servo",
+        /// Plays a row that is only thought of.
+        Test = "test",
         /// Goes to work.
         Start = "start",
         /// Takes the tool out.
@@ -34,6 +44,8 @@ words! {
         Clear = "clear",
         /// Tells what happens, or stops telling.
         Events = "events",
+        /// Draws curves on a plotter.
+        Plot = "plot",
         /// Says what the last object was, and teaches it.
         Label = "label",
         /// Lists the examples.
@@ -64,6 +76,32 @@ pub enum Command {
     Set(Setting, u16),
     /// `save`.
     Save,
+    /// `revert`.
+    Revert,
+    /// `defaults`.
+    Defaults,
+    /// `calibrate start`.
+    CalibrateStart,
+    /// `calibrate MM`, or `calibrate MM force`.
+    Calibrate {
+        /// The distance that was rolled since the start.
+        distance_mm: u16,
+        /// However far the result is from what the wheel's diameter gives.
+        force: bool,
+    },
+    /// `calibrate servo`.
+    CalibrateServo,
+    /// `servo in`.
+    ServoIn,
+    /// `servo out`.
+    ServoOut,
+    /// `servo US`, in microseconds.
+    Servo(u16),
+    /// `test row`, or `test row MM_S`.
+    TestRow {
+        /// The speed of the machine that is played, in mm/s.
+        speed_mm_s: u16,
+    },
     /// `start`, or `start now`.
     Start {
         /// At once, over unseen ground.
@@ -75,6 +113,8 @@ pub enum Command {
     Clear,
     /// `events on|off`.
     Events(bool),
+    /// `plot on|off|teleplot`.
+    Plot(Plot),
     /// `label plant|weed`, with the [`label`].
     Label(u8),
     /// `examples`.
@@ -88,6 +128,21 @@ pub enum Command {
     /// `version`.
     Version,
 }
+
+/// Curves for a plotter.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Plot {
+    /// None.
+    #[default]
+    Off,
+    /// For the Arduino IDE's Serial Plotter.
+    Arduino,
+    /// For Teleplot.
+    Teleplot,
+}
+
+/// Speed at which a row is played unless another is given: 1.8 km/h.
+const TEST_SPEED_MM_S: u16 = 500;
 
 /// Why a line was not understood.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -119,6 +174,20 @@ words! {
         Off = "off",
         /// Of `forget`.
         All = "all",
+        /// Of `calibrate`.
+        Start = "start",
+        /// Of `calibrate`.
+        Servo = "servo",
+        /// Of `calibrate`.
+        Force = "force",
+        /// Of `servo`.
+        In = "in",
+        /// Of `servo`.
+        Out = "out",
+        /// Of `test`.
+        Row = "row",
+        /// Of `plot`.
+        Teleplot = "teleplot",
         /// Of `label`.
         Plant = "plant",
         /// Of `label`.
@@ -136,8 +205,13 @@ pub fn parse(line: &[u8]) -> Result<Command, Mistake> {
     let usage = Err(Mistake::Usage(word));
     let (first, rest) = split_word(rest);
     let (second, rest) = split_word(rest);
-    // Only `set` takes two words, and takes nothing less.
-    if second.is_empty() == (word == Word::Set) || !rest.iter().all(is_blank) {
+    // Few commands take two words, and `set` nothing less.
+    let fits = match word {
+        Word::Set => !second.is_empty(),
+        Word::Calibrate | Word::Test => true,
+        _ => second.is_empty(),
+    };
+    if !fits || !rest.iter().all(is_blank) {
         return usage;
     }
     if first.is_empty() {
@@ -146,13 +220,15 @@ pub fn parse(line: &[u8]) -> Result<Command, Mistake> {
             Word::Status => Ok(Command::Status),
             Word::Get => Ok(Command::GetAll),
             Word::Save => Ok(Command::Save),
+            Word::Revert => Ok(Command::Revert),
+            Word::Defaults => Ok(Command::Defaults),
             Word::Start => Ok(Command::Start { now: false }),
             Word::Hold => Ok(Command::Hold),
             Word::Clear => Ok(Command::Clear),
             Word::Examples => Ok(Command::Examples),
             Word::Dump => Ok(Command::Dump),
             Word::Version => Ok(Command::Version),
-            Word::Set | Word::Events | Word::Label | Word::Forget => usage,
+            _ => usage,
         };
     }
     if let Word::Help | Word::Get | Word::Set = word {
@@ -163,19 +239,37 @@ pub fn parse(line: &[u8]) -> Result<Command, Mistake> {
             _ => value(setting, second).map(|value| Command::Set(setting, value)).ok_or(Mistake::Value(setting)),
         };
     }
-    match (word, Argument::find(first)) {
-        (Word::Start, Some(Argument::Now)) => Ok(Command::Start { now: true }),
-        (Word::Events, Some(Argument::On)) => Ok(Command::Events(true)),
-        (Word::Events, Some(Argument::Off)) => Ok(Command::Events(false)),
-        (Word::Label, Some(Argument::Plant)) => Ok(Command::Label(label::PLANT)),
-        (Word::Label, Some(Argument::Weed)) => Ok(Command::Label(label::WEED)),
-        (Word::Forget, Some(Argument::All)) => Ok(Command::ForgetAll),
-        (Word::Forget, None) => match number(first) {
-            Some(number @ 0..=255) => Ok(Command::Forget(number as u8)),
-            _ => usage,
+    let command = match (word, Argument::find(first), number(first)) {
+        (Word::Start, Some(Argument::Now), _) => Command::Start { now: true },
+        (Word::Events, Some(Argument::On), _) => Command::Events(true),
+        (Word::Events, Some(Argument::Off), _) => Command::Events(false),
+        (Word::Plot, Some(Argument::On), _) => Command::Plot(Plot::Arduino),
+        (Word::Plot, Some(Argument::Off), _) => Command::Plot(Plot::Off),
+        (Word::Plot, Some(Argument::Teleplot), _) => Command::Plot(Plot::Teleplot),
+        (Word::Label, Some(Argument::Plant), _) => Command::Label(label::PLANT),
+        (Word::Label, Some(Argument::Weed), _) => Command::Label(label::WEED),
+        (Word::Forget, Some(Argument::All), _) => Command::ForgetAll,
+        (Word::Forget, _, Some(number @ 0..=255)) => Command::Forget(number as u8),
+        (Word::Servo, Some(Argument::In), _) => Command::ServoIn,
+        (Word::Servo, Some(Argument::Out), _) => Command::ServoOut,
+        (Word::Servo, _, Some(pulse_us)) => Command::Servo(pulse_us),
+        (Word::Calibrate, _, Some(distance_mm)) => {
+            let force = Argument::find(second) == Some(Argument::Force);
+            if !force && !second.is_empty() {
+                return usage;
+            }
+            Command::Calibrate { distance_mm, force }
+        }
+        (Word::Calibrate, Some(Argument::Start), _) if second.is_empty() => Command::CalibrateStart,
+        (Word::Calibrate, Some(Argument::Servo), _) if second.is_empty() => Command::CalibrateServo,
+        (Word::Test, Some(Argument::Row), _) if second.is_empty() => Command::TestRow { speed_mm_s: TEST_SPEED_MM_S },
+        (Word::Test, Some(Argument::Row), _) => match number(second) {
+            Some(speed_mm_s) => Command::TestRow { speed_mm_s },
+            None => return usage,
         },
-        _ => usage,
-    }
+        _ => return usage,
+    };
+    Ok(command)
 }
 
 /// What a word says for a setting: a number, or `on` or `off` for one that is switched.
@@ -280,6 +374,20 @@ mod tests {
             (b"set end_switch off", Command::Set(Setting::EndSwitch, 0)),
             (b"set end_switch 1", Command::Set(Setting::EndSwitch, 1)),
             (b"save", Command::Save),
+            (b"revert", Command::Revert),
+            (b"defaults", Command::Defaults),
+            (b"calibrate start", Command::CalibrateStart),
+            (b"calibrate 10000", Command::Calibrate { distance_mm: 10_000, force: false }),
+            (b"calibrate 10000 force", Command::Calibrate { distance_mm: 10_000, force: true }),
+            (b"calibrate servo", Command::CalibrateServo),
+            (b"servo in", Command::ServoIn),
+            (b"servo out", Command::ServoOut),
+            (b"servo 1750", Command::Servo(1750)),
+            (b"test row", Command::TestRow { speed_mm_s: 500 }),
+            (b"test row 700", Command::TestRow { speed_mm_s: 700 }),
+            (b"plot on", Command::Plot(Plot::Arduino)),
+            (b"plot off", Command::Plot(Plot::Off)),
+            (b"plot teleplot", Command::Plot(Plot::Teleplot)),
             (b"start", Command::Start { now: false }),
             (b"start now", Command::Start { now: true }),
             (b"hold", Command::Hold),
@@ -317,6 +425,19 @@ mod tests {
             (b"start later", Mistake::Usage(Word::Start)),
             (b"events", Mistake::Usage(Word::Events)),
             (b"events maybe", Mistake::Usage(Word::Events)),
+            (b"calibrate", Mistake::Usage(Word::Calibrate)),
+            (b"calibrate me", Mistake::Usage(Word::Calibrate)),
+            (b"calibrate 10000 faster", Mistake::Usage(Word::Calibrate)),
+            (b"calibrate start now", Mistake::Usage(Word::Calibrate)),
+            (b"calibrate 70000", Mistake::Usage(Word::Calibrate)),
+            (b"servo", Mistake::Usage(Word::Servo)),
+            (b"servo up", Mistake::Usage(Word::Servo)),
+            (b"servo in now", Mistake::Usage(Word::Servo)),
+            (b"test", Mistake::Usage(Word::Test)),
+            (b"test plants", Mistake::Usage(Word::Test)),
+            (b"test row fast", Mistake::Usage(Word::Test)),
+            (b"plot", Mistake::Usage(Word::Plot)),
+            (b"plot start", Mistake::Usage(Word::Plot)),
             (b"label tree", Mistake::Usage(Word::Label)),
             (b"forget", Mistake::Usage(Word::Forget)),
             (b"forget 256", Mistake::Usage(Word::Forget)),

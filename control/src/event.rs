@@ -2,6 +2,7 @@
 
 use crate::{
     alarm::{Alarm, Warning},
+    calibration::Outcome,
     classifier::Vote,
     controller::State,
     schedule::Plan,
@@ -40,4 +41,11 @@ pub enum Event {
     },
     /// Something happened that the operator should know of.
     Warning(Warning),
+    /// The servo's swings are over.
+    Calibrated {
+        /// What they told.
+        outcome: Outcome,
+        /// Whether the leads are set to it: they may be out of range, or contradict other settings.
+        fits: bool,
+    },
 }

@@ -15,6 +15,7 @@
 #![forbid(unsafe_code)]
 
 pub mod alarm;
+pub mod calibration;
 pub mod classifier;
 pub mod console;
 pub mod controller;
@@ -26,6 +27,7 @@ pub mod memory;
 pub mod monitor;
 pub mod object;
 pub mod quadrature;
+pub mod rehearsal;
 pub mod reply;
 pub mod reset;
 pub mod saved;

@@ -7,7 +7,7 @@
 
 use crate::{
     alarm::Alarm,
-    units::{Instant, Interval, Position, Ticks, TicksPerSecond},
+    units::{Instant, Interval, Position, Ticks},
 };
 
 /// A step farther than this is progress: a wheel that trembles on an edge moves by one, and one dead channel by one.
@@ -29,10 +29,11 @@ const STANDS: Interval = Interval::from_ms(100);
 /// Times that the beam may break while the machine stands: leaves move in the wind, but plants do not pass.
 const BREAKS: u8 = 3;
 
-/// A machine that rolled faster than this, 0.25 m/s with an encoder of 0.5 mm, and makes no progress for so long, has either
-/// braked with more than 5 m/s2 or lost its encoder. At 2.5 km/h it rolls 21 mm in that time, less than the margin.
-const ROLLS: TicksPerSecond = TicksPerSecond(480);
+/// A machine that made its last progress within [`ROLLS`], at 0.8 km/h or faster with an encoder of 0.5 mm, and makes none for
+/// this long, has either braked with more than 10 m/s2 or lost its encoder. At 2.5 km/h it rolls 21 mm in that time, less
+/// than the margin.
 const SUDDEN: Interval = Interval::from_ms(30);
+const ROLLS: Interval = Interval::from_ms(7);
 
 /// Watches the encoder.
 #[derive(Clone, Debug)]
@@ -69,23 +70,23 @@ impl EncoderMonitor {
         }
     }
 
-    /// Takes a reading, with the speed as it was measured and the count of jumps since power-up; returns the fault that it
-    /// shows.
-    pub fn read(&mut self, now: Instant, position: Position, speed: TicksPerSecond, jumps: u16) -> Option<Alarm> {
+    /// Takes a reading, with the count of jumps since power-up; returns the fault that it shows.
+    pub fn read(&mut self, now: Instant, position: Position, jumps: u16) -> Option<Alarm> {
         if now - self.period_since >= PERIOD {
             self.period_since = now;
             self.edges = 0;
             self.jumps = jumps;
         }
         let moved = position - self.anchor;
+        let since_progress = now - self.progress_at;
         if moved > PROGRESS || moved < -PROGRESS {
             self.anchor = position;
             self.progress_at = now;
-            self.rolled = speed > ROLLS || speed < -ROLLS;
+            self.rolled = since_progress <= ROLLS;
             self.fell_silent = false;
             self.edges = 0;
             self.breaks = 0;
-        } else if self.rolled && now - self.progress_at >= SUDDEN {
+        } else if self.rolled && since_progress >= SUDDEN {
             self.fell_silent = true;
         }
         if position != self.last {

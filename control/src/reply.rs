@@ -6,8 +6,9 @@
 
 use crate::{
     alarm::Warning,
+    calibration::{Leads, Outcome, Unfit},
     classifier::{self, Class, Classifier, label},
-    console::{Argument, Command, Mistake, Word},
+    console::{Argument, Command, Mistake, Plot, Word},
     controller::{Controller, Judged, Refusal, State},
     event::Event,
     memory::Memory,
@@ -56,6 +57,16 @@ commands! {
         "change a setting; save keeps it";
     Save "save",
         "keep the settings for good";
+    Revert "revert",
+        "take the saved settings back";
+    Defaults "defaults",
+        "take a new machine's settings back";
+    Calibrate "calibrate start|servo|MM [force]",
+        "start, roll a measured distance, give it; or time the servo";
+    Servo "servo in|out|US",
+        "move the tool by hand";
+    Test "test row [MM_S]",
+        "swing as for a row of plants, without a sensor";
     Start "start [now]",
         "weed; now, at once over ground the beam has not seen";
     Hold "hold",
@@ -64,6 +75,8 @@ commands! {
         "clear an alarm";
     Events "events on|off",
         "tell of plants, swings and alarms as they come";
+    Plot "plot on|off|teleplot",
+        "curves for the Arduino Serial Plotter, or Teleplot";
     Label "label plant|weed",
         "say what the last object was, and teach it";
     Examples "examples",
@@ -137,6 +150,25 @@ where
         Command::Dump => Answer::DumpHeading,
         Command::Set(setting, value) => done(controller.set(setting, value), Some(setting)),
         Command::Save => done(controller.save(), None),
+        Command::Revert => done(controller.take_saved(), None),
+        Command::Defaults => done(controller.take_defaults(), None),
+        Command::CalibrateStart => {
+            controller.calibrate_start();
+            Answer::Ok
+        }
+        Command::Calibrate { distance_mm, force } => match controller.calibrate(distance_mm, force) {
+            Ok(()) => Answer::Get(Setting::TicksPerM),
+            refused => done(refused, Some(Setting::TicksPerM)),
+        },
+        Command::CalibrateServo => done(controller.calibrate_servo(), None),
+        Command::ServoIn => done(controller.servo_in(), None),
+        Command::ServoOut => done(controller.servo_out(), None),
+        Command::Servo(pulse_us) => done(controller.servo_by_hand(pulse_us), Some(Setting::ServoOutUs)),
+        Command::TestRow { speed_mm_s } => done(controller.test_row(speed_mm_s), None),
+        Command::Plot(plot) => {
+            controller.set_plot(plot);
+            Answer::Ok
+        }
         Command::Start { now } => done(controller.start(now), None),
         Command::Label(label) => done(controller.label(label), None),
         Command::Forget(number) => done(controller.forget(number), None),
@@ -293,12 +325,53 @@ pub fn write_event<W: uWrite + ?Sized>(event: &Event, out: &mut W) -> Result<(),
             say(out, text!("warning name="))?;
             say_listed(out, warning.text())?;
         }
+        Event::Calibrated { outcome: Outcome::Measured(Leads { out_ms, in_ms }), fits } => {
+            say_number(out, text!("calibrated lead_out_ms="), out_ms.into())?;
+            say_number(out, text!(" lead_in_ms="), in_ms.into())?;
+            say(out, if fits { text!(" set=yes") } else { text!(" set=no") })?;
+        }
+        Event::Calibrated { outcome: Outcome::Shown, .. } => {
+            say(out, text!("calibrated by=eye, set lead_out_ms and lead_in_ms to what you saw"))?;
+        }
+        Event::Calibrated { outcome: Outcome::Failed, .. } => {
+            say(out, text!("calibrated by=nobody, the end switch did not follow"))?;
+        }
         Event::Alarm { alarm, position } => {
             say(out, text!("alarm name="))?;
             say_listed(out, alarm.text())?;
             say_number(out, text!(" code="), alarm.code().into())?;
             say_number(out, text!(" pos="), position.count())?;
         }
+    }
+    say(out, text!("\r\n"))
+}
+
+/// Writes the next points of a plotter's curves, each `label:value`, with the line's end.
+///
+/// # Errors
+/// What `out` reports.
+pub fn write_plot<C, M, W>(controller: &Controller<C, M>, plot: Plot, out: &mut W) -> Result<(), W::Error>
+where
+    C: Classifier,
+    M: Memory,
+    W: uWrite + ?Sized,
+{
+    let curves = list!("speed_mm_s", "tool_deg", "beam_broken", "windows");
+    let points = [
+        controller.speed_mm_s(),
+        if controller.tool_out() { 45 } else { 0 },
+        i16::from(controller.beam_is_broken()),
+        i16::from(controller.windows()),
+    ];
+    for (place, point) in (0..).zip(points) {
+        match (plot, place) {
+            (Plot::Teleplot, 0) => say(out, text!(">"))?,
+            (Plot::Teleplot, _) => say(out, text!("\r\n>"))?,
+            (_, 0) => {}
+            _ => say(out, text!(","))?,
+        }
+        say_listed(out, Listed(curves, place))?;
+        say_number(out, text!(":"), point.into())?;
     }
     say(out, text!("\r\n"))
 }
@@ -359,7 +432,12 @@ where
     say_listed(out, setting.text())?;
     write_value(text!("="), setting, controller.settings().get(setting), out)?;
     write_range(setting, out)?;
-    write_value(text!(", default "), setting, setting.description().default, out)
+    write_value(text!(", default "), setting, setting.description().default, out)?;
+    match controller.saved(setting) {
+        None => say(out, text!(", not saved")),
+        Some(saved) if saved == controller.settings().get(setting) => Ok(()),
+        Some(saved) => write_value(text!(", saved "), setting, saved, out),
+    }
 }
 
 /// A text and a setting's value after it.
@@ -423,11 +501,11 @@ where
     say(out, text!("error: "))?;
     match (refusal, setting) {
         (Refusal::OutOfRange, Some(setting)) => write_allowed(setting, out),
-        (Refusal::NotInHold, Some(setting)) => {
+        (Refusal::NotInHold, Some(setting)) if setting.description().hold_only => {
             say_listed(out, setting.text())?;
             say(out, text!(" changes where the tool is, hold first"))
         }
-        (Refusal::NotInHold, None) => say(out, text!("the machine is at work, hold first")),
+        (Refusal::NotInHold, _) => say(out, text!("the machine is at work, hold first")),
         (Refusal::Contradiction(Contradiction::PulsesEqual), _) => {
             say(out, text!("servo_in_us and servo_out_us would be equal, and the tool would not move"))
         }
@@ -437,6 +515,17 @@ where
         }
         (Refusal::NothingToLabel, _) => {
             say(out, text!("there is no object without a label, let the beam see one first"))
+        }
+        (Refusal::NothingSaved, _) => say(out, text!("no settings are saved, save does it")),
+        (Refusal::Unfit(Unfit::NotBegun), _) => say(out, text!("calibrate start first, then roll")),
+        (Refusal::Unfit(Unfit::TooShort), _) => say(out, text!("roll 1000 mm at least, 10000 are better")),
+        (Refusal::Unfit(Unfit::Differs { counted, nominal }), _) => {
+            say_number(out, text!("that would be ticks_per_m "), counted.into())?;
+            say_number(out, text!(", the wheel has "), nominal.into())?;
+            say(out, text!(", look again, or add force"))
+        }
+        (Refusal::TestSpeed { fastest }, _) => {
+            say_number(out, text!("test row takes a speed in mm/s from 100 to "), fastest.into())
         }
         (Refusal::ExamplesFull, _) => say(out, text!("all 32 places are taken, forget one first")),
         (Refusal::NoSuchExample, _) => say(out, text!("no field example has this number, examples lists them")),

@@ -35,12 +35,14 @@ pub struct SavedSettings<M> {
     sequence: u8,
     /// The byte of that copy that is to be written next; [`COPY`] when all are.
     next: u8,
+    /// Whether there is a copy.
+    exists: bool,
 }
 
 impl<M: Memory> SavedSettings<M> {
     /// The settings in a memory, which are yet to be loaded.
     pub const fn new(memory: M) -> Self {
-        Self { memory, newest: 1, sequence: 0, next: COPY as u8 }
+        Self { memory, newest: 1, sequence: 0, next: COPY as u8, exists: false }
     }
 
     /// Loads the newest copy that is whole; `None` where neither is.
@@ -52,6 +54,7 @@ impl<M: Memory> SavedSettings<M> {
         for turn in 0..2 {
             let copy = newer ^ turn;
             if let Some(settings) = self.read(copy) {
+                self.exists = true;
                 (self.newest, self.sequence) = (copy, self.memory.read(address(copy) + SEQUENCE));
                 return Some(settings);
             }
@@ -61,6 +64,7 @@ impl<M: Memory> SavedSettings<M> {
 
     /// Begins to save. The settings must not change until [`carry_on`](Self::carry_on) has finished.
     pub const fn save(&mut self) {
+        self.exists = true;
         self.newest ^= 1;
         self.sequence = self.sequence.wrapping_add(1);
         self.next = 0;
@@ -85,6 +89,13 @@ impl<M: Memory> SavedSettings<M> {
             }
         }
         true
+    }
+
+    /// The value of a setting that is saved, if any is; not while a save is under way.
+    pub fn value(&self, setting: Setting) -> Option<u16> {
+        let place = address(self.newest) + HEADER as u16 + 2 * setting as u16;
+        let byte = |place| self.memory.read(place);
+        self.exists.then(|| u16::from_le_bytes([byte(place), byte(place + 1)]))
     }
 
     /// The memory, to be looked at or put into another machine.

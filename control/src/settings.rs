@@ -63,6 +63,9 @@ settings! {
     /// Diameter of the ground wheel.
     WheelMm "wheel_mm": 200 to 800, 400, true,
         "diameter of the ground wheel";
+    /// Encoder counts a metre, measured.
+    TicksPerM "ticks_per_m": 0 to 20000, 0, true,
+        "encoder counts a metre, as calibrated; 0: by wheel and encoder";
     /// X: how far the beam stands ahead of the tool.
     BeamToToolMm "beam_to_tool_mm": 100 to 2000, 400, true,
         "X, how far the beam stands ahead of the tool";
@@ -196,7 +199,11 @@ impl Settings {
 
     /// The ground wheel with its encoder.
     pub fn wheel(&self) -> Wheel {
-        Wheel { ticks_per_rev: self.get(Setting::TicksPerRev), diameter_mm: self.get(Setting::WheelMm) }
+        Wheel {
+            ticks_per_rev: self.get(Setting::TicksPerRev),
+            diameter_mm: self.get(Setting::WheelMm),
+            ticks_per_m: self.get(Setting::TicksPerM),
+        }
     }
 
     /// A setting in millimetres as ticks of the present wheel.

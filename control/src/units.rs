@@ -139,13 +139,6 @@ impl Add<Interval> for Instant {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct TicksPerSecond(pub i32);
 
-impl Neg for TicksPerSecond {
-    type Output = Self;
-    fn neg(self) -> Self {
-        Self(self.0.wrapping_neg())
-    }
-}
-
 impl TicksPerSecond {
     /// How far the machine rolls at this speed, in so many milliseconds.
     ///
@@ -165,6 +158,8 @@ pub struct Wheel {
     pub ticks_per_rev: u16,
     /// The wheel's diameter in millimetres, 200 to 800.
     pub diameter_mm: u16,
+    /// Counts a metre, measured, up to 20,000; 0 where what the diameter gives is right.
+    pub ticks_per_m: u16,
 }
 
 impl Wheel {
@@ -172,20 +167,33 @@ impl Wheel {
     const PI_NUMERATOR: u32 = 355;
     const PI_DENOMINATOR: u32 = 113;
 
-    /// A distance in ticks, rounded to the nearest: `mm * ticks_per_rev / (pi * diameter)`, the paper's Eq. 1 and 2.
+    /// A distance in ticks, rounded to the nearest: `mm * ticks_per_rev / (pi * diameter)`, the paper's Eq. 1 and 2, or by
+    /// what was measured.
     ///
     /// Right up to 3.8 m with an encoder of 10,000 counts, farther with a coarser one.
     pub fn ticks(self, millimetres: u16) -> Ticks {
-        let numerator = u32::from(millimetres) * u32::from(self.ticks_per_rev) * Self::PI_DENOMINATOR;
-        let denominator = Self::PI_NUMERATOR * u32::from(self.diameter_mm);
+        let millimetres = u32::from(millimetres);
+        let (numerator, denominator) = match self.ticks_per_m {
+            0 => (
+                millimetres * u32::from(self.ticks_per_rev) * Self::PI_DENOMINATOR,
+                Self::PI_NUMERATOR * u32::from(self.diameter_mm),
+            ),
+            measured => (millimetres * u32::from(measured), 1000),
+        };
         Ticks(((numerator + denominator / 2) / denominator) as i32)
     }
 
     /// A distance in millimetres, rounded toward zero and limited to what 16 bits hold; right to 1 mm and 0.02 %.
     pub fn millimetres(self, distance: Ticks) -> i16 {
-        // A tick in 1/65536 mm: at most 1.7 million (800 mm wheel, 100 counts). The limit keeps the product in 32 bits.
-        let circumference = Self::PI_NUMERATOR * u32::from(self.diameter_mm) * 8192 / Self::PI_DENOMINATOR * 8;
-        let counts = u32::from(self.ticks_per_rev);
+        // A tick in 1/65536 mm: at most 1.7 million (800 mm wheel, 100 counts), or 2.4 million where it was measured. The limit
+        // keeps the product in 32 bits.
+        let (circumference, counts) = match self.ticks_per_m {
+            0 => (
+                Self::PI_NUMERATOR * u32::from(self.diameter_mm) * 8192 / Self::PI_DENOMINATOR * 8,
+                u32::from(self.ticks_per_rev),
+            ),
+            measured => (1000 << 16, u32::from(measured)),
+        };
         let tick = (circumference + counts / 2) / counts;
         let limit = ((i16::MAX as u32) << 16) / tick;
         let magnitude = distance.0.unsigned_abs();

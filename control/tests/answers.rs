@@ -5,8 +5,9 @@ mod common;
 use common::{ByWidth, Machine, machine, readings, woken_up};
 use control::{
     alarm::{Alarm, Warning},
+    calibration::{Leads, Outcome},
     classifier::{Class, Vote},
-    console::{LineBuffer, Word},
+    console::{LineBuffer, Plot, Word},
     controller::{Controller, Readings, State},
     event::Event,
     memory::Volatile,
@@ -111,7 +112,10 @@ fn a_setting_takes_every_value_of_its_range_and_no_other() {
         if setting.is_switched() {
             let refusal = [format!("error: {name} takes on or off")];
             assert_eq!(ask(&mut machine, &format!("set {name} 2")), refusal);
-            assert_eq!(ask(&mut machine, &format!("get {name}"))[0], format!("{name}=on on or off, default off"));
+            assert_eq!(
+                ask(&mut machine, &format!("get {name}"))[0],
+                format!("{name}=on on or off, default off, not saved")
+            );
             continue;
         }
         let outside = [description.least.checked_sub(1), description.greatest.checked_add(1)];
@@ -191,6 +195,8 @@ fn every_event_fits_on_a_line() {
         Event::State(State::Hold),
     ];
     events.extend((0..).map_while(Warning::from_index).map(Event::Warning));
+    let longest = Outcome::Measured(Leads { out_ms: u16::MAX, in_ms: u16::MAX });
+    events.extend([longest, Outcome::Shown, Outcome::Failed].map(|outcome| Event::Calibrated { outcome, fits: false }));
     events.extend((0..).map_while(Alarm::from_index).map(|alarm| Event::Alarm { alarm, position: far }));
     for event in events {
         let mut said = Said::default();
@@ -224,7 +230,7 @@ fn the_readme_names_every_setting_with_its_default() {
         let row = readme.lines().find(|line| line.starts_with('|') && line.contains(&format!("`{name}`")));
         let row = row.unwrap_or_else(|| panic!("the README has no row for {name}"));
         let line = ask(&mut machine(), &format!("get {name}")).remove(0);
-        let (_, default) = line.split_once(", default ").expect("get tells the default");
+        let default = line.split(", ").find_map(|part| part.strip_prefix("default ")).expect("get tells the default");
         assert!(row.contains(default), "{name}: {row}");
     }
 }
@@ -292,5 +298,58 @@ fn the_table_of_faults_names_every_alarm_with_its_code_and_every_warning_and_cau
     }
     for cause in (0..).map_while(Cause::from_index) {
         assert!(table.contains(&format!("`{}`", name(cause.text()))), "{cause:?}");
+    }
+}
+
+#[test]
+fn get_tells_what_is_saved_where_that_differs() {
+    let mut machine = machine();
+    assert_eq!(ask(&mut machine, "get k")[0], "k=3 from 1 to 15, default 3, not saved");
+    assert_eq!(ask(&mut machine, "save"), ["ok"]);
+    while !machine.carry_on() {}
+    assert_eq!(ask(&mut machine, "get k")[0], "k=3 from 1 to 15, default 3");
+    ask(&mut machine, "set k 5");
+    assert_eq!(ask(&mut machine, "get k")[0], "k=5 from 1 to 15, default 3, saved 3");
+    assert_eq!(ask(&mut machine, "revert"), ["ok"]);
+    assert_eq!(ask(&mut machine, "get k")[0], "k=3 from 1 to 15, default 3");
+}
+
+#[test]
+fn a_calibration_is_answered_by_what_it_gave_or_by_what_would_be_right() {
+    let mut machine = machine();
+    assert_eq!(ask(&mut machine, "calibrate 10000"), ["error: calibrate start first, then roll"]);
+    assert_eq!(ask(&mut machine, "calibrate start"), ["ok"]);
+    machine.step(readings(1000, 18_900));
+    assert_eq!(ask(&mut machine, "calibrate 500"), ["error: roll 1000 mm at least, 10000 are better"]);
+    let refusal = "error: that would be ticks_per_m 3780, the wheel has 1910, look again, or add force";
+    assert_eq!(ask(&mut machine, "calibrate 5000"), [refusal]);
+    let answer = ["ticks_per_m=1890 from 0 to 20000, default 0, not saved", "ok"];
+    assert_eq!(ask(&mut machine, "calibrate 10000"), answer);
+    assert_eq!(ask(&mut machine, "calibrate 5000 force")[0], "ticks_per_m=3780 from 0 to 20000, default 0, not saved");
+}
+
+#[test]
+fn what_is_tried_on_the_bench_is_refused_at_work_with_what_would_be_right() {
+    let mut machine = machine();
+    let speed = "error: test row takes a speed in mm/s from 100 to 1400";
+    assert_eq!(ask(&mut machine, "test row 1401"), [speed]);
+    assert_eq!(ask(&mut machine, "servo 499"), ["error: servo_out_us takes a whole number from 500 to 2500"]);
+    assert_eq!(ask(&mut machine, "revert"), ["error: no settings are saved, save does it"]);
+    ask(&mut machine, "start");
+    for line in ["servo in", "servo out", "calibrate servo", "test row", "defaults", "revert", "save"] {
+        assert_eq!(ask(&mut machine, line), ["error: the machine is at work, hold first"], "{line}");
+    }
+}
+
+#[test]
+fn curves_are_labels_and_values_and_nothing_else() {
+    let machine = machine();
+    for (plot, expected) in [
+        (Plot::Arduino, "speed_mm_s:0,tool_deg:45,beam_broken:0,windows:0\r\n"),
+        (Plot::Teleplot, ">speed_mm_s:0\r\n>tool_deg:45\r\n>beam_broken:0\r\n>windows:0\r\n"),
+    ] {
+        let mut said = Said::default();
+        reply::write_plot(&machine, plot, &mut said).unwrap();
+        assert_eq!(said.0, expected);
     }
 }

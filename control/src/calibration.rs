@@ -1,0 +1,206 @@
+//! Calibration: what the machine can measure of itself.
+//!
+//! [`Distance`] counts the ticks of a stretch that the operator has measured, which takes in the tyre's wear and the wheel's slip.
+//! [`Swings`] times the servo by the end switch: from the command until the tool is out, and until it begins to come back.
+//! Without an end switch the same swings let the operator time them from a film, with the LED to mark the commands.
+
+use crate::units::{Instant, Interval, Position};
+
+/// The shortest stretch that tells the wheel to better than 0.1 %.
+pub const SHORTEST_MM: u16 = 1000;
+
+/// By how much a calibrated wheel may differ from what its diameter gives, in percent.
+const TOLERANCE_PERCENT: u32 = 30;
+
+/// Why a stretch tells nothing of the wheel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Unfit {
+    /// Nobody has said where the stretch begins.
+    NotBegun,
+    /// It is shorter than [`SHORTEST_MM`].
+    TooShort,
+    /// The wheel would differ by more than 30 % from its diameter.
+    Differs {
+        /// Ticks a metre, as counted; what 16 bits hold.
+        counted: u16,
+        /// Ticks a metre, by the diameter.
+        nominal: u16,
+    },
+}
+
+/// The stretch that is being measured.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Distance(Option<Position>);
+
+impl Distance {
+    /// The stretch begins here.
+    pub const fn begin(&mut self, position: Position) {
+        self.0 = Some(position);
+    }
+
+    /// Ticks a metre of a stretch of `length_mm` that ends at `position`, forward or back; `nominal` is what the wheel's diameter
+    /// gives, from which it may differ as far as it likes if it is `forced`.
+    ///
+    /// # Errors
+    /// [`Unfit`]; the stretch can be ended again.
+    pub fn end(&self, position: Position, length_mm: u16, nominal: u16, forced: bool) -> Result<u16, Unfit> {
+        let begin = self.0.ok_or(Unfit::NotBegun)?;
+        if length_mm < SHORTEST_MM {
+            return Err(Unfit::TooShort);
+        }
+        let length_mm = u32::from(length_mm);
+        // Up to 4 million ticks, 250 m of the finest wheel, which nobody measures by hand.
+        let ticks = (position - begin).0.unsigned_abs().min(u32::MAX / 1000 - 1);
+        let counted = ((ticks * 1000 + length_mm / 2) / length_mm).min(u16::MAX.into());
+        let differs = counted.abs_diff(nominal.into()) * 100 > u32::from(nominal) * TOLERANCE_PERCENT;
+        if counted == 0 || differs && !forced {
+            return Err(Unfit::Differs { counted: counted as u16, nominal });
+        }
+        Ok(counted as u16)
+    }
+}
+
+/// Times that the tool swings to and fro.
+const ROUNDS: u8 = 3;
+
+/// The time given to a swing, several times what any servo takes.
+const SWING: Interval = Interval::from_ms(1500);
+
+/// What a round of [`Swings`] adds to the longest way out: two servo pulses, for a command that comes when it is least welcome.
+const SPARE_MS: u16 = 10;
+
+/// The servo's times, measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Leads {
+    /// The longest time from the command until the tool was out, and a little more.
+    pub out_ms: u16,
+    /// The shortest time from the command until the tool began to come back.
+    pub in_ms: u16,
+}
+
+/// How the swings ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// The end switch told the times.
+    Measured(Leads),
+    /// There is no end switch to tell them.
+    Shown,
+    /// The end switch did not follow a swing.
+    Failed,
+}
+
+/// The tool swings in and out, and the end switch tells when it arrives and when it leaves.
+#[derive(Clone, Debug)]
+pub struct Swings {
+    /// Swings to come, this one included; an even number is a way in.
+    left: u8,
+    since: Instant,
+    /// Whether the switch has followed this swing.
+    followed: bool,
+    watched: bool,
+    leads: Leads,
+}
+
+impl Swings {
+    /// The first swing, into the row, begins. `watched` tells whether there is an end switch.
+    pub const fn new(now: Instant, watched: bool) -> Self {
+        Self { left: 2 * ROUNDS, since: now, followed: false, watched, leads: Leads { out_ms: 0, in_ms: u16::MAX } }
+    }
+
+    /// Whether the tool is to be out.
+    pub const fn tool_out(&self) -> bool {
+        !self.left.is_multiple_of(2)
+    }
+
+    /// Takes the end switch's level, on where it says that the tool is out; returns how it ended.
+    pub fn step(&mut self, now: Instant, switch_on: bool) -> Option<Outcome> {
+        let lasted = now - self.since;
+        if self.watched && !self.followed && switch_on == self.tool_out() {
+            self.followed = true;
+            let lasted_ms = (lasted.steps() / (Interval::STEPS_PER_SECOND / 1000)) as u16;
+            if self.tool_out() {
+                self.leads.out_ms = self.leads.out_ms.max(lasted_ms + 1 + SPARE_MS);
+            } else {
+                self.leads.in_ms = self.leads.in_ms.min(lasted_ms);
+            }
+        }
+        if lasted < SWING {
+            return None;
+        }
+        if self.watched && !self.followed {
+            return Some(Outcome::Failed);
+        }
+        (self.since, self.followed) = (now, false);
+        self.left -= 1;
+        match (self.left, self.watched) {
+            (0, true) => Some(Outcome::Measured(self.leads)),
+            (0, false) => Some(Outcome::Shown),
+            _ => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn counted(ticks: i32, length_mm: u16, forced: bool) -> Result<u16, Unfit> {
+        let mut distance = Distance::default();
+        distance.begin(Position::new(i32::MAX - 100));
+        distance.end(Position::new((i32::MAX - 100).wrapping_add(ticks)), length_mm, 1910, forced)
+    }
+
+    #[test]
+    fn a_measured_stretch_tells_the_ticks_a_metre_forward_and_back() {
+        assert_eq!(counted(18_900, 10_000, false), Ok(1890));
+        assert_eq!(counted(-18_900, 10_000, false), Ok(1890));
+        assert_eq!(counted(1905, 1000, false), Ok(1905));
+    }
+
+    #[test]
+    fn a_stretch_that_cannot_be_right_is_refused_and_can_be_forced() {
+        assert_eq!(Distance::default().end(Position::new(0), 5000, 1910, true), Err(Unfit::NotBegun));
+        assert_eq!(counted(1900, 999, false), Err(Unfit::TooShort));
+        assert_eq!(counted(24_830, 10_000, false), Ok(2483));
+        assert_eq!(counted(24_840, 10_000, false), Err(Unfit::Differs { counted: 2484, nominal: 1910 }));
+        assert_eq!(counted(13_360, 10_000, false), Err(Unfit::Differs { counted: 1336, nominal: 1910 }));
+        assert_eq!(counted(24_840, 10_000, true), Ok(2484));
+        assert_eq!(counted(0, 10_000, true), Err(Unfit::Differs { counted: 0, nominal: 1910 }));
+        assert_eq!(counted(i32::MIN, 1000, false), Err(Unfit::Differs { counted: u16::MAX, nominal: 1910 }));
+    }
+
+    fn at_ms(milliseconds: u32) -> Instant {
+        Instant::new(u32::MAX - 500_000) + Interval::from_ms(milliseconds)
+    }
+
+    /// Runs the swings with a switch that follows the tool so many milliseconds after the command, in the order of the swings.
+    fn run(watched: bool, follows_ms: [u32; 6]) -> (Outcome, u32) {
+        let mut swings = Swings::new(at_ms(0), watched);
+        let (mut told, mut out, mut count) = (0, true, 0);
+        for now in 0_u32.. {
+            if swings.tool_out() != out {
+                // The step before this told it.
+                (told, out, count) = (now.saturating_sub(1), swings.tool_out(), count + 1);
+            }
+            let arrived = now - told >= follows_ms[count.max(1) - 1];
+            if let Some(outcome) = swings.step(at_ms(now), out == arrived) {
+                return (outcome, now);
+            }
+        }
+        unreachable!("the swings end")
+    }
+
+    #[test]
+    fn the_end_switch_tells_the_longest_way_out_and_the_shortest_way_in() {
+        let (outcome, lasted_ms) = run(true, [61, 180, 57, 195, 70, 170]);
+        assert_eq!(outcome, Outcome::Measured(Leads { out_ms: 195 + 11, in_ms: 57 }));
+        assert_eq!(lasted_ms, 9000);
+    }
+
+    #[test]
+    fn a_switch_that_does_not_follow_fails_and_none_at_all_shows_the_swings() {
+        assert_eq!(run(true, [60, 180, 60, 9999, 60, 180]).0, Outcome::Failed);
+        assert_eq!(run(true, [9999, 180, 60, 180, 60, 180]).0, Outcome::Failed);
+        assert_eq!(run(false, [0; 6]), (Outcome::Shown, 9000));
+    }
+}
