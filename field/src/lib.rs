@@ -8,6 +8,7 @@
 //!   and [`waveform`] writes down what was on the pins. [`replay`] plays a recording ([`capture`]) instead of a row, and
 //!   [`mod@bench`] counts cycles and bytes.
 //! - **Training**: [`training`] makes the example table that the firmware carries, of labelled objects.
+//! - **Wiring**: [`wiring`] says what is wired to which contact of the Uno, as a table and as a diagram.
 
 pub mod bench;
 pub mod capture;
@@ -30,3 +31,4 @@ pub mod trial;
 pub mod uno;
 pub mod verdict;
 pub mod waveform;
+pub mod wiring;
