@@ -1,5 +1,7 @@
-//! The classifier's cycles and memory, counted on the virtual Uno. The same sources give the same figures everywhere.
+//! The bench itself: the classifier's cycles and memory, and what is no figure. The same sources give the same figures
+//! everywhere.
 
+use field::bench::encoder::{Direction, Load, Turning, turn};
 use field::{bench, firmware};
 use knn_bench::Task;
 
@@ -18,4 +20,17 @@ fn another_program_is_not_taken_for_the_bench() {
     let elf = firmware::build().expect("the firmware builds");
     let error = bench::classifier(&elf, |_| ()).expect_err("the firmware measures nothing");
     assert!(error.to_string().contains("run the ELF that `cargo bench-firmware` makes"), "{error}");
+}
+
+#[test]
+fn a_rate_that_no_uno_can_follow_is_not_passed() {
+    let elf = firmware::build().expect("the firmware builds");
+    for load in [Load::Idle, Load::Telemetry] {
+        let turning = Turning { load, direction: Direction::Forward, jitter: 0.0 };
+        let slow = turn(&elf, turning, 10_000.0).expect("the firmware runs");
+        assert!(slow.is_passed(), "{slow:?}");
+        // 20 cycles a count.
+        let fast = turn(&elf, turning, 800_000.0).expect("the firmware runs");
+        assert!(!fast.is_passed(), "{fast:?}");
+    }
 }

@@ -1,11 +1,13 @@
 //! How fast the encoder may turn: the highest rate at which the firmware loses no count.
 //!
-//! A trial turns the encoder by [`COUNTS`] at one rate and then asks the firmware for its position. It is passed where that is
-//! exact, where the firmware knows of no lost count, and where it did not start anew. [`highest_rate`] finds the rate by bisection to
-//! [`RESOLUTION`], and then tries rates below it: edges that come in step with something else may pass at a rate by chance.
+//! A trial turns the encoder at one rate and then asks the firmware for its position. It is passed where that is exact, where
+//! the firmware knows of no lost count, where it did not start anew, and where its telemetry went on meanwhile: a
+//! trial lasts longer than its heartbeat and its watchdog wait for a loop that gets no time any more. [`highest_rate`] finds
+//! the rate by bisection to [`RESOLUTION`], and then tries rates below it: edges that come in step with something else may
+//! pass at a rate by chance.
 //!
-//! The firmware is in HOLD. What weeding adds is less than [`Load::Telemetry`], which fills the serial line and has the beam
-//! flicker as fast as its sensor can.
+//! The firmware is in HOLD. What weeding adds is less than [`Load::Telemetry`], which asks for more than the serial line can
+//! carry and has the beam flicker as fast as its sensor can.
 
 use super::BenchError;
 use super::load::{Telemetry, flicker};
@@ -16,8 +18,14 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::path::Path;
 
-/// Counts of a trial: the count's second byte runs over more than a hundred times.
-pub const COUNTS: u32 = 40_000;
+/// Fewest counts of a trial: the count's second byte changes more than a hundred times.
+const FEWEST_COUNTS: f64 = 40_000.0;
+
+/// Shortest trial: twice what the watchdog waits.
+const SHORTEST_S: f64 = 0.5;
+
+/// Share of the serial line below which the telemetry counts as silent: some eight lines of status a second.
+const SILENT_SHARE: f64 = 0.1;
 
 /// Relative distance between a rate that was passed and one that was not, at the end of the search.
 pub const RESOLUTION: f64 = 0.01;
@@ -27,7 +35,7 @@ pub const RESOLUTION: f64 = 0.01;
 pub enum Load {
     /// What it does by itself: clock, loop and servo.
     Idle,
-    /// Its status streams at 115200 baud with nearly no gap, and the beam flickers.
+    /// Its status is asked for without an end at 115200 baud, and the beam flickers.
     Telemetry,
 }
 
@@ -57,6 +65,8 @@ pub const JITTER: f64 = 0.3;
 /// What a trial showed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Counted {
+    /// What else the firmware did.
+    pub load: Load,
     /// Counts that came, net.
     pub true_ticks: i64,
     /// Counts that the firmware has; `None` where it could not be asked any more.
@@ -70,16 +80,17 @@ pub struct Counted {
 }
 
 impl Counted {
-    /// Whether nothing was lost.
-    pub fn is_exact(&self) -> bool {
-        self.position_ticks == Some(self.true_ticks) && self.lost_ticks == 0 && self.restarts == 0
+    /// Whether nothing was lost and the rest of the firmware went on.
+    pub fn is_passed(&self) -> bool {
+        let is_heard = self.load == Load::Idle || self.line_share >= SILENT_SHARE;
+        self.position_ticks == Some(self.true_ticks) && self.lost_ticks == 0 && self.restarts == 0 && is_heard
     }
 }
 
 /// Time from the last edge to the question, in which answers under way come to their end.
 const SETTLE_MS: u64 = 100;
 
-/// Turns the encoder of the firmware at `elf` by [`COUNTS`].
+/// Turns the encoder of the firmware at `elf` for half a second and by 40,000 counts at least.
 ///
 /// # Errors
 /// Where the ELF cannot be run.
@@ -87,9 +98,10 @@ pub fn turn(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<Counted, 
     let mut uno = trial::boot(elf, &[])?;
     ask(&mut uno, "events on")?;
     let step_cycles = CYCLES_PER_SECOND as f64 / counts_per_s;
+    let counts = (counts_per_s * SHORTEST_S).max(FEWEST_COUNTS).ceil() as u32;
     let begin = uno.cycle() + step_cycles.ceil() as u64;
-    let end = begin + (f64::from(COUNTS) * step_cycles).ceil() as u64;
-    uno.drive(edges(turning, step_cycles, begin));
+    let end = begin + (f64::from(counts) * step_cycles).ceil() as u64;
+    uno.drive(edges(turning, step_cycles, begin).take(counts as usize));
     let mut telemetry = Telemetry::default();
     match turning.load {
         Load::Idle => uno.run_until(end)?,
@@ -105,8 +117,9 @@ pub fn turn(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<Counted, 
         // A console that was starved is as bad as a count that was lost.
         Err(_) => None,
     };
-    let counts = i64::from(COUNTS);
+    let counts = i64::from(counts);
     Ok(Counted {
+        load: turning.load,
         true_ticks: if turning.direction == Direction::Forward { counts } else { -counts },
         position_ticks: status.as_ref().map(|status| status.position_ticks),
         lost_ticks: status.map_or(0, |status| status.lost_ticks),
@@ -115,7 +128,7 @@ pub fn turn(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<Counted, 
     })
 }
 
-/// The encoder's edges, in order of time.
+/// The encoder's edges without an end, in order of time.
 fn edges(turning: Turning, step_cycles: f64, begin: u64) -> impl Iterator<Item = PinChange> {
     // Forward, A leads B; backward, B leads A.
     let (first, second) = match turning.direction {
@@ -123,7 +136,7 @@ fn edges(turning: Turning, step_cycles: f64, begin: u64) -> impl Iterator<Item =
         Direction::Backward => (Pin::EncoderB, Pin::EncoderA),
     };
     let mut rng = ChaCha8Rng::seed_from_u64(1);
-    (0..COUNTS).map(move |number| {
+    (0_u32..).map(move |number| {
         let early = rng.random_range(-1.0..=1.0) * turning.jitter;
         let cycle = begin + ((f64::from(number) + turning.jitter + early) * step_cycles).round() as u64;
         let pin = if number % 2 == 0 { first } else { second };
@@ -161,7 +174,7 @@ pub fn highest_rate(elf: &Path, turning: Turning, mut progress: impl FnMut(f64))
         while failed > passed.counts_per_s * (1.0 + RESOLUTION) {
             let middle = (failed * passed.counts_per_s).sqrt();
             let counted = turn(elf, turning, middle)?;
-            if counted.is_exact() {
+            if counted.is_passed() {
                 passed = Rate { counts_per_s: middle, line_share: counted.line_share };
             } else {
                 failed = middle;
@@ -172,7 +185,7 @@ pub fn highest_rate(elf: &Path, turning: Turning, mut progress: impl FnMut(f64))
         let mut below = BELOW.iter().map(|share| share * passed.counts_per_s);
         let chance = loop {
             let Some(rate) = below.next() else { break None };
-            if !turn(elf, turning, rate)?.is_exact() {
+            if !turn(elf, turning, rate)?.is_passed() {
                 break Some(rate);
             }
             done += 1.0;

@@ -56,9 +56,16 @@ pub struct Lateness {
 }
 
 impl Lateness {
+    /// The least and the greatest error: the first is negative where any swing was early.
+    pub fn span_ticks(&self) -> (f64, f64) {
+        let span = (f64::INFINITY, f64::NEG_INFINITY);
+        self.errors_ticks.iter().fold(span, |span, &error| (span.0.min(error), span.1.max(error)))
+    }
+
     /// The greatest distance, early or late.
     pub fn worst_ticks(&self) -> f64 {
-        self.errors_ticks.iter().fold(0.0, |worst, error| worst.max(error.abs()))
+        let (earliest, latest) = self.span_ticks();
+        latest.max(-earliest)
     }
 
     /// The mean distance, early or late.

@@ -138,6 +138,7 @@ impl Figures {
         };
         let turns = self.firmware.turns;
         let swings = self.lateness.errors_ticks.len();
+        let (earliest, latest) = self.lateness.span_ticks();
         for (name, figures) in [
             ("longest turn of the loop, weeding with its status streaming".to_owned(), of_cycles(turns.longest as f64)),
             ("mean turn".to_owned(), of_cycles(turns.mean())),
@@ -146,15 +147,16 @@ impl Figures {
                 of_cycles(self.jitter.width_cycles as f64),
             ),
             ("frame of 20 ms".to_owned(), of_cycles(self.jitter.frame_cycles as f64)),
-            (format!("worst of {swings} swings: due place to servo pin"), of_ticks(self.lateness.worst_ticks())),
-            ("mean swing".to_owned(), of_ticks(self.lateness.mean_ticks())),
+            (format!("from a swing's due place to the servo's pin, earliest of {swings}"), of_ticks(earliest)),
+            ("latest".to_owned(), of_ticks(latest)),
+            ("mean distance".to_owned(), of_ticks(self.lateness.mean_ticks())),
         ] {
             table.add_row([name].into_iter().chain(figures));
         }
         table
     }
 
-    /// A line per interrupt, and the longest stretch without any.
+    /// A line per interrupt, and how long they are off.
     fn interrupts(&self) -> Table {
         let mut table = number_table(&["interrupt", "times", "fewest\ncycles", "mean", "most"]);
         for (&vector, handler) in &self.firmware.interrupts.handlers {
@@ -166,8 +168,13 @@ impl Figures {
                 handler.most.to_string(),
             ]);
         }
-        let longest = self.firmware.interrupts.longest_off.to_string();
-        table.add_row(["longest stretch with interrupts off", "", "", "", &longest]);
+        let off = [
+            ("longest stretch with interrupts off", self.firmware.interrupts.longest_off),
+            ("longest critical section outside of them", self.firmware.interrupts.longest_critical_section),
+        ];
+        for (name, cycles) in off {
+            table.add_row([name, "", "", "", &cycles.to_string()]);
+        }
         table
     }
 
