@@ -2,7 +2,7 @@
 //!
 //! The built-in examples, the scale and the radius are those of the firmware, and so is the code that searches them.
 
-use crate::Harm;
+use crate::Finding;
 use anyhow::Result;
 use clap::Args;
 use field::training::{Confusion, Model, table};
@@ -23,7 +23,7 @@ pub struct Arguments {
 ///
 /// # Errors
 /// Where the file or its contents are wrong.
-pub fn run(arguments: &Arguments) -> Result<Harm> {
+pub fn run(arguments: &Arguments) -> Result<Finding> {
     let objects = table::read(&arguments.file)?;
     let mut model = Model::built_in();
     model.k = arguments.k.unwrap_or(model.k);
@@ -34,5 +34,5 @@ pub fn run(arguments: &Arguments) -> Result<Harm> {
     if confusion.total() > 0 {
         println!("\n{confusion}");
     }
-    if confusion.plants_taken_for_weeds() == 0 { Ok(Harm::None) } else { Ok(Harm::Done) }
+    if confusion.plants_taken_for_weeds() == 0 { Ok(Finding::Good) } else { Ok(Finding::Bad) }
 }

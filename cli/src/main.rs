@@ -1,16 +1,18 @@
 //! The `weeder` command: tries the firmware on a simulated field, and puts it on an Arduino Uno.
 //!
 //! `weeder sim` and `weeder classify` end with status 0 where no plant was damaged, or would be, and 1 where one was;
-//! whatever else goes wrong, here and in the other commands, ends with status 2 and a message that says what would be
-//! right.
+//! commands that compare end with 1 where something differs. Whatever else goes wrong ends with status 2 and a message
+//! that says what would be right.
 
 mod bench;
 mod classify;
+mod course;
 mod design;
 mod flash;
 mod progress;
 mod sim;
 mod train;
+mod virtual_uno;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -29,6 +31,8 @@ enum Command {
     Sim(Box<sim::Arguments>),
     /// Build the firmware and put it on the Uno at a USB port.
     Flash(flash::Arguments),
+    /// Run the firmware, or a bootloader, on a virtual Uno at a pseudo terminal, in real time.
+    VirtualUno(Box<virtual_uno::Arguments>),
     /// Count the cycles and bytes of the firmware and its classifier on a virtual Uno.
     BenchUno,
     /// Make an example table of labelled objects, and say how well it tells plants from weeds.
@@ -39,27 +43,28 @@ enum Command {
     Design(design::Arguments),
 }
 
-/// Whether the plants are alive.
+/// What a command found out, for scripts that ask by its status.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Harm {
-    /// No plant was damaged.
-    None,
-    /// At least one was.
-    Done,
+enum Finding {
+    /// No plant was damaged, nothing differs.
+    Good,
+    /// A plant was damaged, or something differs.
+    Bad,
 }
 
 fn main() -> ExitCode {
     let result = match Arguments::parse().command {
         Command::Sim(arguments) => sim::run(&arguments),
-        Command::Flash(arguments) => flash::run(&arguments).map(|()| Harm::None),
-        Command::BenchUno => bench::run().map(|()| Harm::None),
+        Command::Flash(arguments) => flash::run(&arguments).map(|()| Finding::Good),
+        Command::VirtualUno(arguments) => virtual_uno::run(&arguments).map(|()| Finding::Good),
+        Command::BenchUno => bench::run().map(|()| Finding::Good),
         Command::Train(arguments) => train::run(&arguments),
         Command::Classify(arguments) => classify::run(&arguments),
-        Command::Design(arguments) => design::run(&arguments).map(|()| Harm::None),
+        Command::Design(arguments) => design::run(&arguments).map(|()| Finding::Good),
     };
     match result {
-        Ok(Harm::None) => ExitCode::SUCCESS,
-        Ok(Harm::Done) => ExitCode::from(1),
+        Ok(Finding::Good) => ExitCode::SUCCESS,
+        Ok(Finding::Bad) => ExitCode::from(1),
         Err(error) => {
             eprintln!("error: {error:#}");
             ExitCode::from(2)

@@ -1,55 +1,28 @@
 //! `weeder sim`: the real firmware on a virtual Uno, on a simulated row or on a recording of a real encoder.
 
-use crate::Harm;
+use crate::Finding;
+use crate::course::CourseArguments;
 use crate::progress::Progress;
-use anyhow::{Context, Result, ensure};
-use clap::{Args, builder::RangedU64ValueParser};
+use anyhow::{Context, Result};
+use clap::Args;
 use field::capture::{Capture, Channels};
-use field::machine::Machine;
 use field::motion::mm_s;
-use field::planting::Planting;
 use field::replay::replay;
 use field::row::Row;
 use field::trial::{Outcome, Trial};
 use field::verdict::{Timing, Verdict};
 use field::{firmware, picture, report, waveform};
 use std::fs::{self, File};
-use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 /// What the user asks of a simulation.
 #[derive(Args)]
 pub struct Arguments {
-    /// Speed in km/h.
-    #[arg(long, default_value = "2.5", value_parser = number_within(0.1..=10.0))]
-    speed: f64,
-    /// Mean distance from plant to plant in mm.
-    #[arg(long, default_value = "500", value_parser = number_within(50.0..=5000.0))]
-    spacing: f64,
-    /// Mean width of a canopy in mm.
-    #[arg(long, default_value = "150", value_parser = number_within(10.0..=340.0))]
-    canopy: f64,
-    /// Number of crop plants.
-    #[arg(long, default_value = "20", value_parser = RangedU64ValueParser::<usize>::new().range(1..=1000))]
-    plants: usize,
-    /// Number of tall weeds between them.
-    #[arg(long, default_value = "5", value_parser = RangedU64ValueParser::<usize>::new().range(0..=1000))]
-    weeds: usize,
-    /// Which of all the possible rows: the same seed gives the same row.
-    #[arg(long, default_value = "1")]
-    seed: u64,
-    /// Distance from the beam back to the tool in mm.
-    #[arg(long, default_value = "400", value_parser = RangedU64ValueParser::<u32>::new().range(100..=2000))]
-    beam_to_tool: u32,
+    #[command(flatten)]
+    course: CourseArguments,
     /// Command the swings where they should be done, as the paper does: without leads for the servo's time.
     #[arg(long)]
     paper: bool,
-    /// Grow canopies with gaps through which the beam passes.
-    #[arg(long)]
-    ragged: bool,
-    /// Take the row from a CSV file with the columns position_mm,width_mm,kind instead of growing one.
-    #[arg(long, value_name = "FILE.csv", conflicts_with_all = ["spacing", "canopy", "plants", "weeds", "seed", "ragged"])]
-    row: Option<PathBuf>,
     /// Write the tables as CSV and a picture of the row into this folder.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -73,61 +46,22 @@ pub struct Arguments {
     channel_beam: Option<String>,
 }
 
-/// Scatter of a grown row, as shares of the mean spacing and the mean canopy; never more than a quarter of the gap
-/// between two mean canopies each, so that the plants stay apart.
-const SPACING_SCATTER: f64 = 0.08;
-const CANOPY_SCATTER: f64 = 0.15;
-
-/// A number in a range, for the command line.
-fn number_within(range: RangeInclusive<f64>) -> impl Fn(&str) -> Result<f64, String> + Clone {
-    move |text| {
-        let (least, greatest) = (range.start(), range.end());
-        text.parse()
-            .ok()
-            .filter(|value| range.contains(value))
-            .ok_or_else(|| format!("it has to be a number from {least} to {greatest}"))
-    }
-}
-
 /// Runs it and prints the result.
 ///
 /// # Errors
 /// Where an argument or a file is wrong, or the firmware cannot be run.
-pub fn run(arguments: &Arguments) -> Result<Harm> {
+pub fn run(arguments: &Arguments) -> Result<Finding> {
     match (&arguments.capture, &arguments.channel_a, &arguments.channel_b) {
         (Some(path), Some(a), Some(b)) => {
             let beam = arguments.channel_beam.as_deref();
             let capture = Capture::read(path, &Channels { a, b, beam })?;
             play(arguments, &capture)
         }
-        _ => weed(arguments, arguments.row()?),
+        _ => weed(arguments, arguments.course.row()?),
     }
 }
 
 impl Arguments {
-    fn row(&self) -> Result<Row> {
-        if let Some(path) = &self.row {
-            return Ok(Row::read_csv(path)?);
-        }
-        let gap_mm = self.spacing - self.canopy;
-        ensure!(
-            gap_mm > 0.0,
-            "a spacing of {} mm leaves nothing between canopies of {} mm: --spacing has to exceed --canopy",
-            self.spacing,
-            self.canopy
-        );
-        let planting = Planting {
-            plants: self.plants,
-            spacing_mm: self.spacing,
-            spacing_scatter_mm: (self.spacing * SPACING_SCATTER).min(gap_mm / 4.0),
-            canopy_mm: self.canopy,
-            canopy_scatter_mm: (self.canopy * CANOPY_SCATTER).min(gap_mm / 4.0),
-            weeds: self.weeds,
-            ragged: self.ragged,
-        };
-        Ok(planting.grow(self.seed)?)
-    }
-
     fn firmware(&self) -> Result<PathBuf> {
         match &self.elf {
             Some(path) => Ok(path.clone()),
@@ -136,13 +70,16 @@ impl Arguments {
     }
 }
 
-fn weed(arguments: &Arguments, row: Row) -> Result<Harm> {
-    let machine = Machine { beam_to_tool_mm: f64::from(arguments.beam_to_tool), ..Machine::default() };
+fn weed(arguments: &Arguments, row: Row) -> Result<Finding> {
     let timing = if arguments.paper { Timing::as_in_the_paper() } else { Timing::default() };
-    let trial = Trial::at_speed(row, machine, timing, mm_s(arguments.speed));
+    let trial = Trial::at_speed(row, arguments.course.machine(), timing, mm_s(arguments.course.speed));
     let elf = arguments.firmware()?;
     let manner = if arguments.paper { ", swings as in the paper" } else { "" };
-    println!("{} at {} km/h{manner}", report::introduction(&trial.row, &trial.machine, &trial.motion), arguments.speed);
+    println!(
+        "{} at {} km/h{manner}",
+        report::introduction(&trial.row, &trial.machine, &trial.motion),
+        arguments.course.speed
+    );
     let bar = Progress::new("weeding");
     let outcome = trial.run(&elf, |share| bar.show(share))?;
     bar.finish();
@@ -156,7 +93,7 @@ fn weed(arguments: &Arguments, row: Row) -> Result<Harm> {
         waveform::write(path, outcome.changes.iter().copied())?;
         println!("Waveform    {}", path.display());
     }
-    if outcome.judgement.count(Verdict::Damaged) == 0 { Ok(Harm::None) } else { Ok(Harm::Done) }
+    if outcome.judgement.count(Verdict::Damaged) == 0 { Ok(Finding::Good) } else { Ok(Finding::Bad) }
 }
 
 fn write_folder(folder: &Path, trial: &Trial, outcome: &Outcome) -> Result<()> {
@@ -173,7 +110,7 @@ fn write_folder(folder: &Path, trial: &Trial, outcome: &Outcome) -> Result<()> {
     Ok(())
 }
 
-fn play(arguments: &Arguments, capture: &Capture) -> Result<Harm> {
+fn play(arguments: &Arguments, capture: &Capture) -> Result<Finding> {
     let elf = arguments.firmware()?;
     let bar = Progress::new("playing");
     let played = replay(capture, &elf, |share| bar.show(share))?;
@@ -188,5 +125,5 @@ fn play(arguments: &Arguments, capture: &Capture) -> Result<Harm> {
         waveform::write(path, played.changes.iter().copied())?;
         println!("Waveform    {}", path.display());
     }
-    Ok(Harm::None)
+    Ok(Finding::Good)
 }

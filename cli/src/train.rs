@@ -1,6 +1,6 @@
 //! `weeder train`: makes an example table of labelled objects, and says how well it tells plants from weeds.
 
-use crate::Harm;
+use crate::Finding;
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 use field::training::{
@@ -63,7 +63,7 @@ impl FromStr for Votes {
 ///
 /// # Errors
 /// Where a file or its contents are wrong, or the table would not fit.
-pub fn run(arguments: &Arguments) -> Result<Harm> {
+pub fn run(arguments: &Arguments) -> Result<Finding> {
     ensure!(
         arguments.max <= MOST_EXAMPLES,
         "too many examples for the flash budget: --max is {} and there is room for {MOST_EXAMPLES}",
@@ -92,7 +92,7 @@ pub fn run(arguments: &Arguments) -> Result<Harm> {
             .with_context(|| format!("{} cannot be written", path.display()))?;
         println!("Picture     {}", path.display());
     }
-    Ok(Harm::None)
+    Ok(Finding::Good)
 }
 
 impl Arguments {
