@@ -1,0 +1,79 @@
+//! What stands in the manual and follows from the code: the wiring, and every setting.
+//!
+//! `UPDATE_EXPECT=1 cargo test -p field --test manual` writes it anew.
+
+use control::settings::{Description, Setting};
+use expect_test::{ExpectFile, expect_file};
+use field::wiring;
+use std::fmt::Write;
+
+/// The page with the part between `<!-- name -->` and `<!-- name end -->` replaced.
+#[track_caller]
+fn with_part(page: &ExpectFile, name: &str, part: &str) -> String {
+    let (begin, end) = (format!("<!-- {name} -->\n"), format!("<!-- {name} end -->"));
+    let text = page.data();
+    let (before, rest) = text.split_once(&begin).unwrap_or_else(|| panic!("no {begin:?}"));
+    let (_, after) = rest.split_once(&end).unwrap_or_else(|| panic!("no {end:?}"));
+    [before, &begin, "\n", part, "\n", &end, after].concat()
+}
+
+#[test]
+fn the_wiring_diagram_is_drawn_from_the_pin_table() {
+    expect_file!["../../docs/wiring.svg"].assert_eq(&format!("{}\n", wiring::diagram::draw()));
+}
+
+#[test]
+fn the_wiring_tables_are_the_pin_table() {
+    for page in [expect_file!["../../README.md"], expect_file!["../../docs/build.md"]] {
+        page.assert_eq(&with_part(&page, "wiring", &wiring::table()));
+    }
+}
+
+#[test]
+fn the_settings_page_is_the_settings_table() {
+    let page = expect_file!["../../docs/settings.md"];
+    page.assert_eq(&with_part(&page, "settings", &settings()));
+}
+
+/// Every setting as a table in Markdown.
+fn settings() -> String {
+    let text = |listed: control::text::Listed| String::from_utf8(listed.bytes().collect()).expect("help is ASCII");
+    let mut table = "| name | unit | from | to | default | set in | what it is |\n".to_owned();
+    table += "| --- | --- | --- | --- | --- | --- | --- |\n";
+    for setting in Setting::all() {
+        let name = text(setting.text());
+        let Description { least, greatest, default, hold_only } = setting.description();
+        let shown = |value: u16| match (setting.is_switched(), value) {
+            (true, 0) => "off".to_owned(),
+            (true, _) => "on".to_owned(),
+            (false, _) => value.to_string(),
+        };
+        writeln!(
+            table,
+            "| `{name}` | {} | {} | {} | {} | {} | {} |",
+            unit(&name),
+            shown(least),
+            shown(greatest),
+            shown(default),
+            if hold_only { "hold" } else { "any state" },
+            text(setting.help())
+        )
+        .expect("a string takes everything");
+    }
+    table
+}
+
+/// The unit that a setting's name carries.
+fn unit(name: &str) -> &'static str {
+    const UNITS: [(&str, &str); 8] = [
+        ("_per_rev", "ticks a turn"),
+        ("_per_m", "ticks a metre"),
+        ("_mm_s", "mm/s"),
+        ("_mm", "mm"),
+        ("_ms", "ms"),
+        ("_us", "us"),
+        ("_ticks", "ticks"),
+        ("_m", "m"),
+    ];
+    UNITS.iter().find(|(ending, _)| name.ends_with(ending)).map_or("", |(_, unit)| unit)
+}
