@@ -223,19 +223,6 @@ fn an_alarm_is_not_cleared_by_throwing_the_switch_on() {
 }
 
 #[test]
-fn the_readme_names_every_setting_with_its_default() {
-    let readme = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../README.md")).unwrap();
-    for setting in settings() {
-        let name = String::from_utf8(setting.text().bytes().collect()).unwrap();
-        let row = readme.lines().find(|line| line.starts_with('|') && line.contains(&format!("`{name}`")));
-        let row = row.unwrap_or_else(|| panic!("the README has no row for {name}"));
-        let line = ask(&mut machine(), &format!("get {name}")).remove(0);
-        let default = line.split(", ").find_map(|part| part.strip_prefix("default ")).expect("get tells the default");
-        assert!(row.contains(default), "{name}: {row}");
-    }
-}
-
-#[test]
 fn after_lost_edges_the_beam_is_what_it_is_now_and_not_what_the_last_edge_said() {
     for broken in [false, true] {
         let mut machine = machine();
