@@ -135,7 +135,7 @@ fn target_directory() -> PathBuf {
 }
 
 /// Memory that a firmware takes, in bytes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Size {
     /// Flash: code, constants, and the first values of variables (.text, .data).
     pub flash: u64,
@@ -205,8 +205,8 @@ pub struct Variable {
     pub size: u16,
 }
 
-/// What an ELF holds for the chip.
-#[derive(Clone, Debug)]
+/// What an ELF holds for the chip; by default nothing.
+#[derive(Clone, Debug, Default)]
 pub struct Image {
     /// Flash from address 0 to the last byte used.
     pub flash: Vec<u8>,

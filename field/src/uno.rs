@@ -42,6 +42,7 @@
 //! - An edge reaches its interrupt at once; the chip's synchroniser takes two or three cycles more.
 //! - The transmitter has no second buffer: it takes the next byte when the last one has left.
 //! - UBRR is what the clock divides; the crystal is exact.
+//! - Self-programming takes no time: a page of flash is erased or written within its instruction. Lock bits are not kept.
 
 mod core;
 mod eeprom;
@@ -57,6 +58,7 @@ use self::core::{Core, Stop};
 pub use self::interrupts::{HandlerCycles, InterruptStatistics};
 pub use self::turns::Turns;
 use crate::firmware::{EEPROM_BYTES, Image, ImageError, Size, Variable};
+use crate::hex::{Bootloader, HexError};
 use crate::signal::{CYCLES_PER_SECOND, Pin, PinChange, Pulse};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -73,6 +75,9 @@ pub enum UnoError {
     /// The ELF cannot be run.
     #[error(transparent)]
     Image(#[from] ImageError),
+    /// The firmware reaches into the bootloader.
+    #[error(transparent)]
+    Hex(#[from] HexError),
     /// The EEPROM content does not fit.
     #[error("{0} bytes of EEPROM content were given: the ATmega328P holds {EEPROM_BYTES}")]
     EepromTooLarge(usize),
@@ -168,11 +173,15 @@ pub struct ReceivedByte {
 pub struct Uno {
     core: Core,
     image: Image,
+    /// Where a reset starts the chip, in bytes of flash.
+    reset_address: u16,
     /// Levels to come, by cycle.
     to_drive: VecDeque<PinChange>,
     /// Bytes to come, and when the first one's stop bit ends.
     to_send: VecDeque<u8>,
     next_byte_ends: u64,
+    /// Whether bytes come at the chip's own baud rate, not at [`BAUD`].
+    follows_baud: bool,
     lost_bytes: u64,
 }
 
@@ -199,18 +208,39 @@ impl Uno {
         let mut content = image.eeprom.clone();
         content.resize(content.len().max(eeprom.len()), 0xFF);
         content[..eeprom.len()].copy_from_slice(eeprom);
+        Ok(Uno::power_up(image, &content, 0))
+    }
+
+    /// As [`Uno::boot_with_eeprom`], with a bootloader behind the firmware, or behind erased flash where `elf` is `None`. Every reset
+    /// starts the bootloader, as the fuses of a real Uno have it.
+    ///
+    /// # Errors
+    ///
+    /// As [`Uno::boot_with_eeprom`], and where the firmware reaches into the bootloader.
+    pub fn boot_with_bootloader(bootloader: &Bootloader, elf: Option<&Path>, eeprom: &[u8]) -> Result<Uno, UnoError> {
+        if eeprom.len() > EEPROM_BYTES {
+            return Err(UnoError::EepromTooLarge(eeprom.len()));
+        }
+        let mut image = elf.map(Image::read).transpose()?.unwrap_or_default();
+        image.flash = bootloader.behind(&image.flash)?;
+        Ok(Uno::power_up(image, eeprom, bootloader.start()))
+    }
+
+    fn power_up(image: Image, eeprom: &[u8], reset_address: u16) -> Uno {
         let mut uno = Uno {
-            core: Core::new(&image.flash, &content, 0),
+            core: Core::new(&image.flash, eeprom, reset_address, 0),
             image,
+            reset_address,
             to_drive: VecDeque::new(),
             to_send: VecDeque::new(),
             next_byte_ends: 0,
+            follows_baud: false,
             lost_bytes: 0,
         };
         for pin in Pin::ALL.into_iter().filter(|pin| !pin.is_output()) {
             uno.core.set_input(pin, pin.level_at_rest());
         }
-        Ok(uno)
+        uno
     }
 
     /// Pulls the reset pin. EEPROM, SRAM, inputs and the clock stay; the cause is in MCUSR.
@@ -251,7 +281,7 @@ impl Uno {
     /// written to the EEPROM is torn.
     pub fn power_cycle(&mut self) {
         self.core.lose_power();
-        let mut fresh = Core::new(&self.image.flash, &self.core.eeprom(), self.core.cycle());
+        let mut fresh = Core::new(self.core.flash(), &self.core.eeprom(), self.reset_address, self.core.cycle());
         fresh.take_over(&mut self.core);
         self.core = fresh;
     }
@@ -259,6 +289,11 @@ impl Uno {
     /// Resets since the first power-up, oldest first.
     pub fn resets(&self) -> &[Reset] {
         &self.core.recorder().resets
+    }
+
+    /// The flash's 32 KiB, as the bootloader, if there is one, has written it.
+    pub fn flash(&self) -> &[u8] {
+        self.core.flash()
     }
 
     /// The EEPROM's 1024 bytes, as they would be found if power went now: a byte that is being written is torn.
@@ -378,7 +413,7 @@ impl Uno {
             {
                 self.lost_bytes += 1;
             }
-            self.next_byte_ends += SENT_BYTE_CYCLES;
+            self.next_byte_ends += self.sent_byte_cycles();
         }
         let next_level = self.to_drive.front().map(|change| change.cycle);
         let next_byte = (!self.to_send.is_empty()).then_some(self.next_byte_ends);
@@ -395,9 +430,24 @@ impl Uno {
     /// Types bytes into the serial line, at the pace of the line and behind those that are still on their way.
     pub fn send(&mut self, bytes: &[u8]) {
         if self.to_send.is_empty() {
-            self.next_byte_ends = self.next_byte_ends.max(self.cycle() + SENT_BYTE_CYCLES);
+            self.next_byte_ends = self.next_byte_ends.max(self.cycle() + self.sent_byte_cycles());
         }
         self.to_send.extend(bytes);
+    }
+
+    /// From now on sent bytes come at the rate that the chip's UART is set to, whichever that is, and not at [`BAUD`]: a
+    /// bootloader has a rate of its own.
+    pub fn follow_baud(&mut self) {
+        self.follows_baud = true;
+    }
+
+    fn sent_byte_cycles(&self) -> u64 {
+        if self.follows_baud { self.core.byte_cycles() } else { SENT_BYTE_CYCLES }
+    }
+
+    /// Sent bytes that are still on their way to the receiver.
+    pub fn bytes_on_their_way(&self) -> usize {
+        self.to_send.len()
     }
 
     /// Pushes up to 63 bytes into the receiver at once, faster than any line could: simavr keeps them and hands them out one
@@ -422,6 +472,12 @@ impl Uno {
     pub fn received(&mut self) -> String {
         let bytes = to_bytes(&self.received_bytes());
         String::from_utf8_lossy(&bytes).into_owned()
+    }
+
+    /// Takes the edges of the output pins: from now on [`Uno::changes`] begins with the next one. An Uno that runs for days
+    /// would pile them up.
+    pub fn take_changes(&mut self) -> Vec<PinChange> {
+        std::mem::take(&mut self.core.recorder_mut().changes)
     }
 
     /// Every edge of the output pins (servo, LED) since the first power-up, oldest first.

@@ -23,7 +23,7 @@ use super::recorder::{Recorder, cycles_per_byte, on_interrupt, on_output, on_res
 use super::timer::{self, Timer1};
 use super::turns::{TurnRecorder, Turns};
 use super::{Reset, ResetCause};
-use crate::firmware::EEPROM_BYTES;
+use crate::firmware::{EEPROM_BYTES, FLASH_BYTES};
 use crate::signal::{CYCLES_PER_SECOND, Pin};
 
 unsafe extern "C" {
@@ -111,8 +111,9 @@ unsafe impl Send for Core {}
 
 impl Core {
     /// A chip that has just been powered up, at `cycle`, with `flash` (from address 0) and `eeprom` (from address 0) in it.
-    /// Both must fit, which [`crate::firmware::Image`] and [`super::Uno`] see to.
-    pub(super) fn new(flash: &[u8], eeprom: &[u8], cycle: u64) -> Core {
+    /// Both must fit, which [`crate::firmware::Image`] and [`super::Uno`] see to. It starts at `reset_address` in flash, now and
+    /// after every reset.
+    pub(super) fn new(flash: &[u8], eeprom: &[u8], reset_address: u16, cycle: u64) -> Core {
         // SAFETY: the name is a C string that lives for ever. The chip is known to every simavr, so a null pointer means
         // that memory ran out.
         let chip =
@@ -126,6 +127,8 @@ impl Core {
             simavr::avr_init(avr);
             ptr::copy_nonoverlapping(flash.as_ptr(), (*avr).flash, flash.len());
             (*avr).codeend = flash.len() as u32;
+            (*avr).reset_pc = reset_address.into();
+            (*avr).pc = reset_address.into();
             let sram = (*avr).data.add(SRAM_START.into());
             ptr::write_bytes(sram, SRAM_AT_POWER_UP, (SRAM_END - SRAM_START + 1).into());
             (*avr).cycle = cycle;
@@ -457,6 +460,18 @@ impl Core {
             content[torn.address] |= torn.ones;
         }
         content
+    }
+
+    /// All of the flash, as the firmware or its bootloader has left it.
+    pub(super) fn flash(&self) -> &[u8] {
+        // SAFETY: simavr owns `flash`, of `flashend + 1` bytes, and changes it only in methods that borrow `self` mutably.
+        unsafe { std::slice::from_raw_parts((*self.chip.as_ptr()).flash, FLASH_BYTES) }
+    }
+
+    /// Cycles of a byte on the serial line, as the chip's UART is set up.
+    pub(super) fn byte_cycles(&self) -> u64 {
+        // SAFETY: as in `cycle`.
+        unsafe { cycles_per_byte(self.chip.as_ptr()) }
     }
 
     fn set_eeprom(&mut self, content: &[u8]) {

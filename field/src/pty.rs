@@ -1,0 +1,219 @@
+//! A pseudo terminal: a serial port without a cable, for programs that expect an Uno behind one.
+//!
+//! [`Pty`] is the device's side of it; programs open the other side by its path, or by a symbolic link, as they would open
+//! /dev/ttyACM0. It begins raw, so that bytes pass as they are. Whether some program has it open can be asked, since a real
+//! Uno is reset by that: its modem line DTR, which a pseudo terminal lacks, is wired to the reset pin.
+//!
+//! It has no baud rate: bytes pass at the pace at which they are written and read. It needs Linux.
+
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::fs::{OFlags, fcntl_setfl};
+use rustix::io::Errno;
+use rustix::pty::{OpenptFlags, grantpt, ioctl_tiocgptpeer, openpt, ptsname, unlockpt};
+use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
+use std::fs::File;
+use std::io::{self, ErrorKind, Read, Write};
+use std::os::unix::fs::symlink;
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// Bits in a second that the terminal says it has, to programs that ask and do not set it.
+const BAUD: u32 = 115_200;
+
+/// Why a pseudo terminal does not work.
+#[derive(Debug, Error)]
+pub enum PtyError {
+    /// The system has none to give.
+    #[error("no pseudo terminal can be opened ({0}): is /dev/pts mounted?")]
+    Open(io::Error),
+    /// It stopped working.
+    #[error("the pseudo terminal {path} has failed: {source}")]
+    Failed {
+        /// Its path.
+        path: PathBuf,
+        /// The operating system's answer.
+        source: io::Error,
+    },
+    /// Something else is where the link should be.
+    #[error("{0} exists already and is no link to a pseudo terminal: name another --link, or remove it")]
+    LinkExists(PathBuf),
+    /// The link cannot be made.
+    #[error("{path} cannot be made a link to the pseudo terminal: {source}")]
+    Link {
+        /// Where the link should be.
+        path: PathBuf,
+        /// The operating system's answer.
+        source: io::Error,
+    },
+}
+
+/// The device's side of a pseudo terminal. Dropped, it is gone for those who have the other side open, as an Uno whose cable is
+/// pulled.
+#[derive(Debug)]
+pub struct Pty {
+    device: File,
+    path: PathBuf,
+    link: Option<PathBuf>,
+}
+
+impl Pty {
+    /// Opens one.
+    ///
+    /// # Errors
+    /// Where the system has none to give.
+    pub fn open() -> Result<Pty, PtyError> {
+        let open = || -> io::Result<Pty> {
+            let device = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)?;
+            grantpt(&device)?;
+            unlockpt(&device)?;
+            let path = ptsname(&device, Vec::new())?.into_string().map_err(io::Error::other)?;
+            // Opened and closed once, it reports itself hung up until a program opens it.
+            let other_side =
+                ioctl_tiocgptpeer(&device, OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)?;
+            let mut attributes = tcgetattr(&other_side)?;
+            attributes.make_raw();
+            attributes.set_speed(BAUD)?;
+            tcsetattr(&other_side, OptionalActions::Now, &attributes)?;
+            fcntl_setfl(&device, OFlags::NONBLOCK)?;
+            Ok(Pty { device: device.into(), path: path.into(), link: None })
+        };
+        open().map_err(PtyError::Open)
+    }
+
+    /// The path under which programs open it.
+    pub fn path(&self) -> &Path {
+        self.link.as_deref().unwrap_or(&self.path)
+    }
+
+    /// Makes a symbolic link to it, which is removed again at the end. A link that is left over from one that is gone is
+    /// replaced.
+    ///
+    /// # Errors
+    /// Where something else is there, or the folder cannot be written to.
+    pub fn link(&mut self, path: &Path) -> Result<(), PtyError> {
+        let is_left_over = path.is_symlink() && !path.exists();
+        let linked = match is_left_over {
+            true => std::fs::remove_file(path).and_then(|()| symlink(&self.path, path)),
+            false => symlink(&self.path, path),
+        };
+        match linked {
+            Ok(()) => {
+                self.link = Some(path.into());
+                Ok(())
+            }
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => Err(PtyError::LinkExists(path.into())),
+            Err(source) => Err(PtyError::Link { path: path.into(), source }),
+        }
+    }
+
+    /// Whether a program has it open.
+    ///
+    /// # Errors
+    /// Where it has failed.
+    pub fn is_open(&self) -> Result<bool, PtyError> {
+        let mut poll_fd = [PollFd::new(&self.device, PollFlags::IN)];
+        match poll(&mut poll_fd, Some(&Timespec { tv_sec: 0, tv_nsec: 0 })) {
+            Ok(_) | Err(Errno::INTR) => Ok(!poll_fd[0].revents().contains(PollFlags::HUP)),
+            Err(error) => Err(self.failed(error.into())),
+        }
+    }
+
+    /// Takes what programs have written, up to `buffer`'s length; without waiting. Returns the number of bytes.
+    ///
+    /// # Errors
+    /// Where it has failed.
+    pub fn read(&mut self, buffer: &mut [u8]) -> Result<usize, PtyError> {
+        self.count(|mut device| device.read(buffer))
+    }
+
+    /// Hands over bytes to the program that reads, as many as it has room for; without waiting. Returns the number of bytes.
+    ///
+    /// # Errors
+    /// Where it has failed.
+    pub fn write(&mut self, bytes: &[u8]) -> Result<usize, PtyError> {
+        self.count(|mut device| device.write(bytes))
+    }
+
+    fn count(&self, transfer: impl FnOnce(&File) -> io::Result<usize>) -> Result<usize, PtyError> {
+        match transfer(&self.device) {
+            Ok(count) => Ok(count),
+            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => Ok(0),
+            // Nobody has it open.
+            Err(error) if Errno::from_io_error(&error) == Some(Errno::IO) => Ok(0),
+            Err(error) => Err(self.failed(error)),
+        }
+    }
+
+    fn failed(&self, source: io::Error) -> PtyError {
+        PtyError::Failed { path: self.path.clone(), source }
+    }
+}
+
+impl Drop for Pty {
+    fn drop(&mut self) {
+        if let Some(link) = &self.link {
+            // Nobody can be told, and the next one replaces a link that leads nowhere.
+            let _ = std::fs::remove_file(link);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs::OpenOptions;
+
+    #[test]
+    fn bytes_pass_both_ways_as_they_are() {
+        let mut pty = Pty::open().unwrap();
+        let mut program = OpenOptions::new().read(true).write(true).open(pty.path()).unwrap();
+        let bytes = [0, 3, 4, b'\r', b'\n', 17, 19, 127, 255];
+        program.write_all(&bytes).unwrap();
+        let mut buffer = [0; 32];
+        let count = pty.read(&mut buffer).unwrap();
+        assert_eq!(&buffer[..count], bytes);
+        assert_eq!(pty.write(&bytes).unwrap(), bytes.len());
+        let mut buffer = [0; 9];
+        program.read_exact(&mut buffer).unwrap();
+        assert_eq!(buffer, bytes);
+    }
+
+    #[test]
+    fn it_is_known_when_a_program_opens_and_closes_it() {
+        let mut pty = Pty::open().unwrap();
+        assert!(!pty.is_open().unwrap());
+        let program = OpenOptions::new().read(true).write(true).open(pty.path()).unwrap();
+        assert!(pty.is_open().unwrap());
+        drop(program);
+        assert!(!pty.is_open().unwrap());
+        assert_eq!(pty.read(&mut [0; 8]).unwrap(), 0);
+    }
+
+    #[test]
+    fn a_link_leads_to_it_while_it_is_there() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("uno");
+        let mut pty = Pty::open().unwrap();
+        pty.link(&path).unwrap();
+        assert_eq!(pty.path(), path);
+        assert!(std::fs::canonicalize(&path).unwrap().starts_with("/dev/pts"));
+        drop(pty);
+        assert!(!path.is_symlink());
+    }
+
+    #[test]
+    fn a_link_replaces_a_left_over_one_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("uno");
+        symlink("/dev/pts/no-such", &path).unwrap();
+        let mut pty = Pty::open().unwrap();
+        pty.link(&path).unwrap();
+        let file = folder.path().join("file");
+        std::fs::write(&file, "mine").unwrap();
+        let error = pty.link(&file).unwrap_err().to_string();
+        assert!(error.contains("exists already"), "{error}");
+        assert_eq!(std::fs::read_to_string(&file).unwrap(), "mine");
+        let error = pty.link(&folder.path().join("no-such/uno")).unwrap_err().to_string();
+        assert!(error.contains("cannot be made a link"), "{error}");
+    }
+}
