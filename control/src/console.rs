@@ -199,6 +199,7 @@ words! {
 ///
 /// # Errors
 /// A [`Mistake`] that says what would have been right.
+#[inline(never)]
 pub fn parse(line: &[u8]) -> Result<Command, Mistake> {
     let (word, rest) = split_word(line);
     let word = Word::find(word).ok_or(Mistake::UnknownCommand)?;

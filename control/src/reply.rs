@@ -423,6 +423,7 @@ where
     Ok(())
 }
 
+#[inline(never)]
 fn write_setting<C, M, W>(controller: &Controller<C, M>, setting: Setting, out: &mut W) -> Result<(), W::Error>
 where
     C: Classifier,

@@ -28,7 +28,7 @@ pub struct Schedule {
     canopies: Vec<Object, CAPACITY>,
     /// Everything behind this place is unknown.
     known_from: Position,
-    /// Whether ground behind that place was known once.
+    /// Whether ground behind that place was known once: then a plant may end there, whose margin is to be kept.
     has_forgotten: bool,
 }
 
@@ -56,22 +56,22 @@ impl Schedule {
     pub fn trust_from(&mut self, place: Position) {
         if self.known_from.is_ahead_of(place) {
             self.known_from = place;
+            self.has_forgotten = false;
         }
     }
 
     /// Adds a canopy. When all places are taken, the oldest one behind the tool is forgotten, and the ground up to its
-    /// window's end with it.
+    /// end with it.
     ///
     /// # Errors
     /// [`Full`] when even the oldest window lies at the tool or ahead of it; the canopy is then not added.
     pub fn push(&mut self, canopy: Object, tool: Position, margin: Ticks) -> Result<(), Full> {
         if self.canopies.is_full() {
             let oldest = self.canopies.first().ok_or(Full)?;
-            let end = oldest.trailing + margin;
-            if !tool.is_ahead_of(end) {
+            if !tool.is_ahead_of(oldest.trailing + margin) {
                 return Err(Full);
             }
-            self.forget_up_to(end);
+            self.forget_up_to(oldest.trailing);
             self.canopies.remove(0);
         }
         self.canopies.push(canopy).map_err(|_| Full)
@@ -97,7 +97,8 @@ impl Schedule {
     /// Whether any of the ground between two places is closed: unknown, or within `margin` of a canopy.
     pub fn is_closed(&self, one: Position, other: Position, margin: Ticks) -> bool {
         let (near, far) = if one.is_ahead_of(other) { (other, one) } else { (one, other) };
-        if self.known_from.is_ahead_of(near) {
+        let open_from = if self.has_forgotten { self.known_from + margin } else { self.known_from };
+        if open_from.is_ahead_of(near) {
             return true;
         }
         // Compared by distance from the near end, the counter's wrapping does no harm.
@@ -180,6 +181,8 @@ mod tests {
         assert!(schedule.has_forgotten());
         assert!(closed(&schedule, 294, 294), "what was forgotten is unknown");
         assert!(!closed(&schedule, 295, 295));
+        let (place, wider) = (Position::new(299), Ticks(100));
+        assert!(schedule.is_closed(place, place, wider), "its margin is kept, even one that was set later");
         assert!(closed(&schedule, 20_000, 20_000));
     }
 

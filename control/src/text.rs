@@ -4,8 +4,57 @@
 //! gives a [`Text`], which is no more than its address and length: all texts share one piece of code that writes them.
 //! `list!` lays many literals behind each other, so that a number chooses one, which takes far less code than a match.
 //! `words!` makes an enum whose variants are words.
+//!
+//! What is said is packed: [`FRAGMENTS`] that come again and again are one byte each. The compiler packs, and whoever reads
+//! the characters unpacks. Words are not packed, since they are also read.
 
 use avr_progmem::wrapper::ProgMem;
+
+/// Fragments of what is said, each of which stands for itself as a byte from 0x80 on. They are those that save most, found
+/// by trying; any others would do.
+const FRAGMENTS: &[&str] = &[
+    " the ", "s ", ", ", "e ", "t ", "an", "tool", "d ", "setting", "er", "calibrat", "in", "or", "th", "st", "alarm",
+    "ou", "exampl", "ee", "ea", "on", "take", "se", "o ", "a ", "el", "mm", "ar", "ch", "ro", "of", "at", "hol",
+    " pos=", "ame", "sav", "fir", "objec", "wh", "co", "ac", "es", "no", "pl", "all", "it", "m ", "0 ", "; ", "en",
+    "sp", "re", "ed", "d_", "sw", "vo", "lo", "ti", "gr", "y ", "la", "is", "de", "et",
+];
+
+avr_progmem::progmem! {
+    static progmem FRAGMENT_LIST: [u8; list_length(FRAGMENTS)] = list_bytes(FRAGMENTS);
+}
+
+/// The first byte that stands for a fragment.
+const FIRST_FRAGMENT: u8 = 0x80;
+
+/// The characters that a packed byte stands for, in flash.
+fn unpacked(byte: u8) -> Unpacked {
+    match byte.checked_sub(FIRST_FRAGMENT) {
+        None => Unpacked { literal: Some(byte), at: 0, end: 0 },
+        Some(place) => {
+            let (at, end) = List::new(FRAGMENT_LIST.as_slice()).range(place);
+            Unpacked { literal: None, at, end }
+        }
+    }
+}
+
+/// Characters of a packed byte: itself, or a fragment's.
+struct Unpacked {
+    literal: Option<u8>,
+    at: usize,
+    end: usize,
+}
+
+impl Iterator for Unpacked {
+    type Item = u8;
+
+    fn next(&mut self) -> Option<u8> {
+        if self.at == self.end {
+            return self.literal.take();
+        }
+        self.at += 1;
+        Some(List::new(FRAGMENT_LIST.as_slice()).byte(self.at - 1))
+    }
+}
 
 /// A text in flash, ASCII.
 #[derive(Clone, Copy)]
@@ -19,7 +68,7 @@ impl Text {
 
     /// The characters.
     pub fn bytes(self) -> impl Iterator<Item = u8> {
-        self.0.wrapper_iter().map(|byte| byte.load())
+        self.0.wrapper_iter().flat_map(|byte| unpacked(byte.load()))
     }
 }
 
@@ -51,12 +100,18 @@ impl List {
 
     /// The characters of the text at a place.
     pub fn bytes(self, place: u8) -> impl Iterator<Item = u8> {
+        let (start, end) = self.range(place);
+        (start..end).flat_map(move |at| unpacked(self.byte(at)))
+    }
+
+    /// Where the text at a place begins and ends.
+    #[inline(never)]
+    fn range(self, place: u8) -> (usize, usize) {
         let mut start = 0;
         for _ in 0..place {
             start += 1 + usize::from(self.byte(start));
         }
-        let end = start + 1 + usize::from(self.byte(start));
-        (start + 1..end).map(move |at| self.byte(at))
+        (start + 1, start + 1 + usize::from(self.byte(start)))
     }
 
     #[inline(never)]
@@ -77,11 +132,46 @@ impl Listed {
     }
 }
 
-/// A literal's characters; stops the compiler unless they are ASCII, which is all a serial monitor can be trusted with.
-pub(crate) const fn ascii<const LENGTH: usize>(literal: &str) -> [u8; LENGTH] {
+/// The byte that stands for a literal's characters from `at` on, and how many of them: the longest fragment, or one.
+const fn pack(literal: &str, at: usize) -> (u8, usize) {
+    let characters = literal.as_bytes();
+    let mut packed = (characters[at], 1);
+    let mut place = 0;
+    while place < FRAGMENTS.len() {
+        let fragment = FRAGMENTS[place].as_bytes();
+        let mut same = 0;
+        while same < fragment.len() && at + same < characters.len() && characters[at + same] == fragment[same] {
+            same += 1;
+        }
+        if same == fragment.len() && same > packed.1 {
+            packed = (FIRST_FRAGMENT + place as u8, same);
+        }
+        place += 1;
+    }
+    packed
+}
+
+/// Bytes that a literal takes when it is packed.
+pub(crate) const fn packed_length(literal: &str) -> usize {
+    let (mut length, mut at) = (0, 0);
+    while at < literal.len() {
+        at += pack(literal, at).1;
+        length += 1;
+    }
+    length
+}
+
+/// A literal, packed; stops the compiler unless it is ASCII, which is all a serial monitor can be trusted with.
+pub(crate) const fn packed<const LENGTH: usize>(literal: &str) -> [u8; LENGTH] {
     assert!(literal.is_ascii());
     let mut bytes = [0; LENGTH];
-    bytes.copy_from_slice(literal.as_bytes());
+    let (mut length, mut at) = (0, 0);
+    while at < literal.len() {
+        let (byte, characters) = pack(literal, at);
+        bytes[length] = byte;
+        at += characters;
+        length += 1;
+    }
     bytes
 }
 
@@ -89,7 +179,7 @@ pub(crate) const fn ascii<const LENGTH: usize>(literal: &str) -> [u8; LENGTH] {
 macro_rules! text {
     ($literal:expr) => {{
         avr_progmem::progmem! {
-            static progmem CHARACTERS: [u8; $literal.len()] = $crate::text::ascii($literal);
+            static progmem CHARACTERS: [u8; $crate::text::packed_length($literal)] = $crate::text::packed($literal);
         }
         $crate::text::Text::new(CHARACTERS.as_slice())
     }};
@@ -123,12 +213,45 @@ pub(crate) const fn list_bytes<const LENGTH: usize>(literals: &[&str]) -> [u8; L
     bytes
 }
 
-/// Literals as a [`List`].
+/// Bytes that a list of literals takes when they are packed.
+pub(crate) const fn packed_list_length(literals: &[&str]) -> usize {
+    let mut length = 0;
+    let mut place = 0;
+    while place < literals.len() {
+        length += 1 + packed_length(literals[place]);
+        place += 1;
+    }
+    length
+}
+
+/// Literals, packed, each behind its length.
+pub(crate) const fn packed_list<const LENGTH: usize>(literals: &[&str]) -> [u8; LENGTH] {
+    let mut bytes = [0; LENGTH];
+    let (mut place, mut length) = (0, 0);
+    while place < literals.len() {
+        let literal = literals[place];
+        assert!(literal.is_ascii());
+        bytes[length] = packed_length(literal) as u8;
+        length += 1;
+        let mut at = 0;
+        while at < literal.len() {
+            let (byte, characters) = pack(literal, at);
+            bytes[length] = byte;
+            at += characters;
+            length += 1;
+        }
+        place += 1;
+    }
+    bytes
+}
+
+/// Literals as a [`List`], packed.
 macro_rules! list {
     ($($literal:expr),* $(,)?) => {{
         const LITERALS: &[&str] = &[$($literal),*];
         avr_progmem::progmem! {
-            static progmem LIST: [u8; $crate::text::list_length(LITERALS)] = $crate::text::list_bytes(LITERALS);
+            static progmem LIST: [u8; $crate::text::packed_list_length(LITERALS)] =
+                $crate::text::packed_list(LITERALS);
         }
         $crate::text::List::new(LIST.as_slice())
     }};
@@ -163,7 +286,11 @@ macro_rules! words {
             }
 
             fn words() -> $crate::text::List {
-                $crate::text::list!($($word),*)
+                const WORDS: &[&str] = &[$($word),*];
+                avr_progmem::progmem! {
+                    static progmem LIST: [u8; $crate::text::list_length(WORDS)] = $crate::text::list_bytes(WORDS);
+                }
+                $crate::text::List::new(LIST.as_slice())
             }
 
             /// The word for it.
@@ -179,3 +306,31 @@ macro_rules! words {
     };
 }
 pub(crate) use words;
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use std::{string::String, vec::Vec};
+
+    fn read(bytes: impl Iterator<Item = u8>) -> String {
+        String::from_utf8(bytes.collect()).expect("ASCII")
+    }
+
+    #[test]
+    fn what_is_packed_reads_as_it_was_written() {
+        assert_eq!(read(text!("").bytes()), "");
+        assert_eq!(read(text!("the tool takes the setting, x").bytes()), "the tool takes the setting, x");
+        let list = list!("", "calibrate the tool", "0123456789_=");
+        assert_eq!([0, 1, 2].map(|place| read(list.bytes(place))), ["", "calibrate the tool", "0123456789_="]);
+        assert!(packed_length("calibrate the tool") < 9);
+    }
+
+    #[test]
+    fn every_fragment_reads_as_itself() {
+        let fragments: Vec<String> =
+            (FIRST_FRAGMENT..).take(FRAGMENTS.len()).map(|byte| read(unpacked(byte))).collect();
+        assert_eq!(fragments, FRAGMENTS);
+        assert!(FRAGMENTS.len() <= 128);
+    }
+}

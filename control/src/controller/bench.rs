@@ -54,6 +54,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     ///
     /// # Errors
     /// [`Refusal::NotInHold`], [`Refusal::AlarmLatched`], and [`Refusal::OutOfRange`] for what is no servo's pulse.
+    #[inline(never)]
     pub fn servo_by_hand(&mut self, pulse_us: u16) -> Result<(), Refusal> {
         self.expect_hold()?;
         let range = Setting::ServoOutUs.description();
