@@ -10,6 +10,7 @@ mod course;
 mod design;
 mod flash;
 mod progress;
+mod settings;
 mod sim;
 mod train;
 mod virtual_uno;
@@ -39,6 +40,8 @@ enum Command {
     Train(train::Arguments),
     /// Say what the firmware's classifier takes recorded objects for.
     Classify(classify::Arguments),
+    /// Keep the machine's settings in a file, set them from it, or compare both.
+    Settings(settings::Arguments),
     /// Calculate what a machine's engine, servo, shanks, chain, wheels and handle have to be like.
     Design(design::Arguments),
 }
@@ -60,6 +63,7 @@ fn main() -> ExitCode {
         Command::BenchUno => bench::run().map(|()| Finding::Good),
         Command::Train(arguments) => train::run(&arguments),
         Command::Classify(arguments) => classify::run(&arguments),
+        Command::Settings(arguments) => settings::run(&arguments),
         Command::Design(arguments) => design::run(&arguments).map(|()| Finding::Good),
     };
     match result {

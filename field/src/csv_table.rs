@@ -98,6 +98,11 @@ pub struct Line<'a> {
 }
 
 impl Line<'_> {
+    /// Its number in the file, counted from 1.
+    pub fn number(&self) -> u64 {
+        self.number
+    }
+
     /// The text in a column; empty where the table has no such column.
     pub fn text(&self, column: &str) -> &str {
         let place = self.table.header.iter().position(|name| name == column);

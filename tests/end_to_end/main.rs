@@ -10,6 +10,7 @@ mod console_grammar;
 mod console_settings;
 mod encoder_at_full_rate;
 mod field_examples;
+mod host_link;
 mod interrupt_budgets;
 mod leaves_the_row_when_told;
 mod long_beam_distance;

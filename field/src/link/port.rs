@@ -1,0 +1,177 @@
+//! What a link needs of a port, the search for the Uno's, and a virtual Uno as one.
+
+use super::LinkError;
+use crate::uno::Uno;
+use serialport::{ErrorKind, SerialPort, SerialPortInfo, SerialPortType, UsbPortInfo};
+use std::collections::VecDeque;
+use std::io::{self, Read, Write};
+use std::time::Duration;
+
+/// Bits in a second on the firmware's serial line.
+const BAUD: u32 = crate::uno::BAUD as u32;
+
+/// Longest time that a read waits for a byte.
+const READ_MS: u64 = 20;
+
+/// Longest time that a write waits for room, and a read where it has to.
+const PATIENCE: Duration = Duration::from_millis(READ_MS);
+
+/// USB vendors and products of the Uno, and of the converters on boards that are built like it.
+const UNOS: [(u16, u16); 10] = [
+    (0x2341, 0x0001),
+    (0x2341, 0x0043),
+    (0x2341, 0x0243),
+    (0x2A03, 0x0043),
+    (0x2A03, 0x0243),
+    (0x1A86, 0x7523), // CH340
+    (0x1A86, 0x5523), // CH341
+    (0x0403, 0x6001), // FT232R
+    (0x0403, 0x6015), // FT231X
+    (0x10C4, 0xEA60), // CP2102
+];
+
+/// A line of bytes, both ways.
+///
+/// A read waits at most some hundredths of a second, and then fails by [`io::ErrorKind::TimedOut`]. A read of no bytes, and every
+/// other error, says that the port is gone.
+pub trait Port: Read + Write {}
+
+impl<T: Read + Write + ?Sized> Port for T {}
+
+/// The only Uno's port among those of this machine.
+///
+/// # Errors
+/// Where there is none, or several.
+pub fn find_uno() -> Result<String, LinkError> {
+    only_uno(&serialport::available_ports().map_err(LinkError::NoList)?)
+}
+
+/// The only Uno's port among these, known by its USB vendor and product.
+///
+/// # Errors
+/// Where there is none, or several.
+pub fn only_uno(ports: &[SerialPortInfo]) -> Result<String, LinkError> {
+    let is_uno = |port: &&SerialPortInfo| match &port.port_type {
+        SerialPortType::UsbPort(UsbPortInfo { vid, pid, .. }) => UNOS.contains(&(*vid, *pid)),
+        _ => false,
+    };
+    let unos: Vec<String> = ports.iter().filter(is_uno).map(|port| port.port_name.clone()).collect();
+    match unos.as_slice() {
+        [only] => Ok(only.clone()),
+        [] => Err(LinkError::NoUno(ports.iter().map(|port| port.port_name.clone()).collect())),
+        _ => Err(LinkError::SeveralUnos(unos)),
+    }
+}
+
+/// Opens a port by its name, and says whether that has reset the Uno.
+pub(super) fn open(name: &str) -> Result<(Box<dyn SerialPort>, bool), LinkError> {
+    let mut port = serialport::new(name, BAUD).timeout(PATIENCE).open().map_err(|error| explain(name, error))?;
+    // The line that pulls an Uno's reset; a pseudo-terminal has none.
+    let resets = port.write_data_terminal_ready(true).is_ok();
+    Ok((port, resets))
+}
+
+/// Why a port does not open.
+fn explain(name: &str, error: serialport::Error) -> LinkError {
+    let name = name.to_owned();
+    match error.kind() {
+        ErrorKind::Io(io::ErrorKind::PermissionDenied) => LinkError::Forbidden(name),
+        ErrorKind::Io(io::ErrorKind::ResourceBusy) => LinkError::Busy(name),
+        ErrorKind::Io(io::ErrorKind::NotFound) => LinkError::Absent(name),
+        // A port that is there and yet no device is one that somebody else has locked.
+        ErrorKind::NoDevice if std::fs::exists(&name).unwrap_or(false) => LinkError::Busy(name),
+        ErrorKind::NoDevice => LinkError::Absent(name),
+        _ => LinkError::NotOpened { port: name, source: error },
+    }
+}
+
+/// A virtual Uno as a port, without a pseudo-terminal between. Its clock runs while it is read, as fast as it can.
+pub struct UnoPort {
+    uno: Uno,
+    received: VecDeque<u8>,
+}
+
+impl UnoPort {
+    /// A port at which this Uno is.
+    pub fn new(uno: Uno) -> Self {
+        Self { uno, received: VecDeque::new() }
+    }
+
+    /// The Uno, to drive its inputs.
+    pub fn uno(&mut self) -> &mut Uno {
+        &mut self.uno
+    }
+}
+
+impl Read for UnoPort {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        for _ in 0..READ_MS {
+            if !self.received.is_empty() {
+                return self.received.read(buffer);
+            }
+            self.uno.run_for_ms(1).map_err(io::Error::other)?;
+            self.received.extend(self.uno.received_bytes().into_iter().map(|received| received.byte));
+        }
+        Err(io::ErrorKind::TimedOut.into())
+    }
+}
+
+impl Write for UnoPort {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.uno.send(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn port(name: &str, ids: Option<(u16, u16)>) -> SerialPortInfo {
+        SerialPortInfo {
+            port_name: name.to_owned(),
+            port_type: match ids {
+                None => SerialPortType::Unknown,
+                Some((vid, pid)) => SerialPortType::UsbPort(UsbPortInfo {
+                    vid,
+                    pid,
+                    serial_number: None,
+                    manufacturer: None,
+                    product: None,
+                }),
+            },
+        }
+    }
+
+    #[test]
+    fn the_only_uno_is_found_among_other_ports() {
+        let ports = [port("ttyS0", None), port("ttyACM0", Some((0x2341, 0x0043)))];
+        assert_eq!(only_uno(&ports).unwrap(), "ttyACM0");
+    }
+
+    #[test]
+    fn two_unos_have_to_be_told_apart() {
+        let ports = [port("ttyACM0", Some((0x2341, 0x0043))), port("ttyUSB0", Some((0x1A86, 0x7523)))];
+        let error = only_uno(&ports).unwrap_err().to_string();
+        assert!(error.ends_with("choose one by --port, of ttyACM0, ttyUSB0"), "{error}");
+    }
+
+    #[test]
+    fn no_uno_is_said_with_what_there_is_instead() {
+        let error = only_uno(&[port("ttyS0", None)]).unwrap_err().to_string();
+        assert!(error.contains("(there is ttyS0): plug it in"), "{error}");
+        let error = only_uno(&[]).unwrap_err().to_string();
+        assert!(error.starts_with("there is no Uno at any USB port: plug it in"), "{error}");
+    }
+
+    #[test]
+    fn a_port_that_is_absent_and_a_file_that_is_no_port_are_told_apart() {
+        assert!(matches!(open("/dev/no-such-port"), Err(LinkError::Absent(name)) if name == "/dev/no-such-port"));
+        let file = tempfile::NamedTempFile::new().unwrap();
+        assert!(matches!(open(file.path().to_str().unwrap()), Err(LinkError::NotOpened { .. } | LinkError::Busy(_))));
+    }
+}

@@ -1,0 +1,135 @@
+//! A link at ports that answer by a script: good ones, silent ones, noisy ones.
+
+use super::*;
+use std::io::{Read, Write};
+
+/// A port that answers each line by what `answer` says, and before the first one says `greeting`.
+struct Script<F> {
+    to_read: VecDeque<u8>,
+    typed: Vec<u8>,
+    answer: F,
+}
+
+impl<F: FnMut(&str) -> Vec<u8>> Read for Script<F> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        if self.to_read.is_empty() {
+            return Err(io::ErrorKind::TimedOut.into());
+        }
+        self.to_read.read(buffer)
+    }
+}
+
+impl<F: FnMut(&str) -> Vec<u8>> Write for Script<F> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        for &byte in bytes {
+            if byte == b'\n' {
+                let line = String::from_utf8(std::mem::take(&mut self.typed)).unwrap();
+                self.to_read.extend((self.answer)(&line));
+            } else {
+                self.typed.push(byte);
+            }
+        }
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+fn script<F: FnMut(&str) -> Vec<u8>>(greeting: &str, answer: F) -> Script<F> {
+    Script { to_read: greeting.bytes().collect(), typed: Vec::new(), answer }
+}
+
+/// A link to a firmware that answers `version` as it should, and everything else by `answer`.
+fn link(answer: impl Fn(&str) -> Vec<u8> + 'static) -> Link {
+    let answer = move |line: &str| match line {
+        "" => Vec::new(),
+        "version" => b"weeder 0.1.0\r\nok\r\n".to_vec(),
+        line => answer(line),
+    };
+    Link::over(script("", answer), false).expect("the firmware answers")
+}
+
+#[test]
+fn the_greeting_after_a_reset_is_waited_for_and_the_version_asked() {
+    let answer = |line: &str| if line.is_empty() { Vec::new() } else { b"weeder 0.2.0\r\nok\r\n".to_vec() };
+    let greeting = "\0\x1Bgarbage\r\nweeder 0.2.0, reset by power, state hold, tool out; help lists the commands\r\n";
+    let link = Link::over(script(greeting, answer), true).unwrap();
+    assert_eq!(link.version(), "0.2.0");
+}
+
+#[test]
+fn events_before_an_answer_are_kept_and_do_not_belong_to_it() {
+    let mut link = link(|_| b"swing tool=out pos=7\r\nstate=hold tool=out\r\nlost=0\r\nok\r\n".to_vec());
+    assert_eq!(link.ask("status").unwrap(), ["state=hold tool=out", "lost=0"]);
+    assert_eq!(link.next_line().unwrap().as_deref(), Some("swing tool=out pos=7"));
+    assert_eq!(link.next_line().unwrap(), None);
+}
+
+#[test]
+fn a_refusal_is_an_error_with_the_firmware_s_words() {
+    let mut link = link(|_| b"error: no such command, help lists them all\r\n".to_vec());
+    let error = link.ask("hepl").unwrap_err().to_string();
+    assert_eq!(error, "the firmware answers `hepl` by `error: no such command, help lists them all`");
+}
+
+#[test]
+fn a_port_at_which_nothing_answers_is_given_up() {
+    let error = Link::over(script("", |_: &str| Vec::new()), true).err().unwrap();
+    assert!(error.to_string().contains("`weeder flash`"), "{error}");
+}
+
+#[test]
+fn noise_without_an_end_is_given_up_as_noise() {
+    let noise: Vec<u8> = (0..=255).filter(|&byte| byte != b'\n' && byte != b'\r').cycle().take(60_000).collect();
+    let error = Link::over(script("", move |_: &str| noise.clone()), false).err().unwrap();
+    assert!(matches!(error, LinkError::Noise), "{error}");
+}
+
+#[test]
+fn text_without_an_end_is_given_up_and_only_its_end_is_shown() {
+    let mut link = link(|_| b"all work and no play\r\n".repeat(5000));
+    let error = link.ask("status").unwrap_err().to_string();
+    assert!(error.contains("nothing finishes the answer to `status`") && error.len() < 600, "{error}");
+}
+
+#[test]
+fn another_firmware_is_recognised() {
+    let error = Link::over(script("", |_: &str| b"Grbl 1.1h\r\nok\r\n".to_vec()), false).err().unwrap();
+    assert!(error.to_string().contains("not the weeder's firmware that answers, but \"Grbl 1.1h\""), "{error}");
+}
+
+#[test]
+fn a_reset_while_it_is_asked_is_an_error() {
+    let mut link = link(|_| b"weeder 0.1.0, reset by brown_out, state hold\r\nok\r\n".to_vec());
+    assert!(matches!(link.ask("save"), Err(LinkError::Restarted(command)) if command == "save"));
+}
+
+#[test]
+fn a_command_that_would_be_two_lines_or_no_text_is_not_typed() {
+    let mut link = link(|line| panic!("`{line}` was typed"));
+    for command in ["hold\nstart now", "h\u{00E4}lt", &"x".repeat(COMMAND_LENGTH + 1)] {
+        assert!(matches!(link.send(command), Err(LinkError::NoCommand(_))), "{command:?}");
+    }
+}
+
+#[test]
+fn a_port_that_goes_away_says_so() {
+    struct Unplugged;
+    impl Read for Unplugged {
+        fn read(&mut self, _: &mut [u8]) -> io::Result<usize> {
+            Ok(0)
+        }
+    }
+    impl Write for Unplugged {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            Ok(bytes.len())
+        }
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+    let error = Link::over(Unplugged, false).err().unwrap();
+    assert_eq!(error.to_string(), "the port is gone: plug the Uno in again");
+}

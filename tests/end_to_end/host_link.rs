@@ -1,0 +1,109 @@
+//! The host's link to the console: what it asks, sets and hears, of the real firmware.
+
+use crate::common::{elf, number};
+use control::settings::{Setting, Settings};
+use field::link::settings::{self, SettingsError};
+use field::link::{Link, LinkError, Mode, Status, Told, UnoPort};
+use field::machine::Machine;
+use field::motion::Motion;
+use field::row::{Row, Thing};
+use field::trial;
+use field::uno::Uno;
+
+/// A link to a firmware that has just woken up.
+fn link() -> Link {
+    let uno = Uno::boot(&elf()).expect("the firmware is an image");
+    Link::over(UnoPort::new(uno), true).expect("the firmware answers")
+}
+
+#[test]
+fn a_link_waits_for_the_greeting_and_knows_the_version() {
+    assert_eq!(link().version(), env!("CARGO_PKG_VERSION"));
+}
+
+#[test]
+fn half_a_line_typed_before_the_link_was_there_harms_nothing() {
+    let mut uno = trial::boot(&elf(), &[]).expect("the firmware wakes up");
+    uno.send(b"set whe");
+    let mut link = Link::over(UnoPort::new(uno), false).expect("the firmware answers");
+    let status = link.ask("status").expect("the firmware knows the command").join(" ");
+    assert_eq!(number(&status, "mistakes"), 1, "{status}");
+}
+
+#[test]
+fn all_settings_are_read_and_are_the_table_s_defaults() {
+    assert_eq!(settings::read(&mut link()).expect("the firmware tells them"), Settings::new());
+}
+
+#[test]
+fn settings_are_pushed_whatever_stands_in_each_other_s_way() {
+    let mut link = link();
+    link.ask("clear").expect("the firmware knows the command");
+    // The pulses change places, and only the beam's new place makes room for the margin.
+    let wanted = [
+        (Setting::MarginMm, 200),
+        (Setting::LeadOutMs, 400),
+        (Setting::BeamToToolMm, 1500),
+        (Setting::ServoInUs, 2000),
+        (Setting::ServoOutUs, 1500),
+    ];
+    let changed = settings::push(&mut link, &wanted, true).expect("the firmware takes them");
+    assert_eq!(changed.len(), wanted.len());
+    let found = settings::read(&mut link).expect("the firmware tells them");
+    assert!(wanted.iter().all(|&(setting, value)| found.get(setting) == value), "{found:?}");
+    assert_eq!(settings::push(&mut link, &wanted, false).expect("there is nothing to do"), []);
+}
+
+#[test]
+fn settings_that_contradict_each_other_are_not_sent() {
+    let mut link = link();
+    let error = settings::push(&mut link, &[(Setting::MarginMm, 20), (Setting::BeamToToolMm, 150)], false).unwrap_err();
+    assert!(matches!(error, SettingsError::Contradiction(_)), "{error}");
+    assert!(error.to_string().contains("need a beam_to_tool_mm of "), "{error}");
+    assert_eq!(settings::read(&mut link).expect("the firmware tells them"), Settings::new());
+}
+
+#[test]
+fn a_machine_at_work_is_not_given_another_geometry() {
+    let mut link = link();
+    link.ask("clear").and_then(|_| link.ask("start")).expect("the firmware knows the commands");
+    let wanted = [(Setting::K, 5), (Setting::WheelMm, 405)];
+    assert!(matches!(settings::push(&mut link, &wanted, false), Err(SettingsError::AtWork)));
+    assert_eq!(settings::read(&mut link).expect("the firmware tells them"), Settings::new());
+    assert_eq!(settings::push(&mut link, &[(Setting::K, 5)], false).expect("k may change"), [Setting::K]);
+}
+
+#[test]
+fn every_line_of_a_row_being_weeded_is_understood() {
+    let row = Row::new(vec![Thing::plant(500.0, 150.0), Thing::weed(850.0, 15.0), Thing::plant(1200.0, 150.0)]);
+    let row = row.expect("plants and a weed are a row");
+    let machine = Machine::default();
+    let motion = Motion::steady(0.0, 1000.0, 500.0, 2200.0).change_speed(0.0, 1000.0);
+    let mut uno = trial::boot(&elf(), &[machine.beam_before(&row, &motion)]).expect("the firmware wakes up");
+    uno.send(b"events on\nstart\n");
+    uno.run_for_ms(100).expect("the firmware runs");
+    uno.received();
+    let changes = machine.pin_changes(&row, &motion, uno.cycle());
+    uno.drive(changes);
+    let mut link = Link::over(UnoPort::new(uno), false).expect("the firmware answers");
+
+    let (mut objects, mut swings) = (0, 0);
+    for _ in 0..500 {
+        match link.next_line().expect("the port stays").as_deref().map(Told::parse) {
+            None => {}
+            Some(Some(Told::Object { .. })) => objects += 1,
+            Some(Some(Told::Swing { .. })) => swings += 1,
+            other => panic!("{other:?}"),
+        }
+    }
+    assert_eq!(objects, 3);
+    assert!(swings >= 4, "in, and out and in for each plant: {swings}");
+    let status = Status::parse(&link.ask("status").expect("the firmware knows the command")[0]).expect("a status");
+    assert_eq!((status.mode, status.speed_mm_s), (Mode::Work, 0));
+}
+
+#[test]
+fn what_the_firmware_refuses_is_said_in_its_words() {
+    let error = link().ask("set wheel_mm 7").unwrap_err();
+    assert!(matches!(&error, LinkError::Refused { answer, .. } if answer.contains("200 to 800")), "{error}");
+}
