@@ -409,11 +409,17 @@ impl Drive {
             Event::Object { vote, leading, plan, .. } => Some((vote, leading, plan)),
             _ => None,
         });
+        // What is told in doubt the machine knows; what the model sees then, it may know.
+        let told_as_seen = told.map(|(_, leading, plan)| {
+            let leading = self.count + i64::from((leading - Position::new(self.count as i32)).0);
+            Seen { leading, trailing: leading + i64::from(plan.hold.0), cut: false }
+        });
+        let in_doubt = seen.into_iter().chain(told_as_seen);
         if let State::Alarm(_) = self.state() {
             if !matches!(state, State::Alarm(_)) {
                 self.model.latch(frontier);
             }
-            self.model.alarmed(seen);
+            self.model.alarmed(in_doubt);
             return Ok(());
         }
         let doubtful = self.model.is_doubtful();

@@ -108,7 +108,7 @@ impl Model {
     }
 
     /// The machine is in an alarm, and may have seen this.
-    pub fn alarmed(&mut self, seen: Option<Seen>) {
+    pub fn alarmed(&mut self, seen: impl Iterator<Item = Seen>) {
         self.perhaps.extend(seen);
         self.known_from = self.frontier;
         self.doubtful = self.open.is_some();
