@@ -136,7 +136,7 @@ fn differences(wanted: &[(Setting, u16)], found: &Settings) -> Vec<(Setting, u16
 
 fn table(differences: &[(Setting, u16, u16)]) -> Table {
     let mut table = Table::new();
-    table.load_preset(presets::UTF8_HORIZONTAL_ONLY).set_header(["setting", "file", "machine", "unit"]);
+    table.load_style(presets::UTF8_BORDERS_ONLY).set_header(["setting", "file", "machine", "unit"]);
     for &(setting, file, machine) in differences {
         let [file, machine] = [file, machine].map(|number| value(setting, number).to_string());
         table.add_row([name(setting), file, machine, unit(setting).to_owned()]);
