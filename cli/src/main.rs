@@ -9,6 +9,7 @@ mod classify;
 mod course;
 mod design;
 mod flash;
+mod monitor;
 mod progress;
 mod settings;
 mod sim;
@@ -40,6 +41,8 @@ enum Command {
     Train(train::Arguments),
     /// Say what the firmware's classifier takes recorded objects for.
     Classify(classify::Arguments),
+    /// Watch the machine, and type into its console.
+    Monitor(monitor::Arguments),
     /// Keep the machine's settings in a file, set them from it, or compare both.
     Settings(settings::Arguments),
     /// Calculate what a machine's engine, servo, shanks, chain, wheels and handle have to be like.
@@ -63,6 +66,7 @@ fn main() -> ExitCode {
         Command::BenchUno => bench::run().map(|()| Finding::Good),
         Command::Train(arguments) => train::run(&arguments),
         Command::Classify(arguments) => classify::run(&arguments),
+        Command::Monitor(arguments) => monitor::run(&arguments),
         Command::Settings(arguments) => settings::run(&arguments),
         Command::Design(arguments) => design::run(&arguments).map(|()| Finding::Good),
     };

@@ -23,6 +23,7 @@ mod told;
 pub use self::lines::LineReader;
 pub use self::port::{Port, UnoPort, find_uno, only_uno};
 pub use self::told::{Mode, Status, Told};
+pub use control::classifier::Class;
 
 use std::collections::VecDeque;
 use std::io;
@@ -44,6 +45,9 @@ const ANSWER_BYTES: usize = 40_000;
 
 /// Silent reads in which the greeting has to come after a reset: the longest wait of an old bootloader, and some patience.
 const BOOT_READS: usize = 150;
+
+/// Times that the version is asked for again.
+const RETRIES: usize = 2;
 
 /// What the firmware's name begins with, in its greeting and its version.
 const NAME: &str = "weeder ";
@@ -164,7 +168,15 @@ impl Link {
         // Whatever was typed before ends here, and its answer is nobody's.
         link.type_line("")?;
         link.wait_until_quiet()?;
-        let answer = link.ask("version")?;
+        let mut answer = link.ask("version");
+        // The Uno may be starting right now, which no modem line has told.
+        for _ in 0..RETRIES {
+            if !matches!(answer, Err(LinkError::Restarted(_) | LinkError::Silent { .. })) {
+                break;
+            }
+            answer = link.ask("version");
+        }
+        let answer = answer?;
         match answer.last().and_then(|line| line.strip_prefix(NAME)) {
             Some(version) => link.version = version.to_owned(),
             None => return Err(LinkError::NotTheWeeder(answer.join(" "))),

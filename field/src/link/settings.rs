@@ -92,23 +92,26 @@ pub fn explain(contradiction: Contradiction) -> String {
 /// Where the console fails, or the firmware has other settings than this program.
 pub fn read(link: &mut Link) -> Result<Settings, SettingsError> {
     let lines = link.ask("get")?;
+    let shown: Vec<(Setting, u16)> = lines.iter().filter_map(|line| shown(line)).collect();
     let mut settings = Settings::new();
     for setting in Setting::all() {
-        let name = name(setting);
-        let unknown = || SettingsError::Unknown { setting: name.clone() };
-        let text = lines
-            .iter()
-            .find_map(|line| line.strip_prefix(&name)?.strip_prefix('='))
-            .and_then(|rest| rest.split([' ', ',']).next());
-        let value = match text {
-            Some("on") => 1,
-            Some("off") => 0,
-            Some(number) => number.parse().map_err(|_| unknown())?,
-            None => return Err(unknown()),
-        };
+        let unknown = || SettingsError::Unknown { setting: name(setting) };
+        let &(_, value) = shown.iter().find(|(known, _)| *known == setting).ok_or_else(unknown)?;
         settings.set(setting, value).map_err(|_| unknown())?;
     }
     Ok(settings)
+}
+
+/// The setting that a line shows, as `name=value` with more behind it; none where it shows none.
+pub fn shown(line: &str) -> Option<(Setting, u16)> {
+    let (name, rest) = line.split_once('=')?;
+    let setting = Setting::find(name.as_bytes())?;
+    let value = match rest.split([' ', ',']).next()? {
+        "on" if setting.is_switched() => 1,
+        "off" if setting.is_switched() => 0,
+        number => number.parse().ok()?,
+    };
+    Some((setting, value))
 }
 
 /// The values to send, one after the other, that lead from some settings to others with no contradiction on the way.

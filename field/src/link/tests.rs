@@ -60,6 +60,17 @@ fn the_greeting_after_a_reset_is_waited_for_and_the_version_asked() {
 }
 
 #[test]
+fn an_uno_that_starts_while_it_is_asked_is_asked_again() {
+    let mut lines = 0;
+    let answer = move |_: &str| {
+        lines += 1;
+        let greeting = b"weeder 0.1.0, reset by button, state hold\r\n".to_vec();
+        if lines <= 2 { greeting } else { b"weeder 0.1.0\r\nok\r\n".to_vec() }
+    };
+    assert_eq!(Link::over(script("", answer), false).unwrap().version(), "0.1.0");
+}
+
+#[test]
 fn events_before_an_answer_are_kept_and_do_not_belong_to_it() {
     let mut link = link(|_| b"swing tool=out pos=7\r\nstate=hold tool=out\r\nlost=0\r\nok\r\n".to_vec());
     assert_eq!(link.ask("status").unwrap(), ["state=hold tool=out", "lost=0"]);
