@@ -1,0 +1,200 @@
+//! Whatever comes along the serial line, and whatever the EEPROM holds: targets for a fuzzer.
+//!
+//! `cargo test` runs each on some thousand inputs by chance; `cargo bolero test -p control --release TARGET` has libFuzzer
+//! look for others until it is stopped, and keeps what it finds for `cargo test`.
+
+use bolero::{TypeGenerator, check};
+use control::{
+    alarm::Alarm,
+    classifier::{Classifier, Nearest},
+    console::{LineBuffer, Word},
+    controller::{Controller, Readings, State, WakeUp},
+    examples::EXAMPLES,
+    memory::{ERASED, Memory, SIZE, Volatile},
+    reply::{self, Answer, LINE},
+    reset::Cause,
+    saved::{COPY, SavedSettings},
+    settings::{Setting, Settings},
+    taught,
+    units::{Instant, Position},
+};
+use std::convert::Infallible;
+
+/// The machine as the firmware has it, with these contents of its EEPROM's halves.
+fn machine(for_settings: Volatile, for_examples: Volatile) -> Controller<impl Classifier, impl Memory> {
+    let readings = Readings::new(Instant::new(0), Position::new(0));
+    let wake_up = WakeUp { readings, beam_broken: false, cause: Cause::PowerOn };
+    Controller::new(Nearest::new(&EXAMPLES[..], for_examples), for_settings, wake_up)
+}
+
+/// Something that may come along the line: bytes by chance seldom make a command.
+#[derive(Clone, Debug, TypeGenerator)]
+enum Typed {
+    Bytes(Vec<u8>),
+    Command(u8),
+    Setting(u8),
+    Argument(u8),
+    Number(u16),
+    End,
+}
+
+const ARGUMENTS: [&str; 12] =
+    ["now", "on", "off", "all", "plant", "weed", "start", "in", "out", "servo", "force", "json"];
+
+impl Typed {
+    fn write_to(&self, bytes: &mut Vec<u8>) {
+        match self {
+            Self::Bytes(some) => bytes.extend(some),
+            Self::Command(place) => {
+                bytes.extend(Word::from_index(place % Word::COUNT).iter().flat_map(|w| w.text().bytes()))
+            }
+            Self::Setting(place) => {
+                bytes.extend(Setting::from_index(place % Setting::COUNT).iter().flat_map(|s| s.text().bytes()));
+            }
+            Self::Argument(place) => bytes.extend(ARGUMENTS[usize::from(*place) % ARGUMENTS.len()].bytes()),
+            Self::Number(number) => bytes.extend(number.to_string().bytes()),
+            Self::End => bytes.push(b'\n'),
+        }
+        bytes.push(b' ');
+    }
+}
+
+/// A line as it goes to the terminal.
+struct Line(Vec<u8>);
+
+impl ufmt::uWrite for Line {
+    type Error = Infallible;
+
+    fn write_str(&mut self, text: &str) -> Result<(), Infallible> {
+        self.0.extend(text.bytes());
+        Ok(())
+    }
+}
+
+#[test]
+fn every_line_that_comes_is_answered_by_lines_that_fit_and_one_verdict() {
+    check!().with_type::<Vec<Typed>>().with_iterations(1500).for_each(|typed| {
+        let mut bytes = Vec::new();
+        typed.iter().for_each(|typed| typed.write_to(&mut bytes));
+        bytes.push(b'\n');
+        let mut machine = machine(Volatile::new(), Volatile::new());
+        let mut line = LineBuffer::new();
+        for (turn, byte) in (0_u32..).zip(bytes) {
+            machine.step(Readings::new(Instant::new(turn * 125), Position::new(turn.cast_signed() / 4)));
+            let Some(command) = line.take(byte) else { continue };
+            let mut answer = reply::answer(command, &mut machine);
+            while !machine.carry_on() {}
+            let mut verdicts = 0;
+            while !answer.is_done() {
+                assert_eq!(verdicts, 0, "{command:?} has an answer behind its verdict");
+                let mut out = Line(Vec::new());
+                let Ok(()) = answer.write_line(&machine, &mut out);
+                let Line(out) = out;
+                assert!(out.len() <= LINE, "{:?} has {} bytes", String::from_utf8_lossy(&out), out.len());
+                let text = out.strip_suffix(b"\r\n").expect("a line ends");
+                assert!(text.iter().all(|byte| (b' '..=b'~').contains(byte)), "{}", text.escape_ascii());
+                verdicts += usize::from(text == b"ok" || text.starts_with(b"error: "));
+            }
+            assert_eq!((verdicts, answer), (1, Answer::Done), "{command:?}");
+            while let Some(event) = machine.next_event() {
+                let mut out = Line(Vec::new());
+                let Ok(()) = reply::write_event(&event, &mut out);
+                assert!(out.0.len() <= LINE && out.0.ends_with(b"\r\n"), "{}", out.0.escape_ascii());
+            }
+        }
+    });
+}
+
+/// An EEPROM's content: what was saved, one after the other, and the bytes that were spoiled since. Bytes by chance alone
+/// would never have the right CRC.
+#[derive(Clone, Debug, TypeGenerator)]
+struct Eeprom {
+    filled_with: Option<Vec<u8>>,
+    saved: Vec<Vec<(u8, u16)>>,
+    spoiled: Vec<(u16, u8)>,
+    /// Bytes of the last save that are written before the power goes.
+    power: u8,
+}
+
+/// The defaults, changed: within each value's range, but free to contradict each other.
+fn settings(changes: &[(u8, u16)]) -> Settings {
+    let mut settings = Settings::new();
+    for &(place, value) in changes {
+        let setting = Setting::from_index(place % Setting::COUNT).expect("a place in the table");
+        let range = setting.description();
+        let width = u32::from(range.greatest - range.least) + 1;
+        let value = range.least + (u32::from(value) % width) as u16;
+        settings.set(setting, value).expect("within the range");
+    }
+    settings
+}
+
+fn save(memory: Volatile, settings: &Settings) -> Volatile {
+    let mut saved = SavedSettings::new(memory);
+    saved.load();
+    saved.save();
+    while !saved.carry_on(settings) {}
+    saved.into_memory()
+}
+
+fn load(memory: &Volatile) -> Option<Settings> {
+    SavedSettings::new(memory.clone()).load()
+}
+
+#[test]
+fn whatever_the_eeprom_holds_the_machine_wakes_up_with_whole_settings_or_none_and_says_so() {
+    check!().with_type::<Eeprom>().with_iterations(5000).for_each(|eeprom| {
+        let fill = eeprom.filled_with.as_deref().filter(|fill| !fill.is_empty()).unwrap_or(&[ERASED]);
+        let mut content = [0; 2 * SIZE];
+        content.iter_mut().zip(fill.iter().cycle()).for_each(|(byte, &fill)| *byte = fill);
+        let (for_settings, for_examples) = content.split_at(SIZE);
+        let mut memory = Volatile::holding(for_settings.try_into().expect("half the EEPROM"));
+        for changes in &eeprom.saved {
+            memory = save(memory, &settings(changes));
+        }
+        let mut examples = Volatile::holding(for_examples.try_into().expect("the other half"));
+        for &(address, byte) in &eeprom.spoiled {
+            let address = usize::from(address) % (2 * SIZE);
+            let half = if address < SIZE { &mut memory } else { &mut examples };
+            half.bytes[address % SIZE] = byte;
+        }
+
+        let machine = machine(memory.clone(), examples);
+        let found = load(&memory);
+        let expected = match &found {
+            None => State::Alarm(Alarm::SettingsLost),
+            Some(settings) if settings.contradiction().is_some() => State::Alarm(Alarm::SettingsContradict),
+            Some(_) => State::Hold,
+        };
+        assert_eq!(machine.state(), expected);
+        assert!(machine.tool_out());
+        assert_eq!(machine.settings(), &found.clone().unwrap_or_default());
+        for setting in Setting::all() {
+            let range = setting.description();
+            assert!((range.least..=range.greatest).contains(&machine.settings().get(setting)), "{}", setting as u8);
+        }
+        if eeprom.spoiled.is_empty()
+            && let Some(last) = eeprom.saved.last()
+        {
+            assert_eq!(found, Some(settings(last)), "what was saved last is not there");
+        }
+        assert!(machine.classifier().spoiled() <= taught::CAPACITY);
+        let mut place = 0;
+        while let Some((_, next)) = machine.classifier().listed(place) {
+            assert!(next > place);
+            place = next;
+        }
+
+        // A save on top of all that, and the power goes.
+        let power = usize::from(eeprom.power) % (COPY + 1);
+        let new = settings(&[(0, 1), (10, eeprom.power.into())]);
+        let mut failing = memory;
+        failing.lose_power_after(power);
+        let after = load(&save(failing, &new).with_power());
+        // A byte that was spoiled may become right again by being written: then a save of before is whole again.
+        let once_saved = eeprom.saved.iter().any(|changes| after == Some(settings(changes)));
+        let filled = eeprom.filled_with.is_some();
+        assert!(after == found || after.as_ref() == Some(&new) || once_saved || filled, "{power} bytes: {after:?}");
+        assert!(power < COPY || after == Some(new), "nothing was lost");
+    });
+}
