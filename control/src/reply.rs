@@ -13,7 +13,7 @@ use crate::{
     event::Event,
     memory::Memory,
     settings::{Contradiction, Setting},
-    text::{List, Listed, Text, list, text},
+    text::{self, List, Listed, Text, list, text},
 };
 use ufmt::{uWrite, uwrite};
 
@@ -305,12 +305,9 @@ pub fn write_event<W: uWrite + ?Sized>(event: &Event, out: &mut W) -> Result<(),
     match *event {
         Event::Object { vote, leading, spacing, plan } => {
             say(out, class_name(vote.class))?;
-            say_number(out, text!(" pos="), leading.count())?;
-            say_number(out, text!(" votes="), vote.votes.into())?;
-            say_number(out, text!(" spacing="), spacing.0)?;
-            say_number(out, text!(" delay="), plan.delay.0)?;
-            say_number(out, text!(" hold="), plan.hold.0)?;
-            say_number(out, text!(" actuation="), plan.actuation().0)?;
+            let numbers =
+                [leading.count(), vote.votes.into(), spacing.0, plan.delay.0, plan.hold.0, plan.actuation().0];
+            say_numbers(out, text!(" pos=# votes=# spacing=# delay=# hold=# actuation=#"), &numbers)?;
         }
         Event::Swing { out: leaves, position } => {
             say(out, text!("swing tool="))?;
@@ -326,8 +323,7 @@ pub fn write_event<W: uWrite + ?Sized>(event: &Event, out: &mut W) -> Result<(),
             say_listed(out, warning.text())?;
         }
         Event::Calibrated { outcome: Outcome::Measured(Leads { out_ms, in_ms }), fits } => {
-            say_number(out, text!("calibrated lead_out_ms="), out_ms.into())?;
-            say_number(out, text!(" lead_in_ms="), in_ms.into())?;
+            say_numbers(out, text!("calibrated lead_out_ms=# lead_in_ms=#"), &[out_ms.into(), in_ms.into()])?;
             say(out, if fits { text!(" set=yes") } else { text!(" set=no") })?;
         }
         Event::Calibrated { outcome: Outcome::Shown, .. } => {
@@ -395,10 +391,13 @@ where
         say(out, text!(" for="))?;
         say_listed(out, reason.text())?;
     }
-    say_number(out, text!(" pos="), readings.position.count())?;
-    say_number(out, text!(" speed_mm_s="), controller.speed_mm_s().into())?;
-    say_number(out, text!(" windows="), controller.windows().into())?;
-    say_number(out, text!(" unseen_mm="), controller.unseen_mm().into())
+    let numbers = [
+        readings.position.count(),
+        controller.speed_mm_s().into(),
+        controller.windows().into(),
+        controller.unseen_mm().into(),
+    ];
+    say_numbers(out, text!(" pos=# speed_mm_s=# windows=# unseen_mm=#"), &numbers)
 }
 
 fn write_counts<C, M, W>(controller: &Controller<C, M>, out: &mut W) -> Result<(), W::Error>
@@ -408,13 +407,16 @@ where
     W: uWrite + ?Sized,
 {
     let readings = controller.readings();
-    say_number(out, text!("lost="), readings.lost.into())?;
-    say_number(out, text!(" jumps="), readings.jumps.into())?;
-    say_number(out, text!(" late="), controller.late().into())?;
-    say_number(out, text!(" missed="), controller.events_missed().into())?;
-    say_number(out, text!(" mistakes="), controller.mistakes().into())?;
-    say_number(out, text!(" stack_free="), readings.stack_free.into())?;
-    say(out, text!(" reset="))?;
+    let numbers = [
+        readings.lost,
+        readings.jumps,
+        controller.late(),
+        controller.events_missed(),
+        controller.mistakes(),
+        readings.stack_free,
+    ];
+    let template = text!("lost=# jumps=# late=# missed=# mistakes=# stack_free=# reset=");
+    say_numbers(out, template, &numbers.map(i32::from))?;
     say_listed(out, controller.cause().text())?;
     if controller.sees_no_plants() {
         say(out, text!(" warning="))?;
@@ -562,7 +564,23 @@ fn say_number<W: uWrite + ?Sized>(out: &mut W, text: Text, number: i32) -> Resul
 /// A text.
 #[inline(never)]
 fn say<W: uWrite + ?Sized>(out: &mut W, text: Text) -> Result<(), W::Error> {
-    text.bytes().try_for_each(|byte| out.write_char(char::from(byte)))
+    say_numbers(out, text, &[])
+}
+
+/// A text in which each `#` stands for the next of the numbers.
+#[inline(never)]
+fn say_numbers<W: uWrite + ?Sized>(out: &mut W, text: Text, numbers: &[i32]) -> Result<(), W::Error> {
+    let mut numbers = numbers.iter();
+    for byte in text.packed_bytes() {
+        match numbers.as_slice() {
+            [number, ..] if byte == b'#' => {
+                numbers.next();
+                uwrite!(out, "{}", *number)?;
+            }
+            _ => say_byte(out, byte)?,
+        }
+    }
+    Ok(())
 }
 
 /// A text of a list.
@@ -574,7 +592,16 @@ fn say_listed<W: uWrite + ?Sized>(out: &mut W, Listed(list, place): Listed) -> R
 /// The text at a place in a list, both of which find room in registers.
 #[inline(never)]
 fn say_at<W: uWrite + ?Sized>(out: &mut W, list: List, place: u8) -> Result<(), W::Error> {
-    list.bytes(place).try_for_each(|byte| out.write_char(char::from(byte)))
+    list.packed_bytes(place).try_for_each(|byte| say_byte(out, byte))
+}
+
+/// What a packed byte stands for.
+#[inline(never)]
+fn say_byte<W: uWrite + ?Sized>(out: &mut W, byte: u8) -> Result<(), W::Error> {
+    match text::fragment(byte) {
+        None => out.write_char(char::from(byte)),
+        Some(Listed(list, place)) => say_at(out, list, place),
+    }
 }
 
 /// The state, and which alarm.
