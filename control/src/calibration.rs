@@ -117,6 +117,10 @@ impl Swings {
         let lasted = now - self.since;
         if self.watched && !self.followed && switch_on == self.tool_out() {
             self.followed = true;
+            // No servo is that fast: the switch is stuck, or was never where it should be.
+            if lasted < Interval::from_ms(5) {
+                return Some(Outcome::Failed);
+            }
             let lasted_ms = (lasted.steps() / (Interval::STEPS_PER_SECOND / 1000)) as u16;
             if self.tool_out() {
                 self.leads.out_ms = self.leads.out_ms.max(lasted_ms + 1 + SPARE_MS);
@@ -201,6 +205,7 @@ mod tests {
     fn a_switch_that_does_not_follow_fails_and_none_at_all_shows_the_swings() {
         assert_eq!(run(true, [60, 180, 60, 9999, 60, 180]).0, Outcome::Failed);
         assert_eq!(run(true, [9999, 180, 60, 180, 60, 180]).0, Outcome::Failed);
+        assert_eq!(run(true, [0, 180, 60, 180, 60, 180]).0, Outcome::Failed);
         assert_eq!(run(false, [0; 6]), (Outcome::Shown, 9000));
     }
 }

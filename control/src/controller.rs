@@ -320,9 +320,6 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     pub fn step(&mut self, readings: Readings) -> Orders {
         let tool_was_at = self.tool();
         let readings = self.try_on(readings);
-        while let Some((position, broken)) = self.next_played_edge() {
-            self.take_edge(position, broken);
-        }
         self.readings = readings;
         if let Some(speed) = self.meter.read(readings.now, readings.position) {
             self.leads = Leads::at(speed, &self.settings);
@@ -409,19 +406,20 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         if setting.description().hold_only && self.is_working() {
             return Err(Refusal::NotInHold);
         }
-        let mut settings = self.settings.clone();
-        settings.set(setting, value).map_err(|_| Refusal::OutOfRange)?;
+        let before = self.settings.get(setting);
         // Settings that contradict each other already are mended one at a time.
-        if let Some(contradiction) = settings.contradiction()
-            && self.settings.contradiction().is_none()
-        {
+        let contradicted = self.settings.contradiction().is_some();
+        self.settings.set(setting, value).map_err(|_| Refusal::OutOfRange)?;
+        if !contradicted && let Some(contradiction) = self.settings.contradiction() {
+            // What was set before is within its range.
+            let _ = self.settings.set(setting, before);
             return Err(Refusal::Contradiction(contradiction));
         }
         // Another wheel is one that has not been measured.
         if matches!(setting, Setting::WheelMm | Setting::TicksPerRev) {
-            settings.set(Setting::TicksPerM, 0).map_err(|_| Refusal::OutOfRange)?;
+            let _ = self.settings.set(Setting::TicksPerM, 0);
         }
-        self.take_settings(settings);
+        self.follow_settings();
         Ok(())
     }
 
@@ -433,7 +431,8 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         if self.is_working() {
             return Err(Refusal::NotInHold);
         }
-        self.take_settings(Settings::new());
+        self.settings = Settings::new();
+        self.follow_settings();
         Ok(())
     }
 
@@ -445,13 +444,13 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         if self.is_working() {
             return Err(Refusal::NotInHold);
         }
-        let settings = self.saved.load().ok_or(Refusal::NothingSaved)?;
-        self.take_settings(settings);
+        self.settings = self.saved.load().ok_or(Refusal::NothingSaved)?;
+        self.follow_settings();
         Ok(())
     }
 
-    fn take_settings(&mut self, settings: Settings) {
-        self.settings = settings;
+    /// Works out what follows from the settings.
+    fn follow_settings(&mut self) {
         self.geometry = Geometry::of(&self.settings);
         self.leads = Leads::at(self.meter.speed(), &self.settings);
     }

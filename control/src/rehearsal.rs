@@ -1,81 +1,52 @@
 //! A rehearsal: a row that is only thought of, to see the servo swing without a field or a sensor.
 //!
-//! It gives the positions and beam edges of a machine that rolls past plants of 150 mm, 500 mm apart, at a steady speed. What it
-//! gives goes through the same decisions as a real row.
+//! It gives the place and the beam of a machine that rolls past plants of 150 mm, 500 mm apart, at a steady speed. What it gives
+//! goes through the same decisions as a real row. Place is counted in millimetres here, and all of it follows from the time.
 
-use crate::units::{Instant, Interval, Position, Ticks, TicksPerSecond, Wheel};
+use crate::units::{Instant, Interval, Position, Ticks};
 
 /// Plants in the row.
-pub const PLANTS: u8 = 6;
+pub const PLANTS: u16 = 6;
 
 const SPACING_MM: u16 = 500;
 const CANOPY_MM: u16 = 150;
 
 /// A row that is being played.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct Rehearsal {
-    speed: TicksPerSecond,
-    position: Position,
-    now: Instant,
-    /// What was rolled beyond `position`, in ticks times steps of the clock a second.
-    rest: u32,
-    canopy: Ticks,
-    gap: Ticks,
-    /// The next edge of the beam, and whether it breaks there.
-    edge: Position,
-    breaks: bool,
-    plants_left: u8,
-    /// Where the tool has passed the last plant.
-    end: Position,
+    /// When and where it began.
+    pub begin: Instant,
+    /// Where it began.
+    pub start: Position,
+    /// The machine's speed in mm/s.
+    pub speed_mm_s: u16,
+    /// The wheel's ticks a metre.
+    pub ticks_per_m: u16,
 }
 
 impl Rehearsal {
-    /// A row that begins at `position`, for a machine with its beam `distance` ahead of the tool.
-    pub fn new(now: Instant, position: Position, wheel: Wheel, speed: TicksPerSecond, distance: Ticks) -> Self {
-        let (canopy, spacing) = (wheel.ticks(CANOPY_MM), wheel.ticks(SPACING_MM));
-        // The tool comes into the row before the first plant reaches it.
-        let edge = position + distance + spacing;
-        let length = Ticks(spacing.0 * i32::from(PLANTS));
-        let end = edge + length + distance;
-        Self {
-            speed,
-            position,
-            now,
-            rest: 0,
-            canopy,
-            gap: spacing - canopy,
-            edge,
-            breaks: true,
-            plants_left: PLANTS,
-            end,
-        }
+    /// How far the machine has rolled, in millimetres; it is to be asked for a minute and a half at the most.
+    pub fn rolled_mm(&self, now: Instant) -> u16 {
+        let milliseconds = (now - self.begin).steps() / (Interval::STEPS_PER_SECOND / 1000);
+        (milliseconds * u32::from(self.speed_mm_s) / 1000) as u16
     }
 
-    /// Rolls on to `now`; returns where the machine is.
-    pub fn roll_to(&mut self, now: Instant) -> Position {
-        // The loop comes by at least every quarter of a second, in which nobody rolls 17,000 ticks.
-        let rolled = self.rest + (now - self.now).steps() * self.speed.0.unsigned_abs();
-        self.now = now;
-        self.rest = rolled % Interval::STEPS_PER_SECOND;
-        self.position = self.position + Ticks((rolled / Interval::STEPS_PER_SECOND) as i32);
-        self.position
+    /// Where a machine is that has rolled so far.
+    pub fn position(&self, rolled_mm: u16) -> Position {
+        self.start + Ticks((u32::from(rolled_mm) * u32::from(self.ticks_per_m) / 1000) as i32)
     }
 
-    /// The next edge of the beam that the machine has come to, and whether the beam is broken from there on.
-    pub fn next_edge(&mut self) -> Option<(Position, bool)> {
-        if self.plants_left == 0 || self.edge.is_ahead_of(self.position) {
+    /// Whether the beam is broken after so many millimetres; `None` when the tool has passed the last plant. The tool comes into the
+    /// row, which begins `distance_mm` behind the beam, before the first plant reaches it.
+    pub const fn beam_is_broken(rolled_mm: u16, distance_mm: u16) -> Option<bool> {
+        let first_mm = distance_mm + SPACING_MM;
+        if rolled_mm > first_mm + PLANTS * SPACING_MM + distance_mm {
             return None;
         }
-        let edge = (self.edge, self.breaks);
-        self.edge = self.edge + if self.breaks { self.canopy } else { self.gap };
-        self.plants_left -= u8::from(!self.breaks);
-        self.breaks = !self.breaks;
-        Some(edge)
-    }
-
-    /// Whether the tool has passed the last plant.
-    pub fn is_over(&self) -> bool {
-        self.position.is_ahead_of(self.end)
+        match rolled_mm.checked_sub(first_mm) {
+            Some(place_mm) if place_mm < PLANTS * SPACING_MM => Some(place_mm % SPACING_MM < CANOPY_MM),
+            _ => Some(false),
+        }
     }
 }
 
@@ -86,28 +57,31 @@ mod tests {
     use std::vec::Vec;
 
     #[test]
-    fn the_row_has_its_plants_at_their_places_whatever_the_loop_takes() {
-        let wheel = Wheel { ticks_per_rev: 2400, diameter_mm: 400, ticks_per_m: 0 };
-        let first = Position::new(i32::MAX - 1000);
-        for turn_us in [300, 700, 5000] {
-            let now = Instant::new(u32::MAX - 300_000);
-            let mut row = Rehearsal::new(now, first, wheel, TicksPerSecond(1326), wheel.ticks(400));
-            let mut edges = Vec::new();
-            let mut turns = 0;
-            while !row.is_over() {
-                turns += 1;
-                row.roll_to(now + Interval::from_steps(turns * turn_us / 4));
-                while let Some((edge, broken)) = row.next_edge() {
-                    edges.push(((edge - first).0, broken));
-                }
-            }
-            let expected: Vec<(i32, bool)> = (0..6)
-                .flat_map(|plant| [(764 + 955 * (plant + 1), true), (764 + 955 * (plant + 1) + 286, false)])
+    fn the_row_has_its_plants_at_their_places_and_an_end() {
+        for distance_mm in [100, 400, 2000] {
+            let edges: Vec<(u16, Option<bool>)> = (1..=u16::MAX)
+                .map(|rolled_mm| (rolled_mm, Rehearsal::beam_is_broken(rolled_mm, distance_mm)))
+                .filter(|&(rolled_mm, broken)| broken != Rehearsal::beam_is_broken(rolled_mm - 1, distance_mm))
                 .collect();
-            assert_eq!(edges, expected);
-            // 764 and 955 ticks, six plants, and 764 again at 1326 ticks a second.
-            let seconds = f64::from(turns * turn_us) / 1e6;
-            assert!((seconds - (764.0 + 955.0 + 6.0 * 955.0 + 764.0) / 1326.0).abs() < 0.01, "{seconds}");
+            let first = distance_mm + 500;
+            let plants = (0..6).flat_map(|plant| {
+                let leading = first + 500 * plant;
+                [(leading, Some(true)), (leading + 150, Some(false))]
+            });
+            let expected: Vec<_> = plants.chain([(first + 3000 + distance_mm + 1, None)]).collect();
+            assert_eq!(edges, expected, "{distance_mm}");
+        }
+    }
+
+    #[test]
+    fn the_machine_rolls_at_its_speed_over_the_clocks_and_the_counters_wrap() {
+        let begin = Instant::new(u32::MAX - 300_000);
+        let start = Position::new(i32::MAX - 1000);
+        let row = Rehearsal { begin, start, speed_mm_s: 694, ticks_per_m: 1910 };
+        for (milliseconds, rolled_mm, ticks) in [(0, 0, 0), (1000, 694, 1325), (10_000, 6940, 13_255)] {
+            let now = begin + Interval::from_ms(milliseconds);
+            assert_eq!(row.rolled_mm(now), rolled_mm);
+            assert_eq!((row.position(rolled_mm) - start).0, ticks);
         }
     }
 }

@@ -14,7 +14,7 @@ use crate::{
     servo::{self, HalfMicros},
     settings::Setting,
     speed::SpeedMeter,
-    units::{Position, TicksPerSecond, Wheel},
+    units::{Position, Wheel},
 };
 
 /// What is being tried.
@@ -120,11 +120,10 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             return Err(Refusal::TestSpeed { fastest });
         }
         let Readings { now, position, .. } = self.readings;
-        let wheel = self.settings.wheel();
-        let speed = TicksPerSecond(wheel.ticks(speed_mm_s).0);
         self.begin_anew(position, false);
         self.start(false)?;
-        self.bench = Bench::Row(Rehearsal::new(now, position, wheel, speed, self.geometry.beam_to_tool));
+        let ticks_per_m = self.settings.wheel().ticks(1000).0 as u16;
+        self.bench = Bench::Row(Rehearsal { begin: now, start: position, speed_mm_s, ticks_per_m });
         Ok(())
     }
 
@@ -139,9 +138,12 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
                 }
             }
             Bench::Row(row) => {
-                readings.position = row.roll_to(readings.now);
-                if row.is_over() {
-                    self.enter(State::Hold);
+                let rolled_mm = row.rolled_mm(readings.now);
+                readings.position = row.position(rolled_mm);
+                match Rehearsal::beam_is_broken(rolled_mm, self.settings.get(Setting::BeamToToolMm)) {
+                    None => self.enter(State::Hold),
+                    Some(broken) if broken != self.watch.is_broken() => self.take_edge(readings.position, broken),
+                    Some(_) => {}
                 }
             }
             Bench::RowEnded => {
@@ -150,14 +152,6 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             }
         }
         readings
-    }
-
-    /// The next edge of the row that is played.
-    pub(super) fn next_played_edge(&mut self) -> Option<(Position, bool)> {
-        match &mut self.bench {
-            Bench::Row(row) => row.next_edge(),
-            _ => None,
-        }
     }
 
     /// Sets the leads by what was measured, if they fit, and tells how it ended.
