@@ -28,7 +28,7 @@ use crate::{
     switch::Switch,
     taught,
     text::words,
-    units::{Instant, Interval, Position, Ticks, TicksPerSecond},
+    units::{Coarse, Instant, Interval, Position, Ticks, TicksPerSecond},
 };
 use heapless::Vec;
 
@@ -39,7 +39,7 @@ const OBJECTS: usize = 16;
 const EVENTS: usize = 6;
 
 /// Time between two points of a plotter's curves.
-const PLOT_PERIOD: Interval = Interval::from_ms(50);
+const PLOT_PERIOD: u16 = Coarse::steps_in_ms(50);
 
 /// What the end switch may take longer than the lead: a servo frame, the contacts' bouncing, and some patience.
 const END_SWITCH_GRACE_MS: u32 = 100;
@@ -232,7 +232,7 @@ pub struct Controller<C, M> {
     events_on: bool,
     events_missed: u16,
     plot: Plot,
-    plotted_at: Instant,
+    plotted_at: Coarse,
 }
 
 impl<C: Classifier, M: Memory> Controller<C, M> {
@@ -280,7 +280,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             events_on: false,
             events_missed: 0,
             plot: Plot::Off,
-            plotted_at: now,
+            plotted_at: now.coarse(),
         }
     }
 
@@ -299,7 +299,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         }
         if broken
             && self.is_working()
-            && let Some(alarm) = self.encoder.beam_broke(now)
+            && let Some(alarm) = self.encoder.beam_broke()
         {
             self.raise(alarm);
         }
@@ -607,10 +607,10 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// The curves of which the next points are due, which are due 20 times a second.
     pub fn next_plot(&mut self) -> Option<Plot> {
-        if self.plot == Plot::Off || self.readings.now - self.plotted_at < PLOT_PERIOD {
+        if self.plot == Plot::Off || self.readings.now.coarse().since(self.plotted_at) < PLOT_PERIOD {
             return None;
         }
-        self.plotted_at = self.readings.now;
+        self.plotted_at = self.readings.now.coarse();
         Some(self.plot)
     }
 

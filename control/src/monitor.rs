@@ -7,14 +7,14 @@
 
 use crate::{
     alarm::Alarm,
-    units::{Instant, Interval, Position, Ticks},
+    units::{Coarse, Instant, Position, Ticks},
 };
 
 /// A step farther than this is progress: a wheel that trembles on an edge moves by one, and one dead channel by one.
 const PROGRESS: Ticks = Ticks(2);
 
 /// The time in which edges are counted.
-const PERIOD: Interval = Interval::from_ms(500);
+const PERIOD: u16 = Coarse::steps_in_ms(500);
 
 /// Edges without progress in a period that no tremble gives: one channel alone shows them from 0.6 km/h on, and an
 /// engine's vibration of 50 Hz, which makes 50 of them, does not.
@@ -24,7 +24,7 @@ const DEAD_CHANNEL_EDGES: u8 = 80;
 const JUMPS: u16 = 20;
 
 /// Without progress for so long, the machine stands: slower than 0.05 km/h.
-const STANDS: Interval = Interval::from_ms(100);
+const STANDS: u16 = Coarse::steps_in_ms(100);
 
 /// Times that the beam may break while the machine stands: leaves move in the wind, but plants do not pass.
 const BREAKS: u8 = 3;
@@ -32,24 +32,25 @@ const BREAKS: u8 = 3;
 /// A machine that made its last progress within [`ROLLS`], at 0.8 km/h or faster with an encoder of 0.5 mm, and makes none for
 /// this long, has either braked with more than 10 m/s2 or lost its encoder. At 2.5 km/h it rolls 21 mm in that time, less
 /// than the margin.
-const SUDDEN: Interval = Interval::from_ms(30);
-const ROLLS: Interval = Interval::from_ms(7);
+const SUDDEN: u16 = Coarse::steps_in_ms(30);
+const ROLLS: u16 = Coarse::steps_in_ms(7);
 
 /// Watches the encoder.
 #[derive(Clone, Debug)]
 pub struct EncoderMonitor {
     /// Where the machine last made progress, when, and whether it rolled then.
     anchor: Position,
-    progress_at: Instant,
+    progress_at: Coarse,
     rolled: bool,
-    /// Whether it fell silent too suddenly since.
+    /// Whether it stands since, and whether it fell silent too suddenly.
+    stands: bool,
     fell_silent: bool,
     last: Position,
     /// Edges since the period began, all of them without progress.
     edges: u8,
     /// Times that the beam broke since the machine stands.
     breaks: u8,
-    period_since: Instant,
+    period_since: Coarse,
     /// The count of jumps when the period began.
     jumps: u16,
 }
@@ -59,35 +60,38 @@ impl EncoderMonitor {
     pub const fn new(now: Instant, position: Position, jumps: u16) -> Self {
         Self {
             anchor: position,
-            progress_at: now,
+            progress_at: now.coarse(),
             rolled: false,
+            stands: false,
             fell_silent: false,
             last: position,
             edges: 0,
             breaks: 0,
-            period_since: now,
+            period_since: now.coarse(),
             jumps,
         }
     }
 
     /// Takes a reading, with the count of jumps since power-up; returns the fault that it shows.
     pub fn read(&mut self, now: Instant, position: Position, jumps: u16) -> Option<Alarm> {
-        if now - self.period_since >= PERIOD {
+        let now = now.coarse();
+        if now.since(self.period_since) >= PERIOD {
             self.period_since = now;
             self.edges = 0;
             self.jumps = jumps;
         }
         let moved = position - self.anchor;
-        let since_progress = now - self.progress_at;
+        let since_progress = now.since(self.progress_at);
         if moved > PROGRESS || moved < -PROGRESS {
             self.anchor = position;
             self.progress_at = now;
-            self.rolled = since_progress <= ROLLS;
-            self.fell_silent = false;
+            self.rolled = !self.stands && since_progress <= ROLLS;
+            (self.stands, self.fell_silent) = (false, false);
             self.edges = 0;
             self.breaks = 0;
-        } else if self.rolled && since_progress >= SUDDEN {
-            self.fell_silent = true;
+        } else if since_progress >= SUDDEN {
+            self.fell_silent |= self.rolled;
+            self.stands |= since_progress >= STANDS;
         }
         if position != self.last {
             self.edges = self.edges.saturating_add(1);
@@ -100,8 +104,8 @@ impl EncoderMonitor {
     }
 
     /// The beam broke; returns the fault that this shows.
-    pub fn beam_broke(&mut self, now: Instant) -> Option<Alarm> {
-        if now - self.progress_at < STANDS {
+    pub fn beam_broke(&mut self) -> Option<Alarm> {
+        if !self.stands {
             return None;
         }
         self.breaks = self.breaks.saturating_add(1);
@@ -116,7 +120,7 @@ impl EncoderMonitor {
 }
 
 /// The time in which the beam's edges are counted.
-const FLICKER_PERIOD: Interval = Interval::from_ms(100);
+const FLICKER_PERIOD: u16 = Coarse::steps_in_ms(100);
 
 /// Edges in that time that no canopy makes: at 10 km/h a clear stretch every 14 mm.
 const FLICKER_EDGES: u8 = 40;
@@ -125,18 +129,18 @@ const FLICKER_EDGES: u8 = 40;
 #[derive(Clone, Debug)]
 pub struct BeamMonitor {
     edges: u8,
-    since: Instant,
+    since: Coarse,
 }
 
 impl BeamMonitor {
     /// A monitor that has seen no edge.
     pub const fn new(now: Instant) -> Self {
-        Self { edges: 0, since: now }
+        Self { edges: 0, since: now.coarse() }
     }
 
     /// The beam's level changed; returns the fault that this shows.
     pub fn edge(&mut self, now: Instant) -> Option<Alarm> {
-        if now - self.since >= FLICKER_PERIOD {
+        if now.coarse().since(self.since) >= FLICKER_PERIOD {
             *self = Self::new(now);
         }
         self.edges = self.edges.saturating_add(1);

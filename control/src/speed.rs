@@ -5,22 +5,26 @@
 //! machine creeps. A wheel that has fallen silent for longer than it should is slower than one tick in that silence; after
 //! `STANDSTILL` it stands. A single tick backwards, as vibration gives, moves the answer by its share and no more.
 
-use crate::units::{Instant, Interval, Position, TicksPerSecond};
+use crate::units::{Coarse, Instant, Position, TicksPerSecond};
 
 /// The shortest time between two remembered places. Together with their number it sets the window: long enough that the
 /// grain of a tick and of the main loop stays below half a percent at 1 km/h, short enough to follow a walking person.
-const SPACING: Interval = Interval::from_ms(10);
+const SPACING: u16 = Coarse::steps_in_ms(10);
 
 /// Places remembered; a power of two keeps the ring's arithmetic short.
 const SAMPLES: u8 = 8;
 
 /// Silence after which the machine is said to stand.
-const STANDSTILL: Interval = Interval::from_ms(500);
+const STANDSTILL: u16 = Coarse::steps_in_ms(500);
 
+/// The longest window has to fit into a coarse moment.
+const _: () = assert!(SAMPLES as u32 * (STANDSTILL as u32) < u16::MAX as u32);
+
+/// A place and a time, of which the lower halves are enough: in the longest window, 4 s, nobody rolls 32,767 ticks.
 #[derive(Clone, Copy, Debug, Default)]
 struct Sample {
-    position: Position,
-    time: Instant,
+    place: u16,
+    time: Coarse,
 }
 
 /// Measures the speed from readings of position and time.
@@ -33,14 +37,14 @@ pub struct SpeedMeter {
     /// The last reading at which the position had changed.
     last: Sample,
     /// Silence that the present speed explains.
-    patience: Interval,
+    patience: u16,
     speed: TicksPerSecond,
 }
 
 impl SpeedMeter {
     /// A meter for a machine that stands at `position`.
     pub fn new(position: Position, now: Instant) -> Self {
-        let last = Sample { position, time: now };
+        let last = Sample { place: position.count() as u16, time: now.coarse() };
         Self {
             samples: [last; SAMPLES as usize],
             count: 0,
@@ -58,13 +62,14 @@ impl SpeedMeter {
 
     /// Takes a reading; returns the new speed where it changed.
     ///
-    /// To be called at least every few milliseconds, and much more often than the clock wraps.
+    /// To be called at least every few milliseconds.
     pub fn read(&mut self, now: Instant, position: Position) -> Option<TicksPerSecond> {
         let before = self.speed;
-        if position != self.last.position {
-            self.moved(Sample { position, time: now });
+        let reading = Sample { place: position.count() as u16, time: now.coarse() };
+        if reading.place != self.last.place {
+            self.moved(reading);
         } else {
-            self.silent(now - self.last.time);
+            self.silent(reading.time.since(self.last.time));
         }
         (self.speed != before).then_some(self.speed)
     }
@@ -76,20 +81,19 @@ impl SpeedMeter {
             return;
         }
         let newest = self.samples[usize::from((self.next + SAMPLES - 1) % SAMPLES)];
-        if reading.time - newest.time < SPACING {
+        if reading.time.since(newest.time) < SPACING {
             return;
         }
         let oldest = self.samples[usize::from((self.next + SAMPLES - self.count) % SAMPLES)];
         self.remember(reading);
-        let distance = (reading.position - oldest.position).0;
-        // A window lasts at most SAMPLES silences, so its steps fit; the product does up to 17,179 ticks a window.
-        let time = (reading.time - oldest.time).steps();
-        let speed = (distance.unsigned_abs().wrapping_mul(Interval::STEPS_PER_SECOND) / time) as i32;
-        self.speed = TicksPerSecond(if distance < 0 { -speed } else { speed });
+        let distance = reading.place.wrapping_sub(oldest.place).cast_signed();
+        let time = reading.time.since(oldest.time);
+        let speed = u32::from(distance.unsigned_abs()) * Coarse::STEPS_PER_SECOND / u32::from(time);
+        self.speed = TicksPerSecond(if distance < 0 { -speed.cast_signed() } else { speed.cast_signed() });
         // Two ticks' time: encoders do not space their edges evenly.
-        self.patience = match self.speed.0.unsigned_abs() {
+        self.patience = match speed {
             0 => STANDSTILL,
-            speed => Interval::from_steps(2 * Interval::STEPS_PER_SECOND / speed).max(SPACING).min(STANDSTILL),
+            speed => ((2 * Coarse::STEPS_PER_SECOND / speed) as u16).clamp(SPACING, STANDSTILL),
         };
     }
 
@@ -99,7 +103,7 @@ impl SpeedMeter {
         self.count = (self.count + 1).min(SAMPLES);
     }
 
-    fn silent(&mut self, silence: Interval) {
+    fn silent(&mut self, silence: u16) {
         if silence < self.patience {
             return;
         }
@@ -110,9 +114,9 @@ impl SpeedMeter {
             self.patience = STANDSTILL;
             return;
         }
-        let limit = (Interval::STEPS_PER_SECOND / silence.steps()) as i32;
+        let limit = i32::from(Coarse::STEPS_PER_SECOND as u16 / silence);
         self.speed = TicksPerSecond(self.speed.0.clamp(-limit, limit));
         // Look again after an eighth more, so that the division stays rare.
-        self.patience = Interval::from_steps(silence.steps() + silence.steps() / 8).min(STANDSTILL);
+        self.patience = (silence + silence / 8).min(STANDSTILL);
     }
 }

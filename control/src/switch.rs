@@ -2,17 +2,17 @@
 //!
 //! Only a change counts: a switch that is on when the machine wakes up starts nothing until it has been off.
 
-use crate::units::{Instant, Interval};
+use crate::units::{Coarse, Instant};
 
 /// Contacts bounce for a few milliseconds; a level that lasts this long is meant.
-const SETTLE: Interval = Interval::from_ms(20);
+const SETTLE: u16 = Coarse::steps_in_ms(20);
 
 /// A switch.
 #[derive(Clone, Debug)]
 pub struct Switch {
     on: bool,
     /// Since when the level has differed from `on`.
-    differs_since: Option<Instant>,
+    differs_since: Option<Coarse>,
 }
 
 impl Switch {
@@ -32,8 +32,9 @@ impl Switch {
             self.differs_since = None;
             return None;
         }
+        let now = now.coarse();
         let since = *self.differs_since.get_or_insert(now);
-        if now - since < SETTLE {
+        if now.since(since) < SETTLE {
             return None;
         }
         self.on = on;
@@ -45,6 +46,7 @@ impl Switch {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::units::Interval;
 
     fn at_ms(milliseconds: u32) -> Instant {
         Instant::default() + Interval::from_ms(milliseconds)

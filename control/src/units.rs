@@ -95,6 +95,30 @@ impl Instant {
     pub const fn steps(self) -> u32 {
         self.0
     }
+
+    /// The moment in coarse steps.
+    pub const fn coarse(self) -> Coarse {
+        Coarse((self.0 >> 4) as u16)
+    }
+}
+
+/// A moment in steps of 64 µs, wrapping after 4.2 seconds: half an [`Instant`], for what is looked at much more often.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Coarse(u16);
+
+impl Coarse {
+    /// Steps in a second.
+    pub const STEPS_PER_SECOND: u32 = Interval::STEPS_PER_SECOND >> 4;
+
+    /// So many milliseconds, at most 4193 of them, in steps.
+    pub const fn steps_in_ms(milliseconds: u16) -> u16 {
+        (milliseconds as u32 * Self::STEPS_PER_SECOND / 1000) as u16
+    }
+
+    /// Steps since an earlier moment, less than 4.2 seconds ago.
+    pub const fn since(self, earlier: Self) -> u16 {
+        self.0.wrapping_sub(earlier.0)
+    }
 }
 
 /// A stretch of time in steps of 4 µs.

@@ -75,7 +75,9 @@ fn a_distance_that_was_rolled_sets_the_wheel() {
 
 /// Has the servo timed, with a tool that is out so long after it was told to, and leaves that long after.
 fn swings(machine: &mut Machine, out_ms: u64, in_ms: u64) -> Vec<Event> {
-    stand(machine, 0, 1_000, 0);
+    for now in 0..1_000 {
+        machine.step(Readings { end_switch_on: true, ..readings(now * 1000, 0) });
+    }
     machine.calibrate_servo().unwrap();
     let (mut told_out, mut told_at) = (true, 0);
     for now in 1_000..13_000 {
