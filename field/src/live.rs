@@ -151,7 +151,6 @@ pub struct LiveUno {
     eeprom: Option<EepromFile>,
     /// Bytes from the chip that the program has not had room for.
     unread: VecDeque<u8>,
-    was_open: bool,
     resets_when_opened: bool,
     fast: bool,
 }
@@ -181,7 +180,6 @@ impl LiveUno {
             sets_off: STANDING_S * CYCLES_PER_SECOND,
             eeprom,
             unread: VecDeque::new(),
-            was_open: false,
             resets_when_opened: !setup.keeps_running_when_opened,
             fast: setup.fast,
         })
@@ -242,28 +240,23 @@ impl LiveUno {
 
     /// Resets the chip where a program has opened the port, and passes bytes both ways.
     fn serve_terminal(&mut self) -> Result<(), LiveError> {
-        let is_open = self.pty.is_open()?;
-        if is_open && !self.was_open {
+        if self.pty.was_opened()? {
             self.unread.clear();
             if self.resets_when_opened {
                 self.uno.reset();
             }
         }
-        self.was_open = is_open;
 
         let mut buffer = [0; MOST_BYTES_ON_THEIR_WAY];
         let room = MOST_BYTES_ON_THEIR_WAY.saturating_sub(self.uno.bytes_on_their_way());
         let count = self.pty.read(&mut buffer[..room])?;
         self.uno.send(&buffer[..count]);
 
-        let from_chip = self.uno.received_bytes();
-        if is_open {
-            self.unread.extend(from_chip.iter().map(|received| received.byte));
-            let written = self.pty.write(self.unread.make_contiguous())?;
-            self.unread.drain(..written);
-            let too_many = self.unread.len().saturating_sub(MOST_BYTES_UNREAD);
-            self.unread.drain(..too_many);
-        }
+        self.unread.extend(self.uno.received_bytes().iter().map(|received| received.byte));
+        let written = self.pty.write(self.unread.make_contiguous())?;
+        self.unread.drain(..written);
+        let too_many = self.unread.len().saturating_sub(MOST_BYTES_UNREAD);
+        self.unread.drain(..too_many);
         Ok(())
     }
 

@@ -1,18 +1,20 @@
 //! A pseudo terminal: a serial port without a cable, for programs that expect an Uno behind one.
 //!
 //! [`Pty`] is the device's side of it; programs open the other side by its path, or by a symbolic link, as they would open
-//! /dev/ttyACM0. It begins raw, so that bytes pass as they are. Whether some program has it open can be asked, since a real
-//! Uno is reset by that: its modem line DTR, which a pseudo terminal lacks, is wired to the reset pin.
+//! /dev/ttyACM0. It begins raw, so that bytes pass as they are. That a program opens it is noticed, since a real Uno is
+//! reset by that: its modem line DTR, which a pseudo terminal lacks, is wired to the reset pin.
 //!
-//! It has no baud rate: bytes pass at the pace at which they are written and read. It needs Linux.
+//! The other side is held open here as well, so that the terminal outlives the programs; inotify tells of theirs. It has no
+//! baud rate: bytes pass at the pace at which they are written and read. It needs Linux.
 
-use rustix::event::{PollFd, PollFlags, Timespec, poll};
-use rustix::fs::{OFlags, fcntl_setfl};
+use rustix::fd::OwnedFd;
+use rustix::fs::{OFlags, fcntl_setfl, inotify};
 use rustix::io::Errno;
 use rustix::pty::{OpenptFlags, grantpt, ioctl_tiocgptpeer, openpt, ptsname, unlockpt};
-use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
+use rustix::termios::{OptionalActions, QueueSelector, ioctl_tiocnxcl, tcflush, tcgetattr, tcsetattr};
 use std::fs::File;
 use std::io::{self, ErrorKind, Read, Write};
+use std::mem::MaybeUninit;
 use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -52,6 +54,13 @@ pub enum PtyError {
 #[derive(Debug)]
 pub struct Pty {
     device: File,
+    /// The programs' side, held open.
+    other_side: OwnedFd,
+    /// Tells of programs that open and close it.
+    watch: OwnedFd,
+    /// Whether a program has it open. inotify tells of two at the same moment once, so that they cannot be counted: where
+    /// several have it open, the first that closes it counts for all.
+    is_open: bool,
     path: PathBuf,
     link: Option<PathBuf>,
 }
@@ -66,8 +75,7 @@ impl Pty {
             let device = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)?;
             grantpt(&device)?;
             unlockpt(&device)?;
-            let path = ptsname(&device, Vec::new())?.into_string().map_err(io::Error::other)?;
-            // Opened and closed once, it reports itself hung up until a program opens it.
+            let path: PathBuf = ptsname(&device, Vec::new())?.into_string().map_err(io::Error::other)?.into();
             let other_side =
                 ioctl_tiocgptpeer(&device, OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)?;
             let mut attributes = tcgetattr(&other_side)?;
@@ -75,7 +83,9 @@ impl Pty {
             attributes.set_speed(BAUD)?;
             tcsetattr(&other_side, OptionalActions::Now, &attributes)?;
             fcntl_setfl(&device, OFlags::NONBLOCK)?;
-            Ok(Pty { device: device.into(), path: path.into(), link: None })
+            let watch = inotify::init(inotify::CreateFlags::NONBLOCK | inotify::CreateFlags::CLOEXEC)?;
+            inotify::add_watch(&watch, &path, inotify::WatchFlags::OPEN | inotify::WatchFlags::CLOSE)?;
+            Ok(Pty { device: device.into(), other_side, watch, is_open: false, path, link: None })
         };
         open().map_err(PtyError::Open)
     }
@@ -106,16 +116,35 @@ impl Pty {
         }
     }
 
-    /// Whether a program has it open.
+    /// Whether a program has opened it since the last call, at a time when no other had it open. What was not read before
+    /// that is gone.
     ///
     /// # Errors
     /// Where it has failed.
-    pub fn is_open(&self) -> Result<bool, PtyError> {
-        let mut poll_fd = [PollFd::new(&self.device, PollFlags::IN)];
-        match poll(&mut poll_fd, Some(&Timespec { tv_sec: 0, tv_nsec: 0 })) {
-            Ok(_) | Err(Errno::INTR) => Ok(!poll_fd[0].revents().contains(PollFlags::HUP)),
-            Err(error) => Err(self.failed(error.into())),
+    pub fn was_opened(&mut self) -> Result<bool, PtyError> {
+        let mut opened = false;
+        let mut buffer = [MaybeUninit::uninit(); 1024];
+        let mut events = inotify::Reader::new(&self.watch, &mut buffer);
+        loop {
+            match events.next() {
+                Ok(event) if event.events().contains(inotify::ReadFlags::OPEN) => {
+                    opened |= !self.is_open;
+                    self.is_open = true;
+                }
+                Ok(_) => self.is_open = false,
+                Err(Errno::INTR) => {}
+                Err(Errno::AGAIN) => break,
+                Err(error) => return Err(self.failed(error.into())),
+            }
         }
+        if opened {
+            tcflush(&self.other_side, QueueSelector::IFlush).map_err(|error| self.failed(error.into()))?;
+        }
+        if !self.is_open {
+            // The claim of a program that was killed while it had the port to itself.
+            ioctl_tiocnxcl(&self.other_side).map_err(|error| self.failed(error.into()))?;
+        }
+        Ok(opened)
     }
 
     /// Takes what programs have written, up to `buffer`'s length; without waiting. Returns the number of bytes.
@@ -138,8 +167,6 @@ impl Pty {
         match transfer(&self.device) {
             Ok(count) => Ok(count),
             Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => Ok(0),
-            // Nobody has it open.
-            Err(error) if Errno::from_io_error(&error) == Some(Errno::IO) => Ok(0),
             Err(error) => Err(self.failed(error)),
         }
     }
@@ -166,7 +193,7 @@ mod tests {
     #[test]
     fn bytes_pass_both_ways_as_they_are() {
         let mut pty = Pty::open().unwrap();
-        let mut program = OpenOptions::new().read(true).write(true).open(pty.path()).unwrap();
+        let mut program = open(&pty);
         let bytes = [0, 3, 4, b'\r', b'\n', 17, 19, 127, 255];
         program.write_all(&bytes).unwrap();
         let mut buffer = [0; 32];
@@ -178,15 +205,41 @@ mod tests {
         assert_eq!(buffer, bytes);
     }
 
+    fn open(pty: &Pty) -> File {
+        OpenOptions::new().read(true).write(true).open(pty.path()).unwrap()
+    }
+
     #[test]
-    fn it_is_known_when_a_program_opens_and_closes_it() {
+    fn each_opening_is_noticed_once_however_short_the_time_between() {
         let mut pty = Pty::open().unwrap();
-        assert!(!pty.is_open().unwrap());
-        let program = OpenOptions::new().read(true).write(true).open(pty.path()).unwrap();
-        assert!(pty.is_open().unwrap());
+        assert!(!pty.was_opened().unwrap());
+        let mut program = open(&pty);
+        assert!(pty.was_opened().unwrap());
+        assert!(!pty.was_opened().unwrap());
         drop(program);
-        assert!(!pty.is_open().unwrap());
-        assert_eq!(pty.read(&mut [0; 8]).unwrap(), 0);
+        program = open(&pty);
+        assert!(pty.was_opened().unwrap(), "it was closed and opened");
+        let second = open(&pty);
+        assert!(!pty.was_opened().unwrap(), "another one has it open");
+        drop((program, second));
+        assert!(!pty.was_opened().unwrap());
+        drop(open(&pty));
+        assert!(pty.was_opened().unwrap(), "it was opened and closed");
+    }
+
+    #[test]
+    fn a_program_reads_nothing_that_was_meant_for_the_one_before() {
+        let mut pty = Pty::open().unwrap();
+        let program = open(&pty);
+        assert!(pty.was_opened().unwrap());
+        pty.write(b"unread").unwrap();
+        drop(program);
+        let mut program = open(&pty);
+        assert!(pty.was_opened().unwrap());
+        pty.write(b"new").unwrap();
+        let mut buffer = [0; 3];
+        program.read_exact(&mut buffer).unwrap();
+        assert_eq!(&buffer, b"new");
     }
 
     #[test]
