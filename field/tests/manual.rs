@@ -4,6 +4,7 @@
 
 use control::settings::{Description, Setting};
 use expect_test::{ExpectFile, expect_file};
+use field::link::settings::{help, name, unit};
 use field::wiring;
 use std::fmt::Write;
 
@@ -37,11 +38,9 @@ fn the_settings_page_is_the_settings_table() {
 
 /// Every setting as a table in Markdown.
 fn settings() -> String {
-    let text = |listed: control::text::Listed| String::from_utf8(listed.bytes().collect()).expect("help is ASCII");
     let mut table = "| name | unit | from | to | default | set in | what it is |\n".to_owned();
     table += "| --- | --- | --- | --- | --- | --- | --- |\n";
     for setting in Setting::all() {
-        let name = text(setting.text());
         let Description { least, greatest, default, hold_only } = setting.description();
         let shown = |value: u16| match (setting.is_switched(), value) {
             (true, 0) => "off".to_owned(),
@@ -50,30 +49,16 @@ fn settings() -> String {
         };
         writeln!(
             table,
-            "| `{name}` | {} | {} | {} | {} | {} | {} |",
-            unit(&name),
+            "| `{}` | {} | {} | {} | {} | {} | {} |",
+            name(setting),
+            unit(setting),
             shown(least),
             shown(greatest),
             shown(default),
             if hold_only { "hold" } else { "any state" },
-            text(setting.help())
+            help(setting)
         )
         .expect("a string takes everything");
     }
     table
-}
-
-/// The unit that a setting's name carries.
-fn unit(name: &str) -> &'static str {
-    const UNITS: [(&str, &str); 8] = [
-        ("_per_rev", "ticks a turn"),
-        ("_per_m", "ticks a metre"),
-        ("_mm_s", "mm/s"),
-        ("_mm", "mm"),
-        ("_ms", "ms"),
-        ("_us", "us"),
-        ("_ticks", "ticks"),
-        ("_m", "m"),
-    ];
-    UNITS.iter().find(|(ending, _)| name.ends_with(ending)).map_or("", |(_, unit)| unit)
 }
