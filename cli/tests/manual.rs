@@ -88,13 +88,13 @@ fn words(line: &str) -> Vec<String> {
     words.into_iter().take_while(|word| word != ">").collect()
 }
 
-/// The aliases of .cargo/config.toml that run `weeder`, with the subcommand that they give it.
-fn aliases() -> Vec<(String, String)> {
+/// The aliases of .cargo/config.toml that run `weeder`, with the arguments that they give it.
+fn aliases() -> Vec<(String, Vec<String>)> {
     let config = fs::read_to_string(Path::new(ROOT).join(".cargo/config.toml")).expect("cargo is configured");
     let alias = |line: &str| {
         let (name, command) = line.split_once(" = \"")?;
-        let (_, subcommand) = command.split_once("--package weeder-cli -- ")?;
-        Some((name.to_owned(), subcommand.trim_end_matches('"').to_owned()))
+        let (_, arguments) = command.split_once("--package weeder-cli -- ")?;
+        Some((name.to_owned(), words(arguments.trim_end_matches('"'))))
     };
     config.lines().filter_map(alias).collect()
 }
@@ -109,8 +109,8 @@ fn weeder_arguments(words: &[String]) -> Option<Vec<String>> {
             rest[..start].contains(&"weeder-cli".to_owned()).then(|| rest[start + 1..].to_vec())
         }
         ("cargo", [alias, rest @ ..]) => {
-            let (_, subcommand) = aliases().into_iter().find(|(name, _)| name == alias)?;
-            Some([&[subcommand], rest].concat())
+            let (_, arguments) = aliases().into_iter().find(|(name, _)| name == alias)?;
+            Some([&arguments, rest].concat())
         }
         _ => None,
     }
