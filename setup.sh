@@ -4,10 +4,10 @@
 set -euo pipefail
 cd "$(dirname "$0")"
 
-# For the firmware: the AVR linker and C library, and the programmer.
+# For the firmware: the AVR linker and C library, and the programmer; bootloaders, to try it on the virtual Uno.
 # For the virtual Uno (simavr): a C compiler, and what its Rust binding is generated and linked with.
 packages=(
-    gcc-avr binutils-avr avr-libc avrdude
+    gcc-avr binutils-avr avr-libc avrdude arduino-core-avr
     build-essential pkg-config clang libclang-dev libelf-dev zlib1g-dev libzstd-dev
 )
 

@@ -9,6 +9,7 @@ mod classify;
 mod course;
 mod design;
 mod flash;
+mod hex;
 mod monitor;
 mod progress;
 mod settings;
@@ -33,6 +34,8 @@ enum Command {
     Sim(Box<sim::Arguments>),
     /// Build the firmware and put it on the Uno at a USB port.
     Flash(flash::Arguments),
+    /// Write the firmware as an Intel HEX file, for the Arduino tools.
+    Hex(hex::Arguments),
     /// Run the firmware, or a bootloader, on a virtual Uno at a pseudo terminal, in real time.
     VirtualUno(Box<virtual_uno::Arguments>),
     /// Count the cycles and bytes of the firmware and its classifier on a virtual Uno.
@@ -62,6 +65,7 @@ fn main() -> ExitCode {
     let result = match Arguments::parse().command {
         Command::Sim(arguments) => sim::run(&arguments),
         Command::Flash(arguments) => flash::run(&arguments).map(|()| Finding::Good),
+        Command::Hex(arguments) => hex::run(&arguments).map(|()| Finding::Good),
         Command::VirtualUno(arguments) => virtual_uno::run(&arguments).map(|()| Finding::Good),
         Command::BenchUno => bench::run().map(|()| Finding::Good),
         Command::Train(arguments) => train::run(&arguments),

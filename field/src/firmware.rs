@@ -123,7 +123,7 @@ impl Program {
 }
 
 /// The folder of the workspace's Cargo.toml, which is one above this crate's.
-fn workspace_root() -> &'static Path {
+pub fn workspace_root() -> &'static Path {
     let this_crate = Path::new(env!("CARGO_MANIFEST_DIR"));
     this_crate.parent().unwrap_or(this_crate)
 }
