@@ -12,6 +12,8 @@ mod flash;
 mod hex;
 mod monitor;
 mod progress;
+mod record;
+mod replay;
 mod settings;
 mod sim;
 mod train;
@@ -46,6 +48,10 @@ enum Command {
     Classify(classify::Arguments),
     /// Watch the machine, and type into its console.
     Monitor(monitor::Arguments),
+    /// Write down what the machine does, for as long as it does it.
+    Record(record::Arguments),
+    /// Decide anew on the host what a log's machine met, and say where that differs.
+    Replay(replay::Arguments),
     /// Keep the machine's settings in a file, set them from it, or compare both.
     Settings(settings::Arguments),
     /// Calculate what a machine's engine, servo, shanks, chain, wheels and handle have to be like.
@@ -71,6 +77,8 @@ fn main() -> ExitCode {
         Command::Train(arguments) => train::run(&arguments),
         Command::Classify(arguments) => classify::run(&arguments),
         Command::Monitor(arguments) => monitor::run(&arguments),
+        Command::Record(arguments) => record::run(&arguments).map(|()| Finding::Good),
+        Command::Replay(arguments) => replay::run(&arguments),
         Command::Settings(arguments) => settings::run(&arguments),
         Command::Design(arguments) => design::run(&arguments).map(|()| Finding::Good),
     };

@@ -15,6 +15,7 @@ pub mod completion;
 mod lines;
 pub mod log;
 mod port;
+pub mod replay;
 pub mod session;
 pub mod settings;
 pub mod settings_file;

@@ -137,6 +137,10 @@ impl Session {
         let examples = link.ask("examples")?;
         link.ask("events on")?;
         self.happened.push_back(Happening::Connected { version: link.version().to_owned(), settings, examples });
+        // Before anything is typed: how the machine was when all began.
+        let status = link.ask("status")?;
+        let status = status.into_iter().find_map(|line| Some((Status::parse(&line)?, line)));
+        self.happened.extend(status.map(|(status, line)| Happening::Status(status, line)));
         self.link = Some(link);
         (self.asked, self.poll_at) = (None, None);
         Ok(())

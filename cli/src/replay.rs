@@ -1,0 +1,55 @@
+//! `weeder replay`: a log's swings, decided anew on the host.
+
+use crate::Finding;
+use anyhow::{Context, Result};
+use clap::Args;
+use field::link::{log, replay};
+use serde_json::json;
+use std::path::PathBuf;
+
+/// What the user asks to be replayed.
+#[derive(Args)]
+#[command(after_help = "\
+The status is 1 where log and replay differ; the first difference is shown. A swing may differ by 12 ticks and by 25 ms of the \
+machine's way, because the log has the speed only ten times a second.\n\nExample:\n  weeder replay row.csv --json | jq .difference")]
+pub struct Arguments {
+    /// A log, as `weeder record` and `weeder monitor --log` write it.
+    #[arg(value_name = "LOG.csv")]
+    log: PathBuf,
+    /// Print the result as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Replays, and prints on what log and replay agree.
+///
+/// # Errors
+/// Where the log cannot be read or replayed.
+pub fn run(arguments: &Arguments) -> Result<Finding> {
+    let name = arguments.log.display();
+    let replayed = replay::replay(&log::read(&arguments.log)?).with_context(|| format!("{name} cannot be replayed"))?;
+    let difference = replayed.difference.as_ref().map(ToString::to_string);
+    if arguments.json {
+        let result = json!({
+            "objects": replayed.objects,
+            "swings": replayed.swings,
+            "farthest_swing_ticks": replayed.farthest_swing,
+            "difference": difference,
+            "notes": replayed.notes,
+        });
+        println!("{result:#}");
+    } else {
+        for note in &replayed.notes {
+            println!("Note: {note}");
+        }
+        println!(
+            "The same: {} objects and {} swings, the farthest of them {} ticks apart",
+            replayed.objects, replayed.swings, replayed.farthest_swing
+        );
+        match &difference {
+            Some(difference) => println!("{name}, {difference}"),
+            None => println!("The decisions of {name} are those of this version"),
+        }
+    }
+    Ok(if difference.is_none() { Finding::Good } else { Finding::Bad })
+}

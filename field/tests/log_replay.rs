@@ -1,0 +1,140 @@
+//! A log of the real firmware weeding a row, and the same decisions again on the host.
+
+use field::firmware;
+use field::link::log::{self, Entry, Kind, LogWriter};
+use field::link::replay::{Replayed, replay};
+use field::link::session::{Happening, Session};
+use field::link::{Link, LinkError, UnoPort};
+use field::machine::Machine;
+use field::motion::Motion;
+use field::row::{Row, Thing};
+use field::trial;
+use std::time::{Duration, Instant};
+
+/// Plants and a tall weed.
+fn row() -> Row {
+    let things = vec![
+        Thing::plant(600.0, 150.0),
+        Thing::weed(900.0, 15.0),
+        Thing::plant(1200.0, 140.0),
+        Thing::plant(1700.0, 160.0),
+        Thing::plant(2300.0, 150.0),
+    ];
+    Row::new(things).expect("plants and a weed are a row")
+}
+
+/// The log of a session in which the machine rolls along the row, and was told to start by these commands.
+fn logged(motion: &Motion, commands: &[&str]) -> Vec<Entry> {
+    let (row, machine) = (row(), Machine::default());
+    let mut uno = trial::boot(&firmware::build().expect("the firmware builds"), &[machine.beam_before(&row, motion)])
+        .expect("the firmware wakes up");
+    // The link, the settings and the start take their time.
+    let changes = machine.pin_changes(&row, motion, uno.cycle() + 16_000_000);
+    uno.drive(changes);
+    let mut uno = Some(uno);
+    let open = move || match uno.take() {
+        Some(uno) => Link::over(UnoPort::new(uno), false),
+        None => Err(LinkError::Absent("it is gone".to_owned())),
+    };
+    let mut session = Session::open(open).expect("the firmware answers");
+    for command in commands {
+        assert!(session.command(command), "{command}");
+    }
+    let folder = tempfile::tempdir().expect("there is room for a log");
+    let path = folder.path().join("log.csv");
+    let mut log = LogWriter::open(&path).expect("the log can be written");
+    let mut now = Instant::now();
+    let mut standing = 0;
+    // A second after the machine has come to the end of its way, by the status ten times a second.
+    while standing < 10 {
+        for happening in session.turn(now) {
+            assert!(!matches!(happening, Happening::Lost(_)), "{happening:?}");
+            if let Happening::Status(status, _) = &happening {
+                let is_there = f64::from(status.position) * 0.5236 > motion.end_mm() - motion.start_mm() - 5.0;
+                standing = if is_there { standing + 1 } else { 0 };
+            }
+            log.write(&happening).expect("the log can be written");
+        }
+        now += Duration::from_millis(20);
+    }
+    log::read(&path).expect("the log is one")
+}
+
+#[track_caller]
+fn assert_same(log: &[Entry], swings: usize) -> Replayed {
+    let replayed = replay(log).expect("the log can be replayed");
+    assert_eq!(replayed.difference, None, "{replayed:#?}");
+    assert_eq!((replayed.objects, replayed.notes.len()), (5, 0), "{replayed:#?}");
+    assert!(replayed.swings >= swings, "{replayed:#?}");
+    replayed
+}
+
+#[test]
+fn a_row_at_a_steady_speed_is_decided_the_same_on_the_host() {
+    let motion = Motion::steady(0.0, 500.0, 500.0, 3200.0).change_speed(0.0, 500.0);
+    let log = logged(&motion, &["start"]);
+    let replayed = assert_same(&log, 9);
+    assert!(replayed.farthest_swing <= 12, "{replayed:?}");
+
+    // What was tampered with is found, at its line.
+    let mut tampered = log.clone();
+    let place = tampered.iter().rposition(|entry| entry.text.starts_with("swing tool=out")).expect("a swing");
+    tampered[place].text = "swing tool=out pos=1".to_owned();
+    let difference = replay(&tampered).expect("it can be replayed").difference.expect("they differ");
+    assert_eq!(difference.line, Some(log[place].number), "{difference}");
+    assert!(
+        difference.to_string().contains("the log has `swing tool=out pos=1`, the replay `swing tool="),
+        "{difference}"
+    );
+
+    // With another lead the tool would have left elsewhere.
+    let mut tampered = log.clone();
+    let lead = tampered.iter_mut().find(|entry| entry.text.starts_with("lead_out_ms=")).expect("a lead");
+    lead.text = "lead_out_ms=80".to_owned();
+    assert!(replay(&tampered).expect("it can be replayed").difference.is_some());
+
+    // A weed that the log calls a plant.
+    let mut tampered = log;
+    let weed = tampered.iter_mut().find(|entry| entry.text.starts_with("weed pos=")).expect("a weed");
+    weed.text = weed.text.replace("weed", "plant");
+    let difference = replay(&tampered).expect("it can be replayed").difference.expect("they differ");
+    assert!(difference.to_string().contains("the replay `weed pos="), "{difference}");
+}
+
+#[test]
+fn a_row_with_changes_of_speed_and_a_stop_is_decided_the_same_on_the_host() {
+    let motion = Motion::steady(0.0, 500.0, 300.0, 900.0)
+        .change_speed(650.0, 400.0)
+        .roll_to(1800.0)
+        .change_speed(0.0, 600.0)
+        .change_speed(400.0, 500.0)
+        .roll_to(3200.0)
+        .change_speed(0.0, 500.0);
+    assert_same(&logged(&motion, &["start"]), 9);
+}
+
+#[test]
+fn start_now_over_unseen_ground_is_known_from_start() {
+    let motion = Motion::steady(0.0, 500.0, 500.0, 3200.0).change_speed(0.0, 500.0);
+    assert_same(&logged(&motion, &["start now"]), 9);
+}
+
+#[test]
+fn a_log_without_a_machine_or_with_a_line_that_cannot_be_is_refused() {
+    let entry = |kind, text: &str| Entry { number: 7, time_ms: 0, kind, text: text.to_owned() };
+    assert!(replay(&[]).unwrap_err().to_string().starts_with("the log has no machine in it"));
+    for (kind, text, wrong) in [
+        (Kind::Setting, "k=99", "line 7 of the log: `k=99` is out of range"),
+        (Kind::Setting, "wheel=4", "`wheel=4` is no setting of this version"),
+        (Kind::Example, "field 3 tree 1 2 3 4 5", "is no example"),
+        (Kind::Status, "state=asleep", "is no status"),
+        (Kind::Event, "swing tool=up", "is no event"),
+    ] {
+        let error = replay(&[entry(Kind::Connected, "0.1.0"), entry(kind, text)]).unwrap_err().to_string();
+        assert!(error.contains(wrong), "{error}");
+    }
+    let far = "state=work tool=in pos=2000000000 speed_mm_s=1 windows=0 unseen_mm=0";
+    let near = "state=work tool=in pos=0 speed_mm_s=1 windows=0 unseen_mm=0";
+    let log = [entry(Kind::Connected, "0.1.0"), entry(Kind::Status, near), entry(Kind::Status, far)];
+    assert!(replay(&log).unwrap_err().to_string().contains("the machine cannot have come so far"));
+}
