@@ -24,9 +24,6 @@ static TO_SEND: Ring<TO_SEND_SLOTS> = Ring::new();
 static TO_SEND_BYTES: [Byte; TO_SEND_SLOTS] = [const { Byte::new(0) }; TO_SEND_SLOTS];
 const TO_SEND_SLOTS: usize = reply::LINE.next_power_of_two();
 
-/// Times that received bytes were lost, modulo 256.
-static LOST: Byte = Byte::new(0);
-
 /// The serial line, as the loop sees it.
 pub struct Serial {
     usart: USART0,
@@ -45,11 +42,6 @@ impl Serial {
     /// Bytes that can be written now.
     pub fn room(&self) -> usize {
         TO_SEND.room().into()
-    }
-
-    /// How often received bytes were lost since power-up, modulo 256.
-    pub fn lost(&self) -> u8 {
-        LOST.get()
     }
 }
 
@@ -110,21 +102,13 @@ fn USART_RX() {
     // and a mark in its place tells so as well as one before it.
     let overrun = usart().ucsr0a().read().dor0().bit_is_set();
     let mut byte = usart().udr0().read().bits();
-    let kept = RECEIVED.push(|slot, room| {
+    // What finds no room is behind a mark already.
+    let _ = RECEIVED.push(|slot, room| {
         if overrun || room == 1 {
-            count_lost();
             byte = GAP_MARK;
         }
         RECEIVED_BYTES[slot].set(byte);
     });
-    if !kept {
-        count_lost();
-    }
-}
-
-#[inline(always)]
-fn count_lost() {
-    LOST.set(LOST.get().wrapping_add(1));
 }
 
 // The line can take a byte. At most 70 cycles.

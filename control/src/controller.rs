@@ -826,9 +826,12 @@ impl Geometry {
 impl Leads {
     fn at(speed: TicksPerSecond, settings: &Settings) -> Self {
         let out_ms = settings.get(Setting::LeadOutMs);
+        // A lead is longer by what a command takes to the pin in the mean: half a tick, half a turn of the loop, half a pulse.
+        // Without a lead the paper's schedule stands as it is.
+        let lead = |milliseconds: u16| speed.distance_in_ms(milliseconds + u16::from(milliseconds > 0));
         Self {
-            out: speed.distance_in_ms(out_ms),
-            back: speed.distance_in_ms(settings.get(Setting::LeadInMs).min(out_ms)),
+            out: lead(out_ms),
+            back: lead(settings.get(Setting::LeadInMs).min(out_ms)),
             response: speed.distance_in_ms(settings.get(Setting::BeamResponseMs)),
         }
     }

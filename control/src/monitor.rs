@@ -73,6 +73,7 @@ impl EncoderMonitor {
     }
 
     /// Takes a reading, with the count of jumps since power-up; returns the fault that it shows.
+    #[inline(never)]
     pub fn read(&mut self, now: Instant, position: Position, jumps: u16) -> Option<Alarm> {
         let now = now.coarse();
         if now.since(self.period_since) >= PERIOD {

@@ -192,6 +192,7 @@ where
 }
 
 /// The answer to a command that may have been refused.
+#[inline(never)]
 fn done(result: Result<(), Refusal>, setting: Option<Setting>) -> Answer {
     match result {
         Ok(()) => Answer::Ok,

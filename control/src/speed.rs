@@ -74,6 +74,7 @@ impl SpeedMeter {
         (self.speed != before).then_some(self.speed)
     }
 
+    #[inline(never)]
     fn moved(&mut self, reading: Sample) {
         self.last = reading;
         if self.count == 0 {

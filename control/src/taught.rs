@@ -82,6 +82,7 @@ impl<M: Memory> FieldExamples<M> {
     ///
     /// # Errors
     /// The example, when all slots are taken.
+    #[inline(never)]
     pub fn add(&mut self, example: Taught) -> Result<u8, Taught> {
         let Some(number) = self.slots.iter().position(|&slot| slot != Slot::Held) else {
             return Err(example);
