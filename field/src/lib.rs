@@ -3,10 +3,12 @@
 //! - **The field**: [`row`] says what stands in the row, [`planting`] grows one by chance, [`ground`] counts which ground is
 //!   covered. [`motion`] is how the machine rolls, [`machine`] turns both into levels on the firmware's pins ([`signal`]),
 //!   and [`servo`] is what its pulses do to the tool.
-//! - **The virtual Uno**: [`firmware`] builds and reads the ELF, [`uno`] runs it on simavr, [`console`] talks to it.
+//! - **The virtual Uno**: [`firmware`] builds and reads the ELF, [`hex`] reads bootloaders and writes what avrdude takes, [`uno`] runs
+//!   it on simavr, [`console`] talks to it. [`live`] runs it in real time, at a serial port that other programs open ([`pty`]).
 //! - **Trials**: [`trial`] joins them, [`verdict`] judges what happened to each plant, [`report`] and [`picture`] show it,
 //!   and [`waveform`] writes down what was on the pins. [`replay`] plays a recording ([`capture`]) instead of a row, and
 //!   [`mod@bench`] counts cycles and bytes.
+//! - **Soak**: [`soak`] has everything go wrong now and then, for hours.
 //! - **Training**: [`training`] makes the example table that the firmware carries, of labelled objects.
 //! - **Wiring**: [`wiring`] says what is wired to which contact of the Uno, as a table and as a diagram.
 
@@ -30,6 +32,7 @@ pub mod report;
 pub mod row;
 pub mod servo;
 pub mod signal;
+pub mod soak;
 pub mod training;
 pub mod trial;
 pub mod uno;

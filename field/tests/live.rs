@@ -7,6 +7,8 @@ use field::hex::Bootloader;
 use field::live::{Background, Course, LiveUno, Setup};
 use field::machine::Machine;
 use field::row::{Row, Thing};
+use field::signal::{CYCLES_PER_SECOND, Pin};
+use field::uno::{ResetCause, Uno};
 use serialport::SerialPort;
 use std::io::ErrorKind;
 use std::path::Path;
@@ -155,4 +157,34 @@ fn the_machine_rolls_along_its_row_and_stands_between() {
         positions.push(position.expect("a position").parse().unwrap());
     }
     assert!(positions.is_sorted(), "{positions:?}");
+}
+
+#[test]
+fn an_erased_flash_runs_through_to_the_bootloader_again_and_again() {
+    let bootloader = Bootloader::read(Path::new(OLD_BOOTLOADER)).expect("setup.sh installs arduino-core-avr");
+    let mut uno = Uno::boot_with_bootloader(&bootloader, None, &[]).unwrap();
+    uno.run_for_ms(10_000).expect("it does not run past the end of the flash");
+    assert!(uno.changes().iter().any(|change| change.pin == Pin::Led), "the bootloader flashes the LED");
+}
+
+/// The watchdog stays on over its own reset, at its shortest time, until the firmware turns it off or power goes (data sheet,
+/// 11.9.2). The old bootloader does not turn it off, and takes longer than that to start the firmware.
+#[test]
+fn behind_the_old_bootloader_a_firmware_that_hung_comes_back_only_with_the_power() {
+    const FIVE_SECONDS: u64 = 5 * CYCLES_PER_SECOND;
+    const GREETING: &str = "help lists the commands\r\n";
+    let bootloader = Bootloader::read(Path::new(OLD_BOOTLOADER)).expect("setup.sh installs arduino-core-avr");
+    let elf = firmware::build().expect("the firmware builds");
+    let mut uno = Uno::boot_with_bootloader(&bootloader, Some(&elf), &[]).unwrap();
+    uno.follow_baud();
+    uno.run_until_serial(GREETING, FIVE_SECONDS).expect("it comes up");
+
+    uno.stall().unwrap();
+    assert!(uno.run_until_serial(GREETING, FIVE_SECONDS).is_err());
+    assert!(uno.resets().len() > 10 && uno.resets().iter().all(|reset| reset.cause == ResetCause::Watchdog));
+    uno.reset();
+    assert!(uno.run_until_serial(GREETING, FIVE_SECONDS).is_err(), "the reset button does not help");
+
+    uno.power_cycle();
+    uno.run_until_serial(GREETING, FIVE_SECONDS).expect("it comes up");
 }
