@@ -36,6 +36,23 @@ fn the_settings_page_is_the_settings_table() {
     page.assert_eq(&with_part(&page, "settings", &settings()));
 }
 
+#[test]
+fn the_settings_that_the_readme_names_have_the_defaults_that_it_gives() {
+    let readme = expect_file!["../../README.md"].data();
+    let mut found = 0;
+    for line in readme.lines() {
+        let mut cells = line.trim_matches('|').split('|').map(str::trim);
+        let (Some(names), Some(defaults)) = (cells.next(), cells.next()) else { continue };
+        for (cell, default) in names.split(", ").zip(defaults.split(", ")) {
+            let setting = Setting::all().find(|&setting| cell == format!("`{}`", name(setting)));
+            let Some(setting) = setting else { continue };
+            assert_eq!(default, setting.description().default.to_string(), "{line}");
+            found += 1;
+        }
+    }
+    assert_eq!(found, 5, "the five that one sets first");
+}
+
 /// Every setting as a table in Markdown.
 fn settings() -> String {
     let mut table = "| name | unit | from | to | default | set in | what it is |\n".to_owned();
