@@ -1,5 +1,5 @@
-//! The product on its way onto an Uno: `weeder flash` with the real avrdude, the real old bootloader in `weeder virtual-uno`, and
-//! what is said where something is not as it should be.
+//! The product on its way onto an Uno: `weeder flash` with the real avrdude, the real bootloaders in `weeder virtual-uno`, and what
+//! is said where something is not as it should be.
 //!
 //! Waits end when what is waited for has come; how long that takes on a busy host says nothing.
 
@@ -83,6 +83,34 @@ fn read_until(port: &mut dyn serialport::SerialPort, text: &str) -> String {
     String::from_utf8_lossy(&heard).into_owned()
 }
 
+/// Optiboot, the Uno's bootloader, from the sources that arduino-core-avr brings along: the file that Debian has made of them
+/// is longer than its boot section.
+fn optiboot(folder: &Path) -> PathBuf {
+    let (elf, hex) = (folder.join("optiboot.elf"), folder.join("optiboot.hex"));
+    let mut compiler = Command::new("avr-gcc");
+    compiler
+        .args(["-mmcu=atmega328p", "-DF_CPU=16000000L", "-DBAUD_RATE=115200", "-w", "-Os", "-mrelax", "-nostdlib"])
+        .args(["-fno-split-wide-types", "-fno-inline-small-functions", "-nostartfiles"])
+        .args(["-Wl,--section-start=.text=0x7e00", "-Wl,--section-start=.version=0x7ffe", "-o"])
+        .args([&elf, &Path::new(BOOTLOADERS).join("optiboot/optiboot.c")]);
+    assert!(compiler.status().expect("avr-gcc is there: setup.sh installs it").success());
+    let mut objcopy = Command::new("avr-objcopy");
+    objcopy.args(["-O", "ihex", "-j", ".text", "-j", ".version"]).args(["--set-section-flags", ".version=alloc,load"]);
+    assert!(objcopy.args([&elf, &hex]).status().expect("avr-objcopy is there: setup.sh installs it").success());
+    hex
+}
+
+/// Has `weeder flash` flash an Uno. On a busy host avrdude may come too late for the bootloader's window; a user would try again,
+/// too.
+#[track_caller]
+fn flash(port: &Path, arguments: &[&str]) {
+    let flashed = (0..5).any(|_| {
+        let status = weeder().arg("flash").args(arguments).arg("--port").arg(port).status();
+        status.expect("cargo has built it").success()
+    });
+    assert!(flashed, "avrdude's own words stand above");
+}
+
 /// An ELF for the chip that takes so many bytes of flash.
 fn elf_of(folder: &Path, bytes: usize) -> PathBuf {
     let (source, elf) = (folder.join("filler.S"), folder.join("filler.elf"));
@@ -94,25 +122,14 @@ fn elf_of(folder: &Path, bytes: usize) -> PathBuf {
 }
 
 #[test]
-fn an_empty_uno_is_flashed_through_its_old_bootloader_and_answers() {
+fn an_empty_uno_is_flashed_through_optiboot_and_answers() {
     let folder = tempfile::tempdir().unwrap();
     let (link, eeprom) = (folder.path().join("uno"), folder.path().join("uno.eeprom"));
-    let bootloader = old_bootloader();
-    let arguments = ["--stand", "--bootloader", "BOOTLOADER", "--link", "LINK", "--eeprom", "EEPROM"].map(Path::new);
-    let arguments = arguments.map(|argument| match argument.to_str() {
-        Some("BOOTLOADER") => &bootloader,
-        Some("LINK") => &link,
-        Some("EEPROM") => &eeprom,
-        _ => argument,
-    });
+    let mut arguments = vec![Path::new("--stand"), Path::new("--bootloader")];
+    let bootloader = optiboot(folder.path());
+    arguments.extend([&bootloader, Path::new("--link"), &link, Path::new("--eeprom"), &eeprom]);
     let uno = VirtualUno::start(&arguments);
-
-    // On a busy host avrdude may come too late for the bootloader's window; a user would try again, too.
-    let flashed = (0..5).any(|_| {
-        let status = weeder().args(["flash", "--old-bootloader", "--port"]).arg(&link).status();
-        status.expect("cargo has built it").success()
-    });
-    assert!(flashed, "avrdude's own words stand above");
+    flash(&link, &[]);
 
     let mut port = serialport::new(link.to_string_lossy(), 115_200).timeout(PATIENCE).open().unwrap();
     let greeting = read_until(&mut *port, "help lists the commands\r\n");
@@ -126,6 +143,15 @@ fn an_empty_uno_is_flashed_through_its_old_bootloader_and_answers() {
     assert!(uno.interrupt(), "Ctrl-C ends it well");
     assert!(!link.is_symlink(), "it takes its link with it");
     assert_eq!(fs::metadata(&eeprom).unwrap().len(), 1024);
+}
+
+#[test]
+fn an_uno_with_the_old_bootloader_is_flashed_at_its_own_baud_rate() {
+    let folder = tempfile::tempdir().unwrap();
+    let elf = elf_of(folder.path(), 5000);
+    let link = folder.path().join("uno");
+    let _uno = VirtualUno::start(&[Path::new("--bootloader"), &old_bootloader(), Path::new("--link"), &link]);
+    flash(&link, &["--old-bootloader", "--elf", elf.to_str().expect("a plain path")]);
 }
 
 #[test]

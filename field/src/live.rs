@@ -6,10 +6,10 @@
 //! waited for. A host that is too slow makes the chip slower, never the time between two of its events wrong.
 //!
 //! - **Reset.** A program that opens the port of a real Uno resets it, by the modem line DTR. A pseudo terminal has no such
-//!   line; so the opening itself is what resets, unless [`Setup::resets_when_opened`] is off. Then a bootloader waits for a
+//!   line; so the opening itself is what resets, unless [`Setup::keeps_running_when_opened`]. Then a bootloader waits for a
 //!   new firmware for a second or two, as on the desk.
 //! - **Baud rate.** The chip sends and receives at the pace of its UBRR. The terminal carries bytes at any rate, so that a
-//!   program's wrong one goes unnoticed. What the chip sends while nobody has the port open is lost.
+//!   program's wrong one goes unnoticed. What no program has read is lost when the next one opens the port.
 //! - **The machine.** It stands, gains its speed ahead of the row, rolls past it and brakes behind it; after a few seconds it does
 //!   so again, forward, with the same row before it. The tool does what the firmware says and the row does not mind.
 //! - **EEPROM.** It is read from a file at the start, where there is one, and written to it whenever it has changed.
