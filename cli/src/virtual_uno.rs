@@ -20,11 +20,14 @@ resets it, as on a real one. Try, in another terminal:
   weeder virtual-uno --link /tmp/uno --eeprom uno.eeprom
   picocom -b 115200 /tmp/uno        (type `help`, `clear`, `start`, `status`)
 
-An Uno with an empty flash and the old bootloader, to be flashed by avrdude at 57600 baud:
+An Uno with an empty flash and a bootloader, to be flashed by avrdude:
 
-  weeder virtual-uno --link /tmp/uno --bootloader \\
-    /usr/share/arduino/hardware/arduino/avr/bootloaders/atmega/ATmegaBOOT_168_atmega328.hex
-  weeder flash --port /tmp/uno --old-bootloader")]
+  weeder virtual-uno --link /tmp/uno --bootloader optiboot_atmega328.hex
+  weeder flash --port /tmp/uno
+
+Arduino's IDE has that file. Debian's arduino-core-avr has one that does not fit its place, but a sound one of the old
+bootloader, ATmegaBOOT_168_atmega328.hex, for firmware of up to 30,720 bytes and `weeder flash --old-bootloader`. What
+avrdude says of TIOCMGET means that a pseudo terminal has no modem lines; it does no harm.")]
 pub struct Arguments {
     #[command(flatten)]
     course: CourseArguments,
