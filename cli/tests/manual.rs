@@ -12,8 +12,11 @@ use field::row::{Row, Thing};
 use field::uno::Uno;
 use field::{firmware, trial};
 use std::fs;
+use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Child, Command, Stdio};
+use std::thread;
+use std::time::Duration;
 use tempfile::TempDir;
 
 /// The repository's folder.
@@ -253,6 +256,52 @@ fn roll(uno: &mut Uno, distance_mm: f64) {
     let start_cycle = uno.cycle();
     uno.drive(machine.pin_changes(&row, &motion, start_cycle));
     uno.run_until(cycle_at(start_cycle, motion.duration_s() + 0.1)).expect("the firmware runs");
+}
+
+/// A program that runs until the test is over.
+struct Running(Child);
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        // It may have ended by itself, which the test has noticed.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+#[test]
+fn the_way_to_a_weeder_without_an_uno_is_followed_to_its_end() {
+    firmware::build().expect("the firmware builds");
+    let folder = TempDir::new().expect("a folder");
+    let link = folder.path().join("uno");
+    let with_port = |(line, words): (String, Vec<String>)| {
+        let port = link.to_str().expect("a name in plain text");
+        let words: Vec<String> = words.iter().map(|word| word.replace("/tmp/uno", port)).collect();
+        (line.contains("first-flash.md") && words.iter().any(|word| word == port))
+            .then(|| weeder_arguments(&words))
+            .flatten()
+    };
+    let lines: Vec<Vec<String>> = shell_lines().into_iter().filter_map(with_port).collect();
+    let [virtual_uno, monitor] = lines.as_slice() else { panic!("first the Uno, then the monitor, not {lines:?}") };
+
+    let weeder = |arguments: &[String]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
+        command.current_dir(folder.path()).args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped());
+        command.spawn().expect("cargo has built the command")
+    };
+    let mut uno = Running(weeder(virtual_uno));
+    while !link.exists() {
+        assert_eq!(uno.0.try_wait().expect("it is a child"), None, "the virtual Uno has ended");
+        thread::sleep(Duration::from_millis(50));
+    }
+    // A script has no screen.
+    let mut monitor = weeder(&[monitor.as_slice(), &["--plain".to_owned()]].concat());
+    let mut keyboard = monitor.stdin.take().expect("it is piped");
+    keyboard.write_all(b"clear\nhold\nsave\nstatus\n").expect("it listens");
+    drop(keyboard);
+    let output = monitor.wait_with_output().expect("it ends");
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success() && said.contains("state=hold tool=out"), "{said}");
 }
 
 #[test]
