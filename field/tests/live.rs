@@ -78,6 +78,18 @@ fn opening_the_port_resets_the_chip_and_the_firmware_says_that_it_is_there() {
     assert_eq!(uno.stop().expect("it ran to the end").uno().resets().len(), 2);
 }
 
+#[test]
+fn an_uno_whose_reset_is_cut_runs_on_when_the_port_is_opened() {
+    let uno = start(Setup { keeps_running_when_opened: true, ..product() });
+    for _ in 0..2 {
+        let mut port = open(uno.path());
+        port.set_timeout(Duration::from_secs(1)).unwrap();
+        // What comes before the firmware listens is lost.
+        while port.write_all(b"version\n").is_err() || port.read(&mut [0; 64]).is_err() {}
+    }
+    assert_eq!(uno.stop().expect("it ran to the end").uno().resets(), []);
+}
+
 /// Has avrdude do something with the flash through the bootloader, as often as a user would try it.
 #[track_caller]
 fn avrdude(port: &Path, baud: &str, operation: &str) {
