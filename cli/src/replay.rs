@@ -33,6 +33,7 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
         let result = json!({
             "objects": replayed.objects,
             "swings": replayed.swings,
+            "alarms": replayed.alarms,
             "farthest_swing_ticks": replayed.farthest_swing,
             "difference": difference,
             "notes": replayed.notes,
@@ -43,8 +44,8 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
             println!("Note: {note}");
         }
         println!(
-            "The same: {} objects and {} swings, the farthest of them {} ticks apart",
-            replayed.objects, replayed.swings, replayed.farthest_swing
+            "The same: {} objects, {} alarms and {} swings, which differ by {} ticks at the most",
+            replayed.objects, replayed.alarms, replayed.swings, replayed.farthest_swing
         );
         match &difference {
             Some(difference) => println!("{name}, {difference}"),

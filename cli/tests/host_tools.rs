@@ -105,7 +105,7 @@ fn a_session_is_logged_and_replayed() {
     assert!(text.contains(",event,swing tool=out pos=0\n"), "{text}");
     let output = Command::new(env!("CARGO_BIN_EXE_weeder")).args(["replay", log]).output().expect("it ends");
     let replayed = printed(&output, 0);
-    assert!(replayed.contains("0 objects and 2 swings"), "{replayed}");
+    assert!(replayed.contains("0 objects, 0 alarms and 2 swings"), "{replayed}");
     // Opened again, it is gone on with.
     printed(&weeder(&["monitor", "--plain", "--log", log], uno.path(), ""), 0);
     assert_eq!(fs::read_to_string(log).expect("it is there").matches(",connected,").count(), 2);

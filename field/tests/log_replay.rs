@@ -4,7 +4,7 @@ use field::firmware;
 use field::link::log::{self, Entry, Kind, LogWriter};
 use field::link::replay::{Replayed, replay};
 use field::link::session::{Happening, Session};
-use field::link::{Link, LinkError, UnoPort};
+use field::link::{Link, LinkError, Status, UnoPort};
 use field::machine::Machine;
 use field::motion::Motion;
 use field::row::{Row, Thing};
@@ -24,12 +24,13 @@ fn row() -> Row {
 }
 
 /// The log of a session in which the machine rolls along the row, and was told to start by these commands.
-fn logged(motion: &Motion, commands: &[&str]) -> Vec<Entry> {
-    let (row, machine) = (row(), Machine::default());
-    let mut uno = trial::boot(&firmware::build().expect("the firmware builds"), &[machine.beam_before(&row, motion)])
+fn logged(row: &Row, motion: &Motion, commands: &[&str]) -> Vec<Entry> {
+    let machine = Machine::default();
+    let ticks = machine.ticks(motion, motion.duration_s());
+    let mut uno = trial::boot(&firmware::build().expect("the firmware builds"), &[machine.beam_before(row, motion)])
         .expect("the firmware wakes up");
     // The link, the settings and the start take their time.
-    let changes = machine.pin_changes(&row, motion, uno.cycle() + 16_000_000);
+    let changes = machine.pin_changes(row, motion, uno.cycle() + 16_000_000);
     uno.drive(changes);
     let mut uno = Some(uno);
     let open = move || match uno.take() {
@@ -50,7 +51,7 @@ fn logged(motion: &Motion, commands: &[&str]) -> Vec<Entry> {
         for happening in session.turn(now) {
             assert!(!matches!(happening, Happening::Lost(_)), "{happening:?}");
             if let Happening::Status(status, _) = &happening {
-                let is_there = f64::from(status.position) * 0.5236 > motion.end_mm() - motion.start_mm() - 5.0;
+                let is_there = i64::from(status.position) > ticks - 10;
                 standing = if is_there { standing + 1 } else { 0 };
             }
             log.write(&happening).expect("the log can be written");
@@ -72,7 +73,7 @@ fn assert_same(log: &[Entry], swings: usize) -> Replayed {
 #[test]
 fn a_row_at_a_steady_speed_is_decided_the_same_on_the_host() {
     let motion = Motion::steady(0.0, 500.0, 500.0, 3200.0).change_speed(0.0, 500.0);
-    let log = logged(&motion, &["start"]);
+    let log = logged(&row(), &motion, &["start"]);
     let replayed = assert_same(&log, 9);
     assert!(replayed.farthest_swing <= 12, "{replayed:?}");
 
@@ -110,13 +111,43 @@ fn a_row_with_changes_of_speed_and_a_stop_is_decided_the_same_on_the_host() {
         .change_speed(400.0, 500.0)
         .roll_to(3200.0)
         .change_speed(0.0, 500.0);
-    assert_same(&logged(&motion, &["start"]), 9);
+    assert_same(&logged(&row(), &motion, &["start"]), 9);
 }
 
 #[test]
 fn start_now_over_unseen_ground_is_known_from_start() {
     let motion = Motion::steady(0.0, 500.0, 500.0, 3200.0).change_speed(0.0, 500.0);
-    assert_same(&logged(&motion, &["start now"]), 9);
+    assert_same(&logged(&row(), &motion, &["start now"]), 9);
+}
+
+#[test]
+fn an_alarm_of_the_beam_is_raised_again_and_what_is_left_of_the_object_is_cut() {
+    let things = vec![Thing::plant(600.0, 150.0), Thing::plant(1500.0, 700.0), Thing::plant(2300.0, 150.0)];
+    let row = Row::new(things).expect("plants are a row");
+    let motion = Motion::steady(0.0, 500.0, 500.0, 3200.0).change_speed(0.0, 500.0);
+    let log = logged(&row, &motion, &["start"]);
+    assert!(log.iter().any(|entry| entry.text.starts_with("alarm name=beam_blocked")), "{log:#?}");
+    let replayed = replay(&log).expect("the log can be replayed");
+    assert_eq!(replayed.difference, None, "{replayed:#?}");
+    assert_eq!((replayed.objects, replayed.alarms), (3, 1), "{replayed:#?}");
+}
+
+#[test]
+fn an_alarm_that_the_log_cannot_explain_is_given() {
+    let motion = Motion::steady(0.0, 500.0, 500.0, 3200.0).change_speed(0.0, 500.0);
+    let mut log = logged(&row(), &motion, &["start"]);
+    // The weed and the gap behind it have passed.
+    let weed = log.iter().position(|entry| entry.text.starts_with("weed pos=")).expect("a weed");
+    let later = log.iter().enumerate().skip(weed).filter(|(_, entry)| entry.kind == Kind::Status).nth(2);
+    let (place, status) = later.map(|(place, entry)| (place, Status::parse(&entry.text))).expect("it rolls on");
+    let position = status.expect("a status").position;
+    let alarm = |text: String| Entry { text, kind: Kind::Event, ..log[place].clone() };
+    let alarms =
+        [alarm(format!("alarm name=encoder_jumps code=23 pos={position}")), alarm("state is=alarm".to_owned())];
+    log.splice(place + 1..place + 1, alarms);
+    // From there on the log has the tool swing, and the replay keeps it out.
+    let difference = replay(&log).expect("the log can be replayed").difference.expect("they differ");
+    assert!(difference.to_string().contains("the replay none"), "{difference}");
 }
 
 #[test]

@@ -14,17 +14,16 @@
 //! - Where a log begins with ground already seen, what the tool did there is not judged.
 //! - A replay ends where the bench was used (`servo`, `calibrate`, `test`) or examples were forgotten.
 
+mod compare;
+mod player;
+
+use self::compare::{Bounds, Heard, compare};
+use self::player::Player;
 use super::log::{Entry, Kind};
-use super::settings::{Setting, Settings, shown, steps};
-use super::{Class, Mode, Status, Told};
-use control::classifier::{Nearest, label};
-use control::console::{self, Command};
-use control::controller::{Controller, Readings, State, WakeUp};
-use control::event::Event;
+use super::settings::{Setting, Settings, shown};
+use super::{Status, Told};
+use control::classifier::label;
 use control::features;
-use control::memory::Volatile;
-use control::reset::Cause;
-use control::units::{Instant, Interval, Position, TicksPerSecond};
 use knn::Example;
 use std::fmt;
 use thiserror::Error;
@@ -37,15 +36,6 @@ pub const SWING_TICKS: i32 = 12;
 
 /// By how much of the machine's way a swing's place may differ, in milliseconds.
 pub const SWING_MS: i32 = 25;
-
-/// Time between two steps of a machine at rest.
-const REST_MS: u32 = 5;
-
-/// Longest rest that is replayed: nothing that it changes takes longer.
-const LONGEST_REST_MS: u64 = 2_000;
-
-/// Longest way between two lines of a log. A machine at 10 km/h rolls it in some minutes.
-const LONGEST_WAY: i32 = 1_000_000;
 
 /// Why a log cannot be replayed.
 #[derive(Debug, Error)]
@@ -63,17 +53,6 @@ pub enum ReplayError {
         /// What is wrong with it.
         problem: String,
     },
-}
-
-/// Something that was told, with its line in the log, or the place in the replay.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Heard {
-    line: u64,
-    told: Told,
-    /// The machine's speed then, in ticks a second.
-    speed: i32,
-    /// Whether its place is given, not decided.
-    is_given: bool,
 }
 
 /// What log and replay do not agree on.
@@ -104,6 +83,8 @@ pub struct Replayed {
     pub objects: usize,
     /// Swings on which both agree.
     pub swings: usize,
+    /// Alarms that both raised by themselves.
+    pub alarms: usize,
     /// Greatest distance between a swing of the log and the replay's, in ticks.
     pub farthest_swing: i32,
     /// The first thing on which they do not.
@@ -284,341 +265,5 @@ fn example(line: &str) -> Result<Option<Example<{ features::COUNT }>>, ()> {
         }
         [line] if line.starts_with("spoiled=") => Ok(None),
         _ => Err(()),
-    }
-}
-
-/// The decisions, driven along the log.
-struct Player<'a> {
-    controller: Controller<Nearest<&'a [Example<{ features::COUNT }>], Volatile>, Volatile>,
-    /// The ground over which the beam was broken.
-    canopies: Vec<(i32, i32)>,
-    broken: bool,
-    now: Instant,
-    position: i32,
-    speed_mm_s: i32,
-    heard: Vec<Heard>,
-    /// Whether the next alarm told is one that was given.
-    swallows_alarm: bool,
-}
-
-impl<'a> Player<'a> {
-    fn new(stretch: &'a Stretch<'a>) -> Self {
-        let margins = stretch.settings.wheel().ticks(2 * stretch.settings.get(Setting::MarginMm)).0;
-        let canopies: Vec<(i32, i32)> = stretch
-            .happened
-            .iter()
-            .filter_map(|(_, happened)| match happened {
-                Happened::Told(Told::Object { position, hold, .. }) => {
-                    Some((*position, position.wrapping_add(hold.wrapping_sub(margins))))
-                }
-                _ => None,
-            })
-            .collect();
-        let position = stretch.first.position;
-        let broken = is_in(&canopies, position);
-        let readings = Readings::new(Instant::new(0), Position::new(position));
-        let wake_up = WakeUp { readings, beam_broken: broken, cause: Cause::Unknown };
-        let classifier = Nearest::new(stretch.examples.as_slice(), Volatile::new());
-        let mut controller = Controller::new(classifier, Volatile::new(), wake_up);
-        controller.clear();
-        for (setting, value) in steps(controller.settings(), &stretch.settings) {
-            // In an order that the firmware takes, and every value is in its range.
-            let _ = controller.set(setting, value);
-        }
-        if stretch.first.mode == Mode::Work {
-            let unseen = stretch.first.unseen_mm;
-            let _ = controller.start(unseen < i32::from(stretch.settings.get(Setting::BeamToToolMm)) - 1);
-        }
-        controller.tell_events(true);
-        Self {
-            controller,
-            canopies,
-            broken,
-            now: Instant::new(0),
-            position,
-            speed_mm_s: stretch.first.speed_mm_s,
-            heard: Vec::new(),
-            swallows_alarm: false,
-        }
-    }
-
-    fn speed(&self) -> TicksPerSecond {
-        let wheel = self.controller.settings().wheel();
-        let ticks = wheel.ticks(u16::try_from(self.speed_mm_s.unsigned_abs()).unwrap_or(u16::MAX)).0;
-        TicksPerSecond(if self.speed_mm_s < 0 { -ticks } else { ticks })
-    }
-
-    /// Rolls from one status to the next, `host_ms` later by the host's clock, gaining or losing speed evenly.
-    fn roll(&mut self, from: &Status, to: &Status, host_ms: u64) -> Result<(), ()> {
-        let way = to.position.wrapping_sub(self.position);
-        if way.abs() > LONGEST_WAY {
-            return Err(());
-        }
-        if way == 0 {
-            self.speed_mm_s = to.speed_mm_s;
-            self.rest(host_ms.min(LONGEST_REST_MS));
-            return Ok(());
-        }
-        self.roll_by(way, from.speed_mm_s, to.speed_mm_s, host_ms);
-        Ok(())
-    }
-
-    /// Rolls to a place on the way to the next status, if it lies there.
-    fn roll_to(&mut self, place: i32, from: &Status, next: Option<&Status>) {
-        let way = place.wrapping_sub(self.position);
-        let Some(next) = next else { return };
-        let whole = next.position.wrapping_sub(self.position);
-        if way == 0 || way.signum() != whole.signum() || way.abs() > whole.abs() {
-            return;
-        }
-        let share = f64::from(way) / f64::from(whole);
-        let speed = f64::from(from.speed_mm_s) + share * f64::from(next.speed_mm_s - from.speed_mm_s);
-        self.roll_by(way, from.speed_mm_s, speed.round() as i32, 0);
-    }
-
-    /// Rolls a way, tick by tick. The speeds say how long it takes; where they cannot, the host's clock does.
-    fn roll_by(&mut self, way: i32, from_mm_s: i32, to_mm_s: i32, host_ms: u64) {
-        let tick_mm = 100.0 / f64::from(self.controller.settings().wheel().ticks(100).0.max(1));
-        let (from, to) = (f64::from(from_mm_s) / tick_mm, f64::from(to_mm_s) / tick_mm);
-        let ways = f64::from(way);
-        let mean = (from + to) / 2.0;
-        let by_speed = ways / mean;
-        let host_s = host_ms.max(1) as f64 / 1000.0;
-        let duration_s = if by_speed > 0.0 && by_speed < 3.0 * host_s.max(0.1) { by_speed } else { host_s };
-        let steps = way.unsigned_abs();
-        let start = self.position;
-        let mut elapsed_s = 0.0;
-        for step in 1..=steps {
-            let share = f64::from(step) / f64::from(steps);
-            // Even acceleration: the square of the speed goes evenly with the way.
-            let speed = (from * from + share * (to * to - from * from)).max(0.0).sqrt();
-            let even = duration_s * share;
-            let due_s = if by_speed == duration_s && from.abs() + speed > 0.0 {
-                2.0 * ways.abs() * share / (from.abs() + speed)
-            } else {
-                even
-            };
-            let interval_s = (due_s - elapsed_s).max(0.0);
-            elapsed_s = due_s;
-            self.speed_mm_s = (from_mm_s.signum() | to_mm_s.signum()) * (speed * tick_mm).round() as i32;
-            self.now = self.now + Interval::from_steps((interval_s * f64::from(Interval::STEPS_PER_SECOND)) as u32);
-            self.position = start.wrapping_add(way.signum() * step as i32);
-            self.step();
-        }
-        self.speed_mm_s = to_mm_s;
-    }
-
-    fn rest(&mut self, time_ms: u64) {
-        for _ in 0..time_ms.div_ceil(u64::from(REST_MS)) {
-            self.now = self.now + Interval::from_ms(REST_MS);
-            self.step();
-        }
-    }
-
-    /// Has the decisions take the place where the machine now is.
-    fn step(&mut self) {
-        let response = self.speed().distance_in_ms(self.controller.settings().get(Setting::BeamResponseMs));
-        let ground = (Position::new(self.position) - response).count();
-        let broken = is_in(&self.canopies, ground);
-        if broken != self.broken {
-            self.broken = broken;
-            self.controller.beam_edge(Position::new(self.position), broken);
-        }
-        let mut readings = Readings::new(self.now, Position::new(self.position));
-        // An end switch that does as it is told.
-        readings.end_switch_on = self.controller.tool_out();
-        self.controller.step(readings);
-        self.listen();
-    }
-
-    fn listen(&mut self) {
-        let speed = self.speed().0;
-        while let Some(event) = self.controller.next_event() {
-            let told = match event {
-                Event::Object { vote, leading, spacing, plan } => Told::Object {
-                    class: vote.class,
-                    position: leading.count(),
-                    votes: vote.votes,
-                    spacing: spacing.0,
-                    delay: plan.delay.0,
-                    hold: plan.hold.0,
-                    actuation: plan.actuation().0,
-                },
-                Event::Swing { out, position } => Told::Swing { out, position: position.count() },
-                Event::Alarm { .. } if std::mem::take(&mut self.swallows_alarm) => continue,
-                Event::Alarm { alarm, position } => Told::Alarm { alarm, position: position.count() },
-                // They rest on time, which the log has only roughly; or follow from the others.
-                Event::State(_) | Event::Warning(_) | Event::Calibrated { .. } => continue,
-            };
-            self.heard.push(Heard { line: 0, told, speed, is_given: false });
-        }
-    }
-
-    /// Goes to a state, unless it is there already.
-    fn enter(&mut self, mode: Mode) {
-        match (mode, self.controller.state()) {
-            (Mode::Work, State::Hold) => {
-                let _ = self.controller.start(false);
-            }
-            (Mode::Hold, State::Work | State::Alarm(_)) => {
-                self.controller.hold();
-                self.controller.clear();
-            }
-            _ => return,
-        }
-        self.step();
-    }
-
-    /// Raises an alarm that the log has; whether the replay did not have it by itself.
-    fn raise(&mut self) -> bool {
-        let is_given = !matches!(self.controller.state(), State::Alarm(_));
-        if is_given {
-            // All alarms do the same; this one can be given from outside.
-            self.swallows_alarm = true;
-            self.controller.beam_edges_lost(self.broken);
-            self.step();
-        }
-        is_given
-    }
-
-    /// Carries out what was typed; false where that cannot be replayed.
-    fn command(&mut self, line: &str) -> bool {
-        match console::parse(line.as_bytes()) {
-            Ok(Command::Start { now }) => {
-                let _ = self.controller.start(now);
-            }
-            Ok(Command::Hold) => self.controller.hold(),
-            Ok(Command::Clear) => self.controller.clear(),
-            Ok(Command::Set(setting, value)) => {
-                // Refused here as there.
-                let _ = self.controller.set(setting, value);
-            }
-            Ok(Command::Label(label)) => {
-                let _ = self.controller.label(label);
-            }
-            Ok(Command::Forget(_) | Command::ForgetAll) => return false,
-            _ => {
-                let word = line.split_whitespace().next().unwrap_or_default();
-                return !["servo", "calibrate", "test", "defaults", "revert"].contains(&word);
-            }
-        }
-        self.step();
-        true
-    }
-}
-
-/// Whether the beam is broken over this ground.
-fn is_in(canopies: &[(i32, i32)], ground: i32) -> bool {
-    canopies.iter().any(|&(from, to)| ground.wrapping_sub(from) >= 0 && ground.wrapping_sub(to) < 0)
-}
-
-/// Where a stretch of a log was replayed.
-struct Bounds {
-    /// The first place.
-    first: i32,
-    /// Swings before this place are not judged.
-    judged_from: i32,
-    /// The last place.
-    end: i32,
-}
-
-/// Compares what both tell, each kind in its order, and notes the first difference.
-fn compare(logged: &[Heard], replayed: &[Heard], bounds: &Bounds, result: &mut Replayed) {
-    let kinds: [fn(&Told) -> bool; 3] = [
-        |told| matches!(told, Told::Object { .. }),
-        |told| matches!(told, Told::Swing { .. }),
-        |told| matches!(told, Told::Alarm { .. }),
-    ];
-    let is_judged = |heard: &&Heard| match heard.told {
-        // What was in the beam when the log began is cut for the replay.
-        Told::Object { position, .. } => position.wrapping_sub(bounds.first) >= 0,
-        Told::Swing { position, .. } => position >= bounds.judged_from,
-        _ => !heard.is_given,
-    };
-    // A swing at the very end may come in the one and not yet in the other.
-    let is_at_end = |heard: &Heard| {
-        matches!(heard.told, Told::Swing { position, .. }
-            if bounds.end.wrapping_sub(position).abs() <= swing_ticks(heard, heard))
-    };
-    let mut differences = Vec::new();
-    for is_kind in kinds {
-        let mut ours = replayed.iter().filter(|heard| is_kind(&heard.told)).filter(is_judged);
-        let mut theirs = logged.iter().filter(|heard| is_kind(&heard.told)).filter(is_judged);
-        loop {
-            match (theirs.next(), ours.next()) {
-                (None, None) => break,
-                (Some(logged), Some(replayed)) if agree(logged, replayed) => result.count(logged, replayed),
-                (Some(only), None) | (None, Some(only)) if is_at_end(only) => break,
-                (logged, replayed) => {
-                    let line = logged.map(|heard| heard.line);
-                    differences.push(Difference { line, logged: describe(logged), replayed: describe(replayed) });
-                    break;
-                }
-            }
-        }
-    }
-    if result.difference.is_none() {
-        result.difference = differences.into_iter().min_by_key(|difference| difference.line.unwrap_or(u64::MAX));
-    }
-}
-
-impl Replayed {
-    /// Counts what both agree on.
-    fn count(&mut self, logged: &Heard, replayed: &Heard) {
-        match (logged.told, replayed.told) {
-            (Told::Object { .. }, _) => self.objects += 1,
-            (Told::Swing { position, .. }, Told::Swing { position: ours, .. }) => {
-                self.swings += 1;
-                if !logged.is_given {
-                    self.farthest_swing = self.farthest_swing.max(position.wrapping_sub(ours).abs());
-                }
-            }
-            _ => {}
-        }
-    }
-}
-
-/// By how many ticks the places of these swings may differ.
-fn swing_ticks(logged: &Heard, replayed: &Heard) -> i32 {
-    SWING_TICKS + logged.speed.abs().max(replayed.speed.abs()) * SWING_MS / 1000
-}
-
-/// Whether log and replay tell the same.
-fn agree(logged: &Heard, replayed: &Heard) -> bool {
-    let near = |one: i32, other: i32, ticks: i32| one.wrapping_sub(other).abs() <= ticks;
-    match (logged.told, replayed.told) {
-        (
-            Told::Object { class, position, votes, hold, .. },
-            Told::Object { class: our_class, position: our_position, votes: our_votes, hold: our_hold, .. },
-        ) => {
-            (class, votes) == (our_class, our_votes)
-                && near(position, our_position, OBJECT_TICKS)
-                && near(hold, our_hold, OBJECT_TICKS)
-        }
-        (Told::Swing { out, position }, Told::Swing { out: ours, position: our_position }) => {
-            out == ours && (logged.is_given || near(position, our_position, swing_ticks(logged, replayed)))
-        }
-        (Told::Alarm { alarm, .. }, Told::Alarm { alarm: ours, .. }) => alarm == ours,
-        _ => false,
-    }
-}
-
-fn describe(heard: Option<&Heard>) -> String {
-    let Some(heard) = heard else { return "none".to_owned() };
-    match heard.told {
-        Told::Object { class, position, votes, hold, .. } => {
-            let class = match class {
-                Class::Plant => "plant",
-                Class::Weed => "weed",
-                Class::Unknown => "unknown",
-            };
-            format!("`{class} pos={position} votes={votes} hold={hold}`")
-        }
-        Told::Swing { out, position } => format!("`swing tool={} pos={position}`", if out { "out" } else { "in" }),
-        Told::Alarm { alarm, position } => {
-            let name: String = alarm.text().bytes().map(char::from).collect();
-            format!("`alarm name={name} pos={position}`")
-        }
-        Told::State(_) | Told::Warning(_) | Told::Calibrated | Told::Plot => "something else".to_owned(),
     }
 }

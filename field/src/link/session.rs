@@ -62,6 +62,8 @@ pub struct Session {
     open: Opener,
     link: Option<Link>,
     asked: Option<(Question, Instant)>,
+    /// The command that is being answered.
+    asked_for: String,
     waiting: VecDeque<String>,
     poll_at: Option<Instant>,
     retry_at: Option<Instant>,
@@ -79,6 +81,7 @@ impl Session {
             open: Box::new(open),
             link: None,
             asked: None,
+            asked_for: String::new(),
             waiting: VecDeque::new(),
             poll_at: None,
             retry_at: None,
@@ -156,16 +159,18 @@ impl Session {
             self.take(line);
         }
         if self.asked.as_ref().is_some_and(|&(_, since)| now.saturating_duration_since(since) > PATIENCE) {
-            return Err(LinkError::Silent { command: "status".to_owned(), received: String::new() }.into());
+            return Err(LinkError::Silent { command: self.asked_for.clone(), received: String::new() }.into());
         }
         if self.asked.is_none() {
             if let Some(command) = self.waiting.pop_front() {
                 link.send(&command)?;
                 self.asked = Some((Question::Command, now));
+                self.asked_for.clone_from(&command);
                 self.happened.push_back(Happening::Command(command));
             } else if self.poll_at.is_none_or(|at| now >= at) {
                 link.send("status")?;
                 self.asked = Some((Question::Status, now));
+                "status".clone_into(&mut self.asked_for);
                 self.poll_at = Some(now + POLL);
             }
         }
@@ -197,3 +202,6 @@ impl Session {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

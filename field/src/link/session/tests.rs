@@ -1,0 +1,147 @@
+//! Sessions with a firmware that answers by a script, and may be unplugged.
+
+use super::*;
+use std::cell::{Cell, RefCell};
+use std::io::{self, Read, Write};
+use std::rc::Rc;
+
+/// What the machine says by itself, before its next answer.
+type Says = Rc<RefCell<Vec<u8>>>;
+
+/// A firmware in hold, with the table's own settings, that can be unplugged and be told what to say.
+struct Firmware {
+    plugged_in: Rc<Cell<bool>>,
+    says: Says,
+    typed: Vec<u8>,
+    to_read: VecDeque<u8>,
+}
+
+impl Read for Firmware {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        if !self.plugged_in.get() {
+            return Ok(0);
+        }
+        self.to_read.extend(self.says.borrow_mut().drain(..));
+        if self.to_read.is_empty() { Err(io::ErrorKind::TimedOut.into()) } else { self.to_read.read(buffer) }
+    }
+}
+
+impl Write for Firmware {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        for &byte in bytes {
+            if byte != b'\n' {
+                self.typed.push(byte);
+                continue;
+            }
+            let line = std::mem::take(&mut self.typed);
+            let answer = match line.as_slice() {
+                b"" => String::new(),
+                b"version" => "weeder 0.1.0\r\nok\r\n".to_owned(),
+                b"get" => {
+                    let defaults = settings::Setting::all();
+                    let line = |setting: settings::Setting| {
+                        format!("{}={} and more\r\n", settings::name(setting), setting.description().default)
+                    };
+                    defaults.map(line).collect::<String>() + "ok\r\n"
+                }
+                b"status" => "state=hold tool=out pos=7 speed_mm_s=0 windows=0 unseen_mm=400\r\nok\r\n".to_owned(),
+                b"silence" => String::new(),
+                b"hepl" => "error: no such command\r\n".to_owned(),
+                _ => "ok\r\n".to_owned(),
+            };
+            self.to_read.extend(answer.bytes());
+        }
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+/// A session, the plug, and the machine's mouth.
+fn session() -> (Session, Rc<Cell<bool>>, Says) {
+    let (plugged_in, says) = (Rc::new(Cell::new(true)), Says::default());
+    let (plug, mouth) = (Rc::clone(&plugged_in), Rc::clone(&says));
+    let open = move || {
+        if !plug.get() {
+            return Err(LinkError::Absent("it".to_owned()));
+        }
+        let (plugged_in, says) = (Rc::clone(&plug), Rc::clone(&mouth));
+        Link::over(Firmware { plugged_in, says, typed: Vec::new(), to_read: VecDeque::new() }, false)
+    };
+    (Session::open(open).unwrap(), plugged_in, says)
+}
+
+/// What happens in a second, the status left out.
+fn second(session: &mut Session, from: Instant) -> Vec<Happening> {
+    let turns = (0..50).map(|turn| from + Duration::from_millis(20 * turn));
+    let happened = turns.flat_map(|now| session.turn(now)).collect::<Vec<_>>();
+    happened.into_iter().filter(|happening| !matches!(happening, Happening::Status(..))).collect()
+}
+
+#[test]
+fn commands_are_answered_one_after_the_other_beside_the_status() {
+    let (mut session, _, _) = session();
+    let now = Instant::now();
+    assert!(matches!(session.turn(now).as_slice(), [Happening::Connected { .. }, Happening::Status(..)]));
+    assert!(session.command("hold") && session.command("hepl") && !session.is_idle());
+    let expected = [
+        Happening::Command("hold".to_owned()),
+        Happening::Answer("ok".to_owned()),
+        Happening::Command("hepl".to_owned()),
+        Happening::Answer("error: no such command".to_owned()),
+    ];
+    assert_eq!(second(&mut session, now), expected);
+    assert!(session.is_idle());
+    assert!(!session.command("two\nlines"));
+}
+
+#[test]
+fn events_are_told_whatever_is_being_answered() {
+    let (mut session, _, says) = session();
+    let now = Instant::now();
+    second(&mut session, now);
+    says.borrow_mut().extend(b"swing tool=out pos=9\r\n\xFF\xFE junk\r\n");
+    let told = Happening::Told(Told::Swing { out: true, position: 9 }, "swing tool=out pos=9".to_owned());
+    assert_eq!(second(&mut session, now + Duration::from_secs(1)), [told]);
+}
+
+#[test]
+fn an_uno_that_is_unplugged_is_lost_and_found_again() {
+    let (mut session, plugged_in, _) = session();
+    let now = Instant::now();
+    second(&mut session, now);
+    plugged_in.set(false);
+    let lost = second(&mut session, now + Duration::from_secs(1));
+    assert!(matches!(lost.as_slice(), [Happening::Lost(why)] if why.contains("plug the Uno in again")), "{lost:?}");
+    assert!(!session.is_connected());
+    assert_eq!(second(&mut session, now + Duration::from_secs(5)), []);
+    plugged_in.set(true);
+    let found = second(&mut session, now + Duration::from_secs(10));
+    assert!(matches!(found.as_slice(), [Happening::Connected { .. }]), "{found:?}");
+}
+
+#[test]
+fn an_uno_that_is_reset_is_asked_for_everything_again() {
+    let (mut session, _, says) = session();
+    let now = Instant::now();
+    second(&mut session, now);
+    says.borrow_mut().extend(b"weeder 0.1.0, reset by brown_out, state hold, tool out; help lists the commands\r\n");
+    let happened = second(&mut session, now + Duration::from_secs(1));
+    assert!(matches!(happened.as_slice(), [Happening::Lost(_), Happening::Connected { .. }]), "{happened:?}");
+}
+
+#[test]
+fn an_answer_that_does_not_come_is_given_up() {
+    let (mut session, _, _) = session();
+    let now = Instant::now();
+    second(&mut session, now);
+    assert!(session.command("silence"));
+    let mut happened = Vec::new();
+    for seconds in 1..5 {
+        happened.extend(second(&mut session, now + Duration::from_secs(seconds)));
+    }
+    assert!(happened.iter().any(|happening| matches!(happening, Happening::Lost(_))), "{happened:?}");
+    assert!(session.is_idle());
+}
