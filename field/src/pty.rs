@@ -22,6 +22,9 @@ use thiserror::Error;
 /// Bits in a second that the terminal says it has, to programs that ask and do not set it.
 const BAUD: u32 = 115_200;
 
+/// Where the system keeps the programs' sides.
+const TERMINALS: &str = "/dev/pts";
+
 /// Why a pseudo terminal does not work.
 #[derive(Debug, Error)]
 pub enum PtyError {
@@ -95,13 +98,13 @@ impl Pty {
         self.link.as_deref().unwrap_or(&self.path)
     }
 
-    /// Makes a symbolic link to it, which is removed again at the end. A link that is left over from one that is gone is
-    /// replaced.
+    /// Makes a symbolic link to it, which is removed again at the end. A link to another pseudo terminal, which a process that was
+    /// killed has left over, is replaced.
     ///
     /// # Errors
     /// Where something else is there, or the folder cannot be written to.
     pub fn link(&mut self, path: &Path) -> Result<(), PtyError> {
-        let is_left_over = path.is_symlink() && !path.exists();
+        let is_left_over = std::fs::read_link(path).is_ok_and(|target| target.starts_with(TERMINALS));
         let linked = match is_left_over {
             true => std::fs::remove_file(path).and_then(|()| symlink(&self.path, path)),
             false => symlink(&self.path, path),
@@ -178,7 +181,9 @@ impl Pty {
 
 impl Drop for Pty {
     fn drop(&mut self) {
-        if let Some(link) = &self.link {
+        if let Some(link) = &self.link
+            && std::fs::read_link(link).is_ok_and(|target| target == self.path)
+        {
             // Nobody can be told, and the next one replaces a link that leads nowhere.
             let _ = std::fs::remove_file(link);
         }
