@@ -34,6 +34,8 @@ fn talk(
 ) -> Result<Finding> {
     let mut finding = Finding::Good;
     let mut ended = false;
+    // What the last command brought about is told before the machine has given its status twice.
+    let mut statuses = 0;
     loop {
         // One at a time, so that the commands wait in the pipe.
         if session.is_idle() && !ended {
@@ -47,7 +49,7 @@ fn talk(
                 Err(TryRecvError::Empty) => {}
             }
         }
-        if ended && session.is_idle() {
+        if ended && session.is_idle() && statuses >= 2 {
             return Ok(finding);
         }
         let was_idle = session.is_idle();
@@ -56,13 +58,15 @@ fn talk(
                 log.write(&happening)?;
             }
             match happening {
-                Happening::Connected { .. } | Happening::Command(_) | Happening::Status(..) => {}
+                Happening::Connected { .. } | Happening::Command(_) => {}
+                Happening::Status(..) => statuses += 1,
                 Happening::Lost(why) => {
-                    ensure!(was_idle, "{why}");
+                    ensure!(was_idle && !ended, "{why}");
                     eprintln!("{why}");
                 }
                 Happening::Told(_, line) => writeln!(output, "{line}")?,
                 Happening::Answer(line) => {
+                    statuses = 0;
                     if line.starts_with("error:") {
                         finding = Finding::Bad;
                     }

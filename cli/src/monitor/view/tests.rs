@@ -87,7 +87,13 @@ fn a_screen_too_small_for_all_of_it_is_drawn_as_far_as_it_goes() {
 }
 
 #[test]
-fn a_setting_that_an_answer_shows_moves_what_is_drawn() {
-    let model = machine(&["beam_to_tool_mm=800 from 100 to 2000, default 400"]);
+fn settings_that_are_shown_or_set_move_what_is_drawn() {
+    let mut model = machine(&["beam_to_tool_mm=800 from 100 to 2000, default 400"]);
     assert_eq!(model.settings.get(Setting::BeamToToolMm), 800);
+    model.update(Happening::Command("set beam_to_tool_mm 900".to_owned()));
+    model.update(Happening::Answer("error: the machine is at work, hold first".to_owned()));
+    assert_eq!(model.settings.get(Setting::BeamToToolMm), 800);
+    model.update(Happening::Command("set beam_to_tool_mm  900 ".to_owned()));
+    model.update(Happening::Answer("ok".to_owned()));
+    assert_eq!(model.settings.get(Setting::BeamToToolMm), 900);
 }
