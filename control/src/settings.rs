@@ -1,6 +1,6 @@
 //! The settings: one table of name, range, unit, default and help, and the values in use.
 //!
-//! The console reads this table from flash; a test holds the README to it. Every value is a whole number in 16 bits whose
+//! The console reads this table from flash; a test holds the manual to it. Every value is a whole number in 16 bits whose
 //! name carries its unit.
 
 use crate::{

@@ -98,7 +98,7 @@ impl Listed {
     pub fn bytes(self) -> impl Iterator<Item = u8> {
         let Self(list, place) = self;
         list.packed_bytes(place).flat_map(|byte| {
-            let literal = Some(byte).filter(|_| fragment(byte).is_none());
+            let literal = fragment(byte).is_none().then_some(byte);
             let fragment = fragment(byte).map(|Self(list, place)| list.packed_bytes(place));
             literal.into_iter().chain(fragment.into_iter().flatten())
         })

@@ -49,7 +49,7 @@ fn get_lists_every_setting_with_value_range_and_default() {
             let default = written(setting, default);
             let range =
                 if setting.is_switched() { "on or off".to_owned() } else { format!("from {least} to {greatest}") };
-            format!("{name}={default} {range}, default {default}")
+            format!("{name}={default} {range}, default {default}, not saved")
         })
         .collect();
     assert_eq!(listed, expected);
@@ -118,7 +118,8 @@ fn settings_that_change_where_the_tool_is_are_refused_while_the_machine_works() 
             assert_eq!(get(&mut uno, &name), least);
         }
     }
-    let names = ["ticks_per_rev", "wheel_mm", "beam_to_tool_mm", "margin_mm", "servo_in_us", "servo_out_us"];
+    let names =
+        ["ticks_per_rev", "wheel_mm", "ticks_per_m", "beam_to_tool_mm", "margin_mm", "servo_in_us", "servo_out_us"];
     assert_eq!(refused, names);
 
     ask(&mut uno, "hold");

@@ -144,8 +144,9 @@ fn an_erased_eeprom_gives_the_defaults_and_an_alarm_that_is_to_be_cleared_before
     assert!(k(&mut uno).starts_with("k=3 "));
     ask(&mut uno, "clear");
     ask(&mut uno, "save");
+    let cycle = uno.cycle();
     uno.power_cycle();
-    let greeting = greeting_with_the_tool_out_since(&mut uno, 0);
+    let greeting = greeting_with_the_tool_out_since(&mut uno, cycle);
     assert!(greeting.contains("state hold,"), "saved once, they are found: {greeting:?}");
 }
 
@@ -155,8 +156,9 @@ fn settings_are_saved_and_outlive_the_power() {
     for line in ["set k 5", "set beam_to_tool_mm 620", "set end_switch on", "set end_switch off", "save"] {
         ask(&mut uno, line);
     }
+    let cycle = uno.cycle();
     uno.power_cycle();
-    greeting_with_the_tool_out_since(&mut uno, 0);
+    greeting_with_the_tool_out_since(&mut uno, cycle);
     assert!(k(&mut uno).starts_with("k=5 "));
     assert!(ask(&mut uno, "get beam_to_tool_mm")[0].starts_with("beam_to_tool_mm=620 "));
     ask(&mut uno, "start");
