@@ -16,6 +16,7 @@ mod record;
 mod replay;
 mod settings;
 mod sim;
+mod soak;
 mod train;
 mod virtual_uno;
 
@@ -42,6 +43,8 @@ enum Command {
     VirtualUno(Box<virtual_uno::Arguments>),
     /// Count the cycles and bytes of the firmware and its classifier on a virtual Uno.
     BenchUno,
+    /// Work for a day with everything going wrong now and then, and say what happened.
+    Soak(soak::Arguments),
     /// Make an example table of labelled objects, and say how well it tells plants from weeds.
     Train(train::Arguments),
     /// Say what the firmware's classifier takes recorded objects for.
@@ -74,6 +77,7 @@ fn main() -> ExitCode {
         Command::Hex(arguments) => hex::run(&arguments).map(|()| Finding::Good),
         Command::VirtualUno(arguments) => virtual_uno::run(&arguments).map(|()| Finding::Good),
         Command::BenchUno => bench::run().map(|()| Finding::Good),
+        Command::Soak(arguments) => soak::run(&arguments),
         Command::Train(arguments) => train::run(&arguments),
         Command::Classify(arguments) => classify::run(&arguments),
         Command::Monitor(arguments) => monitor::run(&arguments),

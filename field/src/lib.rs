@@ -8,6 +8,7 @@
 //! - **Trials**: [`trial`] joins them, [`verdict`] judges what happened to each plant, [`report`] and [`picture`] show it,
 //!   and [`waveform`] writes down what was on the pins. [`replay`] plays a recording ([`capture`]) instead of a row, and
 //!   [`mod@bench`] counts cycles and bytes.
+//! - **Soak**: [`soak`] has everything go wrong now and then, for hours.
 //! - **Training**: [`training`] makes the example table that the firmware carries, of labelled objects.
 //! - **Wiring**: [`wiring`] says what is wired to which contact of the Uno, as a table and as a diagram.
 
@@ -31,6 +32,7 @@ pub mod report;
 pub mod row;
 pub mod servo;
 pub mod signal;
+pub mod soak;
 pub mod training;
 pub mod trial;
 pub mod uno;

@@ -23,6 +23,7 @@ mod recordings;
 mod sensor_faults;
 mod serial_noise;
 mod servo_pulses;
+mod soak;
 mod stops_and_rolls_back;
 mod tall_weeds;
 mod the_schedule_on_the_pins;
