@@ -107,9 +107,14 @@ impl Model {
         self.perhaps.append(&mut self.canopies);
     }
 
+    /// The machine may have seen this.
+    pub fn perhaps(&mut self, seen: impl IntoIterator<Item = Seen>) {
+        self.perhaps.extend(seen);
+    }
+
     /// The machine is in an alarm, and may have seen this.
     pub fn alarmed(&mut self, seen: impl Iterator<Item = Seen>) {
-        self.perhaps.extend(seen);
+        self.perhaps(seen);
         self.known_from = self.frontier;
         self.doubtful = self.open.is_some();
     }
