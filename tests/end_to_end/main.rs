@@ -15,6 +15,7 @@ mod interrupt_budgets;
 mod leaves_the_row_when_told;
 mod long_beam_distance;
 mod memory_budget;
+mod on_the_bench;
 mod paper_mode;
 mod performance_servo_jitter;
 mod performance_swing_commands;
