@@ -415,7 +415,7 @@ impl Drive {
             let leading = self.count + i64::from((leading - Position::new(self.count as i32)).0);
             Seen { leading, trailing: leading + i64::from(plan.hold.0), cut: false }
         });
-        let in_doubt = seen.into_iter().chain(told_as_seen.clone());
+        let in_doubt = seen.into_iter().chain(told_as_seen);
         if let State::Alarm(_) = self.state() {
             if !matches!(state, State::Alarm(_)) {
                 self.model.latch(frontier);
