@@ -408,6 +408,8 @@ impl Field {
         }
         excuse.harmed = true;
         excuse.blind |= self.lost_ticks.abs() >= BLIND_TICKS || self.turns <= self.blind_until_turn;
+        // Rolled back onto ground that it has not seen since it woke up: there is no margin before what it does not know.
+        excuse.blind |= out && self.weeder.unseen_mm() > 0;
         if !excuse.mistaken && !excuse.blind {
             let state = self.weeder.state();
             let (time_s, told, row) = (self.time_s(), self.told_turns, self.tally.rows);
