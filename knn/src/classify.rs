@@ -116,7 +116,9 @@ fn search<const FEATURES: usize, const CLASSES: usize>(
     nearest: &mut [Neighbour],
     radius: u32,
 ) -> Result<Answer<CLASSES>, ClassifyError> {
-    pass(examples, features, DISTANCE_LIMIT - 1, Task::<CLASSES>::Find(&mut *nearest));
+    examples.visit_near(features, DISTANCE_LIMIT - 1, &mut |distance, label| {
+        admit(nearest, Neighbour::new(distance, label)).distance()
+    });
     let [next, neighbours @ ..] = nearest else { return Err(ClassifyError::KOutOfRange) };
     let (Some(&last), Some(&first)) = (neighbours.first(), neighbours.last()) else {
         return Err(ClassifyError::KOutOfRange);
@@ -127,40 +129,16 @@ fn search<const FEATURES: usize, const CLASSES: usize>(
     let mut ballot = Ballot { votes: [0; CLASSES], unknown: false };
     if next.distance() == last.distance() {
         // There are more than k within the last neighbour's distance, perhaps more than found room: all of them vote.
-        pass(examples, features, last.distance(), Task::Count(&mut ballot));
+        examples.visit_near(features, last.distance(), &mut |_, label| {
+            ballot.count(label);
+            last.distance()
+        });
     } else {
         for neighbour in neighbours.iter() {
             ballot.count(neighbour.label());
         }
     }
     ballot.decide(neighbours, first.distance(), radius)
-}
-
-/// What a pass over the examples is for.
-enum Task<'a, const CLASSES: usize> {
-    /// To find the nearest.
-    Find(&'a mut [Neighbour]),
-    /// To have all within reach vote.
-    Count(&'a mut Ballot<CLASSES>),
-}
-
-/// Goes over the examples within reach.
-///
-/// Out of line, so that both passes share one copy of the stores' searches.
-#[inline(never)]
-fn pass<const FEATURES: usize, const CLASSES: usize>(
-    examples: &(impl Examples<FEATURES> + ?Sized),
-    features: &[u8; FEATURES],
-    reach: u32,
-    mut task: Task<CLASSES>,
-) {
-    examples.visit_near(features, reach, &mut |distance, label| match &mut task {
-        Task::Find(nearest) => admit(nearest, Neighbour::new(distance, label)).distance(),
-        Task::Count(ballot) => {
-            ballot.count(label);
-            reach
-        }
-    });
 }
 
 /// Gives an example its place among the k + 1 nearest, farthest first, and returns the k-th nearest.

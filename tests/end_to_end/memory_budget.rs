@@ -8,8 +8,8 @@ use field::planting::Planting;
 use field::trial::Trial;
 use field::verdict::Timing;
 
-/// 31 of the 31.5 KiB of flash below the Uno's bootloader.
-const FLASH_BYTES: u64 = 31 * 1024;
+/// The flash below the Uno's bootloader, 31.5 KiB.
+const FLASH_BYTES: u64 = 63 * 512;
 
 /// 1 KiB of the 2 KiB of SRAM; the rest is for the stack.
 const SRAM_BYTES: u64 = 1024;
