@@ -385,7 +385,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// Takes the tool out of the row. A latched alarm stays.
     pub fn hold(&mut self) {
-        if self.is_working() {
+        if !matches!(self.state, State::Alarm(_)) {
             self.enter(State::Hold);
         }
     }
@@ -563,7 +563,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         let tool = self.tool();
         if !self.is_working() || !self.tool_out {
             None
-        } else if self.encoder.is_doubtful() {
+        } else if self.encoder.is_doubtful() || self.encoder.is_quiet() {
             Some(Reason::EncoderDoubtful)
         } else if self.schedule.known_from().is_ahead_of(tool) {
             Some(Reason::UnseenGround)
@@ -656,7 +656,10 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             // A window once left stays left while the measured speed wavers by less than a quarter.
             (back + Ticks(back.0 / 4), out)
         };
-        self.encoder.is_doubtful() || self.is_closed(tool + near, tool + far) || self.outruns_the_beam(tool)
+        self.encoder.is_doubtful()
+            || self.tool_out && self.encoder.is_quiet()
+            || self.is_closed(tool + near, tool + far)
+            || self.outruns_the_beam(tool)
     }
 
     /// Whether the machine is so fast that a plant just behind the beam would be reached before the tool is out.
@@ -789,9 +792,10 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     }
 
     fn enter(&mut self, state: State) {
+        // What moves the tool by hand ends by `hold` as well, and by the switch going off.
+        self.bench.interrupted(state);
         if state != self.state {
             self.state = state;
-            self.bench.interrupted(state);
             self.tell(Event::State(state));
         }
     }

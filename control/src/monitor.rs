@@ -35,6 +35,10 @@ const BREAKS: u8 = 3;
 const SUDDEN: u16 = Coarse::steps_in_ms(30);
 const ROLLS: u16 = Coarse::steps_in_ms(7);
 
+/// When the speed meter begins to take silence for slowness, and leads shrink: from here on until it is clear what the silence
+/// is, a tool that is out stays out.
+const QUIET: u16 = crate::speed::SPACING;
+
 /// Watches the encoder.
 #[derive(Clone, Debug)]
 pub struct EncoderMonitor {
@@ -42,8 +46,9 @@ pub struct EncoderMonitor {
     anchor: Position,
     progress_at: Coarse,
     rolled: bool,
-    /// Whether it stands since, and whether it fell silent too suddenly.
+    /// Whether it stands since, whether it became quiet, and whether it fell silent too suddenly.
     stands: bool,
+    quiet: bool,
     fell_silent: bool,
     last: Position,
     /// Edges since the period began, all of them without progress.
@@ -63,6 +68,7 @@ impl EncoderMonitor {
             progress_at: now.coarse(),
             rolled: false,
             stands: false,
+            quiet: false,
             fell_silent: false,
             last: position,
             edges: 0,
@@ -87,11 +93,12 @@ impl EncoderMonitor {
             self.anchor = position;
             self.progress_at = now;
             self.rolled = !self.stands && since_progress <= ROLLS;
-            (self.stands, self.fell_silent) = (false, false);
+            (self.stands, self.quiet, self.fell_silent) = (false, false, false);
             self.edges = 0;
             self.breaks = 0;
-        } else if since_progress >= SUDDEN {
-            self.fell_silent |= self.rolled;
+        } else if since_progress >= QUIET {
+            self.quiet = self.rolled;
+            self.fell_silent |= self.rolled && since_progress >= SUDDEN;
             self.stands |= since_progress >= STANDS;
         }
         if position != self.last {
@@ -111,6 +118,11 @@ impl EncoderMonitor {
         }
         self.breaks = self.breaks.saturating_add(1);
         (self.breaks >= BREAKS).then_some(Alarm::EncoderSilent)
+    }
+
+    /// Whether the encoder has just become quiet, and nobody knows yet whether the machine brakes or the encoder has died.
+    pub const fn is_quiet(&self) -> bool {
+        self.quiet
     }
 
     /// Whether the machine may roll although the encoder says that it stands: it fell silent from one moment to the next, or

@@ -9,7 +9,7 @@ use crate::units::{Coarse, Instant, Position, TicksPerSecond};
 
 /// The shortest time between two remembered places. Together with their number it sets the window: long enough that the
 /// grain of a tick and of the main loop stays below half a percent at 1 km/h, short enough to follow a walking person.
-const SPACING: u16 = Coarse::steps_in_ms(10);
+pub(crate) const SPACING: u16 = Coarse::steps_in_ms(10);
 
 /// Places remembered; a power of two keeps the ring's arithmetic short.
 const SAMPLES: u8 = 8;

@@ -122,6 +122,23 @@ fn an_encoder_that_falls_silent_from_one_moment_to_the_next_has_the_tool_out_unt
 }
 
 #[test]
+fn an_encoder_that_dies_at_any_place_never_brings_the_tool_back() {
+    // All along a plant's approach, its window and what follows.
+    for died_after in (0..900).step_by(7) {
+        let mut drive = Drive::at_work();
+        drive.roll(0.78, 0.5);
+        drive.pass_a_plant(0.78);
+        drive.roll(0.78, f64::from(died_after) / 1000.0);
+        let was_out = !drive.tool_is_in();
+        for millisecond in 0..300 {
+            drive.roll(0.0, 0.001);
+            assert!(!was_out || !drive.tool_is_in(), "back {millisecond} ms after it died, {died_after} mm on");
+            assert!(millisecond < 31 || !drive.tool_is_in(), "in the row, {died_after} mm on");
+        }
+    }
+}
+
+#[test]
 fn a_machine_that_brakes_keeps_its_tool_in_the_row() {
     for speed_m_s in [0.3, 0.7, 1.3] {
         let mut drive = Drive::at_work();

@@ -44,6 +44,33 @@ fn the_tool_moves_by_hand_in_hold_only_and_is_out_again_when_the_machine_starts(
 }
 
 #[test]
+fn hold_and_the_switch_going_off_end_what_is_done_by_hand() {
+    let out = servo::from_us(2000);
+    let mut machine = machine();
+    machine.servo_in().unwrap();
+    assert_ne!(stand(&mut machine, 0, 10, 0).pulse, out);
+    machine.hold();
+    assert_eq!(stand(&mut machine, 10, 10, 0).pulse, out);
+    machine.calibrate_servo().unwrap();
+    assert_ne!(stand(&mut machine, 20, 10, 0).pulse, out);
+    machine.hold();
+    assert_eq!(stand(&mut machine, 30, 10, 0).pulse, out);
+
+    let with_switch = |machine: &mut Machine, from_ms: u64, switch_on| {
+        for now in from_ms..from_ms + 50 {
+            machine.step(Readings { switch_on, ..readings(now * 1000, 0) });
+        }
+    };
+    with_switch(&mut machine, 100, true);
+    machine.hold();
+    machine.servo_in().unwrap();
+    with_switch(&mut machine, 150, true);
+    assert_ne!(machine.orders().pulse, out);
+    with_switch(&mut machine, 200, false);
+    assert_eq!(machine.orders().pulse, out);
+}
+
+#[test]
 fn an_alarm_ends_what_is_done_by_hand() {
     let mut machine = machine();
     machine.servo_in().unwrap();

@@ -9,7 +9,7 @@
 //! - *mistaken*: plants that the classifier took for weeds;
 //! - *blind*: on the host, plants reached while the count was off by a quarter of the margin because the encoder had lied, or
 //!   within a swing and a tenth of a second of the lie; on the virtual Uno all of a row in which both channels jumped
-//!   at once, and those reached within 0.7 s of a reset or 0.3 s of the encoder's death.
+//!   at once, and those reached within 0.7 s of a reset.
 
 mod core;
 mod elf;

@@ -30,9 +30,6 @@ const PLANTING: Planting = Planting {
 /// The longest time from a reset until the tool is out: the firmware starts, and the servo swings.
 const RESTART_S: f64 = 0.7;
 
-/// The longest time from an encoder's death until the tool is out: the firmware waits for 30 ms, and the servo swings.
-const SILENCE_S: f64 = 0.3;
-
 /// Longest time from a reset to the greeting.
 const GREETING_CYCLES: u64 = CYCLES_PER_SECOND;
 
@@ -181,7 +178,6 @@ fn work(rng: &mut ChaCha8Rng, plan: Plan, elf: &Path, tally: &mut Tally) -> Resu
         let reached =
             motion.times_within_s(&(span.start + machine.beam_to_tool_mm..span.end + machine.beam_to_tool_mm));
         let answers_in_s = match fault {
-            Some(Fault::DeadEncoder) => SILENCE_S,
             _ if was_reset => RESTART_S,
             _ => 0.0,
         };
