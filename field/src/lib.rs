@@ -24,6 +24,7 @@ pub mod link;
 pub mod live;
 pub mod machine;
 pub mod motion;
+pub mod page;
 pub mod picture;
 pub mod planting;
 pub mod pty;
