@@ -9,12 +9,14 @@
 //! row's line, so the tool works the line while that is less than half its width. It is *clear* of the row only when it is
 //! fully out: that is the strict measure by which a trial judges plants, since canopies reach sideways as well.
 //!
-//! The wheel does not slip and the encoder has no jitter.
+//! The encoder has no jitter; where its disc is dirty, pulses of its channel A are missing.
 
 use crate::motion::{Motion, marks};
 use crate::row::Row;
 use crate::servo::{OUT_DEGREES, Servo, Stroke};
 use crate::signal::{CYCLES_PER_SECOND, Pin, PinChange};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 use std::f64::consts::PI;
 use std::ops::Range;
 
@@ -35,6 +37,28 @@ pub struct Machine {
     pub arm_mm: f64,
     /// Width of the tool, across the row.
     pub tool_width_mm: f64,
+    /// Dirt on the encoder's disc.
+    pub dirt: Dirt,
+}
+
+/// Dirt that hides slots of the encoder's disc from channel A, by chance: a hidden pulse loses four counts.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Dirt {
+    /// Share of the pulses that are hidden, from 0 to 1.
+    pub share: f64,
+    /// Which of all the possible discs.
+    pub seed: u64,
+}
+
+/// Counts of a pulse: both edges of both channels.
+const PULSE_TICKS: i64 = 4;
+
+impl Dirt {
+    /// Whether pulse number `pulse` is hidden: always the same ones for the same seed.
+    fn hides(&self, pulse: i64) -> bool {
+        self.share > 0.0
+            && ChaCha8Rng::seed_from_u64(self.seed ^ pulse.cast_unsigned()).random_bool(self.share.clamp(0.0, 1.0))
+    }
 }
 
 impl Default for Machine {
@@ -47,6 +71,7 @@ impl Default for Machine {
             servo: Servo::default(),
             arm_mm: 350.0,
             tool_width_mm: 55.0,
+            dirt: Dirt::default(),
         }
     }
 }
@@ -65,9 +90,15 @@ impl Machine {
         position_mm - self.beam_to_tool_mm
     }
 
-    /// Encoder counts, net, from the beginning of a motion to a time.
+    /// Counts of a clean encoder, net, from the beginning of a motion to a time.
     pub fn ticks(&self, motion: &Motion, time_s: f64) -> i64 {
-        marks(motion.position_mm(time_s) - motion.start_mm(), self.tick_mm())
+        marks(motion.wheel_mm(time_s) - motion.start_mm(), self.tick_mm())
+    }
+
+    /// Counts that dirt hides, between the beginning of a motion and `ticks` farther on.
+    pub fn hidden_ticks(&self, ticks: Range<i64>) -> i64 {
+        let pulses = ticks.start.div_euclid(PULSE_TICKS)..ticks.end.div_euclid(PULSE_TICKS);
+        pulses.filter(|&pulse| self.dirt.hides(pulse)).count() as i64 * PULSE_TICKS
     }
 
     /// Angle from which on the tool no longer works the row's line.
@@ -92,8 +123,7 @@ impl Machine {
 
     /// The beam's level at power-up, before the motion begins.
     pub fn beam_before(&self, row: &Row, motion: &Motion) -> PinChange {
-        let broken =
-            row.things().iter().flat_map(|thing| thing.blocks_mm()).any(|block| block.contains(&motion.start_mm()));
+        let broken = row.blocks_mm().iter().any(|block| block.contains(&motion.start_mm()));
         PinChange { cycle: 0, pin: Pin::Beam, high: !broken }
     }
 
@@ -109,19 +139,19 @@ impl Machine {
 
     /// Quadrature: forward is AB = 00, 10, 11, 01, 00, a count an edge.
     fn encoder_changes(&self, motion: &Motion, start_cycle: u64) -> Vec<PinChange> {
-        let mut phase = 0_u8;
+        let mut ticks = 0_i64;
         motion
             .mark_passings(self.tick_mm())
             .into_iter()
-            .map(|passing| {
-                let before = phase;
-                phase = if passing.forward { phase + 1 } else { phase + 3 } % 4;
-                let cycle = cycle_at(start_cycle, passing.time_s);
-                if channel_a(before) == channel_a(phase) {
-                    PinChange { cycle, pin: Pin::EncoderB, high: channel_b(phase) }
-                } else {
-                    PinChange { cycle, pin: Pin::EncoderA, high: channel_a(phase) }
+            .filter_map(|passing| {
+                let before = ticks;
+                ticks += if passing.forward { 1 } else { -1 };
+                let (phase, cycle) = (ticks.rem_euclid(PULSE_TICKS), cycle_at(start_cycle, passing.time_s));
+                if channel_a(before.rem_euclid(PULSE_TICKS)) == channel_a(phase) {
+                    return Some(PinChange { cycle, pin: Pin::EncoderB, high: channel_b(phase) });
                 }
+                let hidden = self.dirt.hides(ticks.min(before).div_euclid(PULSE_TICKS));
+                (!hidden).then_some(PinChange { cycle, pin: Pin::EncoderA, high: channel_a(phase) })
             })
             .collect()
     }
@@ -129,11 +159,11 @@ impl Machine {
     /// The beam's line, low while the beam is broken, later than the leaves by the sensor's response.
     fn beam_changes(&self, row: &Row, motion: &Motion, start_cycle: u64) -> Vec<PinChange> {
         let response_s = self.beam_response_ms / 1000.0;
-        let blocks: Vec<Range<f64>> = row.things().iter().flat_map(|thing| thing.blocks_mm()).collect();
 
         // Each end of a leaf that is passed toggles the beam, in whatever direction.
-        let mut toggles_s: Vec<f64> = blocks
-            .iter()
+        let mut toggles_s: Vec<f64> = row
+            .blocks_mm()
+            .into_iter()
             .flat_map(|block| [block.start, block.end])
             .flat_map(|end_mm| motion.passings(end_mm))
             .map(|passing| passing.time_s)
@@ -164,12 +194,12 @@ impl Machine {
 }
 
 /// Level of channel A in the four phases of forward motion.
-fn channel_a(phase: u8) -> bool {
+fn channel_a(phase: i64) -> bool {
     matches!(phase, 1 | 2)
 }
 
 /// Level of channel B in the four phases of forward motion.
-fn channel_b(phase: u8) -> bool {
+fn channel_b(phase: i64) -> bool {
     matches!(phase, 2 | 3)
 }
 

@@ -5,7 +5,10 @@
 //! passed follows from one quadratic equation and no time step is involved: the edges of an encoder come out at their
 //! exact times.
 //!
-//! It knows no slip and no machine: what position 0 means is the user's choice.
+//! A driven wheel turns farther than the machine rolls: its slip is the share of the wheel's way that is lost, and each piece
+//! of the motion may have its own ([`Motion::with_slip`]).
+//!
+//! It knows no machine: what position 0 means is the user's choice.
 
 use std::ops::Range;
 
@@ -42,6 +45,9 @@ struct Piece {
     end_mm: f64,
     speed_mm_s: f64,
     acceleration_mm_s2: f64,
+    /// Where the wheel's rim is when the piece begins, and how far it turns while the machine rolls a millimetre.
+    wheel_start_mm: f64,
+    wheel_mm_a_mm: f64,
 }
 
 impl Piece {
@@ -61,6 +67,16 @@ impl Piece {
         let speed_there_mm_s = squared_speed.max(0.0).sqrt().copysign(distance_mm);
         let duration_s = 2.0 * distance_mm / (self.speed_mm_s + speed_there_mm_s);
         (self.start_s + duration_s).clamp(self.start_s, self.end_s)
+    }
+
+    /// Where the wheel's rim is when the machine is at a place.
+    fn wheel_mm(&self, place_mm: f64) -> f64 {
+        self.wheel_start_mm + (place_mm - self.start_mm) * self.wheel_mm_a_mm
+    }
+
+    /// The place at which the wheel's rim is at `wheel_mm`.
+    fn place_at(&self, wheel_mm: f64) -> f64 {
+        self.start_mm + (wheel_mm - self.wheel_start_mm) / self.wheel_mm_a_mm
     }
 }
 
@@ -131,6 +147,8 @@ impl Motion {
             end_mm,
             speed_mm_s: self.end_speed_mm_s,
             acceleration_mm_s2,
+            wheel_start_mm: self.end_mm,
+            wheel_mm_a_mm: 1.0,
         };
         if duration_s > 0.0 {
             self.end_s = piece.end_s;
@@ -138,6 +156,18 @@ impl Motion {
             self.pieces.push(piece);
         }
         self.end_speed_mm_s = end_speed_mm_s;
+        self
+    }
+
+    /// The same motion of a machine whose wheel slips: `slip` is asked for the share of the wheel's way that is lost, below 1,
+    /// for each piece in turn.
+    pub fn with_slip(mut self, mut slip: impl FnMut() -> f64) -> Self {
+        let mut wheel_mm = self.start_mm;
+        for piece in &mut self.pieces {
+            piece.wheel_start_mm = wheel_mm;
+            piece.wheel_mm_a_mm = 1.0 / (1.0 - slip());
+            wheel_mm = piece.wheel_mm(piece.end_mm);
+        }
         self
     }
 
@@ -162,6 +192,15 @@ impl Motion {
             Some(piece) => piece.position_mm(time_s),
             None if time_s < 0.0 => self.start_mm,
             None => self.end_mm,
+        }
+    }
+
+    /// Where a point on the wheel's rim is, counted as if it had rolled on the ground without slip.
+    pub fn wheel_mm(&self, time_s: f64) -> f64 {
+        match (self.piece_at(time_s), self.pieces.last()) {
+            (Some(piece), _) => piece.wheel_mm(piece.position_mm(time_s)),
+            (None, Some(last)) if time_s >= 0.0 => last.wheel_mm(last.end_mm),
+            _ => self.start_mm,
         }
     }
 
@@ -222,12 +261,12 @@ impl Motion {
     ///
     /// The motion begins half way between two marks.
     pub fn mark_passings(&self, pitch_mm: f64) -> Vec<Passing> {
-        let marks_to = |position_mm: f64| marks(position_mm - self.start_mm, pitch_mm);
+        let marks_to = |wheel_mm: f64| marks(wheel_mm - self.start_mm, pitch_mm);
         let mut passings = Vec::new();
         for piece in &self.pieces {
-            let (from, to) = (marks_to(piece.start_mm), marks_to(piece.end_mm));
+            let (from, to) = (marks_to(piece.wheel_start_mm), marks_to(piece.wheel_mm(piece.end_mm)));
             let at = |mark: i64| Passing {
-                time_s: piece.time_at(self.start_mm + (mark as f64 - 0.5) * pitch_mm),
+                time_s: piece.time_at(piece.place_at(self.start_mm + (mark as f64 - 0.5) * pitch_mm)),
                 forward: to > from,
             };
             if to > from {
@@ -284,6 +323,17 @@ mod tests {
                 assert!((moved_mm - mean_mm_s * step_s).abs() < 1e-4, "at {time_s} s");
             }
         }
+    }
+
+    #[test]
+    fn a_wheel_that_slips_turns_farther_than_the_machine_rolls() {
+        let motion = Motion::steady(0.0, 1000.0, 500.0, 1900.0).with_slip(|| 0.05);
+        assert!((motion.wheel_mm(motion.duration_s()) - 2000.0).abs() < 1e-9);
+        assert_eq!(motion.end_mm(), 1900.0);
+        let passings = motion.mark_passings(10.0);
+        assert_eq!(passings.len(), 200);
+        let hundredth = motion.position_mm(passings[99].time_s);
+        assert!((hundredth - 995.0 * 0.95).abs() < 1e-6, "{hundredth} mm");
     }
 
     #[test]

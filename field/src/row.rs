@@ -3,11 +3,13 @@
 //!
 //! A [`Row`] comes from a list, from a CSV file of measured plants or, with [`Planting`](crate::planting::Planting), from a
 //! seed. Things in a row stand apart: where canopies close up, the beam sees one object, and so does the row. Weeds that
-//! are too short for the beam are not in it: they are the ground that the tool works.
+//! are too short for the beam are not in it: they are the ground that the tool works. What flies past the beam without
+//! standing anywhere (clods, insects, dust) may be added ([`Row::with_dust`]).
 //!
 //! All places are millimetres along the ground, from an origin of the row's own.
 
 use crate::csv_table::CsvTable;
+use crate::ground::union;
 use serde::Serialize;
 use std::fmt;
 use std::io;
@@ -157,6 +159,7 @@ const COLUMNS: [&str; 3] = ["position_mm", "width_mm", "kind"];
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
     things: Vec<Thing>,
+    dust_mm: Vec<Range<f64>>,
 }
 
 impl Row {
@@ -171,7 +174,17 @@ impl Row {
         things.iter().try_for_each(Thing::check)?;
         things.sort_by(|a, b| a.position_mm.total_cmp(&b.position_mm));
         things.windows(2).try_for_each(|pair| pair[1].check_after(&pair[0]))?;
-        Ok(Self { things })
+        Ok(Self { things, dust_mm: Vec::new() })
+    }
+
+    /// The same row with dust that breaks the beam over these stretches.
+    pub fn with_dust(self, dust_mm: Vec<Range<f64>>) -> Self {
+        Self { dust_mm, ..self }
+    }
+
+    /// The stretches over which the beam is broken, in ascending order and without overlaps.
+    pub fn blocks_mm(&self) -> Vec<Range<f64>> {
+        union(self.things.iter().flat_map(Thing::blocks_mm).chain(self.dust_mm.iter().cloned()).collect())
     }
 
     /// Everything that stands in the row, in ascending order of place.
@@ -228,10 +241,10 @@ impl Row {
             let (line, thing) = &pair[1];
             thing.check_after(&pair[0].1).map_err(|problem| line.error(problem.to_string()))?;
         }
-        Ok(Self { things: lines.into_iter().map(|(_, thing)| thing).collect() })
+        Ok(Self { things: lines.into_iter().map(|(_, thing)| thing).collect(), dust_mm: Vec::new() })
     }
 
-    /// Writes the row as a CSV table that [`Row::read_csv`] reads. Gaps within a ragged canopy are not kept.
+    /// Writes the row as a CSV table that [`Row::read_csv`] reads. Gaps within a ragged canopy and dust are not kept.
     ///
     /// # Errors
     /// Those of the writer.
@@ -280,7 +293,7 @@ mod tests {
     fn columns_lines_and_spaces_may_come_in_any_order() {
         let row = read("kind, position_mm, width_mm\n# measured in May\nplant, 900, 150\nweed, 500, 15\n");
         let things = vec![Thing::weed(500.0, 15.0), Thing::plant(900.0, 150.0)];
-        assert_eq!(row, Ok(Row { things }));
+        assert_eq!(row, Ok(Row::new(things).unwrap()));
     }
 
     #[test]

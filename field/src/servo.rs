@@ -5,9 +5,12 @@
 //! comes during a stroke takes the same dead time; then the servo turns from wherever it is. Widths between the two ends
 //! ask for angles between them.
 //!
-//! Widths that are no servo's are ignored. There is no load, no overshoot and no acceleration here: dead and travel time stand for all of them.
+//! Widths that are no servo's are ignored. There is no overshoot and no acceleration here: dead and travel time stand for
+//! them, and for the soil's load. Where they scatter, each command has its own, by chance.
 
 use crate::signal::{CYCLES_PER_SECOND, Pulse};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 use std::ops::{Range, RangeInclusive};
 
 /// A hobby servo and how it is set up.
@@ -21,6 +24,19 @@ pub struct Servo {
     pub dead_time_ms: f64,
     /// Time in which it then turns by [`OUT_DEGREES`].
     pub travel_ms: f64,
+    /// What dead time and travel may be off by.
+    pub scatter: Scatter,
+}
+
+/// How much a servo's swings differ from each other.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Scatter {
+    /// The dead time lies within this of its mean, evenly spread.
+    pub dead_time_ms: f64,
+    /// The soil's load makes the travel longer by a share from 0 to this, evenly spread.
+    pub load: f64,
+    /// Which of all the possible sequences of swings.
+    pub seed: u64,
 }
 
 /// Angle of the tool that is fully out of the row.
@@ -56,7 +72,7 @@ impl Command {
 impl Default for Servo {
     /// A 60 kg cm hobby servo unloaded: 60 ms of dead time, 120 ms for 45 degrees.
     fn default() -> Self {
-        Self { in_us: 1500.0, out_us: 2000.0, dead_time_ms: 60.0, travel_ms: 120.0 }
+        Self { in_us: 1500.0, out_us: 2000.0, dead_time_ms: 60.0, travel_ms: 120.0, scatter: Scatter::default() }
     }
 }
 
@@ -85,20 +101,23 @@ impl Servo {
     ///
     /// `start_cycle` is the cycle at which the movement's time is 0.
     pub fn stroke(&self, commands: &[Command], start_cycle: u64) -> Stroke {
-        let degrees_per_s = OUT_DEGREES / (self.travel_ms / 1000.0);
+        let Scatter { dead_time_ms, load, seed } = self.scatter;
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let rest_degrees = commands.first().map_or(OUT_DEGREES, |command| command.degrees);
         let mut corners = vec![Corner { time_s: f64::NEG_INFINITY, degrees: rest_degrees }];
         let mut target_degrees = rest_degrees;
         for (index, command) in commands.iter().enumerate() {
             let heard_s = (command.fall_cycle as f64 - start_cycle as f64) / CYCLES_PER_SECOND as f64;
-            let begin = Corner { time_s: heard_s + self.dead_time_ms / 1000.0, degrees: 0.0 };
+            let late_ms = rng.random_range(-1.0..=1.0) * dead_time_ms;
+            let travel_ms = self.travel_ms * (1.0 + rng.random_range(0.0..=1.0) * load);
+            let begin = Corner { time_s: heard_s + (self.dead_time_ms + late_ms) / 1000.0, degrees: 0.0 };
             let begin = Corner { degrees: angle(&corners, begin.time_s, target_degrees), ..begin };
             // A corner that the stroke had planned beyond this moment is not reached any more.
             corners.retain(|corner| corner.time_s < begin.time_s);
             corners.push(begin);
             target_degrees = command.degrees;
             if index > 0 {
-                let travel_s = (target_degrees - begin.degrees).abs() / degrees_per_s;
+                let travel_s = (target_degrees - begin.degrees).abs() / OUT_DEGREES * travel_ms / 1000.0;
                 corners.push(Corner { time_s: begin.time_s + travel_s, degrees: target_degrees });
             }
         }
