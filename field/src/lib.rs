@@ -8,8 +8,10 @@
 //! - **Trials**: [`trial`] joins them, [`verdict`] judges what happened to each plant, [`report`] and [`picture`] show it,
 //!   and [`waveform`] writes down what was on the pins. [`replay`] plays a recording ([`capture`]) instead of a row, and
 //!   [`mod@bench`] counts cycles and bytes.
+//! - **Field trials**: [`evaluation`] judges the plots of a trial, real or simulated, with the [`statistics`] that this takes.
 //! - **Soak**: [`soak`] has everything go wrong now and then, for hours.
 //! - **Training**: [`training`] makes the example table that the firmware carries, of labelled objects.
+//! - **Files**: [`whole_file`] writes one whole or not at all.
 //! - **Wiring**: [`wiring`] says what is wired to which contact of the Uno, as a table and as a diagram.
 
 pub mod bench;
@@ -17,6 +19,7 @@ pub mod capture;
 pub mod console;
 mod csv_table;
 mod drawing;
+pub mod evaluation;
 pub mod firmware;
 pub mod ground;
 pub mod hex;
@@ -34,9 +37,11 @@ pub mod row;
 pub mod servo;
 pub mod signal;
 pub mod soak;
+pub mod statistics;
 pub mod training;
 pub mod trial;
 pub mod uno;
 pub mod verdict;
 pub mod waveform;
+pub mod whole_file;
 pub mod wiring;

@@ -1,0 +1,117 @@
+//! The linear model of a response on speed and spacing, by least squares.
+
+use super::{Design, NoModel, Remark, is_zero, mean, scatter, varies};
+use linregress::fit_low_level_regression_model;
+use serde::Serialize;
+
+/// One coefficient of a linear model.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Term {
+    /// `constant`, `speed` (for each km/h) or `spacing` (for each cm).
+    pub name: &'static str,
+    /// The coefficient, in the response's unit.
+    pub estimate: f64,
+    /// Its standard error, in the same unit.
+    pub standard_error: f64,
+    /// Estimate by standard error; none where the plots do not scatter.
+    pub t: Option<f64>,
+    /// How probable such a t is where the true coefficient is zero, 0 to 1, both sides together; none where t is.
+    pub p: Option<f64>,
+}
+
+/// A response as `constant + a speed + b spacing`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LinearModel {
+    /// The constant, and a slope for each of speed and spacing that varies.
+    pub terms: Vec<Term>,
+    /// Share of the response's variation that the model explains, 0 to 1.
+    pub r_squared: f64,
+    /// The same, less what chance explains with so many terms; below 0 where the model explains less than that.
+    pub adjusted_r_squared: f64,
+    /// Standard deviation of the plots around the model, in the response's unit.
+    pub residual_standard_error: f64,
+    /// Plots less terms, at least 1.
+    pub degrees_of_freedom: usize,
+    /// What the model says of each plot, in the response's unit.
+    pub fitted: Vec<f64>,
+    /// The response less what the model says, a plot each.
+    pub residuals: Vec<f64>,
+    /// What a reader has to know of it.
+    pub remarks: Vec<Remark>,
+}
+
+impl LinearModel {
+    /// Fits the model to a response with a finite value for each plot.
+    ///
+    /// # Errors
+    /// Where the plots carry none.
+    ///
+    /// # Panics
+    /// Where there are more or fewer values than plots.
+    pub fn fit(design: &Design, values: &[f64]) -> Result<Self, NoModel> {
+        assert_eq!(values.len(), design.plots(), "a response has a value for each plot");
+        let total = scatter(values);
+        if is_zero(total, values) {
+            return Err(NoModel::Constant { value: mean(values) });
+        }
+        let mut columns = vec![("constant", vec![1.0; values.len()])];
+        let mut remarks = Vec::new();
+        let factors =
+            [("speed", &design.speeds_km_h, Remark::OneSpeed), ("spacing", &design.spacings_cm, Remark::OneSpacing)];
+        for (name, levels, constant) in factors {
+            if varies(levels) {
+                columns.push((name, levels.clone()));
+            } else {
+                remarks.push(constant);
+            }
+        }
+        match columns.as_slice() {
+            [_] => return Err(NoModel::OneTreatment),
+            [_, (_, speeds), (_, spacings)] if is_collinear(speeds, spacings) => return Err(NoModel::Inseparable),
+            _ if values.len() <= columns.len() => {
+                return Err(NoModel::TooFewPlots { plots: values.len(), parameters: columns.len() });
+            }
+            _ => {}
+        }
+
+        let row = |plot: usize| [values[plot]].into_iter().chain(columns.iter().map(move |(_, column)| column[plot]));
+        let rows: Vec<f64> = (0..values.len()).flat_map(row).collect();
+        // It refuses what has been refused above.
+        let fit = fit_low_level_regression_model(&rows, values.len(), columns.len() + 1)
+            .map_err(|_| NoModel::TooFewPlots { plots: values.len(), parameters: columns.len() })?;
+        let residuals = fit.residuals().to_vec();
+        let scatters = !is_zero(fit.ssr(), values);
+        if !scatters {
+            remarks.push(Remark::NoScatter);
+        }
+        let term = |(index, (name, _)): (usize, &(&'static str, Vec<f64>))| {
+            let (estimate, standard_error) = (fit.parameters()[index], fit.se()[index]);
+            let t = scatters.then(|| estimate / standard_error);
+            Term { name, estimate, standard_error, t, p: scatters.then(|| fit.p_values()[index]) }
+        };
+        Ok(Self {
+            terms: columns.iter().enumerate().map(term).collect(),
+            r_squared: fit.rsquared(),
+            adjusted_r_squared: fit.rsquared_adj(),
+            residual_standard_error: fit.scale().sqrt(),
+            degrees_of_freedom: values.len() - columns.len(),
+            fitted: values.iter().zip(&residuals).map(|(value, residual)| value - residual).collect(),
+            residuals,
+            remarks,
+        })
+    }
+
+    /// The term of this name, where the model has it.
+    pub fn term(&self, name: &str) -> Option<&Term> {
+        self.terms.iter().find(|term| term.name == name)
+    }
+}
+
+/// Whether one column follows from the other.
+fn is_collinear(a: &[f64], b: &[f64]) -> bool {
+    /// Share of a column that the other leaves unexplained, below which the coefficients are all rounding.
+    const TOLERANCE: f64 = 1e-9;
+    let (mean_a, mean_b) = (mean(a), mean(b));
+    let together: f64 = a.iter().zip(b).map(|(a, b)| (a - mean_a) * (b - mean_b)).sum();
+    1.0 - together * together / (scatter(a) * scatter(b)) < TOLERANCE
+}

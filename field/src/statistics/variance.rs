@@ -1,0 +1,195 @@
+//! The two-way analysis of variance: how much of a response's variation goes with speed, with spacing, with both together,
+//! and with neither.
+//!
+//! Four models are nested in each other: one mean, a mean for each speed, effects of speed and spacing that add up, a
+//! mean for each treatment. A source's sum of squares is what its model leaves less than the one before.
+
+use super::{Design, NoModel, Remark, is_zero, mean, scatter, varies};
+use nalgebra::{DMatrix, DVector};
+use serde::Serialize;
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+
+/// One line of an analysis of variance.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Source {
+    /// `speed`, `spacing`, `speed x spacing` or `residual`.
+    pub name: &'static str,
+    /// Free parameters that it stands for, at least 1.
+    pub degrees_of_freedom: usize,
+    /// The variation that goes with it, in the response's unit squared.
+    pub sum_of_squares: f64,
+    /// The same for each degree of freedom.
+    pub mean_square: f64,
+    /// Its mean square by that of the residual; none for the residual, and where the plots do not scatter.
+    pub f: Option<f64>,
+    /// How probable an F as large is where the source has no effect, 0 to 1; none where F is.
+    pub p: Option<f64>,
+}
+
+/// A response's variation, taken apart by speed and spacing as factors.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct AnalysisOfVariance {
+    /// The sources that the trial can tell apart, the residual last.
+    pub sources: Vec<Source>,
+    /// What a reader has to know of it.
+    pub remarks: Vec<Remark>,
+}
+
+/// What a model leaves of a response.
+#[derive(Clone, Copy)]
+struct Fit {
+    parameters: usize,
+    sum_of_squares: f64,
+}
+
+impl AnalysisOfVariance {
+    /// Takes a response apart that has a finite value for each plot.
+    ///
+    /// # Errors
+    /// Where the plots carry no such analysis.
+    ///
+    /// # Panics
+    /// Where there are more or fewer values than plots.
+    pub fn of(design: &Design, values: &[f64]) -> Result<Self, NoModel> {
+        assert_eq!(values.len(), design.plots(), "a response has a value for each plot");
+        if is_zero(scatter(values), values) {
+            return Err(NoModel::Constant { value: mean(values) });
+        }
+        let (has_speed, has_spacing) = (varies(&design.speeds_km_h), varies(&design.spacings_cm));
+        let speeds = Levels::of(design.speeds_km_h.iter().map(|speed| (*speed, 0.0)));
+        let spacings = Levels::of(design.spacings_cm.iter().map(|spacing| (0.0, *spacing)));
+        let treatments = Levels::of(design.speeds_km_h.iter().copied().zip(design.spacings_cm.iter().copied()));
+
+        let mut fits = vec![("", Fit { parameters: 1, sum_of_squares: scatter(values) })];
+        let mut remarks = Vec::new();
+        if has_speed {
+            fits.push(("speed", treatments_fit(&speeds, values)));
+        } else {
+            remarks.push(Remark::OneSpeed);
+        }
+        if has_spacing {
+            fits.push(("spacing", additive_fit(&speeds, &spacings, values)));
+        } else {
+            remarks.push(Remark::OneSpacing);
+        }
+        if has_speed && has_spacing {
+            let (by_speed, both) = (fits[1].1.parameters, fits[2].1.parameters);
+            if both == by_speed || both == spacings.count {
+                return Err(NoModel::Inseparable);
+            }
+            let each = treatments_fit(&treatments, values);
+            if each.parameters == values.len() {
+                remarks.push(Remark::NoReplication);
+            } else if each.parameters > both {
+                fits.push(("speed x spacing", each));
+            }
+            if !treatments.are_balanced(speeds.count * spacings.count) {
+                remarks.push(Remark::Unbalanced);
+            }
+        }
+        let [(_, total), .., (_, last)] = fits.as_slice() else { return Err(NoModel::OneTreatment) };
+        let (total, last) = (*total, *last);
+        if last.parameters >= values.len() {
+            return Err(NoModel::TooFewPlots { plots: values.len(), parameters: last.parameters });
+        }
+        debug_assert!(last.sum_of_squares <= total.sum_of_squares * (1.0 + 1e-9), "a larger model leaves no more");
+
+        let residual_freedom = values.len() - last.parameters;
+        let residual_mean_square = last.sum_of_squares / residual_freedom as f64;
+        let scatters = !is_zero(last.sum_of_squares, values);
+        if !scatters {
+            remarks.push(Remark::NoScatter);
+        }
+        let source = |pair: &[(&'static str, Fit)]| {
+            let (before, (name, after)) = (pair[0].1, pair[1]);
+            let degrees_of_freedom = after.parameters - before.parameters;
+            let sum_of_squares = (before.sum_of_squares - after.sum_of_squares).max(0.0);
+            let mean_square = sum_of_squares / degrees_of_freedom as f64;
+            let f = scatters.then(|| mean_square / residual_mean_square);
+            let p = f.and_then(|f| probability(f, degrees_of_freedom, residual_freedom));
+            Source { name, degrees_of_freedom, sum_of_squares, mean_square, f, p }
+        };
+        let mut sources: Vec<Source> = fits.windows(2).map(source).collect();
+        sources.push(Source {
+            name: "residual",
+            degrees_of_freedom: residual_freedom,
+            sum_of_squares: last.sum_of_squares,
+            mean_square: residual_mean_square,
+            f: None,
+            p: None,
+        });
+        Ok(Self { sources, remarks })
+    }
+
+    /// The source of this name, where the analysis has it.
+    pub fn source(&self, name: &str) -> Option<&Source> {
+        self.sources.iter().find(|source| source.name == name)
+    }
+}
+
+/// How probable an F as large as this is by chance.
+fn probability(f: f64, of_source: usize, of_residual: usize) -> Option<f64> {
+    FisherSnedecor::new(of_source as f64, of_residual as f64).ok().map(|distribution| distribution.sf(f))
+}
+
+/// The level of a factor that each plot has.
+struct Levels {
+    of_plot: Vec<usize>,
+    count: usize,
+}
+
+impl Levels {
+    /// The levels of plots by what they have.
+    fn of(plots: impl Iterator<Item = (f64, f64)>) -> Self {
+        let mut known: Vec<(f64, f64)> = Vec::new();
+        let of_plot = plots.map(|plot| {
+            known.iter().position(|level| *level == plot).unwrap_or_else(|| {
+                known.push(plot);
+                known.len() - 1
+            })
+        });
+        let of_plot = of_plot.collect();
+        Self { of_plot, count: known.len() }
+    }
+
+    /// Whether there are so many levels, with as many plots each.
+    fn are_balanced(&self, count: usize) -> bool {
+        let plots = |level| self.of_plot.iter().filter(|of_plot| **of_plot == level).count();
+        self.count == count && (1..count).all(|level| plots(level) == plots(0))
+    }
+}
+
+/// A mean for each level.
+fn treatments_fit(levels: &Levels, values: &[f64]) -> Fit {
+    let of_level = |level: usize| -> Vec<f64> {
+        let both = levels.of_plot.iter().zip(values);
+        both.filter(|(of_plot, _)| **of_plot == level).map(|(_, value)| *value).collect()
+    };
+    Fit { parameters: levels.count, sum_of_squares: (0..levels.count).map(|level| scatter(&of_level(level))).sum() }
+}
+
+/// Effects of two factors that add up.
+fn additive_fit(speeds: &Levels, spacings: &Levels, values: &[f64]) -> Fit {
+    /// Singular values below this share of the largest are rounding.
+    const TOLERANCE: f64 = 1e-9;
+    let mean = mean(values);
+    let response = DVector::from_iterator(values.len(), values.iter().map(|value| value - mean));
+    // A column for each level of either: one more than needed, which the singular values tell.
+    let columns = DMatrix::from_fn(values.len(), speeds.count + spacings.count, |plot, column| {
+        let is_at = match column.checked_sub(speeds.count) {
+            None => speeds.of_plot[plot] == column,
+            Some(spacing) => spacings.of_plot[plot] == spacing,
+        };
+        f64::from(is_at)
+    });
+    let decomposition = columns.svd(true, false);
+    let smallest = decomposition.singular_values.max() * TOLERANCE;
+    let mut residual = response.clone();
+    let mut parameters = 0;
+    let basis = decomposition.u.iter().flat_map(|u| u.column_iter().collect::<Vec<_>>());
+    for (direction, _) in basis.zip(&decomposition.singular_values).filter(|(_, size)| **size > smallest) {
+        residual -= direction * direction.dot(&response);
+        parameters += 1;
+    }
+    Fit { parameters, sum_of_squares: residual.norm_squared() }
+}
