@@ -1,0 +1,179 @@
+//! The page's figures: which plot shows what, its legend, and the same in words for those who cannot see it.
+
+use super::plot::{DrawingError, Look, Plot, Series, Shade, key, range_of};
+use super::table::{fixed, short};
+use super::{Comparison, ControllerPoint};
+use crate::evaluation::{Analysis, Response, ResponseAnalysis};
+use crate::statistics::LinearModel;
+
+/// A plot with all that belongs to it.
+pub struct Figure {
+    /// What it shows.
+    pub title: String,
+    /// The unit of what is upwards, or what it is a share of.
+    pub unit: String,
+    /// The plot.
+    pub svg: String,
+    /// What the lines and markers mean.
+    pub legend: Vec<Key>,
+    /// The plot in words.
+    pub words: String,
+    /// What else has to be known.
+    pub caption: String,
+}
+
+/// One entry of a legend.
+pub struct Key {
+    /// Line and marker.
+    pub svg: String,
+    /// Whose they are.
+    pub meaning: String,
+}
+
+const SPEED: &str = "speed, km/h";
+
+/// Plant damage of each controller against speed.
+pub fn damage(comparison: &Comparison) -> Result<Figure, DrawingError> {
+    let limit = (comparison.unavoidable.as_slice(), Shade::Below, "unavoidable: the row slips or scatters that much");
+    let title = ("Plant damage", "% of the plants");
+    let caption = "Plants whose canopy the tool touched. Lower is better.";
+    curves(comparison, title, caption, |point| point.plant_damage_percent, limit)
+}
+
+/// Weeding in the row of each controller against speed.
+pub fn weeding(comparison: &Comparison) -> Result<Figure, DrawingError> {
+    let limit = (comparison.bound.as_slice(), Shade::Above, "physical bound: out of this servo's reach");
+    let title = ("In-row weeding", "% of the row's ground");
+    let caption = "Ground of the row that the tool worked. Higher is better, but what lies above the bound is paid for with plants.";
+    curves(comparison, title, caption, |point| point.in_row_weeding_percent, limit)
+}
+
+fn curves(
+    comparison: &Comparison,
+    (title, unit): (&str, &str),
+    caption: &str,
+    value: fn(&ControllerPoint) -> f64,
+    (limit, shade, meaning): (&[(f64, f64)], Shade, &str),
+) -> Result<Figure, DrawingError> {
+    let mut series = Vec::new();
+    let mut legend = Vec::new();
+    let mut words = format!("{title} in {unit} against speed.");
+    for (index, controller) in comparison.controllers.iter().enumerate() {
+        let look = Look::of_series(index);
+        let line: Vec<_> = controller.points.iter().map(|point| (point.speed_km_h, value(point))).collect();
+        words += &said(&controller.name, &line);
+        legend.push(Key { svg: key(look)?, meaning: controller.name.clone() });
+        series.push(Series { look, line, cloud: Vec::new() });
+    }
+    if !limit.is_empty() {
+        words += &said(meaning, limit);
+        legend.push(Key { svg: key(Look::LIMIT)?, meaning: meaning.to_owned() });
+    }
+    // The first is drawn last: it is the one to be seen where lines meet.
+    series.reverse();
+    let points = || series.iter().flat_map(|series| &series.line).chain(limit);
+    let plot = Plot {
+        x_label: SPEED,
+        x: range_of(points().map(|point| point.0), false),
+        y: range_of(points().map(|point| point.1), true),
+        series: &series,
+        limit: (!limit.is_empty()).then_some((limit, shade)),
+    };
+    Ok(Figure { title: title.into(), unit: unit.into(), svg: plot.svg()?, legend, words, caption: caption.into() })
+}
+
+/// One measure of a trial against speed, a line a spacing through the means, with the plots around them.
+pub fn response(analysis: &Analysis, response: Response) -> Result<Figure, DrawingError> {
+    let treatments = analysis.treatments();
+    let mut series = Vec::new();
+    let mut legend = Vec::new();
+    let mut words = format!("{} in {} against speed.", response.title(), response.unit());
+    for (index, spacing_cm) in spacings_cm(analysis).into_iter().enumerate() {
+        let look = Look::of_series(index);
+        let of_spacing = treatments.iter().filter(|treatment| treatment.spacing_cm == spacing_cm);
+        let line: Vec<_> =
+            of_spacing.map(|treatment| (treatment.speed_km_h, response.value(&treatment.mean))).collect();
+        let plots = analysis.records.iter().zip(&analysis.performances);
+        let cloud = plots
+            .filter(|(record, _)| record.spacing_cm == spacing_cm)
+            .map(|(record, performance)| (record.speed_km_h, response.value(performance)))
+            .collect();
+        let meaning = spacing(spacing_cm);
+        words += &said(&meaning, &line);
+        legend.push(Key { svg: key(look)?, meaning });
+        series.push(Series { look, line, cloud });
+    }
+    let points = || series.iter().flat_map(|series| &series.cloud);
+    let plot = Plot {
+        x_label: SPEED,
+        x: range_of(points().map(|point| point.0), false),
+        y: range_of(points().map(|point| point.1), response == Response::PlantDamage),
+        series: &series,
+        limit: None,
+    };
+    Ok(Figure {
+        title: response.title().into(),
+        unit: response.unit().into(),
+        svg: plot.svg()?,
+        legend,
+        words,
+        caption: format!("The paper's Fig. {}.", paper_figure(response)),
+    })
+}
+
+/// What a model leaves of each plot, against what it says of it.
+pub fn residuals(analysis: &Analysis, of: &ResponseAnalysis, model: &LinearModel) -> Result<Figure, DrawingError> {
+    let x = range_of(model.fitted.iter().copied(), false);
+    let mut series = vec![Series { look: Look::LIMIT, line: vec![(x.start, 0.0), (x.end, 0.0)], cloud: Vec::new() }];
+    let mut legend = Vec::new();
+    for (index, spacing_cm) in spacings_cm(analysis).into_iter().enumerate() {
+        let look = Look::of_series(index);
+        let points = model.fitted.iter().copied().zip(model.residuals.iter().copied());
+        let of_spacing = points.zip(&analysis.records).filter(|(_, record)| record.spacing_cm == spacing_cm);
+        legend.push(Key { svg: key(look)?, meaning: spacing(spacing_cm) });
+        series.push(Series { look, line: Vec::new(), cloud: of_spacing.map(|(point, _)| point).collect() });
+    }
+    let farthest = model.residuals.iter().fold(0.0, |farthest: f64, residual| farthest.max(residual.abs()));
+    let unit = of.response.unit();
+    let label = format!("by the model, {unit}");
+    let plot = Plot { x_label: &label, x, y: range_of([-farthest, farthest], false), series: &series, limit: None };
+    Ok(Figure {
+        title: "Residuals".into(),
+        unit: unit.into(),
+        svg: plot.svg()?,
+        legend,
+        words: format!(
+            "Residuals of the {} plots against what the model says of them; the farthest is {} {unit} off.",
+            model.residuals.len(),
+            fixed(farthest, 2),
+        ),
+        caption: "What the model leaves of each plot. A curve or a funnel in it says that a straight line is the wrong model.".into(),
+    })
+}
+
+/// The spacings of a trial, narrow first.
+fn spacings_cm(analysis: &Analysis) -> Vec<f64> {
+    let mut spacings: Vec<f64> = analysis.records.iter().map(|record| record.spacing_cm).collect();
+    spacings.sort_by(f64::total_cmp);
+    spacings.dedup();
+    spacings
+}
+
+fn spacing(spacing_cm: f64) -> String {
+    format!("{} cm plant spacing", short(spacing_cm))
+}
+
+/// A line in words.
+fn said(name: &str, line: &[(f64, f64)]) -> String {
+    let points: Vec<String> = line.iter().map(|(x, y)| format!("{} at {} km/h", fixed(*y, 1), short(*x))).collect();
+    format!(" {name}: {}.", points.join(", "))
+}
+
+fn paper_figure(response: Response) -> u32 {
+    match response {
+        Response::PlantDamage => 8,
+        Response::WeedingEfficiency => 9,
+        Response::PerformanceIndex => 10,
+        Response::FieldEfficiency => 11,
+    }
+}

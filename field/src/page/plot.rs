@@ -1,0 +1,211 @@
+//! The page's plots: lines with markers over speed, and clouds of points, as SVG that stands within a page.
+//!
+//! Series differ in colour, marker and dashes. The colours in here are those of light paper, and at the same time names: the
+//! page's style sheet puts others in their place for dark paper, and dashes the lines. Plots are drawn at twice the size at which
+//! they are usually shown, because plotters works in whole pixels. Legends and titles are the page's, not the plot's.
+
+use plotters::coord::Shift;
+use plotters::element::{DynElement, IntoDynElement};
+use plotters::prelude::*;
+use std::io;
+use std::ops::Range;
+
+/// What plotters says where it cannot draw.
+pub type DrawingError = DrawingAreaErrorKind<io::Error>;
+
+/// Size of a plot, and of a series' mark in a legend, in pixels.
+const PLOT_SIZE: (u32, u32) = (840, 560);
+const KEY_SIZE: (u32, u32) = (88, 36);
+
+/// Ink for words, for axes, for the mesh, and for what is out of reach.
+const INK: RGBColor = RGBColor(0x33, 0x31, 0x2C);
+const AXIS: RGBColor = RGBColor(0x8A, 0x85, 0x7A);
+const MESH: RGBColor = RGBColor(0xE6, 0xE2, 0xD6);
+const LIMIT: RGBColor = RGBColor(0x5F, 0x5B, 0x52);
+
+/// Colours after Okabe and Ito, darker where they would be pale on white, and markers. They are told apart by people who see few
+/// colours too.
+const LOOKS: [Look; 4] = [
+    Look { colour: RGBColor(0x00, 0x72, 0xB2), marker: Some(Marker::Circle) },
+    Look { colour: RGBColor(0xD5, 0x5E, 0x00), marker: Some(Marker::Triangle) },
+    Look { colour: RGBColor(0x00, 0x8F, 0x68), marker: Some(Marker::Cross) },
+    Look { colour: RGBColor(0xB5, 0x56, 0x8A), marker: Some(Marker::UpturnedTriangle) },
+];
+
+/// How a series looks.
+#[derive(Clone, Copy)]
+pub struct Look {
+    colour: RGBColor,
+    marker: Option<Marker>,
+}
+
+#[derive(Clone, Copy)]
+enum Marker {
+    Circle,
+    Triangle,
+    Cross,
+    UpturnedTriangle,
+}
+
+impl Look {
+    /// A limit that nature sets, which is not measured and so has no markers.
+    pub const LIMIT: Self = Self { colour: LIMIT, marker: None };
+
+    /// The look of one of many series; they recur after four.
+    pub fn of_series(index: usize) -> Self {
+        LOOKS[index % LOOKS.len()]
+    }
+
+    fn stroke(self) -> ShapeStyle {
+        self.colour.stroke_width(5)
+    }
+}
+
+/// Some points that belong together.
+pub struct Series {
+    /// How they look.
+    pub look: Look,
+    /// Joined by a line, with large markers.
+    pub line: Vec<(f64, f64)>,
+    /// Small pale markers of their own.
+    pub cloud: Vec<(f64, f64)>,
+}
+
+/// Ground on one side of a line that is out of reach.
+#[derive(Clone, Copy, PartialEq)]
+pub enum Shade {
+    /// From the line upwards.
+    Above,
+    /// From the line downwards.
+    Below,
+}
+
+/// A plot: what is in it, and which part of the plane it shows.
+pub struct Plot<'a> {
+    /// What is to the right, with its unit.
+    pub x_label: &'a str,
+    /// The part of the plane.
+    pub x: Range<f64>,
+    /// The same upwards.
+    pub y: Range<f64>,
+    /// What is drawn, the last on top.
+    pub series: &'a [Series],
+    /// A limit, and the side of it that nothing reaches.
+    pub limit: Option<(&'a [(f64, f64)], Shade)>,
+}
+
+impl Plot<'_> {
+    /// Draws it.
+    ///
+    /// # Errors
+    /// Where plotters cannot draw it, as for a range without extent.
+    pub fn svg(&self) -> Result<String, DrawingError> {
+        svg(PLOT_SIZE, |area| {
+            let mut chart = ChartBuilder::on(area)
+                .margin(6)
+                .margin_top(14)
+                .margin_right(22)
+                .x_label_area_size(84)
+                .y_label_area_size(84)
+                .build_cartesian_2d(self.x.clone(), self.y.clone())?;
+            let words = ("sans-serif", 34).into_font().color(&INK);
+            chart
+                .configure_mesh()
+                .disable_x_mesh()
+                .max_light_lines(0)
+                .bold_line_style(MESH.stroke_width(2))
+                .axis_style(AXIS.stroke_width(2))
+                .x_labels(6)
+                .y_labels(6)
+                .x_label_formatter(&|value| tick(*value))
+                .y_label_formatter(&|value| tick(*value))
+                .label_style(words.clone())
+                .x_desc(self.x_label)
+                .axis_desc_style(words)
+                .draw()?;
+            if let Some((limit, shade)) = self.limit {
+                let base = if shade == Shade::Above { self.y.end } else { self.y.start };
+                chart.draw_series(AreaSeries::new(limit.iter().copied(), base, LIMIT.mix(0.12)))?;
+                chart.draw_series(LineSeries::new(limit.iter().copied(), Look::LIMIT.stroke()))?;
+            }
+            for series in self.series {
+                let colour = series.look.colour;
+                chart.draw_series(LineSeries::new(series.line.iter().copied(), series.look.stroke()))?;
+                if let Some(marker) = series.look.marker {
+                    chart.draw_series(series.cloud.iter().map(|&point| marker.at(point, 8, colour.mix(0.5))))?;
+                    chart.draw_series(series.line.iter().map(|&point| marker.at(point, 12, colour.to_rgba())))?;
+                }
+            }
+            Ok(())
+        })
+    }
+}
+
+/// Draws the mark of a series in a legend.
+///
+/// # Errors
+/// Where plotters cannot draw it.
+pub fn key(look: Look) -> Result<String, DrawingError> {
+    let (width, height) = (KEY_SIZE.0 as i32, KEY_SIZE.1 as i32);
+    svg(KEY_SIZE, |area| {
+        area.draw(&PathElement::new([(0, height / 2), (width, height / 2)], look.stroke()))?;
+        if let Some(marker) = look.marker {
+            area.draw(&marker.at((width / 2, height / 2), 12, look.colour.to_rgba()))?;
+        }
+        Ok(())
+    })
+}
+
+/// A range that holds all values with some air around them, from zero where `from_zero` says so. It has an extent even where all
+/// values are the same, or there are none.
+pub fn range_of(values: impl IntoIterator<Item = f64>, from_zero: bool) -> Range<f64> {
+    const AIR: f64 = 0.08;
+    let start = if from_zero { 0.0 } else { f64::INFINITY };
+    let (low, high) =
+        values.into_iter().fold((start, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
+    if low > high {
+        return 0.0..1.0;
+    }
+    let extent = if high > low { high - low } else { high.abs().max(1.0) };
+    let air = extent * AIR;
+    if from_zero && low == 0.0 { 0.0..high.max(extent) + air } else { low - air..high + air }
+}
+
+impl Marker {
+    /// The marker at a point; its size is half its width in pixels.
+    fn at<DB, Point>(self, point: Point, size: i32, colour: RGBAColor) -> DynElement<'static, DB, Point>
+    where
+        DB: DrawingBackend,
+        Point: Clone + 'static,
+    {
+        let tip = size + size / 4;
+        match self {
+            Self::Circle => Circle::new(point, size, colour.filled()).into_dyn(),
+            Self::Triangle => TriangleMarker::new(point, tip, colour.filled()).into_dyn(),
+            Self::Cross => Cross::new(point, size - size / 6, colour.stroke_width(5)).into_dyn(),
+            // It stands on its tip.
+            Self::UpturnedTriangle => TriangleMarker::new(point, -tip, colour.filled()).into_dyn(),
+        }
+    }
+}
+
+/// A number at an axis, without the digits that come from counting in binary fractions.
+fn tick(value: f64) -> String {
+    let rounded = (value * 1e4).round() / 1e4;
+    // Minus zero is zero.
+    (rounded + 0.0).to_string().replace('-', "\u{2212}")
+}
+
+/// An SVG of that size with what is drawn on it.
+fn svg(
+    size: (u32, u32),
+    draw: impl FnOnce(&DrawingArea<SVGBackend, Shift>) -> Result<(), DrawingError>,
+) -> Result<String, DrawingError> {
+    let mut svg = String::new();
+    {
+        let area = SVGBackend::with_string(&mut svg, size).into_drawing_area();
+        draw(&area)?;
+        area.present()?;
+    }
+    Ok(svg)
+}

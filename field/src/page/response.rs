@@ -1,0 +1,170 @@
+//! A chapter of the page: what the plots together say of one measure, with what the paper printed of it beside.
+
+use super::figure::{Figure, residuals};
+use super::plot::DrawingError;
+use super::table::{NOTHING, Table, fixed, optional, probability, short, significant};
+use crate::evaluation::published::{Coefficients, Published};
+use crate::evaluation::{Analysis, ResponseAnalysis};
+use crate::statistics::{AnalysisOfVariance, LinearModel};
+
+/// What the page says of one measure.
+pub struct Chapter {
+    /// The measure.
+    pub title: &'static str,
+    /// The model as an equation, or why there is none.
+    pub model: Result<String, String>,
+    /// The paper's equation, and its number; empty where it cannot be read.
+    pub published: String,
+    /// The paper's equation number.
+    pub equation_number: u32,
+    /// The coefficients, and how well the model fits.
+    pub tables: Vec<Table>,
+    /// The analysis of variance, or why there is none.
+    pub variance: Result<Table, String>,
+    /// What has to be known of either, and of the paper's figures.
+    pub remarks: Vec<String>,
+    /// What contradicts what in the paper.
+    pub contradictions: &'static [&'static str],
+    /// The residuals; there are none without a model.
+    pub residuals: Option<Figure>,
+}
+
+impl Chapter {
+    /// The chapter on a measure.
+    ///
+    /// # Errors
+    /// Where plotters cannot draw the residuals.
+    pub fn of(analysis: &Analysis, of: &ResponseAnalysis) -> Result<Self, DrawingError> {
+        let (model, variance) = (of.model.as_ref(), of.variance.as_ref());
+        let name = of.response.title().to_lowercase();
+        let equation = |coefficients: &Coefficients| equation(&name, coefficients);
+        let mut remarks = Vec::new();
+        let of_model = model.iter().flat_map(|model| &model.remarks);
+        for remark in of_model.chain(variance.iter().flat_map(|variance| &variance.remarks)) {
+            let remark = sentence(&remark.to_string());
+            if !remarks.contains(&remark) {
+                remarks.push(remark);
+            }
+        }
+        Ok(Self {
+            title: of.response.title(),
+            model: model.map(|model| equation(&coefficients(model))).map_err(|why| sentence(&why.to_string())),
+            published: equation(&of.published.equation),
+            equation_number: of.published.equation_number,
+            tables: vec![terms(of, model.ok()), fit(analysis, of, model.ok())],
+            variance: variance.map(sources).map_err(|why| sentence(&why.to_string())),
+            remarks,
+            contradictions: of.published.contradictions,
+            residuals: model.ok().map(|model| residuals(analysis, of, model)).transpose()?,
+        })
+    }
+}
+
+/// The model's coefficients, in the shape of the paper's.
+fn coefficients(model: &LinearModel) -> Coefficients {
+    let estimate = |name| model.term(name).map(|term| term.estimate);
+    Coefficients { constant: estimate("constant"), per_km_h: estimate("speed"), per_cm: estimate("spacing") }
+}
+
+/// A measure as an equation; empty where no coefficient is known.
+fn equation(name: &str, coefficients: &Coefficients) -> String {
+    let factors =
+        [(coefficients.constant, ""), (coefficients.per_km_h, " × speed"), (coefficients.per_cm, " × spacing")];
+    let mut right = String::new();
+    for (value, factor) in factors {
+        let Some(value) = value else { continue };
+        let sign = match (value < 0.0, right.is_empty()) {
+            (true, true) => "\u{2212}",
+            (true, false) => " \u{2212} ",
+            (false, true) => "",
+            (false, false) => " + ",
+        };
+        right += &format!("{sign}{}{factor}", significant(value.abs()));
+    }
+    if right.is_empty() { right } else { format!("{name} = {right}") }
+}
+
+/// The coefficients with what chance may have done to them, beside the paper's.
+fn terms(of: &ResponseAnalysis, model: Option<&LinearModel>) -> Table {
+    let Published { equation, text, equation_number, .. } = of.published;
+    let mut table = Table::new(
+        "Linear model",
+        [
+            "term",
+            "estimate",
+            "standard error",
+            "t",
+            "p",
+            &format!("paper, Eq. {equation_number}"),
+            "paper, in its text",
+        ],
+    );
+    let rows = [
+        ("constant", "constant", equation.constant, text.constant),
+        ("speed", "for each km/h", equation.per_km_h, text.per_km_h),
+        ("spacing", "for each cm of spacing", equation.per_cm, text.per_cm),
+    ];
+    for (name, meaning, equation, text) in rows {
+        let term = model.and_then(|model| model.term(name));
+        table.rows.push(vec![
+            meaning.to_owned(),
+            optional(term.map(|term| term.estimate), significant),
+            optional(term.map(|term| term.standard_error), significant),
+            optional(term.and_then(|term| term.t), |t| fixed(t, 2)),
+            optional(term.and_then(|term| term.p), probability),
+            optional(equation, short),
+            optional(text, short),
+        ]);
+    }
+    table
+}
+
+/// How well the model fits, and over which range, beside the paper's.
+fn fit(analysis: &Analysis, of: &ResponseAnalysis, model: Option<&LinearModel>) -> Table {
+    let values = || analysis.performances.iter().map(|performance| of.response.value(performance));
+    let (low, high) =
+        values().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
+    let range = |low: f64, high: f64| format!("{} to {}", fixed(low, 2), fixed(high, 2));
+    let published: Vec<String> = of.published.ranges.iter().map(|(low, high)| range(*low, *high)).collect();
+    let share = |value| fixed(value, 4);
+    let row = |what: &str, ours: String, paper: String| vec![what.to_owned(), ours, paper];
+    let mut table = Table::new("Fit and range", ["", "this trial", "paper"]);
+    table.rows = vec![
+        row("R²", optional(model.map(|model| model.r_squared), share), share(of.published.r_squared)),
+        row(
+            "adjusted R²",
+            optional(model.map(|model| model.adjusted_r_squared), share),
+            optional(of.published.adjusted_r_squared, share),
+        ),
+        row(
+            "residual standard error",
+            optional(model.map(|model| model.residual_standard_error), significant),
+            NOTHING.to_owned(),
+        ),
+        row(&format!("range, {}", of.response.unit()), range(low, high), published.join("; ")),
+    ];
+    table
+}
+
+fn sources(variance: &AnalysisOfVariance) -> Table {
+    let mut table =
+        Table::new("Analysis of variance", ["source", "degrees of freedom", "sum of squares", "mean square", "F", "p"]);
+    for source in &variance.sources {
+        table.rows.push(vec![
+            source.name.replace(" x ", " × "),
+            source.degrees_of_freedom.to_string(),
+            significant(source.sum_of_squares),
+            significant(source.mean_square),
+            optional(source.f, |f| fixed(f, 2)),
+            optional(source.p, probability),
+        ]);
+    }
+    table
+}
+
+/// Words with a capital letter in front and a full stop behind.
+fn sentence(words: &str) -> String {
+    let mut letters = words.chars();
+    let first = letters.next().map(|letter| letter.to_uppercase().to_string()).unwrap_or_default();
+    format!("{first}{}.", letters.as_str())
+}

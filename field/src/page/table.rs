@@ -1,0 +1,74 @@
+//! The page's tables, and how numbers read in them.
+
+/// A table whose first column names its rows.
+pub struct Table {
+    /// What is in it.
+    pub caption: String,
+    /// What stands above each column.
+    pub columns: Vec<String>,
+    /// The rows, with a cell a column.
+    pub rows: Vec<Vec<String>>,
+    /// Whether its cells are words, which stand to the left.
+    pub is_prose: bool,
+}
+
+impl Table {
+    /// A table of numbers.
+    pub fn new(caption: impl Into<String>, columns: impl IntoIterator<Item = impl Into<String>>) -> Self {
+        let columns = columns.into_iter().map(Into::into).collect();
+        Self { caption: caption.into(), columns, rows: Vec::new(), is_prose: false }
+    }
+}
+
+/// What stands where there is no number.
+pub const NOTHING: &str = "\u{2013}";
+
+/// A number with so many decimal places. Its minus is a real one, and nothing is no less than nothing.
+pub fn fixed(value: f64, decimals: usize) -> String {
+    let digits = format!("{:.decimals$}", value.abs());
+    let is_zero = digits.bytes().all(|digit| matches!(digit, b'0' | b'.'));
+    if value < 0.0 && !is_zero { format!("\u{2212}{digits}") } else { digits }
+}
+
+/// A number as short as it can be said with six decimal places.
+pub fn short(value: f64) -> String {
+    let digits = fixed(value, 6);
+    digits.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
+
+/// A number with four digits that count, or more before the point.
+pub fn significant(value: f64) -> String {
+    const DIGITS: f64 = 4.0;
+    const MOST_DECIMALS: f64 = 8.0;
+    let magnitude = if value == 0.0 { 0.0 } else { value.abs().log10().floor() };
+    fixed(value, (DIGITS - 1.0 - magnitude).clamp(0.0, MOST_DECIMALS) as usize)
+}
+
+/// A probability: what is below a thousandth is said to be that.
+pub fn probability(p: f64) -> String {
+    if p < 0.001 { "< 0.001".to_owned() } else { fixed(p, 3) }
+}
+
+/// A number that may not be there.
+pub fn optional(value: Option<f64>, said: impl Fn(f64) -> String) -> String {
+    value.map_or_else(|| NOTHING.to_owned(), said)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_read_as_in_print() {
+        assert_eq!(fixed(-1.255, 1), "\u{2212}1.3");
+        assert_eq!(fixed(-0.01, 1), "0.0");
+        assert_eq!(short(0.1 + 0.2), "0.3");
+        assert_eq!(short(-2.0), "\u{2212}2");
+        assert_eq!(short(120.0), "120");
+        assert_eq!(significant(0.012_345_6), "0.01235");
+        assert_eq!(significant(12_345.6), "12346");
+        assert_eq!(significant(0.0), "0.000");
+        assert_eq!(probability(0.000_4), "< 0.001");
+        assert_eq!(optional(None, short), NOTHING);
+    }
+}
