@@ -16,10 +16,12 @@
 
 pub mod bench;
 pub mod capture;
+pub mod conditions;
 pub mod console;
 mod csv_table;
 mod drawing;
 pub mod evaluation;
+pub mod driving;
 pub mod firmware;
 pub mod ground;
 pub mod hex;
@@ -38,8 +40,10 @@ pub mod servo;
 pub mod signal;
 pub mod soak;
 pub mod statistics;
+pub mod stand;
 pub mod training;
 pub mod trial;
+pub mod twin;
 pub mod uno;
 pub mod verdict;
 pub mod waveform;

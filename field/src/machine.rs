@@ -157,7 +157,7 @@ impl Machine {
     }
 
     /// The beam's line, low while the beam is broken, later than the leaves by the sensor's response.
-    fn beam_changes(&self, row: &Row, motion: &Motion, start_cycle: u64) -> Vec<PinChange> {
+    pub fn beam_changes(&self, row: &Row, motion: &Motion, start_cycle: u64) -> Vec<PinChange> {
         let response_s = self.beam_response_ms / 1000.0;
 
         // Each end of a leaf that is passed toggles the beam, in whatever direction.

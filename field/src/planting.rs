@@ -41,7 +41,7 @@ pub enum PlantingError {
 pub const WEED_MARGIN_MM: f64 = 60.0;
 
 /// Widths of generated tall weeds at the beam's height.
-const WEED_WIDTHS_MM: Range<f64> = 12.0..20.0;
+pub(crate) const WEED_WIDTHS_MM: Range<f64> = 12.0..20.0;
 
 /// Gaps between the leaves of a ragged canopy, and the leaves between them.
 const LEAF_GAPS_MM: Range<f64> = 2.0..8.0;
@@ -135,12 +135,12 @@ impl Planting {
 const NARROWEST_GAP_MM: f64 = 2.0 * WEED_MARGIN_MM + WEED_WIDTHS_MM.end;
 
 /// A deviation evenly spread over plus and minus `within`.
-fn scatter(rng: &mut impl Rng, within: f64) -> f64 {
+pub(crate) fn scatter(rng: &mut impl Rng, within: f64) -> f64 {
     rng.random_range(-1.0..=1.0) * within
 }
 
 /// Leaves and gaps over a canopy's span; leaves reach to both ends.
-fn leaves(rng: &mut impl Rng, canopy_mm: Range<f64>) -> Vec<Range<f64>> {
+pub(crate) fn leaves(rng: &mut impl Rng, canopy_mm: Range<f64>) -> Vec<Range<f64>> {
     let mut leaves = Vec::new();
     let mut start_mm = canopy_mm.start;
     loop {

@@ -7,6 +7,7 @@
 
 use crate::console::{ConsoleError, Status, ask};
 use crate::firmware::Size;
+use crate::link::settings::{Setting, name};
 use crate::machine::Machine;
 use crate::motion::Motion;
 use crate::report::counted;
@@ -42,6 +43,8 @@ pub struct Trial {
     pub timing: Timing,
     /// How the firmware is put to work.
     pub start: Start,
+    /// What else the firmware is told, after the settings that follow from machine and timing.
+    pub settings: Vec<(Setting, u16)>,
 }
 
 /// Why a trial had no outcome.
@@ -106,6 +109,9 @@ const STILL_MS: u64 = 50;
 /// beam stands ahead for that.
 const TOP_SPEED_MM_S: f64 = 3000.0;
 
+/// The lowest that it takes: nothing contradicts it.
+const SLOWEST_TOP_SPEED_MM_S: f64 = 100.0;
+
 /// Simulated time between two reports of progress.
 const PROGRESS_CYCLES: u64 = CYCLES_PER_SECOND / 20;
 
@@ -146,7 +152,7 @@ impl Trial {
         );
         // No machine stops dead, and one that did would look like one whose encoder has failed.
         let motion = motion.change_speed(0.0, BRAKING_MM_S2);
-        Self { row, machine, motion, timing, start: Start::Command }
+        Self { row, machine, motion, timing, start: Start::Command, settings: Vec::new() }
     }
 
     /// Runs the firmware at `elf`. `progress` is told the share of the motion done, from 0 to 1.
@@ -208,31 +214,34 @@ impl Trial {
     /// # Errors
     /// Where it refuses one of them, or does not answer.
     pub fn set_up(&self, uno: &mut Uno) -> Result<(), ConsoleError> {
-        for (name, value) in self.settings() {
-            ask(uno, &format!("set {name} {value}"))?;
+        for (setting, value) in self.told() {
+            ask(uno, &format!("set {} {value}", name(setting)))?;
         }
         Ok(())
     }
 
-    /// The settings by which the firmware knows machine and timing, in an order in which none contradicts the others.
-    fn settings(&self) -> [(&'static str, u32); 10] {
+    /// All that the firmware is told, in an order in which machine and timing do not contradict each other on the way.
+    pub fn told(&self) -> Vec<(Setting, u16)> {
         let Machine { wheel_mm, ticks_per_rev, beam_to_tool_mm, servo, .. } = self.machine;
-        let notice_mm = beam_to_tool_mm - f64::from(self.timing.margin_mm) - 2.0;
+        let Timing { margin_mm, lead_out_ms, lead_in_ms } = self.timing;
+        let notice_mm = beam_to_tool_mm - f64::from(margin_mm) - 2.0;
         // As the firmware counts: the lead, an eighth of it, and what the sensor may take.
-        let notice_s = f64::from(self.timing.lead_out_ms) * 1.125e-3 + 0.002;
-        let wanted_mm_s = (1.25 * self.motion.top_speed_mm_s()).max(100.0);
-        let top_speed_mm_s = wanted_mm_s.min(notice_mm / notice_s).min(TOP_SPEED_MM_S).floor();
-        [
-            ("top_speed_mm_s", 100),
-            ("ticks_per_rev", ticks_per_rev),
-            ("wheel_mm", wheel_mm.round() as u32),
-            ("beam_to_tool_mm", beam_to_tool_mm.round() as u32),
-            ("margin_mm", self.timing.margin_mm),
-            ("lead_out_ms", self.timing.lead_out_ms),
-            ("lead_in_ms", self.timing.lead_in_ms),
-            ("servo_in_us", servo.in_us.round() as u32),
-            ("servo_out_us", servo.out_us.round() as u32),
-            ("top_speed_mm_s", top_speed_mm_s as u32),
-        ]
+        let notice_s = f64::from(lead_out_ms) * 1.125e-3 + 0.002;
+        let wanted_mm_s = (1.25 * self.motion.top_speed_mm_s()).max(SLOWEST_TOP_SPEED_MM_S);
+        let top_speed_mm_s = wanted_mm_s.min(notice_mm / notice_s).min(TOP_SPEED_MM_S);
+        let mut told = vec![
+            (Setting::TopSpeedMmS, SLOWEST_TOP_SPEED_MM_S as u16),
+            (Setting::TicksPerRev, ticks_per_rev as u16),
+            (Setting::WheelMm, wheel_mm.round() as u16),
+            (Setting::BeamToToolMm, beam_to_tool_mm.round() as u16),
+            (Setting::MarginMm, margin_mm as u16),
+            (Setting::LeadOutMs, lead_out_ms as u16),
+            (Setting::LeadInMs, lead_in_ms as u16),
+            (Setting::ServoInUs, servo.in_us.round() as u16),
+            (Setting::ServoOutUs, servo.out_us.round() as u16),
+            (Setting::TopSpeedMmS, top_speed_mm_s as u16),
+        ];
+        told.extend(&self.settings);
+        told
     }
 }

@@ -98,7 +98,14 @@ pub fn bare_ground() -> Row {
 
 /// A trial of the usual machine and timing, started by `start`.
 pub fn trial(row: Row, motion: Motion) -> Trial {
-    Trial { row, machine: Machine::default(), motion, timing: Timing::default(), start: Start::Command }
+    Trial {
+        row,
+        machine: Machine::default(),
+        motion,
+        timing: Timing::default(),
+        start: Start::Command,
+        settings: Vec::new(),
+    }
 }
 
 /// Runs a trial to its end.

@@ -1,0 +1,359 @@
+//! The conditions of a field trial: plot, crop, weeds, ground, driving, sensors, machine and firmware settings.
+//!
+//! One table gives each parameter's name, default, range, meaning and where its number comes from; TOML files, sweeps and the
+//! report's list of parameters follow from it. A file names what differs from the default, and so do the presets. No public
+//! data of places of crop plants in a row, in millimetres, was found: scatter and shares are assumed, and say so.
+//!
+//! What the conditions do is not here: [`crate::stand`] grows plants and weeds, [`crate::driving`] rolls.
+
+use crate::link::settings::{Setting, name};
+use crate::machine::{Dirt, Machine};
+use crate::servo::{Scatter, Servo};
+use crate::verdict::Timing;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::{fs, io};
+use thiserror::Error;
+use toml::de::DeTable;
+
+/// A parameter, as the table has it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Parameter {
+    /// Table and key, joined by a point.
+    pub name: &'static str,
+    /// What it is, in the unit that its name carries.
+    pub meaning: &'static str,
+    /// Where its default comes from.
+    pub source: &'static str,
+    /// Least value.
+    pub least: f64,
+    /// Greatest value.
+    pub greatest: f64,
+}
+
+/// The one table from which everything else about the parameters is made.
+macro_rules! parameters {
+    ($($(#[doc = $about:literal])* $table:ident: $Table:ident {
+        $($key:ident: $kind:ty = $default:literal, $least:literal to $greatest:literal, $meaning:literal, $source:literal;)*
+    })*) => {
+        $($(#[doc = $about])*
+        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+        #[serde(deny_unknown_fields, default)]
+        pub struct $Table {
+            $(#[doc = $meaning] pub $key: $kind,)*
+        }
+
+        impl Default for $Table {
+            fn default() -> Self {
+                Self { $($key: $default,)* }
+            }
+        })*
+
+        /// What a field trial takes place in, and with.
+        #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+        #[serde(deny_unknown_fields, default)]
+        pub struct Conditions {
+            $($(#[doc = $about])* pub $table: $Table,)*
+            /// Settings that the firmware is told instead of those that follow from the machine, by their names.
+            pub settings: BTreeMap<String, u16>,
+        }
+
+        /// Every parameter, in the table's order.
+        pub const PARAMETERS: &[Parameter] = &[$($(Parameter {
+            name: concat!(stringify!($table), ".", stringify!($key)),
+            meaning: $meaning,
+            source: $source,
+            least: $least as f64,
+            greatest: $greatest as f64,
+        },)*)*];
+
+        impl Conditions {
+            /// Every parameter with its value.
+            pub fn values(&self) -> impl Iterator<Item = (&'static Parameter, f64)> {
+                PARAMETERS.iter().zip([$($(f64::from(self.$table.$key),)*)*])
+            }
+        }
+    };
+}
+
+parameters! {
+    /// The plot.
+    plot: Plot {
+        rows: u32 = 3, 1 to 1000, "rows of a plot", "assumed";
+        row_m: f64 = 20.0, 2 to 1000, "length of a row", "assumed";
+        row_spacing_mm: f64 = 400.0, 200 to 2000, "distance between rows, which is the working width", "the machine's width, the paper's Table 1";
+    }
+    /// The crop.
+    crop: Crop {
+        spacing_scatter_mm: f64 = 30.0, 0 to 200, "a plant stands within this of its place along the row, evenly spread", "assumed";
+        across_scatter_mm: f64 = 10.0, 0 to 50, "a plant stands within this of the row's line, evenly spread", "assumed";
+        canopy_mm: f64 = 150.0, 20 to 350, "mean width of a canopy", "assumed, for chilli some weeks after transplanting";
+        canopy_scatter_mm: f64 = 25.0, 0 to 150, "a canopy's width is within this of its mean, evenly spread", "assumed";
+        protected_mm: f64 = 80.0, 2 to 350, "diameter of the zone round a stem that no tool may enter", "assumed: the stem and the roots next to it";
+        missing_percent: f64 = 3.0, 0 to 90, "share of the places without a plant", "assumed";
+        double_percent: f64 = 2.0, 0 to 90, "share of the places with a second plant beside the first", "assumed";
+        ragged_percent: f64 = 30.0, 0 to 100, "share of the canopies with gaps through which the beam passes", "assumed";
+    }
+    /// The weeds.
+    weeds: Weeds {
+        short_per_m2: f64 = 60.0, 0 to 2000, "weeds too short for the beam, everywhere", "assumed";
+        tall_per_m: f64 = 0.3, 0 to 5, "weeds in the row tall enough to break the beam", "assumed";
+    }
+    /// The ground.
+    ground: Ground {
+        slip_percent: f64 = 5.0, 0 to 15, "mean slip of the wheel that the encoder counts", "assumed, for tilled soil";
+        slip_scatter_percent: f64 = 1.5, 0 to 10, "slip is within this of its mean, evenly spread, and changes every metre or two", "assumed";
+    }
+    /// The driving.
+    driving: Driving {
+        speed_scatter_percent: f64 = 8.0, 0 to 50, "speed wanders within this of its mean, evenly spread", "assumed, for a person who walks behind";
+        stops_per_100_m: f64 = 1.0, 0 to 50, "stops on the way", "assumed";
+        stop_s: f64 = 5.0, 0 to 600, "mean length of a stop", "assumed";
+        turn_s: f64 = 6.0, 0 to 600, "mean time for a turn at a row's end", "assumed: the paper's field efficiency of 81 to 86 % asks for about this";
+    }
+    /// What the sensors suffer.
+    sensors: Sensors {
+        dust_per_m: f64 = 0.02, 0 to 10, "breaks of the beam by clods and insects", "assumed";
+        lost_pulses_percent: f64 = 0.01, 0 to 20, "share of the encoder's pulses that are missing", "assumed";
+    }
+    /// The machine.
+    machine: Mechanism {
+        beam_to_tool_mm: f64 = 400.0, 100 to 2000, "X, from the beam back to the tool", "assumed: the paper does not say it";
+        arm_mm: f64 = 350.0, 100 to 1000, "length of the arm that swings the tool aside", "the paper's Table 1";
+        tool_width_mm: f64 = 55.0, 10 to 200, "width of the tool in the row", "the paper's Table 1";
+        sweeps: u32 = 4, 0 to 12, "sweeps between the rows, half of them on each side", "the paper's Eq. 7";
+        sweep_width_mm: f64 = 80.0, 10 to 400, "width of a sweep", "the paper's Table 1";
+        sweep_from_mm: f64 = 40.0, 10 to 400, "from the row's line to the nearest sweep's edge", "assumed: four sweeps then fill the machine's width";
+        dead_time_ms: f64 = 60.0, 0 to 500, "mean time from a pulse until the servo moves", "hobby servos under load: 57 to 117 ms";
+        dead_time_scatter_ms: f64 = 10.0, 0 to 200, "dead time is within this of its mean, evenly spread", "assumed";
+        travel_ms: f64 = 120.0, 10 to 2000, "time for 45 degrees without load", "60 kg cm servos: 98 to 120 ms";
+        load_percent: f64 = 10.0, 0 to 200, "the soil makes the travel longer by up to this, evenly spread", "up to 100 in the worst case";
+        power_hp: f64 = 2.5, 0.1 to 50, "the engine's power, for the performance index", "the paper's Table 1";
+    }
+}
+
+/// The presets: a name, and a file that says what differs from the default.
+const PRESETS: &[(&str, &str)] = &[
+    ("transplanted", ""),
+    ("even-stand", include_str!("../presets/even-stand.toml")),
+    ("direct-sown", include_str!("../presets/direct-sown.toml")),
+    ("weedy", include_str!("../presets/weedy.toml")),
+    ("soft-ground", include_str!("../presets/soft-ground.toml")),
+    ("heavy-soil", include_str!("../presets/heavy-soil.toml")),
+    ("dusty", include_str!("../presets/dusty.toml")),
+];
+
+/// What is wrong with conditions, and what would be right.
+#[derive(Debug, Error)]
+pub enum ConditionsError {
+    /// Neither a preset nor a file that can be read.
+    #[error("{} is none of the presets ({presets}), and as a file it cannot be read", path.display(), presets = presets().collect::<Vec<_>>().join(", "))]
+    Unreadable {
+        /// The name or path.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// The file is no TOML, or has keys or kinds of values that are not known.
+    #[error("{}: {source}", path.display())]
+    NotUnderstood {
+        /// The file.
+        path: PathBuf,
+        /// What the TOML reader says, with line and column.
+        source: toml::de::Error,
+    },
+    /// A value in a file is out of its range.
+    #[error("{}, line {line}: {source}", path.display())]
+    AtLine {
+        /// The file.
+        path: PathBuf,
+        /// The line, from 1.
+        line: usize,
+        /// What is wrong.
+        source: WrongValue,
+    },
+    /// A value is wrong.
+    #[error(transparent)]
+    Wrong(#[from] WrongValue),
+}
+
+/// A value that a parameter or setting cannot have.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum WrongValue {
+    /// The value is out of its range.
+    #[error("{name} is {value}, but has to be {least} to {greatest}: {meaning}")]
+    OutOfRange {
+        /// The parameter.
+        name: String,
+        /// Its value.
+        value: f64,
+        /// The least value.
+        least: f64,
+        /// The greatest value.
+        greatest: f64,
+        /// What it is.
+        meaning: String,
+    },
+    /// A count is no whole number.
+    #[error("{name} is {value}, but has to be a whole number")]
+    NotWhole {
+        /// The parameter.
+        name: String,
+        /// Its value.
+        value: f64,
+    },
+    /// Nobody knows the name.
+    #[error("{0} is neither a parameter of the field nor a setting of the firmware; there are {known}", known = names().collect::<Vec<_>>().join(", "))]
+    Unknown(String),
+}
+
+/// The presets' names.
+pub fn presets() -> impl Iterator<Item = &'static str> {
+    PRESETS.iter().map(|(preset, _)| *preset)
+}
+
+/// All names that [`Conditions::set`] takes.
+fn names() -> impl Iterator<Item = String> {
+    PARAMETERS.iter().map(|parameter| parameter.name.to_owned()).chain(Setting::all().map(name))
+}
+
+impl Conditions {
+    /// Those of a preset, or of a file.
+    ///
+    /// # Errors
+    /// Where it is neither, or something in the file is wrong: with the line.
+    pub fn load(preset_or_file: &str) -> Result<Self, ConditionsError> {
+        let path = Path::new(preset_or_file);
+        match PRESETS.iter().find(|(preset, _)| *preset == preset_or_file) {
+            Some((_, text)) => Self::parse(path, text),
+            None => {
+                let read = fs::read_to_string(path);
+                Self::parse(
+                    path,
+                    &read.map_err(|source| ConditionsError::Unreadable { path: path.to_owned(), source })?,
+                )
+            }
+        }
+    }
+
+    fn parse(path: &Path, text: &str) -> Result<Self, ConditionsError> {
+        let not_understood = |source| ConditionsError::NotUnderstood { path: path.to_owned(), source };
+        let conditions: Self = toml::from_str(text).map_err(not_understood)?;
+        conditions.check().map_err(|source| match line(text, source.name()) {
+            Some(line) => ConditionsError::AtLine { path: path.to_owned(), line, source },
+            None => source.into(),
+        })?;
+        Ok(conditions)
+    }
+
+    /// Whether every value is in its range.
+    fn check(&self) -> Result<(), WrongValue> {
+        let parameters = self.values().map(|(parameter, value)| {
+            let &Parameter { name, meaning, least, greatest, .. } = parameter;
+            (name.to_owned(), value, least, greatest, meaning.to_owned())
+        });
+        for (name, value, least, greatest, meaning) in parameters {
+            // A number that is none is in no range.
+            if !(least..=greatest).contains(&value) {
+                return Err(WrongValue::OutOfRange { name, value, least, greatest, meaning });
+            }
+        }
+        for (key, &value) in &self.settings {
+            let setting =
+                Setting::find(key.as_bytes()).ok_or_else(|| WrongValue::Unknown(format!("settings.{key}")))?;
+            let range = setting.description();
+            if !(range.least..=range.greatest).contains(&value) {
+                return Err(WrongValue::OutOfRange {
+                    name: format!("settings.{key}"),
+                    value: value.into(),
+                    least: range.least.into(),
+                    greatest: range.greatest.into(),
+                    meaning: crate::link::settings::help(setting),
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// Changes a parameter, named `table.key`, or a setting of the firmware, named as the firmware does.
+    ///
+    /// # Errors
+    /// Where there is no such name, or the value is out of its range.
+    pub fn set(&mut self, parameter: &str, value: f64) -> Result<(), WrongValue> {
+        let whole = || {
+            let not_whole = || WrongValue::NotWhole { name: parameter.to_owned(), value };
+            if value.fract() == 0.0 && value.abs() < f64::from(u32::MAX) { Ok(value as i64) } else { Err(not_whole()) }
+        };
+        let mut changed = self.clone();
+        if Setting::find(parameter.as_bytes()).is_some() {
+            changed.settings.insert(parameter.to_owned(), u16::try_from(whole()?).unwrap_or(u16::MAX));
+        } else {
+            let unknown = || WrongValue::Unknown(parameter.to_owned());
+            let mut tables = toml::Table::try_from(&*self).map_err(|_| unknown())?;
+            let entry = parameter
+                .split_once('.')
+                .and_then(|(table, key)| tables.get_mut(table)?.as_table_mut()?.get_mut(key))
+                .filter(|_| PARAMETERS.iter().any(|known| known.name == parameter))
+                .ok_or_else(unknown)?;
+            *entry = if entry.is_integer() { toml::Value::Integer(whole()?) } else { toml::Value::Float(value) };
+            changed = tables.try_into().map_err(|_| WrongValue::NotWhole { name: parameter.to_owned(), value })?;
+        }
+        changed.check()?;
+        *self = changed;
+        Ok(())
+    }
+
+    /// The machine, whose servo and encoder are the `seed`'s of all the possible ones.
+    pub fn machine(&self, seed: u64) -> Machine {
+        let Mechanism { beam_to_tool_mm, arm_mm, tool_width_mm, .. } = self.machine;
+        let scatter =
+            Scatter { dead_time_ms: self.machine.dead_time_scatter_ms, load: self.machine.load_percent / 100.0, seed };
+        let (dead_time_ms, travel_ms) = (self.machine.dead_time_ms, self.machine.travel_ms);
+        Machine {
+            beam_to_tool_mm,
+            arm_mm,
+            tool_width_mm,
+            servo: Servo { dead_time_ms, travel_ms, scatter, ..Servo::default() },
+            dirt: Dirt { share: self.sensors.lost_pulses_percent / 100.0, seed },
+            ..Machine::default()
+        }
+    }
+
+    /// Margin and leads that the firmware is told.
+    pub fn timing(&self) -> Timing {
+        let default = Timing::default();
+        let told = |setting, otherwise| self.settings.get(&name(setting)).map_or(otherwise, |&value| value.into());
+        Timing {
+            margin_mm: told(Setting::MarginMm, default.margin_mm),
+            lead_out_ms: told(Setting::LeadOutMs, default.lead_out_ms),
+            lead_in_ms: told(Setting::LeadInMs, default.lead_in_ms),
+        }
+    }
+
+    /// The firmware's settings that are told beside those of machine and timing.
+    pub fn told(&self) -> Vec<(Setting, u16)> {
+        let timing = [Setting::MarginMm, Setting::LeadOutMs, Setting::LeadInMs];
+        self.settings
+            .iter()
+            .filter_map(|(key, &value)| Some((Setting::find(key.as_bytes())?, value)))
+            .filter(|(setting, _)| !timing.contains(setting))
+            .collect()
+    }
+}
+
+impl WrongValue {
+    fn name(&self) -> &str {
+        match self {
+            Self::OutOfRange { name, .. } | Self::NotWhole { name, .. } | Self::Unknown(name) => name,
+        }
+    }
+}
+
+/// The line, from 1, in which `table.key` stands.
+fn line(text: &str, name: &str) -> Option<usize> {
+    let (table, key) = name.split_once('.')?;
+    let root = DeTable::parse(text).ok()?;
+    let (key, _) = root.get_ref().get(table)?.get_ref().as_table()?.get_key_value(key)?;
+    Some(text[..key.span().start].lines().count().max(1))
+}
