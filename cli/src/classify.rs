@@ -10,6 +10,11 @@ use std::path::PathBuf;
 
 /// What the user asks to be classified.
 #[derive(Args)]
+#[command(after_help = "\
+Examples:
+  weeder classify field.csv          what `dump` has printed, labelled or not
+  weeder classify field.csv --k 5    with five votes
+The status is 1 where a plant would be taken for a weed.")]
 pub struct Arguments {
     /// A CSV file with the columns speed_mm_s,spacing_mm,delay_mm,hold_mm,actuation_mm and, if known, label.
     #[arg(value_name = "FILE.csv")]

@@ -10,6 +10,11 @@ use std::path::PathBuf;
 
 /// What the user asks of the design calculations.
 #[derive(Args)]
+#[command(after_help = "\
+Examples:
+  weeder design                              the paper's machine
+  weeder design --print-machine > my.toml    a commented file to start from
+  weeder design --machine my.toml --json     your machine, for a program")]
 pub struct Arguments {
     /// The machine; what the file leaves out, or all without it, is as on the paper's machine.
     #[arg(long, value_name = "FILE.toml")]

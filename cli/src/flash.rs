@@ -13,7 +13,7 @@ use std::time::Duration;
 /// What the user asks of flashing.
 #[derive(Args)]
 #[command(after_help = "\
-Try:
+Examples:
   weeder flash                         the only Uno at a USB port
   weeder flash --port /dev/ttyACM0     this one
   weeder flash --old-bootloader        a board that does not answer at 115200 baud")]

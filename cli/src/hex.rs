@@ -9,6 +9,9 @@ use std::path::PathBuf;
 /// What the user asks of the file.
 #[derive(Args)]
 #[command(after_help = "\
+Example:
+  weeder hex weeder.hex
+
 Any computer with avrdude, which the Arduino IDE brings along, can put the file on an Uno:
 
   avrdude -c arduino -p atmega328p -D -b 115200 -P /dev/ttyACM0 -U flash:w:weeder.hex:i")]

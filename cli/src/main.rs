@@ -6,6 +6,7 @@
 
 mod bench;
 mod classify;
+mod completions;
 mod course;
 mod design;
 mod flash;
@@ -20,7 +21,7 @@ mod soak;
 mod train;
 mod virtual_uno;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use std::process::ExitCode;
 
 /// Tries the intra-row weeder's firmware on a simulated field, and puts it on an Arduino Uno.
@@ -42,6 +43,7 @@ enum Command {
     /// Run the firmware, or a bootloader, on a virtual Uno at a pseudo terminal, in real time.
     VirtualUno(Box<virtual_uno::Arguments>),
     /// Count the cycles and bytes of the firmware and its classifier on a virtual Uno.
+    #[command(after_help = "Example: weeder bench-uno > figures.txt")]
     BenchUno,
     /// Work for a day with everything going wrong now and then, and say what happened.
     Soak(soak::Arguments),
@@ -59,6 +61,8 @@ enum Command {
     Settings(settings::Arguments),
     /// Calculate what a machine's engine, servo, shanks, chain, wheels and handle have to be like.
     Design(design::Arguments),
+    /// Print what a shell needs to complete this command's words.
+    Completions(completions::Arguments),
 }
 
 /// What a command found out, for scripts that ask by its status.
@@ -85,6 +89,7 @@ fn main() -> ExitCode {
         Command::Replay(arguments) => replay::run(&arguments),
         Command::Settings(arguments) => settings::run(&arguments),
         Command::Design(arguments) => design::run(&arguments).map(|()| Finding::Good),
+        Command::Completions(arguments) => completions::run(&arguments, Arguments::command()).map(|()| Finding::Good),
     };
     match result {
         Ok(Finding::Good) => ExitCode::SUCCESS,
@@ -99,10 +104,41 @@ fn main() -> ExitCode {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clap::CommandFactory;
+    use clap::Command;
 
     #[test]
     fn the_arguments_are_well_formed() {
         Arguments::command().debug_assert();
+    }
+
+    /// A command's subcommands and theirs, each with its name in full.
+    fn subcommands(command: &Command, name: &str) -> Vec<(String, Command)> {
+        let of_one = |command: &Command| {
+            let name = format!("{name} {}", command.get_name());
+            [vec![(name.clone(), command.clone())], subcommands(command, &name)].concat()
+        };
+        command.get_subcommands().flat_map(of_one).collect()
+    }
+
+    #[test]
+    fn every_command_s_help_has_examples_that_are_well_formed() {
+        for (name, command) in subcommands(&Arguments::command(), "weeder") {
+            let help = command.get_after_help().map(ToString::to_string).unwrap_or_default();
+            let lines = help.lines().map(|line| line.trim_start().trim_start_matches("Example: "));
+            // What stands behind a pipe, `&&` or some blanks is not the command's.
+            let examples = lines.filter(|line| line.starts_with(&name)).map(|line| {
+                let end = ["  ", " |", " >", " &&"].into_iter().filter_map(|end| line.find(end)).min();
+                &line[..end.unwrap_or(line.len())]
+            });
+            let mut seen = 0;
+            for example in examples {
+                let words = shlex::split(example).expect("its quotes are balanced");
+                if let Err(error) = Arguments::try_parse_from(words) {
+                    panic!("{example}: {error}");
+                }
+                seen += 1;
+            }
+            assert!(seen > 0, "the help of `{name}` has no example");
+        }
     }
 }

@@ -17,6 +17,12 @@ use std::path::{Path, PathBuf};
 
 /// What the user asks of a simulation.
 #[derive(Args)]
+#[command(after_help = "\
+Examples:
+  weeder sim --speed 1 --spacing 600 --plants 30 --weeds 8    another row, at another speed
+  weeder sim --row field.csv --out report                     your own plants, with tables and a picture
+  weeder sim --capture logic.vcd --channel-a D2 --channel-b D3    a logic analyser's recording
+The status is 1 where a plant was damaged.")]
 pub struct Arguments {
     #[command(flatten)]
     course: CourseArguments,

@@ -11,6 +11,11 @@ use std::time::Instant;
 
 /// What the user asks of a soak.
 #[derive(Args)]
+#[command(after_help = "\
+Examples:
+  weeder soak                                        a day of the decisions, half an hour of the firmware
+  weeder soak --hours 0 --uno-minutes 6 --faults 900    the firmware alone, with a fault every four seconds
+The status is 1 where something happened that must not.")]
 pub struct Arguments {
     /// Simulated hours of the decision core on the host.
     #[arg(long, default_value = "24", value_parser = RangedU64ValueParser::<u32>::new().range(0..=10_000))]

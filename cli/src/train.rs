@@ -12,6 +12,11 @@ use std::str::FromStr;
 
 /// What the user asks of a training.
 #[derive(Args)]
+#[command(after_help = "\
+Examples:
+  weeder train field.csv --picture field.svg                    say how well it would do, and draw it
+  weeder train field.csv --out control/src/examples/table.rs    have the next `weeder flash` take it along
+  weeder train --synthetic                                      the built-in table, from simulated rows")]
 pub struct Arguments {
     /// CSV files with the columns speed_mm_s,spacing_mm,delay_mm,hold_mm,actuation_mm,label; label is plant or weed.
     #[arg(value_name = "FILE.csv", required_unless_present = "synthetic", conflicts_with = "synthetic")]

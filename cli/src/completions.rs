@@ -1,0 +1,30 @@
+//! `weeder completions`: what a shell has to be told so that Tab completes the command's words.
+//!
+//! The words are those of the arguments themselves, by clap_complete. Ports and values of settings are not among them.
+
+use anyhow::{Context, Result};
+use clap::Args;
+use clap_complete::Shell;
+use std::io::{self, Write};
+
+/// What the user asks of the completions.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  source <(weeder completions bash)    as a line of ~/.bashrc
+  weeder completions zsh > ~/.zfunc/_weeder    where ~/.zfunc is in fpath before compinit runs
+  weeder completions fish > ~/.config/fish/completions/weeder.fish")]
+pub struct Arguments {
+    /// The shell that is to complete.
+    shell: Shell,
+}
+
+/// Prints the script that the shell reads.
+///
+/// # Errors
+/// Where it cannot be printed.
+pub fn run(arguments: &Arguments, mut command: clap::Command) -> Result<()> {
+    let mut script = Vec::new();
+    clap_complete::generate(arguments.shell, &mut command, "weeder", &mut script);
+    io::stdout().write_all(&script).context("the completions cannot be printed")
+}

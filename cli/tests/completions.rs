@@ -1,0 +1,55 @@
+//! `weeder completions`: what the shells make of it.
+
+use std::fs;
+use std::process::Command;
+
+/// What `weeder completions` prints for a shell.
+fn completions(shell: &str) -> String {
+    let output = Command::new(env!("CARGO_BIN_EXE_weeder")).args(["completions", shell]).output();
+    let output = output.expect("cargo has built the command");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).expect("it is text")
+}
+
+/// What Tab offers in bash behind these words, the last of which is begun.
+fn offered_by_bash(words: &[&str]) -> Vec<String> {
+    let folder = tempfile::tempdir().expect("there is room for a file");
+    let file = folder.path().join("weeder");
+    fs::write(&file, completions("bash")).expect("it can be written");
+    // As bash itself calls it: the command, the word that is begun, and the one before.
+    let script = r#"source "$1"; shift
+        COMP_WORDS=("$@") COMP_CWORD=$(($# - 1))
+        _weeder "$1" "${@: -1}" "${@: -2:1}"
+        printf '%s\n' "${COMPREPLY[@]}""#;
+    let mut bash = Command::new("bash");
+    let output = bash.args(["--norc", "-c", script, "bash"]).arg(&file).args(words).output().expect("bash is there");
+    assert!(output.stderr.is_empty(), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).expect("it is text").lines().map(str::to_owned).collect()
+}
+
+#[test]
+fn bash_completes_commands_and_their_options() {
+    assert_eq!(offered_by_bash(&["weeder", "mon"]), ["monitor"]);
+    assert_eq!(offered_by_bash(&["weeder", "settings", "pu"]), ["pull", "push"]);
+    assert_eq!(offered_by_bash(&["weeder", "flash", "--old"]), ["--old-bootloader"]);
+    assert_eq!(offered_by_bash(&["weeder", "completions", "z"]), ["zsh"]);
+}
+
+#[test]
+fn other_shells_are_told_of_every_command() {
+    for shell in ["elvish", "fish", "powershell", "zsh"] {
+        let script = completions(shell);
+        for command in ["virtual-uno", "monitor", "old-bootloader"] {
+            assert!(script.contains(command), "{shell} is not told of {command}");
+        }
+    }
+}
+
+#[test]
+fn a_shell_that_is_not_known_is_refused_with_those_that_are() {
+    let output = Command::new(env!("CARGO_BIN_EXE_weeder")).args(["completions", "tcsh"]).output();
+    let output = output.expect("cargo has built the command");
+    assert_eq!(output.status.code(), Some(2));
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(message.contains("[possible values: bash, elvish, fish, powershell, zsh]"), "{message}");
+}
