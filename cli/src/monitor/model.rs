@@ -3,7 +3,7 @@
 use super::command_line::CommandLine;
 use field::link::advice;
 use field::link::session::Happening;
-use field::link::settings::{Setting, Settings, shown};
+use field::link::settings::{Setting, Settings};
 use field::link::{Class, Mode, Status, Told};
 use std::collections::VecDeque;
 
@@ -54,8 +54,6 @@ pub struct Model {
     pub lines: VecDeque<String>,
     /// What is being typed.
     pub line: CommandLine,
-    /// The setting that the command under way sets.
-    being_set: Option<(Setting, u16)>,
 }
 
 impl Model {
@@ -71,7 +69,6 @@ impl Model {
             advice: None,
             lines: VecDeque::new(),
             line: CommandLine::default(),
-            being_set: None,
         }
     }
 
@@ -90,19 +87,9 @@ impl Model {
             }
             Happening::Status(status, _) => self.take_status(status),
             Happening::Told(told, line) => self.take_told(told, line),
-            Happening::Command(line) => {
-                let set = line.trim().strip_prefix("set ").and_then(|rest| rest.trim().split_once(' '));
-                self.being_set = set.and_then(|(name, value)| shown(&format!("{name}={}", value.trim())));
-                self.say(format!("> {line}"));
-            }
-            Happening::Answer(line) => {
-                let set = if line == "ok" { self.being_set.take() } else { shown(&line) };
-                if let Some((setting, value)) = set {
-                    // The firmware shows and takes only what its table allows.
-                    let _ = self.settings.set(setting, value);
-                }
-                self.say(line);
-            }
+            Happening::Command(line) => self.say(format!("> {line}")),
+            Happening::Answer(line) => self.say(line),
+            Happening::Settings(settings) => self.settings = settings,
         }
     }
 

@@ -58,7 +58,7 @@ fn talk(
                 log.write(&happening)?;
             }
             match happening {
-                Happening::Connected { .. } | Happening::Command(_) => {}
+                Happening::Connected { .. } | Happening::Settings(_) | Happening::Command(_) => {}
                 Happening::Status(..) => statuses += 1,
                 Happening::Lost(why) => {
                     ensure!(was_idle && !ended, "{why}");

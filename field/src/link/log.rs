@@ -135,6 +135,8 @@ impl LogWriter {
             Happening::Told(_, line) => self.line(Kind::Event, line),
             Happening::Command(line) => self.line(Kind::Command, line),
             Happening::Answer(line) => self.line(Kind::Answer, line),
+            // They follow from the commands.
+            Happening::Settings(_) => Ok(()),
         }
     }
 

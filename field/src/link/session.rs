@@ -2,7 +2,8 @@
 //!
 //! [`Session::turn`] is called over and over. It types what was asked of it, one command at a time, asks for the status when
 //! nothing else is under way, and tells what happened. It waits no longer than a read does, except for the Uno to start where
-//! a port is opened. After every start of the Uno it asks for the settings and the examples and turns the events on.
+//! a port is opened. After every start of the Uno it asks for the settings and the examples and turns the events on; after every
+//! command that changes settings it asks for them anew.
 
 use super::settings::{self, Settings, SettingsError};
 use super::{Link, LinkError, Status, Told, is_greeting};
@@ -46,12 +47,16 @@ pub enum Happening {
     Command(String),
     /// A line of the answer to it, the last of which is `ok` or begins with `error:`.
     Answer(String),
+    /// The settings as they are behind a command that has changed some.
+    Settings(Settings),
 }
 
 /// What the firmware is answering.
 enum Question {
     Status,
     Command,
+    /// The settings, with the lines that have come.
+    Settings(Vec<String>),
 }
 
 /// A way to a link.
@@ -65,6 +70,8 @@ pub struct Session {
     /// The command that is being answered.
     asked_for: String,
     waiting: VecDeque<String>,
+    /// Whether settings have changed since they were asked for.
+    settings_changed: bool,
     poll_at: Option<Instant>,
     retry_at: Option<Instant>,
     happened: VecDeque<Happening>,
@@ -83,6 +90,7 @@ impl Session {
             asked: None,
             asked_for: String::new(),
             waiting: VecDeque::new(),
+            settings_changed: false,
             poll_at: None,
             retry_at: None,
             happened: VecDeque::new(),
@@ -145,7 +153,7 @@ impl Session {
         let status = status.into_iter().find_map(|line| Some((Status::parse(&line)?, line)));
         self.happened.extend(status.map(|(status, line)| Happening::Status(status, line)));
         self.link = Some(link);
-        (self.asked, self.poll_at) = (None, None);
+        (self.asked, self.poll_at, self.settings_changed) = (None, None, false);
         Ok(())
     }
 
@@ -162,16 +170,21 @@ impl Session {
             return Err(LinkError::Silent { command: self.asked_for.clone(), received: String::new() }.into());
         }
         if self.asked.is_none() {
-            if let Some(command) = self.waiting.pop_front() {
-                link.send(&command)?;
-                self.asked = Some((Question::Command, now));
-                self.asked_for.clone_from(&command);
-                self.happened.push_back(Happening::Command(command));
+            let question = if let Some(command) = self.waiting.pop_front() {
+                self.happened.push_back(Happening::Command(command.clone()));
+                Some((Question::Command, command))
             } else if self.poll_at.is_none_or(|at| now >= at) {
-                link.send("status")?;
-                self.asked = Some((Question::Status, now));
-                "status".clone_into(&mut self.asked_for);
                 self.poll_at = Some(now + POLL);
+                Some((Question::Status, "status".to_owned()))
+            } else if std::mem::take(&mut self.settings_changed) {
+                Some((Question::Settings(Vec::new()), "get".to_owned()))
+            } else {
+                None
+            };
+            if let Some((question, line)) = question {
+                link.send(&line)?;
+                self.asked = Some((question, now));
+                self.asked_for = line;
             }
         }
         self.link = Some(link);
@@ -181,26 +194,39 @@ impl Session {
     /// Takes a line, and knows whose it is.
     fn take(&mut self, line: String) {
         let is_end = line == "ok" || line.starts_with("error:");
-        match &self.asked {
-            _ if !is_end && let Some(told) = Told::parse(&line) => self.happened.push_back(Happening::Told(told, line)),
+        if !is_end && let Some(told) = Told::parse(&line) {
+            self.settings_changed |= told == Told::Calibrated;
+            self.happened.push_back(Happening::Told(told, line));
+            return;
+        }
+        match &mut self.asked {
             Some((Question::Status, _)) => {
                 if let Some(status) = Status::parse(&line) {
                     self.happened.push_back(Happening::Status(status, line));
                 }
-                if is_end {
-                    self.asked = None;
-                }
             }
             Some((Question::Command, _)) => {
+                self.settings_changed |= line == "ok" && changes_settings(&self.asked_for);
                 self.happened.push_back(Happening::Answer(line));
-                if is_end {
-                    self.asked = None;
-                }
             }
+            Some((Question::Settings(lines), _)) if is_end => match settings::shown_by(lines) {
+                Ok(settings) => self.happened.push_back(Happening::Settings(settings)),
+                // Noise has spoiled a line: once more.
+                Err(_) => self.settings_changed = true,
+            },
+            Some((Question::Settings(lines), _)) => lines.push(line),
             // The end of an answer that was given up.
             None => {}
         }
+        if is_end {
+            self.asked = None;
+        }
     }
+}
+
+/// Whether a command changes settings where it is answered by `ok`.
+fn changes_settings(command: &str) -> bool {
+    matches!(command.split_whitespace().next(), Some("set" | "defaults" | "revert" | "calibrate"))
 }
 
 #[cfg(test)]

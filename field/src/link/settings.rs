@@ -91,7 +91,14 @@ pub fn explain(contradiction: Contradiction) -> String {
 /// # Errors
 /// Where the console fails, or the firmware has other settings than this program.
 pub fn read(link: &mut Link) -> Result<Settings, SettingsError> {
-    let lines = link.ask("get")?;
+    shown_by(&link.ask("get")?)
+}
+
+/// The settings that the answer to `get` shows.
+///
+/// # Errors
+/// Where one of them is missing, or has a value that cannot be.
+pub(super) fn shown_by(lines: &[String]) -> Result<Settings, SettingsError> {
     let shown: Vec<(Setting, u16)> = lines.iter().filter_map(|line| shown(line)).collect();
     let mut settings = Settings::new();
     for setting in Setting::all() {

@@ -87,13 +87,15 @@ fn a_screen_too_small_for_all_of_it_is_drawn_as_far_as_it_goes() {
 }
 
 #[test]
-fn settings_that_are_shown_or_set_move_what_is_drawn() {
-    let mut model = machine(&["beam_to_tool_mm=800 from 100 to 2000, default 400"]);
-    assert_eq!(model.settings.get(Setting::BeamToToolMm), 800);
-    model.update(Happening::Command("set beam_to_tool_mm 900".to_owned()));
-    model.update(Happening::Answer("error: the machine is at work, hold first".to_owned()));
-    assert_eq!(model.settings.get(Setting::BeamToToolMm), 800);
-    model.update(Happening::Command("set beam_to_tool_mm  900 ".to_owned()));
-    model.update(Happening::Answer("ok".to_owned()));
-    assert_eq!(model.settings.get(Setting::BeamToToolMm), 900);
+fn what_is_drawn_follows_the_machine_s_settings() {
+    let mut lines = ROW.to_vec();
+    lines.push("state=work tool=in pos=2196 speed_mm_s=556 windows=1 unseen_mm=0");
+    let mut model = machine(&lines);
+    let mut settings = Settings::new();
+    settings.set(Setting::BeamToToolMm, 800).unwrap();
+    let before = screen(&model);
+    model.update(Happening::Settings(settings));
+    assert_ne!(screen(&model), before);
+    model.update(Happening::Settings(Settings::new()));
+    assert_eq!(screen(&model), before);
 }

@@ -12,6 +12,7 @@ type Says = Rc<RefCell<Vec<u8>>>;
 struct Firmware {
     plugged_in: Rc<Cell<bool>>,
     says: Says,
+    wheel_mm: u16,
     typed: Vec<u8>,
     to_read: VecDeque<u8>,
 }
@@ -40,12 +41,23 @@ impl Write for Firmware {
                 b"get" => {
                     let defaults = settings::Setting::all();
                     let line = |setting: settings::Setting| {
-                        format!("{}={} and more\r\n", settings::name(setting), setting.description().default)
+                        let default = setting.description().default;
+                        let value = if setting == settings::Setting::WheelMm { self.wheel_mm } else { default };
+                        format!("{}={value} and more\r\n", settings::name(setting))
                     };
                     defaults.map(line).collect::<String>() + "ok\r\n"
                 }
                 b"status" => "state=hold tool=out pos=7 speed_mm_s=0 windows=0 unseen_mm=400\r\nok\r\n".to_owned(),
                 b"silence" => String::new(),
+                b"set wheel_mm 405" | b"revert" => {
+                    self.wheel_mm = 405;
+                    "ok\r\n".to_owned()
+                }
+                b"defaults" => {
+                    self.wheel_mm = 400;
+                    "ok\r\n".to_owned()
+                }
+                b"set wheel_mm 9" => "error: out of range\r\n".to_owned(),
                 b"hepl" => "error: no such command\r\n".to_owned(),
                 _ => "ok\r\n".to_owned(),
             };
@@ -68,7 +80,8 @@ fn session() -> (Session, Rc<Cell<bool>>, Says) {
             return Err(LinkError::Absent("it".to_owned()));
         }
         let (plugged_in, says) = (Rc::clone(&plug), Rc::clone(&mouth));
-        Link::over(Firmware { plugged_in, says, typed: Vec::new(), to_read: VecDeque::new() }, false)
+        let (typed, to_read) = (Vec::new(), VecDeque::new());
+        Link::over(Firmware { plugged_in, says, wheel_mm: 400, typed, to_read }, false)
     };
     (Session::open(open).unwrap(), plugged_in, says)
 }
@@ -105,6 +118,26 @@ fn events_are_told_whatever_is_being_answered() {
     says.borrow_mut().extend(b"swing tool=out pos=9\r\n\xFF\xFE junk\r\n");
     let told = Happening::Told(Told::Swing { out: true, position: 9 }, "swing tool=out pos=9".to_owned());
     assert_eq!(second(&mut session, now + Duration::from_secs(1)), [told]);
+}
+
+#[test]
+fn settings_are_asked_for_again_whatever_has_changed_them() {
+    let (mut session, _, says) = session();
+    let mut now = Instant::now();
+    second(&mut session, now);
+    for (command, wheel_mm) in [("set wheel_mm 405", 405), ("defaults", 400), ("revert", 405)] {
+        now += Duration::from_secs(1);
+        assert!(session.command(command));
+        let happened = second(&mut session, now);
+        let Some(Happening::Settings(settings)) = happened.last() else { panic!("{command}: {happened:?}") };
+        assert_eq!(settings.get(settings::Setting::WheelMm), wheel_mm, "{command}");
+    }
+    says.borrow_mut().extend(b"calibrated lead_out_ms=150 lead_in_ms=40\r\n");
+    let happened = second(&mut session, now + Duration::from_secs(1));
+    assert!(matches!(happened.as_slice(), [Happening::Told(..), Happening::Settings(_)]), "{happened:?}");
+    assert!(session.command("set wheel_mm 9"));
+    let happened = second(&mut session, now + Duration::from_secs(2));
+    assert!(matches!(happened.as_slice(), [Happening::Command(_), Happening::Answer(_)]), "{happened:?}");
 }
 
 #[test]
