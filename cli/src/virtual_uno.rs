@@ -4,10 +4,10 @@ use crate::course::CourseArguments;
 use anyhow::{Context, Result};
 use clap::Args;
 use field::firmware;
-use field::hex::Bootloader;
+use field::hex::{Bootloader, HexError};
 use field::live::{Course, LiveUno, Setup};
 use field::motion::mm_s;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -22,20 +22,24 @@ resets it, as on a real one. Try, in another terminal:
 
 An Uno with an empty flash and a bootloader, to be flashed by avrdude:
 
-  weeder virtual-uno --link /tmp/uno --bootloader optiboot_atmega328.hex
+  weeder virtual-uno --link /tmp/uno --bootloader optiboot
   weeder flash --port /tmp/uno
 
-Arduino's IDE has that file. Debian's arduino-core-avr has one that does not fit its place, but a sound one of the old
-bootloader, ATmegaBOOT_168_atmega328.hex, for firmware of up to 30,720 bytes and `weeder flash --old-bootloader`. What
-avrdude says of TIOCMGET means that a pseudo terminal has no modem lines; it does no harm.")]
+Or with the old bootloader, as Debian's arduino-core-avr has it, for firmware of up to 30,720 bytes:
+
+  weeder virtual-uno --link /tmp/uno --bootloader ATmegaBOOT_168_atmega328.hex
+  weeder flash --port /tmp/uno --old-bootloader
+
+What avrdude says of TIOCMGET means that a pseudo terminal has no modem lines; it does no harm.")]
 pub struct Arguments {
     #[command(flatten)]
     course: CourseArguments,
     /// Have the machine stand still instead of rolling along the row.
     #[arg(long)]
     stand: bool,
-    /// Start this bootloader at every reset, with an empty flash before it unless --elf is given too.
-    #[arg(long, value_name = "FILE.hex")]
+    /// Start this bootloader at every reset, with an empty flash before it unless --elf is given too: a file's, or
+    /// `optiboot`, the Uno's own, which is compiled for it.
+    #[arg(long, value_name = "optiboot|FILE.hex")]
     bootloader: Option<PathBuf>,
     /// Run this firmware instead of building the one in this repository.
     #[arg(long, value_name = "FILE.elf")]
@@ -54,12 +58,17 @@ pub struct Arguments {
     fast: bool,
 }
 
-/// Runs until Ctrl-C.
+/// The bootloader of that name, or in that file.
+fn bootloader(name: &Path) -> Result<Bootloader, HexError> {
+    if name == Path::new("optiboot") { Bootloader::optiboot() } else { Bootloader::read(name) }
+}
+
+/// Runs until Ctrl-C, or until it is asked to end by SIGTERM or SIGHUP.
 ///
 /// # Errors
 /// Where a file is wrong, no pseudo terminal is to be had, or the firmware crashes.
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let bootloader = arguments.bootloader.as_deref().map(Bootloader::read).transpose()?;
+    let bootloader = arguments.bootloader.as_deref().map(bootloader).transpose()?;
     let course = Course {
         row: arguments.course.row()?,
         machine: arguments.course.machine(),

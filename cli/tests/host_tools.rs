@@ -3,7 +3,7 @@
 use field::firmware;
 use field::live::{Background, LiveUno, Setup};
 use std::fs;
-use std::io::Write;
+use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
@@ -119,6 +119,26 @@ fn ports_logs_and_recordings_that_do_not_exist_are_named() {
     }
     let output = Command::new(env!("CARGO_BIN_EXE_weeder")).args(["replay", "no-such.csv"]).output().expect("it ends");
     assert!(printed(&output, 2).contains("no-such.csv cannot be read"));
+}
+
+#[test]
+fn a_virtual_uno_that_is_told_to_end_takes_its_link_with_it() {
+    let folder = tempfile::tempdir().expect("there is room for a link");
+    let link = folder.path().join("uno");
+    for signal in ["-INT", "-TERM", "-HUP"] {
+        let mut uno = Command::new(env!("CARGO_BIN_EXE_weeder"))
+            .args(["virtual-uno", "--stand", "--bootloader", "optiboot", "--link"])
+            .arg(&link)
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("cargo has built the command");
+        let mut line = String::new();
+        BufReader::new(uno.stdout.take().expect("it is piped")).read_line(&mut line).expect("it says where it is");
+        assert!(link.is_symlink(), "{line}");
+        Command::new("kill").args([signal, &uno.id().to_string()]).status().expect("there is a kill");
+        assert!(uno.wait().expect("it ends").success(), "{signal}");
+        assert!(!link.is_symlink(), "{signal} has left it behind");
+    }
 }
 
 #[cfg(unix)]

@@ -1,17 +1,24 @@
-//! Intel HEX, the files that the Arduino tools take: the firmware as one, and a bootloader out of one.
+//! Intel HEX, the files that the Arduino tools take: the firmware as one, and a bootloader out of one, or compiled here.
 //!
 //! A bootloader stands at the end of the flash and is started first by every reset; it writes a new firmware where it is sent
 //! one in time, and otherwise starts the one that is there. Its place says how much flash is left for the firmware.
 //! Nothing here runs one: [`crate::uno`] does.
 
-use crate::firmware::FLASH_BYTES;
+use crate::firmware::{FLASH_BYTES, Image, ImageError};
 use ihex::{Reader, ReaderError, Record};
 use std::io;
 use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
 use thiserror::Error;
 
 /// Sizes in bytes that the fuses can give the boot section (data sheet, table 27-7).
 const BOOT_SECTION_BYTES: [usize; 4] = [512, 1024, 2048, 4096];
+
+/// Optiboot's source, as Debian's arduino-core-avr brings it along.
+const OPTIBOOT_SOURCE: &str = "/usr/share/arduino/hardware/arduino/avr/bootloaders/optiboot/optiboot.c";
+
+/// Where Optiboot begins: it has the smallest boot section.
+const OPTIBOOT_START: u16 = 0x7E00;
 
 /// Bytes of data in a line, as most tools write them.
 const LINE_BYTES: usize = 16;
@@ -51,6 +58,12 @@ pub enum HexError {
     /// The file has no data.
     #[error("{0} is empty: take a bootloader's .hex, such as ATmegaBOOT_168_atmega328.hex")]
     Empty(PathBuf),
+    /// Optiboot could not be compiled.
+    #[error("optiboot cannot be compiled ({0}): ./setup.sh installs avr-gcc and {OPTIBOOT_SOURCE}")]
+    NotCompiled(String),
+    /// What was compiled is no ELF that could be read.
+    #[error(transparent)]
+    Image(#[from] ImageError),
     /// The firmware is too long to stand before the bootloader.
     #[error("the firmware takes {bytes} bytes of flash: the bootloader leaves {available}")]
     NoRoom {
@@ -88,6 +101,29 @@ impl Bootloader {
             code[address - start..][..bytes.len()].copy_from_slice(&bytes);
         }
         Ok(Bootloader { start: start_address, code })
+    }
+
+    /// Compiles Optiboot, the Uno's own bootloader. The file of it that Debian has ready is longer than its boot section.
+    ///
+    /// # Errors
+    /// Where avr-gcc or the source is missing.
+    pub fn optiboot() -> Result<Bootloader, HexError> {
+        let not_compiled = |reason: &dyn ToString| HexError::NotCompiled(reason.to_string());
+        let elf = tempfile::NamedTempFile::new().map_err(|error| not_compiled(&error))?;
+        let status = Command::new("avr-gcc")
+            .args(["-mmcu=atmega328p", "-DF_CPU=16000000L", "-DBAUD_RATE=115200", "-w", "-Os", "-mrelax", "-nostdlib"])
+            .args(["-fno-split-wide-types", "-fno-inline-small-functions", "-nostartfiles"])
+            .arg(format!("-Wl,--section-start=.text={OPTIBOOT_START:#x}"))
+            .arg("-o")
+            .args([elf.path(), Path::new(OPTIBOOT_SOURCE)])
+            .stdin(Stdio::null())
+            .status()
+            .map_err(|error| not_compiled(&error))?;
+        if !status.success() {
+            return Err(not_compiled(&status));
+        }
+        let code = Image::read(elf.path())?.flash.split_off(OPTIBOOT_START.into());
+        Ok(Bootloader { start: OPTIBOOT_START, code })
     }
 
     /// Address of its first byte in flash, from which a reset starts it: the number of bytes that it leaves to the firmware.
@@ -168,6 +204,13 @@ mod tests {
         let flash = bootloader.behind(&[9, 8]).unwrap();
         assert_eq!(flash.len(), 0x7803);
         assert_eq!((&flash[..3], &flash[0x77FF..]), (&[9, 8, 0xFF][..], &[0xFF, 1, 2, 3][..]));
+    }
+
+    #[test]
+    fn optiboot_is_compiled_into_the_smallest_boot_section() {
+        let optiboot = Bootloader::optiboot().unwrap();
+        assert_eq!(optiboot.start(), 0x7E00);
+        assert!(optiboot.code.len() <= 512, "{} bytes", optiboot.code.len());
     }
 
     #[test]
