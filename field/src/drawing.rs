@@ -8,7 +8,7 @@ use svg::node::Node;
 use svg::node::element::{Group, Line, Rectangle, Text};
 
 /// The background.
-const PAPER: &str = "#fbfaf6";
+pub const PAPER: &str = "#fbfaf6";
 
 /// Colour of what is to be read.
 pub const INK: &str = "#33312c";

@@ -274,8 +274,8 @@ fn counted(record: &PlotRecord) -> [String; 11] {
         record.damaged.to_string(),
         fixed(record.area_m2, 2),
         fixed(record.time_s, 1),
-        short(record.width_m),
-        short(record.power_hp),
+        fixed(record.width_m, 2),
+        fixed(record.power_hp, 2),
     ]
 }
 

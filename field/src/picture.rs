@@ -2,13 +2,14 @@
 //!
 //! The row is broken into lanes, to be read like lines of a text.
 
-use crate::drawing::{Legend, PALE_INK, document, line, paper, rectangle, swatch, tenth, words};
+use crate::drawing::{Legend, MARK_SIZE, PALE_INK, PAPER, document, line, paper, rectangle, swatch, tenth, words};
 use crate::row::{Kind, Thing};
 use crate::trial::{Outcome, Trial};
 use crate::verdict::Verdict;
 use std::ops::Range;
 use svg::Document;
-use svg::node::element::{ClipPath, Definitions, Ellipse, Group, Line, Polyline};
+use svg::node::element::path::Data;
+use svg::node::element::{ClipPath, Definitions, Ellipse, Group, Line, Path, Polyline};
 
 /// Ground in a lane, and the picture's pixels for a millimetre of it.
 const LANE_MM: f64 = 2500.0;
@@ -104,18 +105,34 @@ fn draw_lane(trial: &Trial, outcome: &Outcome, ground: &Range<f64>) -> Group {
         .add(scale(ground))
 }
 
-fn canopy(plant: &Thing, x: f64, verdict: Verdict) -> Ellipse {
-    let colour = match verdict {
-        Verdict::Kept => PLANT,
-        Verdict::MarginCut => MARGIN_CUT,
-        Verdict::Damaged => DAMAGED,
-    };
-    Ellipse::new()
+fn canopy(plant: &Thing, x: f64, verdict: Verdict) -> Group {
+    let ellipse = Ellipse::new()
         .set("cx", tenth(x))
         .set("cy", CANOPY_Y)
         .set("rx", tenth(plant.width_mm / 2.0 * PIXELS_PER_MM))
         .set("ry", CANOPY_HALF_HEIGHT)
-        .set("fill", colour)
+        .set("fill", colour(verdict));
+    Group::new().add(ellipse).add(strokes(x, CANOPY_Y, CANOPY_HALF_HEIGHT * 0.5, verdict))
+}
+
+fn colour(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Kept => PLANT,
+        Verdict::MarginCut => MARGIN_CUT,
+        Verdict::Damaged => DAMAGED,
+    }
+}
+
+/// What tells the verdicts apart where the colours do not: one stroke for a cut margin, a cross for damage.
+fn strokes(x: f64, y: f64, reach: f64, verdict: Verdict) -> Path {
+    let (left, right, top, bottom) = (tenth(x - reach), tenth(x + reach), tenth(y - reach), tenth(y + reach));
+    let stroke = Data::new().move_to((left, bottom)).line_to((right, top));
+    let drawn = match verdict {
+        Verdict::Kept => Data::new(),
+        Verdict::MarginCut => stroke,
+        Verdict::Damaged => stroke.move_to((left, top)).line_to((right, bottom)),
+    };
+    Path::new().set("d", drawn).set("stroke", PAPER).set("stroke-width", 2.5).set("stroke-linecap", "round")
 }
 
 fn weed(x: f64) -> Line {
@@ -140,10 +157,9 @@ fn scale(ground: &Range<f64>) -> Group {
 }
 
 fn legend() -> Group {
+    let verdicts =
+        [(Verdict::Kept, "plant kept"), (Verdict::MarginCut, "margin cut"), (Verdict::Damaged, "plant damaged")];
     let entries = [
-        (PLANT, "plant kept"),
-        (MARGIN_CUT, "margin cut"),
-        (DAMAGED, "plant damaged"),
         (WEED, "tall weed"),
         (BEAM, "beam broken"),
         (WEEDED, "tool in the row or swinging"),
@@ -151,6 +167,14 @@ fn legend() -> Group {
         (CURVE, "tool's angle"),
     ];
     let mut legend = Legend::new(SIDE, 22.0);
+    for (verdict, meaning) in verdicts {
+        let half = MARK_SIZE / 2.0;
+        let mark = |x, y| {
+            let swatch = swatch(x, y, colour(verdict));
+            Group::new().add(swatch).add(strokes(x + half, y + half, half * 0.5, verdict))
+        };
+        legend.explain(mark, meaning);
+    }
     for (colour, meaning) in entries {
         legend.explain(|x, y| swatch(x, y, colour), meaning);
     }
@@ -174,6 +198,14 @@ mod tests {
         // Both plants, and the legend.
         assert_eq!(drawn.matches(DAMAGED).count(), 3);
         assert_eq!(drawn.matches(PLANT).count(), 1);
+    }
+
+    #[test]
+    fn verdicts_differ_in_their_strokes_too() {
+        let path = |verdict| strokes(0.0, 0.0, 5.0, verdict).to_string();
+        assert_eq!(path(Verdict::Kept).matches('L').count(), 0);
+        assert_eq!(path(Verdict::MarginCut).matches('L').count(), 1);
+        assert_eq!(path(Verdict::Damaged).matches('L').count(), 2);
     }
 
     #[test]

@@ -34,7 +34,7 @@ const SPEED: &str = "speed, km/h";
 
 /// Plant damage of each controller against speed.
 pub fn damage(comparison: &Comparison) -> Result<Figure, DrawingError> {
-    let limit = (comparison.unavoidable.as_slice(), Shade::Below, "unavoidable: the row slips or scatters that much");
+    let limit = (comparison.unavoidable.as_slice(), Shade::Below, "unavoidable with this slip and scatter");
     let title = ("Plant damage", "% of the plants");
     let caption = "Plants whose canopy the tool touched. Lower is better.";
     curves(comparison, title, caption, |point| point.plant_damage_percent, limit)
@@ -42,9 +42,9 @@ pub fn damage(comparison: &Comparison) -> Result<Figure, DrawingError> {
 
 /// Weeding in the row of each controller against speed.
 pub fn weeding(comparison: &Comparison) -> Result<Figure, DrawingError> {
-    let limit = (comparison.bound.as_slice(), Shade::Above, "physical bound: out of this servo's reach");
+    let limit = (comparison.bound.as_slice(), Shade::Above, "physical bound, above which plants are cut");
     let title = ("In-row weeding", "% of the row's ground");
-    let caption = "Ground of the row that the tool worked. Higher is better, but what lies above the bound is paid for with plants.";
+    let caption = "Ground of the row that the tool worked. Higher is better, as far as the bound: what is above it is paid for with plants.";
     curves(comparison, title, caption, |point| point.in_row_weeding_percent, limit)
 }
 
@@ -62,12 +62,12 @@ fn curves(
         let look = Look::of_series(index);
         let line: Vec<_> = controller.points.iter().map(|point| (point.speed_km_h, value(point))).collect();
         words += &said(&controller.name, &line);
-        legend.push(Key { svg: key(look)?, meaning: controller.name.clone() });
+        legend.push(Key { svg: key(look, true)?, meaning: controller.name.clone() });
         series.push(Series { look, line, cloud: Vec::new() });
     }
     if !limit.is_empty() {
         words += &said(meaning, limit);
-        legend.push(Key { svg: key(Look::LIMIT)?, meaning: meaning.to_owned() });
+        legend.push(Key { svg: key(Look::LIMIT, true)?, meaning: meaning.to_owned() });
     }
     // The first is drawn last: it is the one to be seen where lines meet.
     series.reverse();
@@ -85,28 +85,34 @@ fn curves(
 /// One measure of a trial against speed, a line a spacing through the means, with the plots around them.
 pub fn response(analysis: &Analysis, response: Response) -> Result<Figure, DrawingError> {
     let treatments = analysis.treatments();
+    let spacings = spacings_cm(analysis);
+    let x = range_of(analysis.records.iter().map(|record| record.speed_km_h), false);
+    // So that plots of different spacings with the same value are both to be seen.
+    let step = (x.end - x.start) * 0.02;
+    let aside = |index: usize| (index as f64 - (spacings.len() - 1) as f64 / 2.0) * step;
     let mut series = Vec::new();
     let mut legend = Vec::new();
     let mut words = format!("{} in {} against speed.", response.title(), response.unit());
-    for (index, spacing_cm) in spacings_cm(analysis).into_iter().enumerate() {
+    for (index, &spacing_cm) in spacings.iter().enumerate() {
         let look = Look::of_series(index);
+        let moved = |(speed_km_h, value): (f64, f64)| (speed_km_h + aside(index), value);
         let of_spacing = treatments.iter().filter(|treatment| treatment.spacing_cm == spacing_cm);
         let line: Vec<_> =
             of_spacing.map(|treatment| (treatment.speed_km_h, response.value(&treatment.mean))).collect();
         let plots = analysis.records.iter().zip(&analysis.performances);
         let cloud = plots
             .filter(|(record, _)| record.spacing_cm == spacing_cm)
-            .map(|(record, performance)| (record.speed_km_h, response.value(performance)))
+            .map(|(record, performance)| moved((record.speed_km_h, response.value(performance))))
             .collect();
         let meaning = spacing(spacing_cm);
         words += &said(&meaning, &line);
-        legend.push(Key { svg: key(look)?, meaning });
-        series.push(Series { look, line, cloud });
+        legend.push(Key { svg: key(look, true)?, meaning });
+        series.push(Series { look, line: line.into_iter().map(moved).collect(), cloud });
     }
     let points = || series.iter().flat_map(|series| &series.cloud);
     let plot = Plot {
         x_label: SPEED,
-        x: range_of(points().map(|point| point.0), false),
+        x,
         y: range_of(points().map(|point| point.1), response == Response::PlantDamage),
         series: &series,
         limit: None,
@@ -130,7 +136,7 @@ pub fn residuals(analysis: &Analysis, of: &ResponseAnalysis, model: &LinearModel
         let look = Look::of_series(index);
         let points = model.fitted.iter().copied().zip(model.residuals.iter().copied());
         let of_spacing = points.zip(&analysis.records).filter(|(_, record)| record.spacing_cm == spacing_cm);
-        legend.push(Key { svg: key(look)?, meaning: spacing(spacing_cm) });
+        legend.push(Key { svg: key(look, false)?, meaning: spacing(spacing_cm) });
         series.push(Series { look, line: Vec::new(), cloud: of_spacing.map(|(point, _)| point).collect() });
     }
     let farthest = model.residuals.iter().fold(0.0, |farthest: f64, residual| farthest.max(residual.abs()));

@@ -122,6 +122,7 @@ impl Plot<'_> {
                 .label_style(words.clone())
                 .x_desc(self.x_label)
                 .axis_desc_style(words)
+                .set_all_tick_mark_size(10)
                 .draw()?;
             if let Some((limit, shade)) = self.limit {
                 let base = if shade == Shade::Above { self.y.end } else { self.y.start };
@@ -132,7 +133,7 @@ impl Plot<'_> {
                 let colour = series.look.colour;
                 chart.draw_series(LineSeries::new(series.line.iter().copied(), series.look.stroke()))?;
                 if let Some(marker) = series.look.marker {
-                    chart.draw_series(series.cloud.iter().map(|&point| marker.at(point, 8, colour.mix(0.5))))?;
+                    chart.draw_series(series.cloud.iter().map(|&point| marker.at(point, 8, colour.mix(0.6))))?;
                     chart.draw_series(series.line.iter().map(|&point| marker.at(point, 12, colour.to_rgba())))?;
                 }
             }
@@ -141,14 +142,16 @@ impl Plot<'_> {
     }
 }
 
-/// Draws the mark of a series in a legend.
+/// Draws the mark of a series in a legend, on a piece of its line where it has one.
 ///
 /// # Errors
 /// Where plotters cannot draw it.
-pub fn key(look: Look) -> Result<String, DrawingError> {
+pub fn key(look: Look, has_line: bool) -> Result<String, DrawingError> {
     let (width, height) = (KEY_SIZE.0 as i32, KEY_SIZE.1 as i32);
     svg(KEY_SIZE, |area| {
-        area.draw(&PathElement::new([(0, height / 2), (width, height / 2)], look.stroke()))?;
+        if has_line {
+            area.draw(&PathElement::new([(0, height / 2), (width, height / 2)], look.stroke()))?;
+        }
         if let Some(marker) = look.marker {
             area.draw(&marker.at((width / 2, height / 2), 12, look.colour.to_rgba()))?;
         }

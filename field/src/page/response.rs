@@ -17,8 +17,10 @@ pub struct Chapter {
     pub published: String,
     /// The paper's equation number.
     pub equation_number: u32,
-    /// The coefficients, and how well the model fits.
-    pub tables: Vec<Table>,
+    /// The coefficients.
+    pub terms: Table,
+    /// How well the model fits.
+    pub fit: Table,
     /// The analysis of variance, or why there is none.
     pub variance: Result<Table, String>,
     /// What has to be known of either, and of the paper's figures.
@@ -37,7 +39,7 @@ impl Chapter {
     pub fn of(analysis: &Analysis, of: &ResponseAnalysis) -> Result<Self, DrawingError> {
         let (model, variance) = (of.model.as_ref(), of.variance.as_ref());
         let name = of.response.title().to_lowercase();
-        let equation = |coefficients: &Coefficients| equation(&name, coefficients);
+
         let mut remarks = Vec::new();
         let of_model = model.iter().flat_map(|model| &model.remarks);
         for remark in of_model.chain(variance.iter().flat_map(|variance| &variance.remarks)) {
@@ -48,10 +50,13 @@ impl Chapter {
         }
         Ok(Self {
             title: of.response.title(),
-            model: model.map(|model| equation(&coefficients(model))).map_err(|why| sentence(&why.to_string())),
-            published: equation(&of.published.equation),
+            model: model
+                .map(|model| equation(&name, &coefficients(model), significant))
+                .map_err(|why| sentence(&why.to_string())),
+            published: equation(&name, &of.published.equation, short),
             equation_number: of.published.equation_number,
-            tables: vec![terms(of, model.ok()), fit(analysis, of, model.ok())],
+            terms: terms(of, model.ok()),
+            fit: fit(analysis, of, model.ok()),
             variance: variance.map(sources).map_err(|why| sentence(&why.to_string())),
             remarks,
             contradictions: of.published.contradictions,
@@ -67,7 +72,7 @@ fn coefficients(model: &LinearModel) -> Coefficients {
 }
 
 /// A measure as an equation; empty where no coefficient is known.
-fn equation(name: &str, coefficients: &Coefficients) -> String {
+fn equation(name: &str, coefficients: &Coefficients, said: fn(f64) -> String) -> String {
     let factors =
         [(coefficients.constant, ""), (coefficients.per_km_h, " × speed"), (coefficients.per_cm, " × spacing")];
     let mut right = String::new();
@@ -79,7 +84,7 @@ fn equation(name: &str, coefficients: &Coefficients) -> String {
             (false, true) => "",
             (false, false) => " + ",
         };
-        right += &format!("{sign}{}{factor}", significant(value.abs()));
+        right += &format!("{sign}{}{factor}", said(value.abs()));
     }
     if right.is_empty() { right } else { format!("{name} = {right}") }
 }
@@ -141,7 +146,7 @@ fn fit(analysis: &Analysis, of: &ResponseAnalysis, model: Option<&LinearModel>) 
             optional(model.map(|model| model.residual_standard_error), significant),
             NOTHING.to_owned(),
         ),
-        row(&format!("range, {}", of.response.unit()), range(low, high), published.join("; ")),
+        row(&format!("range, {}", of.response.unit()), range(low, high), published.join(",\n")),
     ];
     table
 }

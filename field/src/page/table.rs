@@ -36,12 +36,13 @@ pub fn short(value: f64) -> String {
     digits.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
-/// A number with four digits that count, or more before the point.
+/// A number with four digits that count, or more before the point; what is below a millionth is zero.
 pub fn significant(value: f64) -> String {
     const DIGITS: f64 = 4.0;
-    const MOST_DECIMALS: f64 = 8.0;
-    let magnitude = if value == 0.0 { 0.0 } else { value.abs().log10().floor() };
-    fixed(value, (DIGITS - 1.0 - magnitude).clamp(0.0, MOST_DECIMALS) as usize)
+    if value.abs() < 1e-6 {
+        return "0".to_owned();
+    }
+    fixed(value, (DIGITS - 1.0 - value.abs().log10().floor()).max(0.0) as usize)
 }
 
 /// A probability: what is below a thousandth is said to be that.
@@ -67,7 +68,7 @@ mod tests {
         assert_eq!(short(120.0), "120");
         assert_eq!(significant(0.012_345_6), "0.01235");
         assert_eq!(significant(12_345.6), "12346");
-        assert_eq!(significant(0.0), "0.000");
+        assert_eq!(significant(-1e-17), "0");
         assert_eq!(probability(0.000_4), "< 0.001");
         assert_eq!(optional(None, short), NOTHING);
     }
