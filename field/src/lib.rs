@@ -8,7 +8,8 @@
 //! - **Trials**: [`trial`] joins them, [`verdict`] judges what happened to each plant, [`report`] and [`picture`] show it,
 //!   and [`waveform`] writes down what was on the pins. [`replay`] plays a recording ([`capture`]) instead of a row, and
 //!   [`mod@bench`] counts cycles and bytes.
-//! - **Field trials**: [`evaluation`] judges the plots of a trial, real or simulated, with the [`statistics`] that this takes.
+//! - **Field trials**: [`evaluation`] judges the plots of a trial, real or simulated, with the [`statistics`] that this takes,
+//!   and [`page`] shows them in a browser.
 //! - **Soak**: [`soak`] has everything go wrong now and then, for hours.
 //! - **Training**: [`training`] makes the example table that the firmware carries, of labelled objects.
 //! - **Files**: [`whole_file`] writes one whole or not at all.
