@@ -111,7 +111,7 @@ fn write_folder(folder: &Path, trial: &Trial, outcome: &Outcome) -> Result<()> {
     trial.row.write_csv(create("row.csv")?)?;
     report::write_plants_csv(outcome, create("plants.csv")?)?;
     report::write_weeds_csv(outcome, create("weeds.csv")?)?;
-    svg::write(create("row.svg")?, &picture::draw(trial, outcome))?;
+    svg::write(create("row.svg")?, &picture::draw(&trial.row, &outcome.judgement))?;
     println!("Written     row.svg, row.csv, plants.csv and weeds.csv in {}", folder.display());
     Ok(())
 }

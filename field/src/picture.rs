@@ -3,9 +3,8 @@
 //! The row is broken into lanes, to be read like lines of a text.
 
 use crate::drawing::{Legend, MARK_SIZE, PALE_INK, PAPER, document, line, paper, rectangle, swatch, tenth, words};
-use crate::row::{Kind, Thing};
-use crate::trial::{Outcome, Trial};
-use crate::verdict::Verdict;
+use crate::row::{Kind, Row, Thing};
+use crate::verdict::{Judgement, Verdict};
 use std::ops::Range;
 use svg::Document;
 use svg::node::element::path::Data;
@@ -39,9 +38,9 @@ const WEEDED: &str = "#b99a72";
 const OUT: &str = "#dfe7ee";
 const CURVE: &str = "#2a6f97";
 
-/// Draws a trial's outcome.
-pub fn draw(trial: &Trial, outcome: &Outcome) -> Document {
-    let span = trial.row.span_mm();
+/// Draws a row and what happened to it.
+pub fn draw(row: &Row, judgement: &Judgement) -> Document {
+    let span = row.span_mm();
     let lanes = ((span.end - span.start) / LANE_MM).ceil().max(1.0) as usize;
     let (width, height) = (LANE_WIDTH + 2.0 * SIDE, HEAD + lanes as f64 * LANE_HEIGHT + 8.0);
     let clip = ClipPath::new().set("id", "lane").add(rectangle(0.0, 0.0, LANE_WIDTH, LANE_HEIGHT, "#000"));
@@ -52,24 +51,24 @@ pub fn draw(trial: &Trial, outcome: &Outcome) -> Document {
         let ground = start_mm..(start_mm + LANE_MM).min(span.end);
         let top = HEAD + lane as f64 * LANE_HEIGHT;
         document =
-            document.add(draw_lane(trial, outcome, &ground).set("transform", format!("translate({SIDE} {top})")));
+            document.add(draw_lane(row, judgement, &ground).set("transform", format!("translate({SIDE} {top})")));
     }
     document
 }
 
 /// The part of the row in a lane, in a coordinate system that begins at its left end.
-fn draw_lane(trial: &Trial, outcome: &Outcome, ground: &Range<f64>) -> Group {
+fn draw_lane(row: &Row, judgement: &Judgement, ground: &Range<f64>) -> Group {
     let x = |place_mm: f64| (place_mm - ground.start) * PIXELS_PER_MM;
     let is_here = |stretch: &Range<f64>| stretch.start < ground.end && ground.start < stretch.end;
     let length = x(ground.end);
 
     let mut drawn = Group::new().set("clip-path", "url(#lane)");
     drawn = drawn.add(rectangle(0.0, TOOL_Y, length, TOOL_HEIGHT, WEEDED));
-    for clear in outcome.judgement.clear_mm.iter().filter(|clear| is_here(clear)) {
+    for clear in judgement.clear_mm.iter().filter(|clear| is_here(clear)) {
         let (from, to) = (clear.start.max(ground.start), clear.end.min(ground.end));
         drawn = drawn.add(rectangle(x(from), TOOL_Y, x(to) - x(from), TOOL_HEIGHT, OUT));
     }
-    for thing in trial.row.things().iter().filter(|thing| is_here(&thing.span_mm())) {
+    for thing in row.things().iter().filter(|thing| is_here(&thing.span_mm())) {
         for block in thing.blocks_mm() {
             let width = (x(block.end) - x(block.start)).max(2.0);
             drawn = drawn.add(rectangle(x(block.start), BEAM_Y, width, 4.0, BEAM));
@@ -78,11 +77,10 @@ fn draw_lane(trial: &Trial, outcome: &Outcome, ground: &Range<f64>) -> Group {
             drawn = drawn.add(weed(x(thing.position_mm)));
         }
     }
-    for plant in outcome.judgement.plants.iter().filter(|plant| is_here(&plant.plant.span_mm())) {
+    for plant in judgement.plants.iter().filter(|plant| is_here(&plant.plant.span_mm())) {
         drawn = drawn.add(canopy(&plant.plant, x(plant.plant.position_mm), plant.verdict));
     }
-    let points: Vec<String> = outcome
-        .judgement
+    let points: Vec<String> = judgement
         .path
         .iter()
         .map(|&(place_mm, degrees)| format!("{:.1},{:.1}", x(place_mm), angle_y(degrees)))
@@ -193,7 +191,7 @@ mod tests {
     #[test]
     fn the_picture_shows_each_plant_in_the_colour_of_its_verdict() {
         let (trial, outcome) = ruined_row();
-        let drawn = draw(&trial, &outcome).to_string();
+        let drawn = draw(&trial.row, &outcome.judgement).to_string();
         assert_eq!(drawn.matches("<ellipse").count(), 2);
         // Both plants, and the legend.
         assert_eq!(drawn.matches(DAMAGED).count(), 3);
@@ -210,9 +208,9 @@ mod tests {
 
     #[test]
     fn a_long_row_is_broken_into_lanes() {
-        let (mut trial, outcome) = ruined_row();
-        trial.row = crate::row::Row::new(vec![Thing::plant(0.0, 100.0), Thing::plant(6000.0, 100.0)]).unwrap();
-        let drawn = draw(&trial, &outcome).to_string();
+        let (_, outcome) = ruined_row();
+        let row = Row::new(vec![Thing::plant(0.0, 100.0), Thing::plant(6000.0, 100.0)]).unwrap();
+        let drawn = draw(&row, &outcome.judgement).to_string();
         // 12 m of row: half a spacing beyond either plant.
         assert_eq!(drawn.matches("out 45°").count(), 5);
     }

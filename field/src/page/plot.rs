@@ -14,7 +14,7 @@ use std::ops::Range;
 pub type DrawingError = DrawingAreaErrorKind<io::Error>;
 
 /// Size of a plot, and of a series' mark in a legend, in pixels.
-const PLOT_SIZE: (u32, u32) = (840, 560);
+const PLOT_SIZE: (u32, u32) = (840, 572);
 const KEY_SIZE: (u32, u32) = (88, 36);
 
 /// Ink for words, for axes, for the mesh, and for what is out of reach.
@@ -105,7 +105,7 @@ impl Plot<'_> {
                 .margin(6)
                 .margin_top(14)
                 .margin_right(22)
-                .x_label_area_size(84)
+                .x_label_area_size(96)
                 .y_label_area_size(84)
                 .build_cartesian_2d(self.x.clone(), self.y.clone())?;
             let words = ("sans-serif", 34).into_font().color(&INK);

@@ -36,13 +36,14 @@ pub fn short(value: f64) -> String {
     digits.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
-/// A number with four digits that count, or more before the point; what is below a millionth is zero.
+/// A number with four digits that count, or more before the point; and five decimal places at most.
 pub fn significant(value: f64) -> String {
     const DIGITS: f64 = 4.0;
-    if value.abs() < 1e-6 {
+    const DECIMALS: f64 = 5.0;
+    if value.abs() < 0.1_f64.powf(DECIMALS) {
         return "0".to_owned();
     }
-    fixed(value, (DIGITS - 1.0 - value.abs().log10().floor()).max(0.0) as usize)
+    fixed(value, (DIGITS - 1.0 - value.abs().log10().floor()).clamp(0.0, DECIMALS) as usize)
 }
 
 /// A probability: what is below a thousandth is said to be that.
