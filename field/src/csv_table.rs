@@ -63,8 +63,17 @@ impl CsvTable {
         // The reader stands at the line behind the one that it has read; a record's own position may be a comment's.
         let header_line = reader.position().line() - 1;
         if let Some(missing) = columns.iter().find(|&column| !header.iter().any(|name| name == *column)) {
+            let semicolons = header.iter().any(|name| name.contains(';'));
+            let hint = if semicolons { "; fields are separated by commas, not by semicolons" } else { "" };
             let problem = format!("the column `{missing}` is missing: the header has to name {}", columns.join(","));
-            return Err(at(header_line, problem));
+            return Err(at(header_line, problem + hint));
+        }
+        let is_twice = |column: &&&str| header.iter().filter(|name| name == *column).count() > 1;
+        if let Some(twice) = columns.iter().find(is_twice) {
+            return Err(at(
+                header_line,
+                format!("the column `{twice}` stands there twice: each has a name of its own"),
+            ));
         }
         let mut lines = Vec::new();
         let mut record = StringRecord::new();
@@ -167,6 +176,19 @@ mod tests {
         let wrong = "table.csv, line 2: the column `place_mm` is missing: the header has to name place_mm";
         assert_eq!(read("# measured in May\nwidth_mm\n7\n"), Err(wrong.to_owned()));
         assert!(read("").unwrap_err().starts_with("table.csv, line 1: the column `place_mm` is missing"));
+    }
+
+    #[test]
+    fn a_column_that_stands_there_twice_is_refused() {
+        let wrong = "table.csv, line 1: the column `place_mm` stands there twice: each has a name of its own";
+        assert_eq!(read("place_mm,width_mm,place_mm\n7,1,8\n"), Err(wrong.to_owned()));
+        assert_eq!(read("place_mm,width_mm,width_mm\n7,1,8\n"), Ok(vec![(2, 7)]), "it is not read");
+    }
+
+    #[test]
+    fn semicolons_between_the_fields_are_noticed() {
+        let said = read("place_mm;width_mm\n7;1\n").unwrap_err();
+        assert!(said.ends_with("; fields are separated by commas, not by semicolons"), "{said}");
     }
 
     #[test]

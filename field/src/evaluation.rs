@@ -11,7 +11,6 @@ pub mod table;
 use crate::statistics::{AnalysisOfVariance, Design, LinearModel, NoModel};
 use published::Published;
 use serde::Serialize;
-use std::fmt;
 pub use table::{TableError, read_csv, write_csv};
 use thiserror::Error;
 
@@ -84,16 +83,10 @@ impl PlotRecord {
     /// # Errors
     /// Names the first quantity that is out of its range or contradicts another.
     pub fn check(&self) -> Result<(), Implausible> {
-        let positive = "it has to be above 0";
+        let within = |value: f64, lowest: f64, highest: f64| (lowest..=highest).contains(&value);
         let checks = [
-            ("replication", f64::from(self.replication), self.replication > 0, "they are counted from 1"),
-            (
-                "speed_km_h",
-                self.speed_km_h,
-                (0.1..=15.0).contains(&self.speed_km_h),
-                "it has to be from 0.1 to 15 km/h",
-            ),
-            ("spacing_cm", self.spacing_cm, (5.0..=500.0).contains(&self.spacing_cm), "it has to be from 5 to 500 cm"),
+            ("speed_km_h", self.speed_km_h, within(self.speed_km_h, 0.1, 15.0), "it has to be from 0.1 to 15 km/h"),
+            ("spacing_cm", self.spacing_cm, within(self.spacing_cm, 5.0, 500.0), "it has to be from 5 to 500 cm"),
             (
                 "weeds_before",
                 self.weeds_before.into(),
@@ -108,10 +101,10 @@ impl PlotRecord {
             ),
             ("plants", self.plants.into(), self.plants > 0, "without a plant there is no plant damage in percent"),
             ("damaged", self.damaged.into(), self.damaged <= self.plants, "it cannot exceed plants"),
-            ("area_m2", self.area_m2, is_positive(self.area_m2), positive),
-            ("time_s", self.time_s, is_positive(self.time_s), positive),
-            ("width_m", self.width_m, is_positive(self.width_m), positive),
-            ("power_hp", self.power_hp, is_positive(self.power_hp), positive),
+            ("area_m2", self.area_m2, within(self.area_m2, 0.01, 1e6), "it has to be from 0.01 to 1000000 m2"),
+            ("time_s", self.time_s, within(self.time_s, 0.1, 1e6), "it has to be from 0.1 to 1000000 s"),
+            ("width_m", self.width_m, within(self.width_m, 0.01, 50.0), "it has to be from 0.01 to 50 m"),
+            ("power_hp", self.power_hp, within(self.power_hp, 0.001, 1000.0), "it has to be from 0.001 to 1000 hp"),
         ];
         let wrong = checks.into_iter().find(|(_, _, fits, _)| !fits);
         wrong.map_or(Ok(()), |(column, value, _, right)| Err(Implausible { column, value, right }))
@@ -135,11 +128,6 @@ impl PlotRecord {
                 / self.power_hp,
         }
     }
-}
-
-/// Above zero, and a number.
-fn is_positive(value: f64) -> bool {
-    value > 0.0 && value.is_finite()
 }
 
 /// A measure that the paper models on speed and spacing.
@@ -187,12 +175,6 @@ impl Response {
             Self::PerformanceIndex => performance.performance_index,
             Self::FieldEfficiency => performance.field_efficiency_percent,
         }
-    }
-}
-
-impl fmt::Display for Response {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str(self.title())
     }
 }
 
@@ -276,6 +258,13 @@ impl Analysis {
         Ok(Self { records, performances, responses })
     }
 
+    /// The plots, numbered from 1, that cover more ground than their speed and width allow: a field efficiency above
+    /// 100 %, which is a mistake in area, time, width or speed.
+    pub fn faster_than_possible(&self) -> Vec<usize> {
+        let plots = (1..).zip(&self.performances);
+        plots.filter(|(_, plot)| plot.field_efficiency_percent > 100.0).map(|(number, _)| number).collect()
+    }
+
     /// The plots by treatment, slow and narrow first.
     pub fn treatments(&self) -> Vec<Treatment> {
         let mut of_treatments: Vec<(f64, f64)> =
@@ -302,5 +291,83 @@ impl Analysis {
             performance_index: mean(|plot| plot.performance_index),
         };
         Treatment { speed_km_h, spacing_cm, plots: plots.len(), mean }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A plot whose figures come out round.
+    const PLOT: PlotRecord = PlotRecord {
+        replication: 1,
+        speed_km_h: 1.5,
+        spacing_cm: 50.0,
+        weeds_before: 200,
+        weeds_after: 30,
+        plants: 50,
+        damaged: 1,
+        area_m2: 24.0,
+        time_s: 180.0,
+        width_m: 0.4,
+        power_hp: 2.5,
+    };
+
+    #[test]
+    fn a_plot_is_judged_by_the_paper_s_equations() {
+        let plot = PLOT.performance();
+        let close = |value: f64, expected: f64| assert!((value - expected).abs() < 1e-9, "{value} is not {expected}");
+        close(plot.plant_damage_percent, 2.0);
+        close(plot.weeding_efficiency_percent, 85.0);
+        close(plot.theoretical_capacity_ha_h, 0.06);
+        close(plot.effective_capacity_ha_h, 0.048);
+        close(plot.field_efficiency_percent, 80.0);
+        // 0.048 ha/h * 98 % * 85 % / 2.5 hp
+        close(plot.performance_index, 159.936);
+    }
+
+    #[test]
+    fn a_plot_that_cannot_be_is_named_with_its_place_and_column() {
+        let wrong = |change: fn(&mut PlotRecord)| {
+            let mut plot = PLOT;
+            change(&mut plot);
+            Analysis::of(vec![PLOT, plot]).err().map(|error| error.to_string()).unwrap_or_default()
+        };
+        assert_eq!(wrong(|plot| plot.weeds_after = 201), "plot 2: weeds_after is 201: it cannot exceed weeds_before");
+        assert_eq!(wrong(|plot| plot.damaged = 51), "plot 2: damaged is 51: it cannot exceed plants");
+        assert_eq!(wrong(|plot| plot.time_s = f64::NAN), "plot 2: time_s is NaN: it has to be from 0.1 to 1000000 s");
+        assert_eq!(Analysis::of(Vec::new()).err(), Some(AnalysisError::NoPlots));
+    }
+
+    #[test]
+    fn a_treatment_has_the_means_of_its_plots() {
+        let second = PlotRecord { replication: 2, damaged: 3, ..PLOT };
+        let slow = PlotRecord { speed_km_h: 1.0, ..PLOT };
+        let treatments = Analysis::of(vec![PLOT, second, slow]).unwrap().treatments();
+        let found: Vec<_> = treatments.iter().map(|treatment| (treatment.speed_km_h, treatment.plots)).collect();
+        assert_eq!(found, [(1.0, 1), (1.5, 2)]);
+        assert!((treatments[1].mean.plant_damage_percent - 4.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn ground_covered_faster_than_the_machine_drives_is_noticed() {
+        let hasty = PlotRecord { replication: 2, time_s: 100.0, ..PLOT };
+        assert_eq!(Analysis::of(vec![PLOT, hasty]).unwrap().faster_than_possible(), [2]);
+    }
+
+    #[test]
+    fn without_damage_anywhere_the_other_measures_still_have_their_models() {
+        let plot = |(index, speed_km_h): (u32, f64)| PlotRecord {
+            replication: index,
+            speed_km_h,
+            damaged: 0,
+            weeds_after: 30 + index,
+            ..PLOT
+        };
+        let analysis = Analysis::of((0..).zip([1.0, 1.0, 2.0, 2.0]).map(plot).collect()).unwrap();
+        let [damage, weeding, ..] = analysis.responses.as_slice() else { panic!("there are four") };
+        assert_eq!(damage.model, Err(NoModel::Constant { value: 0.0 }));
+        assert_eq!(damage.variance, Err(NoModel::Constant { value: 0.0 }));
+        assert!(weeding.model.is_ok() && weeding.variance.is_ok(), "{weeding:?}");
     }
 }

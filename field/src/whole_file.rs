@@ -24,3 +24,42 @@ pub fn write<E: From<io::Error>>(path: &Path, contents: impl FnOnce(&mut dyn Wri
     file.persist(path).map_err(|error| error.error)?;
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    #[test]
+    fn a_file_that_fails_half_way_leaves_what_was_there() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("report.html");
+        write(&path, |to| to.write_all(b"whole")).unwrap();
+        let error = write(&path, |to| {
+            to.write_all(b"half")?;
+            Err(io::Error::other("no more"))
+        });
+        assert_eq!(error.unwrap_err().to_string(), "no more");
+        assert_eq!(fs::read_to_string(&path).unwrap(), "whole");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "nothing else is left behind");
+    }
+
+    #[test]
+    fn a_file_is_replaced_and_others_may_read_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let (path, plain) = (folder.path().join("trial.csv"), folder.path().join("plain.csv"));
+        for text in ["first", "second"] {
+            write(&path, |to| to.write_all(text.as_bytes())).unwrap();
+            assert_eq!(fs::read_to_string(&path).unwrap(), text);
+        }
+        fs::write(&plain, "").unwrap();
+        assert_eq!(fs::metadata(&path).unwrap().permissions(), fs::metadata(&plain).unwrap().permissions());
+    }
+
+    #[test]
+    fn a_folder_that_does_not_exist_is_an_error() {
+        let folder = tempfile::tempdir().unwrap();
+        let written = write(&folder.path().join("no/such/file"), |to| to.write_all(b"text"));
+        assert_eq!(written.unwrap_err().kind(), io::ErrorKind::NotFound);
+    }
+}
