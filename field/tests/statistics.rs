@@ -57,9 +57,12 @@ fn assert_terms(model: &LinearModel, expected: [(&str, [f64; 4]); 3]) {
     }
 }
 
-/// Asserts the degrees of freedom, sum of squares, F and p of each source.
+/// Name, degrees of freedom and sum of squares of a source, and its F and p.
+type Expected = (&'static str, usize, f64, Option<(f64, f64)>);
+
+/// Asserts each source of an analysis.
 #[track_caller]
-fn assert_sources(analysis: &AnalysisOfVariance, expected: &[(&str, usize, f64, Option<(f64, f64)>)]) {
+fn assert_sources(analysis: &AnalysisOfVariance, expected: &[Expected]) {
     let names: Vec<&str> = analysis.sources.iter().map(|source| source.name).collect();
     assert_eq!(names, expected.iter().map(|(name, ..)| *name).collect::<Vec<_>>());
     for (source, (_, degrees_of_freedom, sum_of_squares, test)) in analysis.sources.iter().zip(expected) {
@@ -85,8 +88,8 @@ fn the_linear_model_of_a_balanced_trial_is_that_of_r() {
     assert_terms(
         &model,
         [
-            ("constant", [85.4058333333334, 2.5103986843194486, 34.0208246071824, 7.47979655142463e-20]),
-            ("speed", [-4.87000000000001, 0.3911649944844918, -12.44998931056722, 3.68204457834911e-11]),
+            ("constant", [85.4058333333334, 2.51039868431945, 34.0208246071824, 7.47979655142463e-20]),
+            ("speed", [-4.87000000000001, 0.391164994484492, -12.4499893105672, 3.68204457834911e-11]),
             ("spacing", [0.1525, 0.0437335759042827, 3.48702334183164, 2.19859531082751e-3]),
         ],
     );
@@ -108,8 +111,8 @@ fn the_analysis_of_variance_of_a_balanced_trial_is_that_of_r() {
     assert_sources(
         &analysis,
         &[
-            ("speed", 3, 178.39125, Some((40.5895904436862622, 1.04624193060900e-7))),
-            ("spacing", 1, 13.95375, Some((9.5247440273037096, 7.08133011193657e-3))),
+            ("speed", 3, 178.39125, Some((40.5895904436863, 1.046241930609e-7))),
+            ("spacing", 1, 13.95375, Some((9.52474402730371, 7.08133011193657e-3))),
             ("speed x spacing", 3, 0.14458333333333, Some((0.0328972317026964, 0.991670819398798))),
             ("residual", 16, 23.44, None),
         ],
@@ -125,8 +128,8 @@ fn an_unbalanced_trial_is_analysed_as_r_does_with_speed_first() {
     assert_terms(
         &model,
         [
-            ("constant", [87.286813750641230, 2.9551875360648348, 29.53681033281342, 2.19080804358767e-15]),
-            ("speed", [-4.990559261159556, 0.4465414342636985, -11.17602730279326, 5.72548197034553e-9]),
+            ("constant", [87.2868137506412, 2.95518753606483, 29.5368103328134, 2.19080804358767e-15]),
+            ("speed", [-4.99055926115956, 0.446541434263699, -11.1760273027933, 5.72548197034553e-9]),
             ("spacing", [0.123114417650078, 0.0489161632813876, 2.51684534091256, 2.28846783592904e-2]),
         ],
     );
@@ -137,9 +140,9 @@ fn an_unbalanced_trial_is_analysed_as_r_does_with_speed_first() {
     assert_sources(
         &analysis,
         &[
-            ("speed", 3, 156.542482456139822, Some((35.703240867044052, 5.79192482702960e-6))),
-            ("spacing", 1, 6.456089887640585, Some((4.417395112837215, 5.94189718741978e-2))),
-            ("speed x spacing", 3, 0.851076779026191, Some((0.194108326130792, 0.898219585560760))),
+            ("speed", 3, 156.54248245614, Some((35.7032408670441, 5.7919248270296e-6))),
+            ("spacing", 1, 6.45608988764058, Some((4.41739511283722, 5.94189718741978e-2))),
+            ("speed x spacing", 3, 0.851076779026191, Some((0.194108326130792, 0.89821958556076))),
             ("residual", 11, 16.0766666666667, None),
         ],
     );
@@ -159,7 +162,7 @@ fn without_replications_the_interaction_is_part_of_the_residual() {
     assert_sources(
         &analysis,
         &[
-            ("speed", 3, 11.20375, Some((14.86401326699834, 0.0263536734300019))),
+            ("speed", 3, 11.20375, Some((14.8640132669983, 0.0263536734300019))),
             ("spacing", 1, 1.90125, Some((7.56716417910448, 0.0706919894512404))),
             ("residual", 3, 0.75375, None),
         ],
@@ -181,9 +184,9 @@ fn a_treatment_without_plots_takes_a_degree_of_freedom_from_the_interaction() {
     assert_sources(
         &analysis,
         &[
-            ("speed", 2, 17.35, Some((7.886363636363643, 0.0284243938885632))),
+            ("speed", 2, 17.35, Some((7.88636363636364, 0.0284243938885632))),
             ("spacing", 1, 15.125, Some((13.75, 0.0138822403876832))),
-            ("speed x spacing", 1, 0.125, Some((0.113636363636363, 0.7497313768945737))),
+            ("speed x spacing", 1, 0.125, Some((0.113636363636363, 0.749731376894574))),
             ("residual", 5, 5.5, None),
         ],
     );
