@@ -9,6 +9,7 @@ mod classify;
 mod completions;
 mod course;
 mod design;
+mod evaluate;
 mod flash;
 mod hex;
 mod monitor;
@@ -61,6 +62,8 @@ enum Command {
     Settings(settings::Arguments),
     /// Calculate what a machine's engine, servo, shanks, chain, wheels and handle have to be like.
     Design(design::Arguments),
+    /// Judge a field trial by what was counted and measured in its plots.
+    Evaluate(evaluate::Arguments),
     /// Print what a shell needs to complete this command's words.
     Completions(completions::Arguments),
 }
@@ -89,6 +92,7 @@ fn main() -> ExitCode {
         Command::Replay(arguments) => replay::run(&arguments),
         Command::Settings(arguments) => settings::run(&arguments),
         Command::Design(arguments) => design::run(&arguments).map(|()| Finding::Good),
+        Command::Evaluate(arguments) => evaluate::run(&arguments).map(|()| Finding::Good),
         Command::Completions(arguments) => completions::run(&arguments, Arguments::command()).map(|()| Finding::Good),
     };
     match result {

@@ -5,7 +5,9 @@
 //! writes them as CSV, [`PlotRecord::performance`] is what follows from one, [`Analysis`] what follows from all, and [`published`] is what
 //! the paper printed. Nothing here knows whether a plot was real or simulated.
 
+mod findings;
 pub mod published;
+mod report;
 pub mod table;
 
 use crate::statistics::{AnalysisOfVariance, Design, LinearModel, NoModel};
@@ -210,6 +212,8 @@ pub struct Analysis {
 pub struct ResponseAnalysis {
     /// The measure.
     pub response: Response,
+    /// Its lowest and its highest value in a plot, in its unit.
+    pub range: (f64, f64),
     /// It as a linear function of speed in km/h and spacing in cm.
     pub model: Result<LinearModel, NoModel>,
     /// Its two-way analysis of variance by speed and spacing, with their interaction.
@@ -247,8 +251,10 @@ impl Analysis {
         let design = Design::new(records.iter().map(|record| (record.speed_km_h, record.spacing_cm)));
         let analyse = |response: Response| {
             let values: Vec<f64> = performances.iter().map(|performance| response.value(performance)).collect();
+            let extreme = |pick: fn(f64, f64) -> f64| values.iter().copied().reduce(pick).unwrap_or_default();
             ResponseAnalysis {
                 response,
+                range: (extreme(f64::min), extreme(f64::max)),
                 model: LinearModel::fit(&design, &values),
                 variance: AnalysisOfVariance::of(&design, &values),
                 published: Published::of(response),
