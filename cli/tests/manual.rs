@@ -39,7 +39,7 @@ speed_mm_s,spacing_mm,delay_mm,hold_mm,actuation_mm,answer,votes,label
 const FOREIGN: [&str; 3] = ["avrdude", "echo", "sudo"];
 
 /// Subcommands that need neither an Uno nor much time.
-const CHEAP: [&str; 4] = ["classify", "design", "hex", "train"];
+const CHEAP: [&str; 5] = ["classify", "design", "evaluate", "hex", "train"];
 
 /// A page of the manual.
 struct Page {
@@ -169,6 +169,9 @@ fn commands_in_the_manual_that_need_no_uno_do_what_they_say() {
     let folder = TempDir::new().expect("a folder");
     fs::create_dir_all(folder.path().join("control/src/examples")).expect("a folder in it");
     fs::write(folder.path().join("field.csv"), OBJECTS).expect("a file in it");
+    fs::create_dir(folder.path().join("docs")).expect("a folder in it");
+    let example = "docs/trial-example.csv";
+    fs::copy(Path::new(ROOT).join(example), folder.path().join(example)).expect("the manual has an example");
     // The reader makes it by `design --print-machine > my.toml`.
     fs::write(folder.path().join("my.toml"), "weeder.mass = \"60 kg\"\n").expect("a file in it");
     let mut run = Vec::new();
