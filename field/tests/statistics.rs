@@ -4,6 +4,8 @@
 //! responses are invented.
 
 use field::statistics::{AnalysisOfVariance, Design, LinearModel, NoModel, Remark, Source};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 
 /// The paper's speeds and spacings with three replications: all plots of a speed together, and of a spacing in them.
 ///
@@ -264,4 +266,42 @@ fn plots_without_scatter_have_estimates_but_no_tests() {
     let analysis = AnalysisOfVariance::of(&design, &values).unwrap();
     assert!(analysis.sources.iter().all(|source| source.f.is_none() && source.p.is_none()), "{analysis:?}");
     assert_eq!(analysis.remarks, [Remark::NoScatter]);
+}
+
+#[test]
+fn whatever_was_left_of_a_trial_no_figure_is_infinite_or_none() {
+    let mut chance = ChaCha8Rng::seed_from_u64(1);
+    let (mut modelled, mut analysed) = (0, 0);
+    for _ in 0..5000 {
+        let plots = chance.random_range(1..12);
+        let levels = chance.random_range(1..4);
+        let mut level = |of: [f64; 3]| of[chance.random_range(0..levels)];
+        let design: Vec<(f64, f64)> = (0..plots).map(|_| (level([1.0, 1.5, 2.5]), level([50.0, 60.0, 75.0]))).collect();
+        // Counts of few plants: often the same, as damage is.
+        let most = chance.random_range(1..4);
+        let values: Vec<f64> = design.iter().map(|_| f64::from(chance.random_range(0..most)) / 0.3).collect();
+        let design = Design::new(design);
+
+        if let Ok(model) = LinearModel::fit(&design, &values) {
+            modelled += 1;
+            let figures = [model.r_squared, model.adjusted_r_squared, model.residual_standard_error];
+            let of_terms = model.terms.iter().flat_map(|term| {
+                [Some(term.estimate), Some(term.standard_error), term.t, term.p].into_iter().flatten()
+            });
+            assert!(figures.into_iter().chain(of_terms).all(f64::is_finite), "{design:?} {values:?} {model:?}");
+        }
+        if let Ok(analysis) = AnalysisOfVariance::of(&design, &values) {
+            analysed += 1;
+            let sources = &analysis.sources;
+            let figures = |source: &Source| [Some(source.mean_square), source.f, source.p].into_iter().flatten();
+            assert!(sources.iter().flat_map(figures).all(f64::is_finite), "{design:?} {values:?} {analysis:?}");
+            let freedom: usize = sources.iter().map(|source| source.degrees_of_freedom).sum();
+            assert_eq!(freedom, values.len() - 1, "{analysis:?}");
+            let mean = values.iter().sum::<f64>() / values.len() as f64;
+            let all: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+            let parts: f64 = sources.iter().map(|source| source.sum_of_squares).sum();
+            assert!((parts / all - 1.0).abs() < 1e-9, "the parts make the whole: {analysis:?}");
+        }
+    }
+    assert!(modelled > 1000 && analysed > 1000, "{modelled} {analysed}");
 }

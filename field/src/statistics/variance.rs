@@ -63,7 +63,7 @@ impl AnalysisOfVariance {
         let mut fits = vec![("", Fit { parameters: 1, sum_of_squares: scatter(values) })];
         let mut remarks = Vec::new();
         if has_speed {
-            fits.push(("speed", treatments_fit(&speeds, values)));
+            fits.push(("speed", levels_fit(&speeds, values)));
         } else {
             remarks.push(Remark::OneSpeed);
         }
@@ -77,7 +77,7 @@ impl AnalysisOfVariance {
             if both == by_speed || both == spacings.count {
                 return Err(NoModel::Inseparable);
             }
-            let each = treatments_fit(&treatments, values);
+            let each = levels_fit(&treatments, values);
             if each.parameters == values.len() {
                 remarks.push(Remark::NoReplication);
             } else if each.parameters > both {
@@ -87,12 +87,11 @@ impl AnalysisOfVariance {
                 remarks.push(Remark::Unbalanced);
             }
         }
-        let [(_, total), .., (_, last)] = fits.as_slice() else { return Err(NoModel::OneTreatment) };
-        let (total, last) = (*total, *last);
+        let [_, .., (_, last)] = fits.as_slice() else { return Err(NoModel::OneTreatment) };
+        let last = *last;
         if last.parameters >= values.len() {
             return Err(NoModel::TooFewPlots { plots: values.len(), parameters: last.parameters });
         }
-        debug_assert!(last.sum_of_squares <= total.sum_of_squares * (1.0 + 1e-9), "a larger model leaves no more");
 
         let residual_freedom = values.len() - last.parameters;
         let residual_mean_square = last.sum_of_squares / residual_freedom as f64;
@@ -160,7 +159,7 @@ impl Levels {
 }
 
 /// A mean for each level.
-fn treatments_fit(levels: &Levels, values: &[f64]) -> Fit {
+fn levels_fit(levels: &Levels, values: &[f64]) -> Fit {
     let of_level = |level: usize| -> Vec<f64> {
         let both = levels.of_plot.iter().zip(values);
         both.filter(|(of_plot, _)| **of_plot == level).map(|(_, value)| *value).collect()
