@@ -1,7 +1,10 @@
 //! The firmware's console, as a patient operator uses it: one command, then all of its answer.
 //!
 //! The firmware answers a command by its lines and then exactly one `ok` or `error: ...` (the README's console chapter).
+//! [`crate::link`] does the same over a serial port, by the host's clock and with every suspicion; here the clock is the virtual
+//! Uno's own, so that the same commands always come at the same cycles.
 
+use crate::link::{LineReader, Values};
 use crate::uno::{Uno, UnoError};
 use thiserror::Error;
 
@@ -49,25 +52,22 @@ pub enum ConsoleError {
 pub fn ask(uno: &mut Uno, command: &str) -> Result<Vec<String>, ConsoleError> {
     uno.received();
     uno.send(format!("{command}\n").as_bytes());
-    let mut received = String::new();
+    let (mut lines, mut answer) = (LineReader::new(), Vec::new());
     for _ in 0..TIMEOUT_MS {
         uno.run_for_ms(1)?;
-        received += &uno.received();
-        // Only lines that are complete count.
-        let complete = received.rfind('\n').map_or("", |end| &received[..=end]);
-        let mut lines: Vec<String> = complete.lines().map(str::to_owned).collect();
-        match lines.last().map(String::as_str) {
-            Some("ok") => {
-                lines.pop();
-                return Ok(lines);
+        lines.take(uno.received().as_bytes());
+        while let Some(line) = lines.next_line() {
+            if line == "ok" {
+                return Ok(answer);
             }
-            Some(answer) if answer.starts_with("error") => {
-                return Err(ConsoleError::Refused { command: command.to_owned(), answer: answer.to_owned() });
+            if line.starts_with("error:") {
+                return Err(ConsoleError::Refused { command: command.to_owned(), answer: line });
             }
-            _ => {}
+            answer.push(line);
         }
     }
-    Err(ConsoleError::Silent { command: command.to_owned(), received })
+    answer.push(lines.partial().to_owned());
+    Err(ConsoleError::Silent { command: command.to_owned(), received: answer.join("\n") })
 }
 
 /// What the firmware says of itself on `status`.
@@ -91,16 +91,12 @@ impl Status {
     }
 
     fn parse(line: &str) -> Result<Self, ConsoleError> {
-        let value = |key: &'static str| {
-            line.split_whitespace()
-                .find_map(|word| word.strip_prefix(key)?.strip_prefix('='))
-                .ok_or(ConsoleError::Status { key, line: line.to_owned() })
-        };
-        let not_a_number = |key| ConsoleError::Status { key, line: line.to_owned() };
+        let values = Values(line);
+        let missing = |key| ConsoleError::Status { key, line: line.to_owned() };
         Ok(Self {
-            state: value("state")?.to_owned(),
-            position_ticks: value("pos")?.parse().map_err(|_| not_a_number("pos"))?,
-            lost_ticks: value("lost")?.parse().map_err(|_| not_a_number("lost"))?,
+            state: values.text("state").ok_or_else(|| missing("state"))?.to_owned(),
+            position_ticks: values.number("pos").ok_or_else(|| missing("pos"))?,
+            lost_ticks: values.number("lost").ok_or_else(|| missing("lost"))?,
         })
     }
 }

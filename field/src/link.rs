@@ -22,7 +22,8 @@ pub mod settings_file;
 mod told;
 
 pub use self::lines::LineReader;
-pub use self::port::{Port, UnoPort, find_uno, only_uno};
+pub use self::port::{Port, UnoPort, find_uno, try_port};
+pub(crate) use self::told::Values;
 pub use self::told::{Mode, Status, Told};
 pub use control::classifier::Class;
 
@@ -81,7 +82,7 @@ pub enum LinkError {
     )]
     Forbidden(String),
     /// The port cannot be opened for another reason.
-    #[error("{port} cannot be opened: is it a serial port?")]
+    #[error("{port} cannot be opened as a serial port")]
     NotOpened {
         /// Its name.
         port: String,

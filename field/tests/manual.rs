@@ -1,9 +1,11 @@
-//! What stands in the manual and follows from the code: the wiring, and every setting.
+//! What stands in the manual and follows from the code: the wiring, every setting, and what to do about every alarm.
 //!
 //! `UPDATE_EXPECT=1 cargo test -p field --test manual` writes it anew.
 
+use control::alarm::{Alarm, Warning};
 use control::settings::{Description, Setting};
 use expect_test::{ExpectFile, expect_file};
+use field::link::advice;
 use field::link::settings::{help, name, unit};
 use field::wiring;
 use std::fmt::Write;
@@ -51,6 +53,23 @@ fn the_settings_that_the_readme_names_have_the_defaults_that_it_gives() {
         }
     }
     assert_eq!(found, 5, "the five that one sets first");
+}
+
+#[test]
+fn the_faults_page_says_what_the_monitor_says_to_do() {
+    let page = expect_file!["../../docs/faults.md"].data();
+    let alarms = (0..).map_while(Alarm::from_index).map(|alarm| {
+        let (code, name) = (alarm.code(), alarm.text().bytes().map(char::from).collect::<String>());
+        (format!("| {}-{} | `{name}` |", code / 10, code % 10), advice::alarm(alarm))
+    });
+    let warnings = (0..).map_while(Warning::from_index).map(|warning| {
+        let name = warning.text().bytes().map(char::from).collect::<String>();
+        (format!("| | `{name}` (warning) |"), advice::warning(warning))
+    });
+    for (begin, advice) in alarms.chain(warnings) {
+        let row = page.lines().find(|line| line.starts_with(&begin)).unwrap_or_else(|| panic!("no row {begin}"));
+        assert!(row.ends_with(&format!(" | {advice} |")), "{row}: {advice}");
+    }
 }
 
 /// Every setting as a table in Markdown.

@@ -1,32 +1,44 @@
-//! What to do about an alarm or a warning, in a sentence for the operator.
+//! What to do about an alarm or a warning, in a few words for the operator: as docs/faults.md has it, which a test holds to this.
 
 use control::alarm::{Alarm, Warning};
 
 /// What to look at when an alarm is latched, and before it is cleared.
 pub fn alarm(alarm: Alarm) -> &'static str {
     match alarm {
-        Alarm::BeamBlocked => "take away what hangs in the beam, align it, or raise max_width_mm",
-        Alarm::BeamFlickers => "clean the beam's lenses and see to its plug and wires",
-        Alarm::BeamEdgesLost => "see to the beam's wires and its supply: its signal chatters",
-        Alarm::EncoderSilent => "see to the encoder's plug, its supply and the ground wheel",
-        Alarm::EncoderChannelDead => "one encoder wire is broken: see to those at D2 and D3",
-        Alarm::EncoderJumps => "see to the encoder's wires and screen: both channels change at once",
-        Alarm::TooFast => "walk slower, or raise top_speed_mm_s",
-        Alarm::RolledBackTooFar => "roll forward: the ground under the tool has been forgotten",
-        Alarm::ScheduleFull => {
-            "more stands between beam and tool than can be kept: see merge_gap_ticks and the beam's height"
-        }
-        Alarm::ToolStuck => "free the tool, and see to the servo's supply and the end switch",
-        Alarm::SettingsLost => "the defaults are in use: set or push the settings, then save",
-        Alarm::SettingsContradict => "set the settings right with each other, then save",
-        Alarm::StackLow => "clear it; when it comes again, report it with the output of status",
+        Alarm::BeamBlocked => "clear the beam, align it, or raise `max_width_mm`",
+        Alarm::BeamFlickers => "clean the beam's lenses, see to its plug and wires",
+        Alarm::BeamEdgesLost => "see to the beam's wires and supply: its signal chatters",
+        Alarm::EncoderSilent => "see to the encoder's coupling; hold when you stop in wind",
+        Alarm::EncoderChannelDead => "see to the wires at D2 and D3 and their pull-ups",
+        Alarm::EncoderJumps => "see to the encoder's screen, ground and pull-ups",
+        Alarm::TooFast => "drive slower, or set the beam farther ahead and raise the limit",
+        Alarm::RolledBackTooFar => "roll forward to where you stopped, then `clear`",
+        Alarm::ScheduleFull => "set the beam nearer, or raise `merge_gap_ticks`",
+        Alarm::ToolStuck => "stop; look for a stone, a dead servo, a loose switch",
+        Alarm::SettingsLost => "check `get`, set what differs, `save`, `clear`",
+        Alarm::SettingsContradict => "`start` says which; change one of them, `save`",
+        Alarm::StackLow => "tell the developers what you did; a reset clears it",
     }
 }
 
 /// What to do about a warning.
 pub fn warning(warning: Warning) -> &'static str {
     match warning {
-        Warning::LateCommand => "the tool left late: keep the speed steady, or raise lead_out_ms",
-        Warning::NoPlants => "no plant for a long way: see that the beam is low enough and not blind",
+        Warning::LateCommand => "drive evenly, look at the plant, or raise `lead_out_ms`",
+        Warning::NoPlants => "see whether the beam is as high as the canopy, and clean",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_alarm_and_what_to_do_fit_on_a_line_of_80_characters() {
+        for alarm in (0..).map_while(Alarm::from_index) {
+            let line =
+                format!("alarm {}: {}", alarm.text().bytes().map(char::from).collect::<String>(), super::alarm(alarm));
+            assert!(line.len() <= 80, "{line}");
+        }
     }
 }

@@ -50,7 +50,7 @@ pub fn find_uno() -> Result<String, LinkError> {
 ///
 /// # Errors
 /// Where there is none, or several.
-pub fn only_uno(ports: &[SerialPortInfo]) -> Result<String, LinkError> {
+fn only_uno(ports: &[SerialPortInfo]) -> Result<String, LinkError> {
     let is_uno = |port: &&SerialPortInfo| match &port.port_type {
         SerialPortType::UsbPort(UsbPortInfo { vid, pid, .. }) => UNOS.contains(&(*vid, *pid)),
         _ => false,
@@ -61,6 +61,14 @@ pub fn only_uno(ports: &[SerialPortInfo]) -> Result<String, LinkError> {
         [] => Err(LinkError::NoUno(ports.iter().map(|port| port.port_name.clone()).collect())),
         _ => Err(LinkError::SeveralUnos(unos)),
     }
+}
+
+/// Opens a port by its name and closes it again.
+///
+/// # Errors
+/// Where it is absent, in use, forbidden, or no serial port; each says what to do.
+pub fn try_port(name: &str) -> Result<(), LinkError> {
+    open(name).map(drop)
 }
 
 /// Opens a port by its name, and says whether that has reset the Uno.
@@ -130,6 +138,7 @@ impl Write for UnoPort {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::pty::Pty;
 
     fn port(name: &str, ids: Option<(u16, u16)>) -> SerialPortInfo {
         SerialPortInfo {
@@ -170,8 +179,29 @@ mod tests {
 
     #[test]
     fn a_port_that_is_absent_and_a_file_that_is_no_port_are_told_apart() {
-        assert!(matches!(open("/dev/no-such-port"), Err(LinkError::Absent(name)) if name == "/dev/no-such-port"));
+        let error = try_port("/dev/no-such-port").unwrap_err().to_string();
+        assert!(error.starts_with("there is no port /dev/no-such-port: plug the Uno in"), "{error}");
         let file = tempfile::NamedTempFile::new().unwrap();
-        assert!(matches!(open(file.path().to_str().unwrap()), Err(LinkError::NotOpened { .. } | LinkError::Busy(_))));
+        let error = try_port(file.path().to_str().unwrap()).unwrap_err().to_string();
+        assert!(error.ends_with("cannot be opened as a serial port"), "{error}");
+    }
+
+    #[test]
+    fn a_port_that_another_program_has_claimed_is_busy_until_it_is_done() {
+        let mut pty = Pty::open().unwrap();
+        let port = pty.path().to_string_lossy().into_owned();
+        let claim = serialport::new(&port, BAUD).open().unwrap();
+        let error = try_port(&port).unwrap_err().to_string();
+        assert!(error.ends_with("close the serial monitor or whatever else has it open"), "{error}");
+        drop(claim);
+        assert!(pty.was_opened().unwrap());
+        try_port(&port).unwrap();
+    }
+
+    #[test]
+    fn who_may_not_open_a_port_is_told_of_its_group() {
+        let denied = serialport::Error::new(ErrorKind::Io(io::ErrorKind::PermissionDenied), "Permission denied");
+        let error = explain("/dev/ttyACM0", denied).to_string();
+        assert!(error.contains("`sudo usermod -aG dialout $USER`) and log in anew"), "{error}");
     }
 }

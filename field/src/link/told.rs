@@ -98,15 +98,15 @@ pub struct Status {
     pub unseen_mm: i32,
 }
 
-/// The words behind a line's name, by their keys.
-struct Values<'a>(&'a str);
+/// The words `key=value` of a line, by their keys.
+pub(crate) struct Values<'a>(pub &'a str);
 
 impl<'a> Values<'a> {
-    fn text(&self, key: &str) -> Option<&'a str> {
+    pub fn text(&self, key: &str) -> Option<&'a str> {
         self.0.split(' ').find_map(|word| word.strip_prefix(key)?.strip_prefix('='))
     }
 
-    fn number<T: std::str::FromStr>(&self, key: &str) -> Option<T> {
+    pub fn number<T: std::str::FromStr>(&self, key: &str) -> Option<T> {
         self.text(key)?.parse().ok()
     }
 
