@@ -5,7 +5,10 @@
 use crate::Finding;
 use anyhow::Result;
 use clap::Args;
-use field::training::{Confusion, Model, table};
+use field::row::Kind;
+use field::training::table::{self, Recorded};
+use field::training::{Confusion, Model, class_of, label_of};
+use serde_json::{Value, json};
 use std::path::PathBuf;
 
 /// What the user asks to be classified.
@@ -14,6 +17,7 @@ use std::path::PathBuf;
 Examples:
   weeder classify field.csv          what `dump` has printed, labelled or not
   weeder classify field.csv --k 5    with five votes
+  weeder classify field.csv --json | jq '.[] | select(.answer == \"unknown\")'
 The status is 1 where a plant would be taken for a weed.")]
 pub struct Arguments {
     /// A CSV file with the columns speed_mm_s,spacing_mm,delay_mm,hold_mm,actuation_mm and, if known, label.
@@ -22,6 +26,9 @@ pub struct Arguments {
     /// Examples that vote; as the firmware starts with where none are given.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=i64::from(field::training::MAX_K)))]
     k: Option<u8>,
+    /// Print a JSON object for each instead of the table.
+    #[arg(long)]
+    json: bool,
 }
 
 /// Classifies, and prints a line an object and, where there are labels, who was taken for whom.
@@ -32,12 +39,31 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     let objects = table::read(&arguments.file)?;
     let mut model = Model::built_in();
     model.k = arguments.k.unwrap_or(model.k);
-    println!("{}", model.table(&objects)?);
-
     let labelled = objects.iter().filter_map(|object| Some((object.kind?, model.class(&object.features))));
     let confusion: Confusion = labelled.collect();
-    if confusion.total() > 0 {
-        println!("\n{confusion}");
+    if arguments.json {
+        println!("{:#}", as_json(&model, &objects)?);
+    } else {
+        println!("{}", model.table(&objects)?);
+        if confusion.total() > 0 {
+            println!("\n{confusion}");
+        }
     }
     if confusion.plants_taken_for_weeds() == 0 { Ok(Finding::Good) } else { Ok(Finding::Bad) }
+}
+
+/// What each object is taken for, and what speaks for it.
+fn as_json(model: &Model, objects: &[Recorded]) -> Result<Value> {
+    let row = |object: &Recorded| {
+        let answer = model.answer(&object.features)?;
+        let votes = |kind| answer.votes[usize::from(label_of(kind))];
+        Ok(json!({
+            "answer": format!("{:?}", class_of(&answer)).to_lowercase(),
+            "votes_plant": votes(Kind::Plant),
+            "votes_weed": votes(Kind::Weed),
+            "nearest_squared": answer.nearest,
+            "label": object.kind.map(|kind| kind.to_string()),
+        }))
+    };
+    objects.iter().map(row).collect()
 }

@@ -70,6 +70,17 @@ fn a_plant_that_would_be_cut_ends_with_status_1() {
 }
 
 #[test]
+fn answers_are_printed_as_json_for_scripts() {
+    let folder = folder_with("694,300,226,116,439,plant\n694,500,226,250,573,\n");
+    let output = weeder(folder.path(), &["classify", "objects.csv", "--json"]);
+    assert_eq!(output.status.code(), Some(1));
+    let rows: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((&rows[0]["answer"], &rows[0]["label"]), (&"weed".into(), &"plant".into()));
+    assert_eq!((&rows[1]["answer"], &rows[1]["label"]), (&"plant".into(), &serde_json::Value::Null));
+    assert!(rows[1]["votes_plant"].as_u64() > rows[1]["votes_weed"].as_u64(), "{rows}");
+}
+
+#[test]
 fn objects_without_labels_are_classified_without_a_score() {
     let folder = folder_with("694,300,226,116,439,\n");
     let output = weeder(folder.path(), &["classify", "objects.csv"]);

@@ -169,3 +169,28 @@ fn a_log_without_a_machine_or_with_a_line_that_cannot_be_is_refused() {
     let log = [entry(Kind::Connected, "0.1.0"), entry(Kind::Status, near), entry(Kind::Status, far)];
     assert!(replay(&log).unwrap_err().to_string().contains("the machine cannot have come so far"));
 }
+
+#[test]
+fn numbers_that_no_machine_gives_are_replayed_or_refused() {
+    let entry = |kind, text: &str| Entry { number: 7, time_ms: u64::MAX, kind, text: text.to_owned() };
+    for [one, other] in [[i32::MIN, i32::MAX], [i32::MAX, i32::MIN], [0, i32::MIN]] {
+        let status =
+            |number: i32| format!("state=work tool=in pos={number} speed_mm_s={number} windows=1 unseen_mm={number}");
+        let plant = format!("plant pos={one} votes=3 spacing={one} delay={one} hold={other} actuation={one}");
+        let (swing, alarm) =
+            (format!("swing tool=out pos={other}"), format!("alarm name=beam_blocked code=11 pos={one}"));
+        let log = [
+            entry(Kind::Connected, "0.1.0"),
+            entry(Kind::Status, &status(one)),
+            entry(Kind::Event, &plant),
+            entry(Kind::Event, &swing),
+            entry(Kind::Event, &alarm),
+            entry(Kind::Event, "state is=work"),
+            entry(Kind::Status, &status(one)),
+        ];
+        assert!(replay(&log).expect("it stands still").difference.is_some(), "{one} {other}");
+        let jump = [&log[..2], &[entry(Kind::Status, &status(other))]].concat();
+        // From the greatest place to the least is one step.
+        assert_eq!(replay(&jump).is_err(), one == 0, "{one} {other}");
+    }
+}

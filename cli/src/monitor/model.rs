@@ -122,7 +122,8 @@ impl Model {
         match told {
             Told::Object { class, position, votes, spacing, hold, .. } => {
                 // The hold is the canopy and both margins.
-                let width = hold - self.settings.wheel().ticks(2 * self.settings.get(Setting::MarginMm)).0;
+                let margins = self.settings.wheel().ticks(2 * self.settings.get(Setting::MarginMm)).0;
+                let width = hold.wrapping_sub(margins);
                 let seen = Seen { class, votes, leading: position, width, spacing };
                 self.objects.push_front(seen);
                 self.objects.truncate(OBJECTS);

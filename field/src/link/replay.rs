@@ -170,7 +170,7 @@ impl<'a> Stretch<'a> {
         let wheel = self.settings.wheel();
         let beam_to_tool = self.settings.ticks(Setting::BeamToToolMm);
         // A machine that has just started has seen nothing yet.
-        let starts_unseen = i32::from(wheel.millimetres(beam_to_tool)) <= self.first.unseen_mm + 1;
+        let starts_unseen = i32::from(wheel.millimetres(beam_to_tool)) <= self.first.unseen_mm.saturating_add(1);
         let judged_from = if starts_unseen { i32::MIN } else { self.first.position.saturating_add(beam_to_tool.0) };
         if !starts_unseen {
             replayed.notes.push(format!(

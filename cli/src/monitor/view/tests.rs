@@ -78,6 +78,19 @@ fn a_machine_that_is_gone_is_said_to_be() {
 }
 
 #[test]
+fn numbers_that_no_machine_gives_are_drawn_as_far_as_they_go() {
+    for number in [i32::MIN, i32::MAX] {
+        let plant =
+            format!("plant pos={number} votes=255 spacing={number} delay={number} hold={number} actuation={number}");
+        let status =
+            "state=work tool=in pos=0 speed_mm_s=0 windows=4294967295 unseen_mm=0".replace("=0", &format!("={number}"));
+        let lines = [plant.as_str(), &status, &plant, "state=hold tool=out pos=0 speed_mm_s=0 windows=0 unseen_mm=0"];
+        let drawn = screen(&machine(&lines));
+        assert!(drawn.contains("plant    255"), "{drawn}");
+    }
+}
+
+#[test]
 fn a_screen_too_small_for_all_of_it_is_drawn_as_far_as_it_goes() {
     let model = machine(&ROW);
     for (width, height) in [(1, 1), (3, 40), (80, 2), (10, 10)] {

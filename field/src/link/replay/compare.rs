@@ -42,7 +42,7 @@ pub(super) fn compare(logged: &[Heard], replayed: &[Heard], bounds: &Bounds, res
     // A swing at the very end may come in the one and not yet in the other.
     let is_at_end = |heard: &Heard| {
         matches!(heard.told, Told::Swing { position, .. }
-            if bounds.end.wrapping_sub(position).abs() <= swing_ticks(heard, heard))
+            if bounds.end.wrapping_sub(position).saturating_abs() <= swing_ticks(heard, heard))
     };
     let mut differences = Vec::new();
     for is_kind in kinds {
@@ -75,7 +75,7 @@ impl Replayed {
             (Told::Swing { position, .. }, Told::Swing { position: ours, .. }) => {
                 self.swings += 1;
                 if !logged.is_given {
-                    self.farthest_swing = self.farthest_swing.max(position.wrapping_sub(ours).abs());
+                    self.farthest_swing = self.farthest_swing.max(position.wrapping_sub(ours).saturating_abs());
                 }
             }
             _ => {}
@@ -90,7 +90,7 @@ fn swing_ticks(logged: &Heard, replayed: &Heard) -> i32 {
 
 /// Whether log and replay tell the same.
 fn agree(logged: &Heard, replayed: &Heard) -> bool {
-    let near = |one: i32, other: i32, ticks: i32| one.wrapping_sub(other).abs() <= ticks;
+    let near = |one: i32, other: i32, ticks: i32| one.wrapping_sub(other).saturating_abs() <= ticks;
     match (logged.told, replayed.told) {
         (
             Told::Object { class, position, votes, hold, .. },

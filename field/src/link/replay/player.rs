@@ -23,6 +23,9 @@ const LONGEST_REST_MS: u64 = 2_000;
 /// Longest way between two lines of a log. A machine at 10 km/h rolls it in some minutes.
 const LONGEST_WAY: i32 = 1_000_000;
 
+/// Faster than any machine, and as far as [`control::units::Wheel::ticks`] goes with every encoder.
+const FASTEST_MM_S: u16 = 3_800;
+
 /// The decisions, driven along the log.
 pub(super) struct Player<'a> {
     controller: Controller<Nearest<&'a [Example<{ features::COUNT }>], Volatile>, Volatile>,
@@ -74,14 +77,14 @@ impl<'a> Player<'a> {
     /// The machine's speed in ticks.
     pub(super) fn speed(&self) -> TicksPerSecond {
         let wheel = self.controller.settings().wheel();
-        let ticks = wheel.ticks(u16::try_from(self.speed_mm_s.unsigned_abs()).unwrap_or(u16::MAX)).0;
+        let ticks = wheel.ticks(self.speed_mm_s.unsigned_abs().min(FASTEST_MM_S.into()) as u16).0;
         TicksPerSecond(if self.speed_mm_s < 0 { -ticks } else { ticks })
     }
 
     /// Rolls from one status to the next, `host_ms` later by the host's clock, gaining or losing speed evenly.
     pub(super) fn roll(&mut self, from: &Status, to: &Status, host_ms: u64) -> Result<(), ()> {
         let way = to.position.wrapping_sub(self.position);
-        if way.abs() > LONGEST_WAY {
+        if way.saturating_abs() > LONGEST_WAY {
             return Err(());
         }
         if way == 0 {
@@ -98,11 +101,11 @@ impl<'a> Player<'a> {
         let way = place.wrapping_sub(self.position);
         let Some(next) = next else { return };
         let whole = next.position.wrapping_sub(self.position);
-        if way == 0 || way.signum() != whole.signum() || way.abs() > whole.abs() {
+        if way == 0 || way.signum() != whole.signum() || way.unsigned_abs() > whole.unsigned_abs() {
             return;
         }
         let share = f64::from(way) / f64::from(whole);
-        let speed = f64::from(from.speed_mm_s) + share * f64::from(next.speed_mm_s - from.speed_mm_s);
+        let speed = f64::from(from.speed_mm_s) + share * (f64::from(next.speed_mm_s) - f64::from(from.speed_mm_s));
         self.roll_by(way, from.speed_mm_s, speed.round() as i32, 0);
     }
 
