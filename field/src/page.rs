@@ -1,7 +1,7 @@
 //! A trial's report as a page for a browser: one file with its plots and tables, that needs nothing beside it.
 //!
-//! [`Page`] says what is on it. The plots are SVG within the page, and its colours follow the reader's choice of light or
-//! dark. It holds no script, asks no network, and comes out the same for the same trial: there is no clock in it. The
+//! [`Page`] says what is on it. The plots are SVG within the page, and its colours follow the reader's choice of light
+//! or dark. It holds no script, asks no network, and comes out the same for the same trial: there is no clock in it. The
 //! words and their order are in `templates/page.html`, its looks in `templates/page.css`.
 
 mod figure;
@@ -25,7 +25,7 @@ pub struct Comparison {
     pub controllers: Vec<ControllerCurve>,
     /// The most of the row that this servo allows to be weeded: speed in km/h, and % of the row's ground.
     pub bound: Vec<(f64, f64)>,
-    /// The least damage that slip and scatter allow: speed in km/h, and % of the plants. Empty where none is unavoidable.
+    /// The least damage that slip and scatter allow, empty where none is known: speed in km/h, and % of the plants.
     pub unavoidable: Vec<(f64, f64)>,
 }
 

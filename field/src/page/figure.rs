@@ -36,7 +36,7 @@ const SPEED: &str = "speed, km/h";
 pub fn damage(comparison: &Comparison) -> Result<Figure, DrawingError> {
     let limit = (comparison.unavoidable.as_slice(), Shade::Below, "unavoidable with this slip and scatter");
     let title = ("Plant damage", "% of the plants");
-    let caption = "Plants whose canopy the tool touched. Lower is better.";
+    let caption = "Plants that the tool damaged, of all in the rows. Lower is better.";
     curves(comparison, title, caption, |point| point.plant_damage_percent, limit)
 }
 
@@ -44,7 +44,8 @@ pub fn damage(comparison: &Comparison) -> Result<Figure, DrawingError> {
 pub fn weeding(comparison: &Comparison) -> Result<Figure, DrawingError> {
     let limit = (comparison.bound.as_slice(), Shade::Above, "physical bound, above which plants are cut");
     let title = ("In-row weeding", "% of the row's ground");
-    let caption = "Ground of the row that the tool worked. Higher is better, as far as the bound: what is above it is paid for with plants.";
+    let caption =
+        "Ground of the row that the tool worked. Higher is better, but above the bound it is paid for with plants.";
     curves(comparison, title, caption, |point| point.in_row_weeding_percent, limit)
 }
 
@@ -153,7 +154,8 @@ pub fn residuals(analysis: &Analysis, of: &ResponseAnalysis, model: &LinearModel
             model.residuals.len(),
             fixed(farthest, 2),
         ),
-        caption: "What the model leaves of each plot. A curve or a funnel in it says that a straight line is the wrong model.".into(),
+        caption: "What the model leaves of each plot. A curve or a funnel in it says that a straight line is wrong."
+            .into(),
     })
 }
 

@@ -1,8 +1,8 @@
 //! The page's plots: lines with markers over speed, and clouds of points, as SVG that stands within a page.
 //!
-//! Series differ in colour, marker and dashes. The colours in here are those of light paper, and at the same time names: the
-//! page's style sheet puts others in their place for dark paper, and dashes the lines. Plots are drawn at twice the size at which
-//! they are usually shown, because plotters works in whole pixels. Legends and titles are the page's, not the plot's.
+//! Series differ in colour, marker and dashes. The colours in here are those of light paper, and at the same time names:
+//! the page's style sheet puts others in their place for dark paper, and dashes the lines. Plots are drawn at twice the
+//! size at which they are usually shown, because plotters works in whole pixels. Legends and titles are the page's.
 
 use plotters::coord::Shift;
 use plotters::element::{DynElement, IntoDynElement};
@@ -23,8 +23,8 @@ const AXIS: RGBColor = RGBColor(0x8A, 0x85, 0x7A);
 const MESH: RGBColor = RGBColor(0xE6, 0xE2, 0xD6);
 const LIMIT: RGBColor = RGBColor(0x5F, 0x5B, 0x52);
 
-/// Colours after Okabe and Ito, darker where they would be pale on white, and markers. They are told apart by people who see few
-/// colours too.
+/// Colours after Okabe and Ito, darker where they would be pale on white, and markers: people who see few colours tell them
+/// apart too.
 const LOOKS: [Look; 4] = [
     Look { colour: RGBColor(0x00, 0x72, 0xB2), marker: Some(Marker::Circle) },
     Look { colour: RGBColor(0xD5, 0x5E, 0x00), marker: Some(Marker::Triangle) },
@@ -159,8 +159,8 @@ pub fn key(look: Look, has_line: bool) -> Result<String, DrawingError> {
     })
 }
 
-/// A range that holds all values with some air around them, from zero where `from_zero` says so. It has an extent even where all
-/// values are the same, or there are none.
+/// A range that holds all values with some air around them, from zero where `from_zero` says so. It has an extent even
+/// where all values are the same, or there are none.
 pub fn range_of(values: impl IntoIterator<Item = f64>, from_zero: bool) -> Range<f64> {
     const AIR: f64 = 0.08;
     let start = if from_zero { 0.0 } else { f64::INFINITY };

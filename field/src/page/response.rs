@@ -52,12 +52,12 @@ impl Chapter {
             title: of.response.title(),
             model: model
                 .map(|model| equation(&name, &coefficients(model), significant))
-                .map_err(|why| sentence(&why.to_string())),
+                .map_err(|why| format!("{why}.")),
             published: equation(&name, &of.published.equation, short),
             equation_number: of.published.equation_number,
             terms: terms(of, model.ok()),
             fit: fit(analysis, of, model.ok()),
-            variance: variance.map(sources).map_err(|why| sentence(&why.to_string())),
+            variance: variance.map(sources).map_err(|why| format!("{why}.")),
             remarks,
             contradictions: of.published.contradictions,
             residuals: model.ok().map(|model| residuals(analysis, of, model)).transpose()?,
