@@ -27,7 +27,13 @@ use std::process::ExitCode;
 
 /// Tries the intra-row weeder's firmware on a simulated field, and puts it on an Arduino Uno.
 #[derive(Parser)]
-#[command(name = "weeder", version, disable_help_subcommand = true)]
+#[command(
+    name = "weeder",
+    version,
+    disable_help_subcommand = true,
+    after_help = "Each command's --help has examples. The status is 0 where all is well; 1 where a plant was damaged, something \
+        differs, or the machine refused a command; 2 where something else went wrong, with a message that says what would be right."
+)]
 struct Arguments {
     #[command(subcommand)]
     command: Command,

@@ -43,6 +43,9 @@ enum Action {
         /// Have the machine keep all its settings for good.
         #[arg(long)]
         save: bool,
+        /// Print which were set as JSON.
+        #[arg(long)]
+        json: bool,
         #[command(flatten)]
         port: Port,
     },
@@ -93,15 +96,18 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
             }
             Ok(Finding::Good)
         }
-        Action::Push { file, save, port } => {
+        Action::Push { file, save, json, port } => {
             let wanted = settings_file::read(file)?;
             ensure!(!wanted.is_empty(), "{} names no setting: `weeder settings pull` writes them all", file.display());
             let changed = settings::push(&mut port.open()?, &wanted, *save)?;
+            let changed: Vec<String> = changed.into_iter().map(name).collect();
+            if *json {
+                println!("{:#}", json!({ "set": changed, "saved": save }));
+                return Ok(Finding::Good);
+            }
             match changed.as_slice() {
                 [] => println!("The machine has these settings already"),
-                changed => {
-                    println!("Set: {}", changed.iter().map(|&setting| name(setting)).collect::<Vec<_>>().join(", "))
-                }
+                changed => println!("Set: {}", changed.join(", ")),
             }
             println!(
                 "{}",

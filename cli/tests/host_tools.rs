@@ -66,6 +66,9 @@ fn settings_are_pulled_changed_compared_and_pushed() {
     assert!(pushed.contains("ok\n"), "{pushed}");
     let pushed = printed(&weeder(&["settings", "push", name, "--save"], uno.path(), ""), 0);
     assert_eq!(pushed, "Set: wheel_mm\nAll settings are saved\n");
+    let again = printed(&weeder(&["settings", "push", name, "--json"], uno.path(), ""), 0);
+    let again: serde_json::Value = serde_json::from_str(&again).expect("it is JSON");
+    assert_eq!(again, serde_json::json!({ "set": [], "saved": false }));
     // Each of these opened the port anew, which is a reset: what was saved is still there.
     printed(&weeder(&["settings", "diff", name], uno.path(), ""), 0);
     let json = printed(&weeder(&["settings", "pull", "--json"], uno.path(), ""), 0);

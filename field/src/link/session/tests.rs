@@ -1,6 +1,8 @@
 //! Sessions with a firmware that answers by a script, and may be unplugged.
 
 use super::*;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 use std::cell::{Cell, RefCell};
 use std::io::{self, Read, Write};
 use std::rc::Rc;
@@ -138,6 +140,27 @@ fn settings_are_asked_for_again_whatever_has_changed_them() {
     assert!(session.command("set wheel_mm 9"));
     let happened = second(&mut session, now + Duration::from_secs(2));
     assert!(matches!(happened.as_slice(), [Happening::Command(_), Happening::Answer(_)]), "{happened:?}");
+}
+
+#[test]
+fn noise_between_the_lines_does_not_end_a_session() {
+    let (mut session, _, says) = session();
+    let mut random = ChaCha8Rng::seed_from_u64(1);
+    let mut now = Instant::now();
+    second(&mut session, now);
+    for _ in 0..10 {
+        let mut noise = vec![0; 10_000];
+        random.fill_bytes(&mut noise);
+        says.borrow_mut().extend(noise);
+        says.borrow_mut().extend(b"\r\nplant pos=99999999999 votes=-1\r\nstate=hold\r\nswing\r\n=\r\n:\r\n");
+        assert!(session.command("hold"));
+        for _ in 0..3 {
+            now += Duration::from_secs(1);
+            let happened = second(&mut session, now);
+            assert!(!happened.iter().any(|happening| matches!(happening, Happening::Lost(_))), "{happened:?}");
+        }
+        assert!(session.is_idle() && session.is_connected());
+    }
 }
 
 #[test]
