@@ -30,6 +30,7 @@ pub mod quadrature;
 pub mod rehearsal;
 pub mod reply;
 pub mod reset;
+mod said;
 pub mod saved;
 pub mod schedule;
 pub mod servo;

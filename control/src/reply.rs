@@ -12,82 +12,14 @@ use crate::{
     controller::{Controller, Judged, Refusal, State},
     event::Event,
     memory::Memory,
+    said,
     settings::{Contradiction, Setting},
-    text::{self, List, Listed, Text, list, text},
+    text::Text,
 };
 use ufmt::{uWrite, uwrite};
 
 /// Room that a line needs, its end included.
 pub const LINE: usize = 127;
-
-/// The one table of what is said about the commands.
-macro_rules! commands {
-    ($($Word:ident $usage:literal, $help:literal;)*) => {
-        impl Word {
-            /// The command with the words that it takes.
-            fn usage(self) -> Listed {
-                Listed(list!($($usage),*), self as u8)
-            }
-
-            /// What it does.
-            fn help(self) -> Listed {
-                Listed(list!($($help),*), self as u8)
-            }
-        }
-
-        const _: () = {
-            let mut place = 0;
-            $(
-                assert!(Word::$Word as u8 == place, "the commands stand here in the order of their words");
-                place += 1;
-            )*
-            assert!(place == Word::COUNT);
-        };
-    };
-}
-
-commands! {
-    Help "help [name]",
-        "this list, or what a setting is";
-    Status "status",
-        "state, position, speed and windows, and what was counted";
-    Get "get [name]",
-        "one setting, or all";
-    Set "set name value",
-        "change a setting; save keeps it";
-    Save "save",
-        "keep the settings for good";
-    Revert "revert",
-        "take the saved settings back";
-    Defaults "defaults",
-        "take a new machine's settings back";
-    Calibrate "calibrate start|servo|MM [force]",
-        "start, roll a measured distance, give it; or time the servo";
-    Servo "servo in|out|US",
-        "move the tool by hand";
-    Test "test row [MM_S]",
-        "swing as for a row of plants, without a sensor";
-    Start "start [now]",
-        "weed; now, at once over ground the beam has not seen";
-    Hold "hold",
-        "take the tool out of the row";
-    Clear "clear",
-        "clear an alarm";
-    Events "events on|off",
-        "tell of plants, swings and alarms as they come";
-    Plot "plot on|off|teleplot",
-        "curves for the Arduino Serial Plotter, or Teleplot";
-    Label "label plant|weed",
-        "say what the last object was, and teach it";
-    Examples "examples",
-        "all examples, with source and class";
-    Forget "forget N|all",
-        "forget examples from the field";
-    Dump "dump",
-        "the last 16 objects as CSV";
-    Version "version",
-        "name the firmware";
-}
 
 /// The part of an answer that has not been written yet.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -221,11 +153,11 @@ impl Answer {
             Self::Done => return Ok(()),
             Self::Greeting => {
                 write_version(out)?;
-                say(out, text!(", reset by "))?;
-                say_listed(out, controller.cause().text())?;
-                say(out, text!(", state "))?;
+                say(out, said::RESET_BY)?;
+                say(out, controller.cause().text())?;
+                say(out, said::STATE)?;
                 write_state(controller.state(), out)?;
-                say(out, text!(", tool out; help lists the commands"))?;
+                say(out, said::TOOL_OUT)?;
                 Self::Done
             }
             Self::Help(place) => {
@@ -262,12 +194,12 @@ impl Answer {
                     Self::Examples(next)
                 }
                 None => {
-                    say_number(out, text!("spoiled="), controller.classifier().spoiled().into())?;
+                    say_number(out, said::SPOILED, controller.classifier().spoiled().into())?;
                     Self::Ok
                 }
             },
             Self::DumpHeading => {
-                say(out, text!("speed_mm_s,spacing_mm,delay_mm,hold_mm,actuation_mm,answer,votes,label"))?;
+                say(out, said::DUMP)?;
                 if controller.objects().is_empty() { Self::Ok } else { Self::Dump(0) }
             }
             Self::Dump(place) => {
@@ -282,7 +214,7 @@ impl Answer {
                 Self::Ok
             }
             Self::Ok => {
-                say(out, text!("ok"))?;
+                say(out, said::OK)?;
                 Self::Done
             }
             Self::Wrong(mistake) => {
@@ -294,7 +226,7 @@ impl Answer {
                 Self::Done
             }
         };
-        say(out, text!("\r\n"))
+        say(out, said::END)
     }
 }
 
@@ -308,39 +240,39 @@ pub fn write_event<W: uWrite + ?Sized>(event: &Event, out: &mut W) -> Result<(),
             say(out, class_name(vote.class))?;
             let numbers =
                 [leading.count(), vote.votes.into(), spacing.0, plan.delay.0, plan.hold.0, plan.actuation().0];
-            say_numbers(out, text!(" pos=# votes=# spacing=# delay=# hold=# actuation=#"), &numbers)?;
+            say_numbers(out, said::OBJECT, &numbers)?;
         }
         Event::Swing { out: leaves, position } => {
-            say(out, text!("swing tool="))?;
+            say(out, said::SWING)?;
             say(out, place_name(leaves))?;
-            say_number(out, text!(" pos="), position.count())?;
+            say_number(out, said::POS, position.count())?;
         }
         Event::State(state) => {
-            say(out, text!("state is="))?;
+            say(out, said::STATE_EVENT)?;
             say(out, state_name(state))?;
         }
         Event::Warning(warning) => {
-            say(out, text!("warning name="))?;
-            say_listed(out, warning.text())?;
+            say(out, said::WARNING)?;
+            say(out, warning.text())?;
         }
         Event::Calibrated { outcome: Outcome::Measured(Leads { out_ms, in_ms }), fits } => {
-            say_numbers(out, text!("calibrated lead_out_ms=# lead_in_ms=#"), &[out_ms.into(), in_ms.into()])?;
-            say(out, if fits { text!(" set=yes") } else { text!(" set=no") })?;
+            say_numbers(out, said::CALIBRATED, &[out_ms.into(), in_ms.into()])?;
+            say(out, if fits { said::SET } else { said::NOT_SET })?;
         }
         Event::Calibrated { outcome: Outcome::Shown, .. } => {
-            say(out, text!("calibrated by=eye, set lead_out_ms and lead_in_ms to what you saw"))?;
+            say(out, said::CALIBRATED_BY_EYE)?;
         }
         Event::Calibrated { outcome: Outcome::Failed, .. } => {
-            say(out, text!("calibrated by=nobody, the end switch did not follow"))?;
+            say(out, said::NOT_CALIBRATED)?;
         }
         Event::Alarm { alarm, position } => {
-            say(out, text!("alarm name="))?;
-            say_listed(out, alarm.text())?;
-            say_number(out, text!(" code="), alarm.code().into())?;
-            say_number(out, text!(" pos="), position.count())?;
+            say(out, said::ALARM)?;
+            say(out, alarm.text())?;
+            say_number(out, said::CODE, alarm.code().into())?;
+            say_number(out, said::POS, position.count())?;
         }
     }
-    say(out, text!("\r\n"))
+    say(out, said::END)
 }
 
 /// Writes the next points of a plotter's curves, each `label:value`, with the line's end.
@@ -353,7 +285,6 @@ where
     M: Memory,
     W: uWrite + ?Sized,
 {
-    let curves = list!("speed_mm_s", "tool_deg", "beam_broken", "windows");
     let points = [
         controller.speed_mm_s(),
         if controller.tool_out() { 45 } else { 0 },
@@ -362,15 +293,15 @@ where
     ];
     for (place, point) in (0..).zip(points) {
         match (plot, place) {
-            (Plot::Teleplot, 0) => say(out, text!(">"))?,
-            (Plot::Teleplot, _) => say(out, text!("\r\n>"))?,
+            (Plot::Teleplot, 0) => say(out, said::TELEPLOT)?,
+            (Plot::Teleplot, _) => say(out, said::TELEPLOT_NEXT)?,
             (_, 0) => {}
-            _ => say(out, text!(","))?,
+            _ => say(out, said::COMMA)?,
         }
-        say_listed(out, Listed(curves, place))?;
-        say_number(out, text!(":"), point.into())?;
+        say(out, said::curve(place))?;
+        say_number(out, said::COLON, point.into())?;
     }
-    say(out, text!("\r\n"))
+    say(out, said::END)
 }
 
 fn write_status<C, M, W>(controller: &Controller<C, M>, out: &mut W) -> Result<(), W::Error>
@@ -380,17 +311,17 @@ where
     W: uWrite + ?Sized,
 {
     let readings = controller.readings();
-    say(out, text!("state="))?;
+    say(out, said::STATE_IS)?;
     say(out, state_name(controller.state()))?;
     if let State::Alarm(alarm) = controller.state() {
-        say(out, text!(" alarm="))?;
-        say_listed(out, alarm.text())?;
+        say(out, said::ALARM_IS)?;
+        say(out, alarm.text())?;
     }
-    say(out, text!(" tool="))?;
+    say(out, said::TOOL_IS)?;
     say(out, place_name(controller.tool_out()))?;
     if let Some(reason) = controller.reason() {
-        say(out, text!(" for="))?;
-        say_listed(out, reason.text())?;
+        say(out, said::FOR)?;
+        say(out, reason.text())?;
     }
     let numbers = [
         readings.position.count(),
@@ -398,7 +329,7 @@ where
         controller.windows().into(),
         controller.unseen_mm().into(),
     ];
-    say_numbers(out, text!(" pos=# speed_mm_s=# windows=# unseen_mm=#"), &numbers)
+    say_numbers(out, said::PLACE, &numbers)
 }
 
 fn write_counts<C, M, W>(controller: &Controller<C, M>, out: &mut W) -> Result<(), W::Error>
@@ -416,12 +347,12 @@ where
         controller.mistakes(),
         readings.stack_free,
     ];
-    let template = text!("lost=# jumps=# late=# missed=# mistakes=# stack_free=# reset=");
+    let template = said::COUNTS;
     say_numbers(out, template, &numbers.map(i32::from))?;
-    say_listed(out, controller.cause().text())?;
+    say(out, controller.cause().text())?;
     if controller.sees_no_plants() {
-        say(out, text!(" warning="))?;
-        say_listed(out, Warning::NoPlants.text())?;
+        say(out, said::WARNING_IS)?;
+        say(out, Warning::NoPlants.text())?;
     }
     Ok(())
 }
@@ -433,14 +364,14 @@ where
     M: Memory,
     W: uWrite + ?Sized,
 {
-    say_listed(out, setting.text())?;
-    write_value(text!("="), setting, controller.settings().get(setting), out)?;
+    say(out, setting.text())?;
+    write_value(said::IS, setting, controller.settings().get(setting), out)?;
     write_range(setting, out)?;
-    write_value(text!(", default "), setting, setting.description().default, out)?;
+    write_value(said::DEFAULT, setting, setting.description().default, out)?;
     match controller.saved(setting) {
-        None => say(out, text!(", not saved")),
+        None => say(out, said::NOT_SAVED),
         Some(saved) if saved == controller.settings().get(setting) => Ok(()),
-        Some(saved) => write_value(text!(", saved "), setting, saved, out),
+        Some(saved) => write_value(said::SAVED, setting, saved, out),
     }
 }
 
@@ -450,48 +381,48 @@ fn write_value<W: uWrite + ?Sized>(text: Text, setting: Setting, value: u16, out
         return say_number(out, text, value.into());
     }
     say(out, text)?;
-    say_listed(out, if value == 0 { Argument::Off } else { Argument::On }.text())
+    say(out, if value == 0 { Argument::Off } else { Argument::On }.text())
 }
 
 fn write_range<W: uWrite + ?Sized>(setting: Setting, out: &mut W) -> Result<(), W::Error> {
     if setting.is_switched() {
-        return say(out, text!(" on or off"));
+        return say(out, said::ON_OR_OFF);
     }
     let description = setting.description();
-    say_number(out, text!(" from "), description.least.into())?;
-    say_number(out, text!(" to "), description.greatest.into())
+    say_number(out, said::FROM, description.least.into())?;
+    say_number(out, said::TO, description.greatest.into())
 }
 
 fn write_example<W: uWrite + ?Sized>(listed: &classifier::Listed, out: &mut W) -> Result<(), W::Error> {
-    say(out, if listed.from_field { text!("field") } else { text!("built_in") })?;
-    say_number(out, text!(" "), listed.number.into())?;
-    say(out, text!(" "))?;
+    say(out, if listed.from_field { said::FIELD } else { said::BUILT_IN })?;
+    say_number(out, said::BLANK, listed.number.into())?;
+    say(out, said::BLANK)?;
     say(out, label_name(listed.example.label))?;
-    listed.example.features.iter().try_for_each(|&feature| say_number(out, text!(" "), feature.into()))
+    listed.example.features.iter().try_for_each(|&feature| say_number(out, said::BLANK, feature.into()))
 }
 
 fn write_object<W: uWrite + ?Sized>(object: &Judged, out: &mut W) -> Result<(), W::Error> {
     for value in object.features().values() {
         uwrite!(out, "{}", value)?;
-        say(out, text!(","))?;
+        say(out, said::COMMA)?;
     }
     say(out, class_name(object.vote.class))?;
-    say_number(out, text!(","), object.vote.votes.into())?;
-    say(out, text!(","))?;
+    say_number(out, said::COMMA, object.vote.votes.into())?;
+    say(out, said::COMMA)?;
     object.label.map_or(Ok(()), |label| say(out, label_name(label)))
 }
 
 fn write_mistake<W: uWrite + ?Sized>(mistake: Mistake, out: &mut W) -> Result<(), W::Error> {
-    say(out, text!("error: "))?;
+    say(out, said::ERROR)?;
     let what = match mistake {
-        Mistake::TooLong => text!("the line is longer than 80 characters, send a shorter one"),
-        Mistake::NotText => text!("the line is not plain text, send letters, digits and blanks only"),
-        Mistake::CharactersLost => text!("characters of this line were lost, send it again"),
-        Mistake::UnknownCommand => text!("no such command, help lists them all"),
-        Mistake::UnknownSetting => text!("no such setting, get lists them all"),
+        Mistake::TooLong => said::TOO_LONG,
+        Mistake::NotText => said::NOT_TEXT,
+        Mistake::CharactersLost => said::CHARACTERS_LOST,
+        Mistake::UnknownCommand => said::UNKNOWN_COMMAND,
+        Mistake::UnknownSetting => said::UNKNOWN_SETTING,
         Mistake::Usage(word) => {
-            say(out, text!("the words do not fit, the command is "))?;
-            return say_listed(out, word.usage());
+            say(out, said::USAGE)?;
+            return say(out, word.usage());
         }
         Mistake::Value(setting) => return write_allowed(setting, out),
     };
@@ -502,57 +433,50 @@ fn write_refusal<W>(refusal: Refusal, setting: Option<Setting>, out: &mut W) -> 
 where
     W: uWrite + ?Sized,
 {
-    say(out, text!("error: "))?;
+    say(out, said::ERROR)?;
     match (refusal, setting) {
         (Refusal::OutOfRange, Some(setting)) => write_allowed(setting, out),
         (Refusal::NotInHold, Some(setting)) if setting.description().hold_only => {
-            say_listed(out, setting.text())?;
-            say(out, text!(" changes where the tool is, hold first"))
+            say(out, setting.text())?;
+            say(out, said::HOLD_TO_SET)
         }
-        (Refusal::NotInHold, _) => say(out, text!("the machine is at work, hold first")),
-        (Refusal::Contradiction(Contradiction::PulsesEqual), _) => {
-            say(out, text!("servo_in_us and servo_out_us would be equal, and the tool would not move"))
-        }
+        (Refusal::NotInHold, _) => say(out, said::HOLD_FIRST),
+        (Refusal::Contradiction(Contradiction::PulsesEqual), _) => say(out, said::PULSES_EQUAL),
         (Refusal::Contradiction(Contradiction::BeamTooNear { needed_mm }), _) => {
-            say_number(out, text!("margin, leads and top speed would need beam_to_tool_mm "), needed_mm.into())?;
-            say(out, text!(" or more, change one of them first"))
+            say_number(out, said::BEAM_TOO_NEAR, needed_mm.into())?;
+            say(out, said::BEAM_FARTHER)
         }
-        (Refusal::NothingToLabel, _) => {
-            say(out, text!("there is no object without a label, let the beam see one first"))
-        }
-        (Refusal::NothingSaved, _) => say(out, text!("no settings are saved, save does it")),
-        (Refusal::Unfit(Unfit::NotBegun), _) => say(out, text!("calibrate start first, then roll")),
-        (Refusal::Unfit(Unfit::TooShort), _) => say(out, text!("roll 1000 mm at least, 10000 are better")),
+        (Refusal::NothingToLabel, _) => say(out, said::NOTHING_TO_LABEL),
+        (Refusal::NothingSaved, _) => say(out, said::NOTHING_SAVED),
+        (Refusal::Unfit(Unfit::NotBegun), _) => say(out, said::NOT_BEGUN),
+        (Refusal::Unfit(Unfit::TooShort), _) => say(out, said::TOO_SHORT),
         (Refusal::Unfit(Unfit::Differs { counted, nominal }), _) => {
-            say_number(out, text!("that would be ticks_per_m "), counted.into())?;
-            say_number(out, text!(", the wheel has "), nominal.into())?;
-            say(out, text!(", look again, or add force"))
+            say_number(out, said::WHEEL_DIFFERS, counted.into())?;
+            say_number(out, said::WHEEL_HAS, nominal.into())?;
+            say(out, said::LOOK_AGAIN)
         }
-        (Refusal::TestSpeed { fastest }, _) => {
-            say_number(out, text!("test row takes a speed in mm/s from 100 to "), fastest.into())
-        }
-        (Refusal::ExamplesFull, _) => say(out, text!("all 32 places are taken, forget one first")),
-        (Refusal::NoSuchExample, _) => say(out, text!("no field example has this number, examples lists them")),
-        _ => say(out, text!("an alarm is latched, see status, then clear it")),
+        (Refusal::TestSpeed { fastest }, _) => say_number(out, said::TEST_SPEED, fastest.into()),
+        (Refusal::ExamplesFull, _) => say(out, said::EXAMPLES_FULL),
+        (Refusal::NoSuchExample, _) => say(out, said::NO_SUCH_EXAMPLE),
+        _ => say(out, said::ALARM_LATCHED),
     }
 }
 
 fn write_allowed<W: uWrite + ?Sized>(setting: Setting, out: &mut W) -> Result<(), W::Error> {
-    say_listed(out, setting.text())?;
-    say(out, if setting.is_switched() { text!(" takes") } else { text!(" takes a whole number") })?;
+    say(out, setting.text())?;
+    say(out, if setting.is_switched() { said::TAKES } else { said::TAKES_A_NUMBER })?;
     write_range(setting, out)
 }
 
 fn write_version<W: uWrite + ?Sized>(out: &mut W) -> Result<(), W::Error> {
-    say(out, text!("weeder "))?;
-    say(out, text!(env!("CARGO_PKG_VERSION")))
+    say(out, said::WEEDER)
 }
 
 /// A name and what it stands for.
-fn explain<W: uWrite + ?Sized>(out: &mut W, name: Listed, explanation: Listed) -> Result<(), W::Error> {
-    say_listed(out, name)?;
-    say(out, text!(" - "))?;
-    say_listed(out, explanation)
+fn explain<W: uWrite + ?Sized>(out: &mut W, name: Text, explanation: Text) -> Result<(), W::Error> {
+    say(out, name)?;
+    say(out, said::DASH)?;
+    say(out, explanation)
 }
 
 /// A text and a number after it: in one place, and in one width, which costs the least flash.
@@ -572,69 +496,48 @@ fn say<W: uWrite + ?Sized>(out: &mut W, text: Text) -> Result<(), W::Error> {
 #[inline(never)]
 fn say_numbers<W: uWrite + ?Sized>(out: &mut W, text: Text, numbers: &[i32]) -> Result<(), W::Error> {
     let mut numbers = numbers.iter();
-    for byte in text.packed_bytes() {
+    for character in text.bytes() {
         match numbers.as_slice() {
-            [number, ..] if byte == b'#' => {
+            [number, ..] if character == b'#' => {
                 numbers.next();
                 uwrite!(out, "{}", *number)?;
             }
-            _ => say_byte(out, byte)?,
+            _ => out.write_char(char::from(character))?,
         }
     }
     Ok(())
-}
-
-/// A text of a list.
-#[inline(always)]
-fn say_listed<W: uWrite + ?Sized>(out: &mut W, Listed(list, place): Listed) -> Result<(), W::Error> {
-    say_at(out, list, place)
-}
-
-/// The text at a place in a list, both of which find room in registers.
-#[inline(never)]
-fn say_at<W: uWrite + ?Sized>(out: &mut W, list: List, place: u8) -> Result<(), W::Error> {
-    list.packed_bytes(place).try_for_each(|byte| say_byte(out, byte))
-}
-
-/// What a packed byte stands for.
-#[inline(never)]
-fn say_byte<W: uWrite + ?Sized>(out: &mut W, byte: u8) -> Result<(), W::Error> {
-    match text::fragment(byte) {
-        None => out.write_char(char::from(byte)),
-        Some(Listed(list, place)) => say_at(out, list, place),
-    }
 }
 
 /// The state, and which alarm.
 fn write_state<W: uWrite + ?Sized>(state: State, out: &mut W) -> Result<(), W::Error> {
     say(out, state_name(state))?;
     if let State::Alarm(alarm) = state {
-        say(out, text!(" "))?;
-        say_listed(out, alarm.text())?;
+        say(out, said::BLANK)?;
+        say(out, alarm.text())?;
     }
     Ok(())
 }
 
 fn state_name(state: State) -> Text {
     match state {
-        State::Hold => text!("hold"),
-        State::Work => text!("work"),
-        State::Alarm(_) => text!("alarm"),
+        State::Hold => Word::Hold.text(),
+        State::Work => said::WORK,
+        State::Alarm(_) => said::IN_ALARM,
     }
 }
 
 fn place_name(tool_out: bool) -> Text {
-    if tool_out { text!("out") } else { text!("in") }
+    if tool_out { Argument::Out.text() } else { Argument::In.text() }
 }
 
 fn label_name(label: u8) -> Text {
-    if label == label::PLANT { text!("plant") } else { text!("weed") }
+    if label == label::PLANT { Argument::Plant.text() } else { Argument::Weed.text() }
 }
 
 fn class_name(class: Class) -> Text {
     match class {
-        Class::Plant => text!("plant"),
-        Class::Weed => text!("weed"),
-        Class::Unknown => text!("unknown"),
+        Class::Plant => Argument::Plant.text(),
+        Class::Weed => Argument::Weed.text(),
+        Class::Unknown => said::UNKNOWN,
     }
 }

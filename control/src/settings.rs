@@ -5,7 +5,7 @@
 
 use crate::{
     memory::CHECK,
-    text::{Listed, list, list_bytes, list_length, words},
+    text::{Text, words},
     units::{Ticks, TicksPerSecond, Wheel},
 };
 
@@ -43,16 +43,9 @@ macro_rules! settings {
             ];
         }
 
-        impl Setting {
-            /// What it is, for the operator.
-            pub fn help(self) -> Listed {
-                Listed(list!($($help),*), self as u8)
-            }
-        }
-
         $(const _: () = assert!($least <= $default && $default <= $greatest, $name);)*
 
-        const NAMES: &[&str] = &[$($name),*];
+        pub(crate) const HELPS: &[&str] = &[$($help),*];
     };
 }
 
@@ -110,8 +103,20 @@ settings! {
         "whether a switch on D5 closes when the tool is out, and is to be watched";
 }
 
-/// Stands for this table wherever values are kept without their names: the CRC-16 of the names in their order.
-pub const TABLE_MARK: u16 = CHECK.checksum(&list_bytes::<{ list_length(NAMES) }>(NAMES));
+/// Stands for this table wherever values are kept without their names: the CRC-16 of the names in their
+/// order, each behind its length.
+pub const TABLE_MARK: u16 = {
+    let (mut bytes, mut end, mut place) = ([0; 512], 0, 0);
+    while place < Setting::WORDS.len() {
+        let name = Setting::WORDS[place].as_bytes();
+        bytes[end] = name.len() as u8;
+        let (_, behind) = bytes.split_at_mut(end + 1);
+        behind.split_at_mut(name.len()).0.copy_from_slice(name);
+        end += 1 + name.len();
+        place += 1;
+    }
+    CHECK.checksum(bytes.split_at(end).0)
+};
 
 /// Settings that cannot be right together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -129,6 +134,11 @@ impl Setting {
     /// All settings, in the table's order.
     pub fn all() -> impl Iterator<Item = Self> {
         (0..).map_while(Self::from_index)
+    }
+
+    /// What it is, for the operator.
+    pub fn help(self) -> Text {
+        const { Text::first_of(HELPS) }.plus(self as u8)
     }
 
     /// Whether it is switched on and off, as 1 and 0.

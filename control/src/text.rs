@@ -1,235 +1,270 @@
 //! Text that lies in flash.
 //!
-//! An AVR keeps Rust's string literals in SRAM, of which there are 2 KiB. `text!` lays a literal into flash instead and
-//! gives a [`Text`], which is no more than its address and length: all texts share one piece of code that writes them.
-//! `list!` lays many literals behind each other, so that a number chooses one, which takes far less code than a match.
-//! `words!` makes an enum whose variants are words.
+//! An AVR keeps Rust's string literals in SRAM, of which there are 2 KiB. So all that the machine says lies in flash, in one
+//! table, and a [`Text`] is no more than its number there: one byte. What is said stands in [`said`](crate::said); `words!`
+//! makes an enum whose variants are words of that table, to be written and to be read.
 //!
-//! What is said is packed: [`FRAGMENTS`] that come again and again are one byte each. The compiler packs, and whoever reads
-//! the characters unpacks. Words are not packed, since they are also read.
+//! The texts are packed: [`FRAGMENTS`] that come again and again are one byte each. A fragment is a pair of bytes, each of
+//! which is a character or stands for another fragment, so that nothing is searched where one is unpacked. The compiler
+//! packs, and [`Characters`] unpacks.
 
-use avr_progmem::wrapper::ProgMem;
+use crate::said::GROUPS;
 
-/// Fragments of what is said, each of which stands for itself as a byte from 0x80 on. They are those that save most, found
-/// by trying; any others would do.
+/// Fragments of what is said, sorted, each of which stands for itself as a byte from 0x80 on. They come from joining the most
+/// frequent pair again and again; any others would do that can be split into two.
 const FRAGMENTS: &[&str] = &[
-    " the ", "s ", ", ", "e ", "t ", "an", "tool", "d ", "setting", "er", "calibrat", "in", "or", "th", "st", "alarm",
-    "ou", "exampl", "ee", "ea", "on", "take", "se", "o ", "a ", "el", "mm", "ar", "ch", "ro", "of", "at", "hol",
-    " pos=", "ame", "sav", "fir", "objec", "wh", "co", "ac", "es", "no", "pl", "all", "it", "m ", "0 ", "; ", "en",
-    "sp", "re", "ed", "d_", "sw", "vo", "lo", "ti", "gr", "y ", "la", "is", "de", "et",
+    " p", " the ", ", ", "0 ", "; ", "=#", "=# ", "_m", "_mm", "a ", "ac", "ad", "al", "alar", "alarm", "am", "an",
+    "an ", "and ", "ar", "as ", "at ", "be", "beam", "beam_", "br", "cal", "cali", "calibr", "calibra", "ch", "ck",
+    "co", "com", "comm", "d ", "de", "e ", "e the ", "ed", "ee", "eed", "el", "en", "enco", "encod", "er", "er ",
+    "es ", "ex", "exam", "examp", "example", "fa", "fi", "fir", "first", "for", "fr", "ge", "gr", "hol", "in", "ing",
+    "is ", "it", "l ", "la", "le", "lead", "lead_", "li", "lo", "m ", "nam", "no", "not ", "of", "of ", "ol", "on",
+    "or", "or ", "ou", "oun", "out", "ow", "pl", "plan", "plant", "re", "row", "s ", "s, ", "s=# ", "s_", "sa", "sav",
+    "se", "ser", "servo", "set", "sett", "setting", "sp", "st", "st ", "sta", "star", "sw", "t ", "ta", "tak", "te",
+    "th", "the ", "ti", "to", "to ", "tool", "tool ", "tu", "ul", "um", "un", "vo", "wh", "y ",
 ];
-
-avr_progmem::progmem! {
-    static progmem FRAGMENT_LIST: [u8; list_length(FRAGMENTS)] = list_bytes(FRAGMENTS);
-}
 
 /// The first byte that stands for a fragment.
 const FIRST_FRAGMENT: u8 = 0x80;
 
-/// The fragment that a packed byte stands for, if it is not a character.
-pub(crate) fn fragment(byte: u8) -> Option<Listed> {
-    byte.checked_sub(FIRST_FRAGMENT).map(|place| Listed(List::new(FRAGMENT_LIST.as_slice()), place))
+/// Second halves of fragments that wait while the first ones are unpacked, at most; a power of two, for short arithmetic.
+const WAITING: usize = 8;
+
+/// Texts from one entry of the index to the next; from there on, a text is found by the lengths of those before it.
+const STRIDE: u8 = 16;
+
+/// Where the index begins in the table, behind the fragments, and where the texts do.
+const INDEX: usize = 2 * FRAGMENTS.len();
+const TEXTS: usize = INDEX + 2 * (count() as usize).div_ceil(STRIDE as usize);
+
+avr_progmem::progmem! {
+    static progmem TABLE: [u8; table::<4096>().1] = table().0;
 }
 
-/// A text in flash, ASCII.
-#[derive(Clone, Copy)]
-pub struct Text(ProgMem<[u8]>);
+/// A byte of the table: in one place, as reading it takes more code than it seems.
+#[inline(never)]
+fn byte(place: usize) -> u8 {
+    TABLE.load_at(place)
+}
+
+/// A text in flash, by its number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Text(u8);
 
 impl Text {
-    /// The text whose characters lie in `flash`; made by `text!`.
-    pub(crate) const fn new(flash: ProgMem<[u8]>) -> Self {
-        Self(flash)
-    }
-
-    /// The packed bytes.
-    pub(crate) fn packed_bytes(self) -> impl Iterator<Item = u8> {
-        self.0.wrapper_iter().map(|byte| byte.load())
-    }
-}
-
-/// Texts behind each other in flash, each behind a byte with its length; made by `list!`.
-#[derive(Clone, Copy)]
-pub struct List(ProgMem<[u8]>);
-
-impl List {
-    pub(crate) const fn new(flash: ProgMem<[u8]>) -> Self {
-        Self(flash)
-    }
-
-    /// The place of the text that reads as `word`.
-    #[inline(never)]
-    pub(crate) fn find(self, word: &[u8]) -> Option<u8> {
-        let mut start = 0;
-        let mut place = 0;
-        while start < self.0.len() {
-            let length = usize::from(self.byte(start));
-            start += 1;
-            if length == word.len() && word.iter().zip(start..).all(|(&character, at)| character == self.byte(at)) {
-                return Some(place);
-            }
-            start += length;
+    /// The first text of a group.
+    pub(crate) const fn first_of(group: &[&str]) -> Self {
+        let (mut first, mut place) = (0, 0);
+        while !is_same_group(GROUPS[place], group) {
+            first += GROUPS[place].len() as u8;
             place += 1;
         }
-        None
+        Self(first)
     }
 
-    /// The packed bytes of the text at a place.
-    pub(crate) fn packed_bytes(self, place: u8) -> impl Iterator<Item = u8> {
-        let mut start = 0;
-        for _ in 0..place {
-            start += 1 + usize::from(self.byte(start));
-        }
-        let end = start + 1 + usize::from(self.byte(start));
-        (start + 1..end).map(move |at| self.byte(at))
+    /// The text that stands so many places behind this one.
+    pub(crate) const fn plus(self, places: u8) -> Self {
+        Self(self.0 + places)
     }
 
+    /// The characters, ASCII.
     #[inline(never)]
-    fn byte(self, at: usize) -> u8 {
-        self.0.load_at(at)
+    pub fn bytes(self) -> Characters {
+        let entry = INDEX + 2 * usize::from(self.0 / STRIDE);
+        let mut start = usize::from(u16::from_le_bytes([byte(entry), byte(entry + 1)]));
+        for _ in 0..self.0 % STRIDE {
+            start += 1 + usize::from(byte(start));
+        }
+        Characters { next: start + 1, left: byte(start), waiting: [0; WAITING], halves: 0 }
     }
-}
 
-/// The text at a place in a list.
-#[derive(Clone, Copy)]
-pub struct Listed(pub(crate) List, pub(crate) u8);
-
-impl Listed {
-    /// The characters.
-    pub fn bytes(self) -> impl Iterator<Item = u8> {
-        let Self(list, place) = self;
-        list.packed_bytes(place).flat_map(|byte| {
-            let literal = fragment(byte).is_none().then_some(byte);
-            let fragment = fragment(byte).map(|Self(list, place)| list.packed_bytes(place));
-            literal.into_iter().chain(fragment.into_iter().flatten())
+    /// Which of `count` texts from this one on reads as `word`.
+    #[inline(never)]
+    pub(crate) fn find(self, count: u8, word: &[u8]) -> Option<u8> {
+        (0..count).find(|&place| {
+            let mut characters = self.plus(place).bytes();
+            word.iter().all(|&character| characters.next() == Some(character)) && characters.next().is_none()
         })
     }
 }
 
-/// The byte that stands for a literal's characters from `at` on, and how many of them: the longest fragment, or one.
-const fn pack(literal: &str, at: usize) -> (u8, usize) {
-    let characters = literal.as_bytes();
-    let mut packed = (characters[at], 1);
+/// The characters of a text that are still to be unpacked.
+#[derive(Clone, Debug)]
+pub struct Characters {
+    /// Where the next byte lies, and how many there are.
+    next: usize,
+    left: u8,
+    /// Second halves of fragments, the last one first, and how many of them wait.
+    waiting: [u8; WAITING],
+    halves: u8,
+}
+
+impl Iterator for Characters {
+    type Item = u8;
+
+    #[inline(never)]
+    fn next(&mut self) -> Option<u8> {
+        let mut code = if self.halves > 0 {
+            self.halves -= 1;
+            self.waiting[usize::from(self.halves) % WAITING]
+        } else {
+            self.left = self.left.checked_sub(1)?;
+            self.next += 1;
+            byte(self.next - 1)
+        };
+        while let Some(fragment) = code.checked_sub(FIRST_FRAGMENT) {
+            let pair = 2 * usize::from(fragment);
+            self.waiting[usize::from(self.halves) % WAITING] = byte(pair + 1);
+            self.halves += 1;
+            code = byte(pair);
+        }
+        Some(code)
+    }
+}
+
+/// How many texts there are.
+const fn count() -> u8 {
+    let (mut count, mut group) = (0, 0);
+    while group < GROUPS.len() {
+        count += GROUPS[group].len();
+        group += 1;
+    }
+    assert!(count <= u8::MAX as usize, "a byte numbers the texts");
+    count as u8
+}
+
+/// The table and its length: the fragments, the index, and the texts, each behind a byte with its packed length.
+const fn table<const SIZE: usize>() -> ([u8; SIZE], usize) {
+    let mut table = [0; SIZE];
     let mut place = 0;
     while place < FRAGMENTS.len() {
-        let fragment = FRAGMENTS[place].as_bytes();
-        let mut same = 0;
-        while same < fragment.len() && at + same < characters.len() && characters[at + same] == fragment[same] {
-            same += 1;
+        let [first, second] = split(FRAGMENTS[place].as_bytes());
+        (table[2 * place], table[2 * place + 1]) = (first, second);
+        assert!(waiting(first) < WAITING && waiting(second) <= WAITING);
+        place += 1;
+    }
+    let (mut number, mut end, mut group) = (0, TEXTS, 0);
+    while group < GROUPS.len() {
+        let mut place = 0;
+        while place < GROUPS[group].len() {
+            if number % STRIDE as usize == 0 {
+                let entry = INDEX + 2 * (number / STRIDE as usize);
+                [table[entry], table[entry + 1]] = (end as u16).to_le_bytes();
+            }
+            let start = end + 1;
+            end = pack(GROUPS[group][place], &mut table, start);
+            table[start - 1] = (end - start) as u8;
+            number += 1;
+            place += 1;
         }
-        if same == fragment.len() && same > packed.1 {
-            packed = (FIRST_FRAGMENT + place as u8, same);
+        group += 1;
+    }
+    (table, end)
+}
+
+/// Writes a text into the table, in as few bytes as the fragments allow; returns where it ends.
+const fn pack(text: &str, table: &mut [u8], mut end: usize) -> usize {
+    assert!(text.is_ascii(), "a serial monitor can be trusted with ASCII alone");
+    let text = text.as_bytes();
+    // From the text's end forward: with which byte the rest of it is shortest, how long that byte reads, and how long the rest is.
+    let mut best = [(0, 0, 0); 128];
+    let mut at = text.len();
+    while at > 0 {
+        at -= 1;
+        best[at] = (text[at], 1, best[at + 1].2 + 1);
+        let [mut place, behind] = beginning_with(text[at]);
+        while place < behind {
+            let fragment = FRAGMENTS[place].as_bytes();
+            if begins(text.split_at(at).1, fragment) && best[at + fragment.len()].2 + 1 < best[at].2 {
+                best[at] = (FIRST_FRAGMENT + place as u8, fragment.len(), best[at + fragment.len()].2 + 1);
+            }
+            place += 1;
         }
-        place += 1;
     }
-    packed
+    while at < text.len() {
+        table[end] = best[at].0;
+        at += best[at].1;
+        end += 1;
+    }
+    end
 }
 
-/// Bytes that a literal takes when it is packed.
-pub(crate) const fn packed_length(literal: &str) -> usize {
-    let (mut length, mut at) = (0, 0);
-    while at < literal.len() {
-        at += pack(literal, at).1;
-        length += 1;
-    }
-    length
-}
-
-/// A literal, packed; stops the compiler unless it is ASCII, which is all a serial monitor can be trusted with.
-pub(crate) const fn packed<const LENGTH: usize>(literal: &str) -> [u8; LENGTH] {
-    assert!(literal.is_ascii());
-    let mut bytes = [0; LENGTH];
-    let (mut length, mut at) = (0, 0);
-    while at < literal.len() {
-        let (byte, characters) = pack(literal, at);
-        bytes[length] = byte;
-        at += characters;
-        length += 1;
-    }
-    bytes
-}
-
-/// A literal as a [`Text`].
-macro_rules! text {
-    ($literal:expr) => {{
-        avr_progmem::progmem! {
-            static progmem CHARACTERS: [u8; $crate::text::packed_length($literal)] = $crate::text::packed($literal);
+/// The two bytes that a fragment stands for.
+const fn split(fragment: &[u8]) -> [u8; 2] {
+    let mut at = 1;
+    while at < fragment.len() {
+        let (first, second) = fragment.split_at(at);
+        if let (Some(first), Some(second)) = (code(first), code(second)) {
+            return [first, second];
         }
-        $crate::text::Text::new(CHARACTERS.as_slice())
-    }};
-}
-pub(crate) use text;
-
-/// Bytes that a list of literals takes.
-pub(crate) const fn list_length(literals: &[&str]) -> usize {
-    let mut length = 0;
-    let mut place = 0;
-    while place < literals.len() {
-        length += 1 + literals[place].len();
-        place += 1;
+        at += 1;
     }
-    length
+    panic!("a fragment consists of two characters or other fragments");
 }
 
-/// Literals, each behind its length.
-pub(crate) const fn list_bytes<const LENGTH: usize>(literals: &[&str]) -> [u8; LENGTH] {
-    let mut bytes = [0; LENGTH];
-    let (mut place, mut start) = (0, 0);
-    while place < literals.len() {
-        let literal = literals[place];
-        assert!(literal.is_ascii() && literal.len() <= u8::MAX as usize);
-        bytes[start] = literal.len() as u8;
-        let (_, behind) = bytes.split_at_mut(start + 1);
-        behind.split_at_mut(literal.len()).0.copy_from_slice(literal.as_bytes());
-        start += 1 + literal.len();
-        place += 1;
+/// The byte that stands for a part of a text, if one does.
+const fn code(part: &[u8]) -> Option<u8> {
+    if let [character] = part {
+        return Some(*character);
     }
-    bytes
-}
-
-/// Bytes that a list of literals takes when they are packed.
-pub(crate) const fn packed_list_length(literals: &[&str]) -> usize {
-    let mut length = 0;
-    let mut place = 0;
-    while place < literals.len() {
-        length += 1 + packed_length(literals[place]);
-        place += 1;
-    }
-    length
-}
-
-/// Literals, packed, each behind its length.
-pub(crate) const fn packed_list<const LENGTH: usize>(literals: &[&str]) -> [u8; LENGTH] {
-    let mut bytes = [0; LENGTH];
-    let (mut place, mut length) = (0, 0);
-    while place < literals.len() {
-        let literal = literals[place];
-        assert!(literal.is_ascii());
-        bytes[length] = packed_length(literal) as u8;
-        length += 1;
-        let mut at = 0;
-        while at < literal.len() {
-            let (byte, characters) = pack(literal, at);
-            bytes[length] = byte;
-            at += characters;
-            length += 1;
+    let [mut place, behind] = beginning_with(part[0]);
+    while place < behind {
+        if FRAGMENTS[place].len() == part.len() && begins(part, FRAGMENTS[place].as_bytes()) {
+            return Some(FIRST_FRAGMENT + place as u8);
         }
         place += 1;
     }
-    bytes
+    None
 }
 
-/// Literals as a [`List`], packed.
-macro_rules! list {
-    ($($literal:expr),* $(,)?) => {{
-        const LITERALS: &[&str] = &[$($literal),*];
-        avr_progmem::progmem! {
-            static progmem LIST: [u8; $crate::text::packed_list_length(LITERALS)] =
-                $crate::text::packed_list(LITERALS);
-        }
-        $crate::text::List::new(LIST.as_slice())
-    }};
+/// Second halves that wait at once while a byte is unpacked.
+const fn waiting(code: u8) -> usize {
+    if code < FIRST_FRAGMENT {
+        return 0;
+    }
+    let [first, second] = split(FRAGMENTS[(code - FIRST_FRAGMENT) as usize].as_bytes());
+    let (first, second) = (waiting(first) + 1, waiting(second));
+    if first > second { first } else { second }
 }
-pub(crate) use list;
+
+/// Where the fragments stand that begin with a character: the first one's place, and the place behind the last one.
+const fn beginning_with(character: u8) -> [usize; 2] {
+    [STARTS[character as usize], STARTS[character as usize + 1]]
+}
+
+/// For each character, how many fragments begin with one before it.
+const STARTS: [usize; 129] = {
+    let mut starts = [0; 129];
+    let (mut character, mut place) = (0, 0);
+    while character < starts.len() {
+        while place < FRAGMENTS.len() && (FRAGMENTS[place].as_bytes()[0] as usize) < character {
+            place += 1;
+        }
+        starts[character] = place;
+        character += 1;
+    }
+    assert!(FRAGMENTS.len() <= 128 && place == FRAGMENTS.len());
+    starts
+};
+
+const fn begins(text: &[u8], part: &[u8]) -> bool {
+    let mut same = 0;
+    while same < part.len() && same < text.len() && text[same] == part[same] {
+        same += 1;
+    }
+    same == part.len()
+}
+
+const fn is_same_group(one: &[&str], other: &[&str]) -> bool {
+    let mut same = 0;
+    while same < one.len() && same < other.len() {
+        let (one, other) = (one[same].as_bytes(), other[same].as_bytes());
+        if one.len() != other.len() || !begins(one, other) {
+            return false;
+        }
+        same += 1;
+    }
+    one.len() == other.len()
+}
 
 /// An enum whose variants are words: `text` writes one, `find` reads one.
 macro_rules! words {
@@ -247,8 +282,13 @@ macro_rules! words {
         }
 
         impl $Name {
+            /// The words, in the order of declaration.
+            pub(crate) const WORDS: &[&str] = &[$($word),*];
+
             /// How many there are.
-            pub const COUNT: u8 = [$($word),*].len() as u8;
+            pub const COUNT: u8 = Self::WORDS.len() as u8;
+
+            const FIRST: $crate::text::Text = $crate::text::Text::first_of(Self::WORDS);
 
             /// The one at a place in the order of declaration.
             pub const fn from_index(index: u8) -> Option<Self> {
@@ -258,22 +298,14 @@ macro_rules! words {
                 }
             }
 
-            fn words() -> $crate::text::List {
-                const WORDS: &[&str] = &[$($word),*];
-                avr_progmem::progmem! {
-                    static progmem LIST: [u8; $crate::text::list_length(WORDS)] = $crate::text::list_bytes(WORDS);
-                }
-                $crate::text::List::new(LIST.as_slice())
-            }
-
             /// The word for it.
-            pub fn text(self) -> $crate::text::Listed {
-                $crate::text::Listed(Self::words(), self as u8)
+            pub const fn text(self) -> $crate::text::Text {
+                Self::FIRST.plus(self as u8)
             }
 
             /// The one that `word` stands for.
             pub fn find(word: &[u8]) -> Option<Self> {
-                Self::words().find(word).and_then(Self::from_index)
+                Self::FIRST.find(Self::COUNT, word).and_then(Self::from_index)
             }
         }
     };
@@ -284,24 +316,33 @@ pub(crate) use words;
 mod tests {
     extern crate std;
     use super::*;
-    use std::{string::String, vec::Vec};
+    use std::string::String;
 
-    fn read(bytes: impl Iterator<Item = u8>) -> String {
-        String::from_utf8(bytes.collect()).expect("ASCII")
+    #[test]
+    fn every_text_reads_as_it_was_written() {
+        let mut text = Text(0);
+        for written in GROUPS.iter().copied().flatten() {
+            assert_eq!(String::from_utf8(text.bytes().collect()).expect("ASCII"), **written);
+            text = text.plus(1);
+        }
+        assert_eq!(text.0, count());
     }
 
     #[test]
-    fn what_is_packed_reads_as_it_was_written() {
-        let list = list!("", "calibrate the tool", "0123456789_=");
-        let said = [0, 1, 2].map(|place| read(Listed(list, place).bytes()));
-        assert_eq!(said, ["", "calibrate the tool", "0123456789_="]);
-        assert!(packed_length("calibrate the tool") < 9);
+    fn texts_are_packed_to_two_thirds_at_most() {
+        let written: usize = GROUPS.iter().copied().flatten().map(|text| text.len()).sum();
+        assert!(3 * TABLE.len() < 2 * written, "{} of {written}", TABLE.len());
     }
 
     #[test]
-    fn every_fragment_reads_as_itself() {
-        let fragments = (0..FRAGMENTS.len() as u8).map(|place| fragment(FIRST_FRAGMENT + place).expect("a fragment"));
-        let fragments: Vec<String> = fragments.map(|fragment| read(fragment.bytes())).collect();
-        assert_eq!(fragments, FRAGMENTS);
+    fn a_word_is_found_among_its_own_group_and_as_a_whole_only() {
+        let group = GROUPS.last().expect("there are groups");
+        let first = Text::first_of(group);
+        for (place, word) in (0..).zip(*group) {
+            assert_eq!(first.find(group.len() as u8, word.as_bytes()), Some(place));
+            assert_eq!(first.find(place, word.as_bytes()), None, "the group ends before it");
+            assert_eq!(first.find(group.len() as u8, &word.as_bytes()[1..]), None);
+            assert_eq!(first.find(group.len() as u8, &[word.as_bytes(), b"_"].concat()), None);
+        }
     }
 }
