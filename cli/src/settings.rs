@@ -145,7 +145,7 @@ fn table(differences: &[(Setting, u16, u16)]) -> Table {
     table.load_style(presets::UTF8_BORDERS_ONLY).set_header(["setting", "file", "machine", "unit"]);
     for &(setting, file, machine) in differences {
         let [file, machine] = [file, machine].map(|number| value(setting, number).to_string());
-        table.add_row([name(setting), file, machine, unit(setting).to_owned()]);
+        table.add_row([name(setting), file, machine, unit(setting)]);
     }
     table
 }

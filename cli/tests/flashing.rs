@@ -111,6 +111,18 @@ fn flash(port: &Path, arguments: &[&str]) {
     assert!(flashed, "avrdude's own words stand above");
 }
 
+/// Asserts that the firmware greets who opens the port, once the bootloader has waited, and answers.
+#[track_caller]
+fn assert_talks(link: &Path) {
+    let mut port = serialport::new(link.to_string_lossy(), 115_200).timeout(PATIENCE).open().unwrap();
+    let greeting = read_until(&mut *port, "help lists the commands\r\n");
+    assert!(greeting.contains("weeder"), "{greeting}");
+    port.write_all(b"version\n").unwrap();
+    assert!(read_until(&mut *port, "ok\r\n").contains(env!("CARGO_PKG_VERSION")));
+    port.write_all(b"status\n").unwrap();
+    assert!(read_until(&mut *port, "ok\r\n").contains("tool=out"));
+}
+
 /// An ELF for the chip that takes so many bytes of flash.
 fn elf_of(folder: &Path, bytes: usize) -> PathBuf {
     let (source, elf) = (folder.join("filler.S"), folder.join("filler.elf"));
@@ -131,27 +143,20 @@ fn an_empty_uno_is_flashed_through_optiboot_and_answers() {
     let uno = VirtualUno::start(&arguments);
     flash(&link, &[]);
 
-    let mut port = serialport::new(link.to_string_lossy(), 115_200).timeout(PATIENCE).open().unwrap();
-    let greeting = read_until(&mut *port, "help lists the commands\r\n");
-    assert!(greeting.contains("weeder"), "{greeting}");
-    port.write_all(b"version\n").unwrap();
-    assert!(read_until(&mut *port, "ok\r\n").contains(env!("CARGO_PKG_VERSION")));
-    port.write_all(b"status\n").unwrap();
-    assert!(read_until(&mut *port, "ok\r\n").contains("tool=out"));
-
-    drop(port);
+    assert_talks(&link);
     assert!(uno.interrupt(), "Ctrl-C ends it well");
     assert!(!link.is_symlink(), "it takes its link with it");
     assert_eq!(fs::metadata(&eeprom).unwrap().len(), 1024);
 }
 
 #[test]
-fn an_uno_with_the_old_bootloader_is_flashed_at_its_own_baud_rate() {
+fn an_uno_with_the_old_bootloader_is_flashed_at_its_own_baud_rate_and_answers() {
     let folder = tempfile::tempdir().unwrap();
-    let elf = elf_of(folder.path(), 5000);
     let link = folder.path().join("uno");
-    let _uno = VirtualUno::start(&[Path::new("--bootloader"), &old_bootloader(), Path::new("--link"), &link]);
-    flash(&link, &["--old-bootloader", "--elf", elf.to_str().expect("a plain path")]);
+    let arguments = [Path::new("--stand"), Path::new("--bootloader"), &old_bootloader(), Path::new("--link"), &link];
+    let _uno = VirtualUno::start(&arguments);
+    flash(&link, &["--old-bootloader"]);
+    assert_talks(&link);
 }
 
 #[test]

@@ -628,6 +628,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     }
 
     /// The next event to be told.
+    #[inline(never)]
     pub fn next_event(&mut self) -> Option<Event> {
         (!self.events.is_empty()).then(|| self.events.remove(0))
     }

@@ -168,7 +168,7 @@ impl Answer {
             }
             Self::Explain(setting) => {
                 explain(out, setting.text(), setting.help())?;
-                Self::Ok
+                Self::Get(setting)
             }
             Self::Status => {
                 write_status(controller, out)?;
@@ -234,6 +234,7 @@ impl Answer {
 ///
 /// # Errors
 /// What `out` reports.
+#[inline(never)]
 pub fn write_event<W: uWrite + ?Sized>(event: &Event, out: &mut W) -> Result<(), W::Error> {
     match *event {
         Event::Object { vote, leading, spacing, plan } => {
@@ -279,6 +280,7 @@ pub fn write_event<W: uWrite + ?Sized>(event: &Event, out: &mut W) -> Result<(),
 ///
 /// # Errors
 /// What `out` reports.
+#[inline(never)]
 pub fn write_plot<C, M, W>(controller: &Controller<C, M>, plot: Plot, out: &mut W) -> Result<(), W::Error>
 where
     C: Classifier,
@@ -291,16 +293,8 @@ where
         i16::from(controller.beam_is_broken()),
         i16::from(controller.windows()),
     ];
-    for (place, point) in (0..).zip(points) {
-        match (plot, place) {
-            (Plot::Teleplot, 0) => say(out, said::TELEPLOT)?,
-            (Plot::Teleplot, _) => say(out, said::TELEPLOT_NEXT)?,
-            (_, 0) => {}
-            _ => say(out, said::COMMA)?,
-        }
-        say(out, said::curve(place))?;
-        say_number(out, said::COLON, point.into())?;
-    }
+    let curves = if plot == Plot::Teleplot { said::TELEPLOT } else { said::SERIAL_PLOTTER };
+    say_numbers(out, curves, &points.map(i32::from))?;
     say(out, said::END)
 }
 
@@ -366,6 +360,7 @@ where
 {
     say(out, setting.text())?;
     write_value(said::IS, setting, controller.settings().get(setting), out)?;
+    say(out, setting.unit())?;
     write_range(setting, out)?;
     write_value(said::DEFAULT, setting, setting.description().default, out)?;
     match controller.saved(setting) {

@@ -14,9 +14,9 @@ use crate::{
 /// All texts of the machine, from which the table in flash is made.
 pub(crate) const GROUPS: &[&[&str]] = &[
     SAID,
-    CURVES,
     USAGES,
     HELPS,
+    settings::UNITS,
     settings::HELPS,
     Setting::WORDS,
     Word::WORDS,
@@ -53,7 +53,6 @@ said! {
     DASH = " - ";
     BLANK = " ";
     COMMA = ",";
-    COLON = ":";
     IS = "=";
     DEFAULT = ", default ";
     SAVED = ", saved ";
@@ -82,8 +81,8 @@ said! {
     NOT_CALIBRATED = "calibrated by=nobody, the end switch did not follow";
     ALARM = "alarm name=";
     CODE = " code=";
-    TELEPLOT = ">";
-    TELEPLOT_NEXT = "\r\n>";
+    SERIAL_PLOTTER = "speed_mm_s:#,tool_deg:#,beam_broken:#,windows:#";
+    TELEPLOT = ">speed_mm_s:#\r\n>tool_deg:#\r\n>beam_broken:#\r\n>windows:#";
     FIELD = "field";
     BUILT_IN = "built_in";
     SPOILED = "spoiled=";
@@ -113,14 +112,6 @@ said! {
     EXAMPLES_FULL = "all 32 places are taken, forget one first";
     NO_SUCH_EXAMPLE = "no field example has this number, examples lists them";
     ALARM_LATCHED = "an alarm is latched, see status, then clear it";
-}
-
-/// The curves of a plotter.
-const CURVES: &[&str] = &["speed_mm_s", "tool_deg", "beam_broken", "windows"];
-
-/// The name of a curve.
-pub(crate) fn curve(place: u8) -> Text {
-    const { Text::first_of(CURVES) }.plus(place)
 }
 
 /// The one table of what is said about the commands.

@@ -1,4 +1,4 @@
-//! The settings: one table of name, range, unit, default and help, and the values in use.
+//! The settings: one table of name, unit, range, default and help, and the values in use.
 //!
 //! The console reads this table from flash; a test holds the manual to it. Every value is a whole number in 16 bits whose
 //! name carries its unit.
@@ -24,7 +24,7 @@ pub struct Description {
 
 /// The one table from which everything else about the settings is made.
 macro_rules! settings {
-    ($($(#[$doc:meta])* $Variant:ident $name:literal: $least:literal to $greatest:literal, $default:literal, $hold_only:literal, $help:literal;)*) => {
+    ($($(#[$doc:meta])* $Variant:ident $name:literal $(in $unit:literal)?: $least:literal to $greatest:literal, $default:literal, $hold_only:literal, $help:literal;)*) => {
         words! {
             /// A setting.
             pub enum Setting {
@@ -45,6 +45,7 @@ macro_rules! settings {
 
         $(const _: () = assert!($least <= $default && $default <= $greatest, $name);)*
 
+        pub(crate) const UNITS: &[&str] = &[$(concat!($(" ", $unit)?)),*];
         pub(crate) const HELPS: &[&str] = &[$($help),*];
     };
 }
@@ -54,49 +55,49 @@ settings! {
     TicksPerRev "ticks_per_rev": 100 to 10000, 2400, true,
         "encoder counts in a turn of the ground wheel";
     /// Diameter of the ground wheel.
-    WheelMm "wheel_mm": 200 to 800, 400, true,
+    WheelMm "wheel_mm" in "mm": 200 to 800, 400, true,
         "diameter of the ground wheel";
     /// Encoder counts a metre, measured.
     TicksPerM "ticks_per_m": 0 to 20000, 0, true,
         "encoder counts a metre, as calibrated; 0: by wheel and encoder";
     /// X: how far the beam stands ahead of the tool.
-    BeamToToolMm "beam_to_tool_mm": 100 to 2000, 400, true,
+    BeamToToolMm "beam_to_tool_mm" in "mm": 100 to 2000, 400, true,
         "X, how far the beam stands ahead of the tool";
     /// Ground kept free of the tool on both sides of a canopy.
-    MarginMm "margin_mm": 0 to 200, 50, true,
+    MarginMm "margin_mm" in "mm": 0 to 200, 50, true,
         "ground that the tool leaves alone on both sides of a canopy";
     /// Time from the command to the tool being out.
-    LeadOutMs "lead_out_ms": 0 to 500, 180, false,
+    LeadOutMs "lead_out_ms" in "ms": 0 to 500, 180, false,
         "from the command until the tool is out, under load; 0 as in the paper";
     /// Shortest time from the command to the tool beginning to come back.
-    LeadInMs "lead_in_ms": 0 to 500, 40, false,
+    LeadInMs "lead_in_ms" in "ms": 0 to 500, 40, false,
         "shortest time from the command until the tool begins to come back";
     /// Pulse for the tool in the row.
-    ServoInUs "servo_in_us": 500 to 2500, 1500, true,
+    ServoInUs "servo_in_us" in "us": 500 to 2500, 1500, true,
         "servo pulse for the tool in the row, 0 degrees";
     /// Pulse for the tool out of the row.
-    ServoOutUs "servo_out_us": 500 to 2500, 2000, true,
+    ServoOutUs "servo_out_us" in "us": 500 to 2500, 2000, true,
         "servo pulse for the tool out of the row, 45 degrees";
     /// Shortest gap between two servo pulses.
-    ServoGapMs "servo_gap_ms": 0 to 15, 3, false,
+    ServoGapMs "servo_gap_ms" in "ms": 0 to 15, 3, false,
         "shortest gap between servo pulses; 0 keeps fixed frames of 20 ms";
     /// Examples that vote.
     K "k": 1 to 15, 3, false,
         "nearest examples that vote on what an object is";
     /// Width above which an object cannot be a plant.
-    MaxWidthMm "max_width_mm": 20 to 1500, 400, false,
+    MaxWidthMm "max_width_mm" in "mm": 20 to 1500, 400, false,
         "a beam broken over more ground than this raises an alarm";
     /// Gaps in a canopy shorter than this belong to it.
-    MergeGapTicks "merge_gap_ticks": 0 to 2000, 40, false,
+    MergeGapTicks "merge_gap_ticks" in "ticks": 0 to 2000, 40, false,
         "clear stretches shorter than this, in ticks, belong to the canopy";
     /// The sensor's response time.
-    BeamResponseMs "beam_response_ms": 0 to 50, 1, false,
+    BeamResponseMs "beam_response_ms" in "ms": 0 to 50, 1, false,
         "time the beam's sensor takes to answer";
     /// Speed above which the machine must not work.
-    TopSpeedMmS "top_speed_mm_s": 100 to 3000, 1400, false,
+    TopSpeedMmS "top_speed_mm_s" in "mm/s": 100 to 3000, 1400, false,
         "working faster than this raises an alarm; 1400 is 5 km/h";
     /// Ground without a plant that is worth a warning.
-    NoPlantM "no_plant_m": 0 to 100, 10, false,
+    NoPlantM "no_plant_m" in "m": 0 to 100, 10, false,
         "so many metres without a plant give a warning; 0 never";
     /// Whether an end switch tells that the tool is out.
     EndSwitch "end_switch": 0 to 1, 0, false,
@@ -139,6 +140,11 @@ impl Setting {
     /// What it is, for the operator.
     pub fn help(self) -> Text {
         const { Text::first_of(HELPS) }.plus(self as u8)
+    }
+
+    /// Its unit behind a blank, or nothing where it is a count or switched.
+    pub fn unit(self) -> Text {
+        const { Text::first_of(UNITS) }.plus(self as u8)
     }
 
     /// Whether it is switched on and off, as 1 and 0.

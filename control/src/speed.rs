@@ -45,14 +45,7 @@ impl SpeedMeter {
     /// A meter for a machine that stands at `position`.
     pub fn new(position: Position, now: Instant) -> Self {
         let last = Sample { place: position.count() as u16, time: now.coarse() };
-        Self {
-            samples: [last; SAMPLES as usize],
-            count: 0,
-            next: 0,
-            last,
-            patience: STANDSTILL,
-            speed: TicksPerSecond(0),
-        }
+        Self { samples: Default::default(), count: 0, next: 0, last, patience: STANDSTILL, speed: TicksPerSecond(0) }
     }
 
     /// The speed as of the last reading.

@@ -50,6 +50,7 @@ enum Slot {
 
 impl<M: Memory> FieldExamples<M> {
     /// Looks through a memory for the examples that it holds.
+    #[inline(never)]
     pub fn new(memory: M) -> Self {
         let slots = [Slot::Free; CAPACITY as usize];
         let mut store = Self { memory, slots, spoiled: 0, writing: 0, bytes: [ERASED; SLOT], left: 0 };

@@ -289,6 +289,20 @@ fn the_table_of_faults_names_every_alarm_with_its_code_and_every_warning_and_cau
 }
 
 #[test]
+fn get_and_help_tell_the_unit_as_a_word_of_its_own() {
+    for command in ["get", "help"] {
+        let tells = |setting: &str, shown: &str| {
+            let answer = ask(&mut machine(), &format!("{command} {setting}"));
+            assert!(answer[answer.len() - 2].starts_with(shown), "{answer:?}");
+        };
+        tells("top_speed_mm_s", "top_speed_mm_s=1400 mm/s from 100 to 3000, default 1400");
+        tells("merge_gap_ticks", "merge_gap_ticks=40 ticks from 0 to 2000, default 40");
+        tells("ticks_per_rev", "ticks_per_rev=2400 from 100 to 10000, default 2400");
+        tells("end_switch", "end_switch=off on or off, default off");
+    }
+}
+
+#[test]
 fn get_tells_what_is_saved_where_that_differs() {
     let mut machine = machine();
     assert_eq!(ask(&mut machine, "get k")[0], "k=3 from 1 to 15, default 3, not saved");

@@ -23,7 +23,7 @@ fn every_command_is_answered_by_its_lines_and_one_ok() {
     let mut uno = woken_up();
     for (command, lines) in [
         ("help", Word::COUNT),
-        ("help wheel_mm", 1),
+        ("help wheel_mm", 2),
         ("version", 1),
         ("status", 2),
         ("get", Setting::COUNT),
@@ -93,8 +93,9 @@ fn help_names_every_command_and_explains_every_setting() {
     for setting in (0..).map_while(Setting::from_index) {
         let name = String::from_utf8(setting.text().bytes().collect()).expect("ASCII");
         let answer = exchange(&mut uno, format!("help {name}\n").as_bytes());
-        assert!(answer.len() == 2 && answer[0].starts_with(&name) && answer[1] == "ok", "{answer:#?}");
+        assert!(answer.len() == 3 && answer[0].starts_with(&name) && answer[2] == "ok", "{answer:#?}");
         assert!(answer[0].len() > name.len() + 10, "{answer:#?}");
+        assert!(answer[1].starts_with(&format!("{name}=")), "{answer:#?}");
     }
 }
 

@@ -41,7 +41,7 @@ fn easily_set() -> Uno {
 }
 
 #[test]
-fn get_lists_every_setting_with_value_range_and_default() {
+fn get_lists_every_setting_with_value_unit_range_and_default() {
     let listed = ask(&mut woken_up(), "get");
     let expected: Vec<String> = settings()
         .map(|(setting, name)| {
@@ -49,7 +49,8 @@ fn get_lists_every_setting_with_value_range_and_default() {
             let default = written(setting, default);
             let range =
                 if setting.is_switched() { "on or off".to_owned() } else { format!("from {least} to {greatest}") };
-            format!("{name}={default} {range}, default {default}, not saved")
+            let unit = String::from_utf8(setting.unit().bytes().collect()).expect("ASCII");
+            format!("{name}={default}{unit} {range}, default {default}, not saved")
         })
         .collect();
     assert_eq!(listed, expected);

@@ -8,8 +8,8 @@ use field::planting::Planting;
 use field::trial::Trial;
 use field::verdict::Timing;
 
-/// The flash below the Uno's bootloader, 31.5 KiB.
-const FLASH_BYTES: u64 = 63 * 512;
+/// The flash below the bootloader that came before the Uno's, 30 KiB.
+const FLASH_BYTES: u64 = 30 * 1024;
 
 /// 1 KiB of the 2 KiB of SRAM; the rest is for the stack.
 const SRAM_BYTES: u64 = 1024;

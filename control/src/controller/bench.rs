@@ -175,6 +175,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         self.readings.position = position;
     }
 
+    #[inline(never)]
     fn expect_hold(&self) -> Result<(), Refusal> {
         match self.state {
             State::Hold => Ok(()),

@@ -49,17 +49,10 @@ pub fn help(setting: Setting) -> String {
     setting.help().bytes().map(char::from).collect()
 }
 
-/// A setting's unit, which its name carries; empty for a count.
-pub fn unit(setting: Setting) -> &'static str {
-    let name = name(setting);
-    if name.contains("_per_") {
-        return "";
-    }
-    // The longest first.
-    [("_mm_s", "mm/s"), ("_mm", "mm"), ("_ms", "ms"), ("_us", "us"), ("_ticks", "ticks"), ("_m", "m")]
-        .into_iter()
-        .find_map(|(ending, unit)| name.ends_with(ending).then_some(unit))
-        .unwrap_or_default()
+/// A setting's unit; empty for a count.
+pub fn unit(setting: Setting) -> String {
+    // The console puts it behind a number, and its blank with it.
+    setting.unit().bytes().map(char::from).collect::<String>().trim_start().to_owned()
 }
 
 /// What a setting may be, with its unit and default.
