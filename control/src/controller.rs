@@ -6,16 +6,24 @@
 //! the machine is and how fast it rolls.
 
 mod bench;
+mod commands;
+mod faults;
+mod ground;
+mod shown;
 
-use self::bench::Bench;
+pub use self::{commands::Refusal, shown::Reason};
+
+use self::{
+    bench::Bench,
+    ground::{Geometry, Leads},
+};
 use crate::{
-    alarm::{Alarm, Warning},
-    calibration::{Distance, Unfit},
-    classifier::{Class, Classifier, Full, Vote},
+    alarm::Alarm,
+    calibration::Distance,
+    classifier::{Class, Classifier, Vote},
     console::Plot,
     event::Event,
     features::{self, Features},
-    lamp,
     memory::Memory,
     monitor::{BeamMonitor, EncoderMonitor},
     object::{Object, Watch},
@@ -23,12 +31,10 @@ use crate::{
     saved::SavedSettings,
     schedule::{Plan, Schedule},
     servo::{self, HalfMicros},
-    settings::{Contradiction, Setting, Settings},
+    settings::{Setting, Settings},
     speed::SpeedMeter,
     switch::Switch,
-    taught,
-    text::words,
-    units::{Coarse, Instant, Interval, Position, Ticks, TicksPerSecond},
+    units::{Coarse, Instant, Position},
 };
 use heapless::Vec;
 
@@ -37,15 +43,6 @@ const OBJECTS: usize = 16;
 
 /// Events that wait to be told. They are short-lived: a plant gives three in half a second.
 const EVENTS: usize = 6;
-
-/// Time between two points of a plotter's curves.
-const PLOT_PERIOD: u16 = Coarse::steps_in_ms(50);
-
-/// What the end switch may take longer than the lead: a servo frame, the contacts' bouncing, and some patience.
-const END_SWITCH_GRACE_MS: u32 = 100;
-
-/// Free bytes of stack below which the machine does not work on: two interrupts' worth.
-const STACK_RESERVE: u16 = 48;
 
 /// What the machine is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -104,72 +101,6 @@ pub struct Orders {
     pub pulse_out: HalfMicros,
     /// The shortest gap between servo pulses in milliseconds; 0 for fixed frames.
     pub gap_ms: u8,
-}
-
-/// Distances that follow from the settings, in ticks of the present wheel.
-#[derive(Clone, Copy, Debug)]
-struct Geometry {
-    beam_to_tool: Ticks,
-    margin: Ticks,
-    max_width: Ticks,
-    merge_gap: Ticks,
-    /// As ticks a second.
-    top_speed: Ticks,
-    /// Zero for none.
-    no_plant: Ticks,
-}
-
-/// Distances rolled at the present speed while something answers; negative when rolling backwards.
-#[derive(Clone, Copy, Debug, Default)]
-struct Leads {
-    /// While the tool swings out.
-    out: Ticks,
-    /// Before the tool begins to come back: never longer than `out`.
-    back: Ticks,
-    /// While the beam's sensor answers.
-    response: Ticks,
-}
-
-/// A command that the present state does not allow.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Refusal {
-    /// An alarm is latched.
-    AlarmLatched,
-    /// The setting changes where the tool is, or is to be saved, and the machine is at work.
-    NotInHold,
-    /// The value lies outside the setting's range.
-    OutOfRange,
-    /// The settings would contradict each other.
-    Contradiction(Contradiction),
-    /// There is no object to label yet, or the last one has its label.
-    NothingToLabel,
-    /// All places for examples are taken.
-    ExamplesFull,
-    /// No example from the field has this number.
-    NoSuchExample,
-    /// No settings are saved that could be taken back.
-    NothingSaved,
-    /// What was rolled tells nothing of the wheel.
-    Unfit(Unfit),
-    /// A row is not played at such a speed.
-    TestSpeed {
-        /// The highest speed at which it is, in mm/s.
-        fastest: u16,
-    },
-}
-
-words! {
-    /// Why the tool is out of the row while the machine works.
-    pub enum Reason {
-        /// A plant is there, or comes up.
-        Plant = "plant",
-        /// The beam has not seen the ground.
-        UnseenGround = "unseen_ground",
-        /// A plant just behind the beam would be reached before the tool is out.
-        TooFast = "too_fast",
-        /// The beam broke and the encoder says that the machine stands.
-        EncoderDoubtful = "encoder_doubtful",
-    }
 }
 
 /// An object as it was judged: what its features follow from, in less room than they take.
@@ -364,378 +295,6 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         }
     }
 
-    /// Goes to work; with `now`, at once and over ground that the beam has not seen.
-    ///
-    /// # Errors
-    /// [`Refusal::AlarmLatched`] while an alarm is.
-    pub fn start(&mut self, now: bool) -> Result<(), Refusal> {
-        if let State::Alarm(_) = self.state {
-            return Err(Refusal::AlarmLatched);
-        }
-        if let Some(contradiction) = self.settings.contradiction() {
-            return Err(Refusal::Contradiction(contradiction));
-        }
-        if now {
-            // A margin behind the tool as well, so that it does not stand on the border of what is known.
-            self.schedule.trust_from(self.tool() - self.geometry.margin);
-        }
-        self.go_to_work();
-        Ok(())
-    }
-
-    /// Takes the tool out of the row. A latched alarm stays.
-    pub fn hold(&mut self) {
-        if !matches!(self.state, State::Alarm(_)) {
-            self.enter(State::Hold);
-        }
-    }
-
-    /// Clears an alarm; the machine is in HOLD afterwards.
-    pub fn clear(&mut self) {
-        if let State::Alarm(_) = self.state {
-            self.enter(State::Hold);
-        }
-    }
-
-    /// Sets a setting.
-    ///
-    /// # Errors
-    /// [`Refusal::NotInHold`], [`Refusal::OutOfRange`], and [`Refusal::Contradiction`] where there was none before; nothing
-    /// is changed then.
-    pub fn set(&mut self, setting: Setting, value: u16) -> Result<(), Refusal> {
-        if setting.description().hold_only && self.is_working() {
-            return Err(Refusal::NotInHold);
-        }
-        let before = self.settings.get(setting);
-        // Settings that contradict each other already are mended one at a time.
-        let contradicted = self.settings.contradiction().is_some();
-        self.settings.set(setting, value).map_err(|_| Refusal::OutOfRange)?;
-        if !contradicted && let Some(contradiction) = self.settings.contradiction() {
-            // What was set before is within its range.
-            let _ = self.settings.set(setting, before);
-            return Err(Refusal::Contradiction(contradiction));
-        }
-        // Another wheel is one that has not been measured.
-        if matches!(setting, Setting::WheelMm | Setting::TicksPerRev) {
-            let _ = self.settings.set(Setting::TicksPerM, 0);
-        }
-        self.follow_settings();
-        Ok(())
-    }
-
-    /// Takes all settings back that a new machine has; [`save`](Self::save) makes it last.
-    ///
-    /// # Errors
-    /// [`Refusal::NotInHold`].
-    pub fn take_defaults(&mut self) -> Result<(), Refusal> {
-        if self.is_working() {
-            return Err(Refusal::NotInHold);
-        }
-        self.settings = Settings::new();
-        self.follow_settings();
-        Ok(())
-    }
-
-    /// Takes all settings back that are saved.
-    ///
-    /// # Errors
-    /// [`Refusal::NotInHold`] and [`Refusal::NothingSaved`].
-    pub fn take_saved(&mut self) -> Result<(), Refusal> {
-        if self.is_working() {
-            return Err(Refusal::NotInHold);
-        }
-        self.settings = self.saved.load().ok_or(Refusal::NothingSaved)?;
-        self.follow_settings();
-        Ok(())
-    }
-
-    /// Works out what follows from the settings.
-    fn follow_settings(&mut self) {
-        self.geometry = Geometry::of(&self.settings);
-        self.leads = Leads::at(self.meter.speed(), &self.settings);
-    }
-
-    /// The value of a setting that is saved, if any is.
-    pub fn saved(&self, setting: Setting) -> Option<u16> {
-        self.saved.value(setting)
-    }
-
-    /// Begins to save the settings, which [`carry_on`](Self::carry_on) finishes.
-    ///
-    /// # Errors
-    /// [`Refusal::NotInHold`] and [`Refusal::Contradiction`].
-    pub fn save(&mut self) -> Result<(), Refusal> {
-        if self.is_working() {
-            return Err(Refusal::NotInHold);
-        }
-        if let Some(contradiction) = self.settings.contradiction() {
-            return Err(Refusal::Contradiction(contradiction));
-        }
-        self.saved.save();
-        Ok(())
-    }
-
-    /// Carries on with what is being kept for good, settings and examples, without waiting; whether all has been written.
-    pub fn carry_on(&mut self) -> bool {
-        self.saved.carry_on(&self.settings) && self.classifier.carry_on()
-    }
-
-    /// Labels the last object and teaches it to the classifier.
-    ///
-    /// # Errors
-    /// [`Refusal::NothingToLabel`] and [`Refusal::ExamplesFull`].
-    pub fn label(&mut self, label: u8) -> Result<(), Refusal> {
-        let unlabelled = self.objects.last_mut().filter(|object| object.label.is_none());
-        let object = unlabelled.ok_or(Refusal::NothingToLabel)?;
-        self.classifier.teach(&object.features(), label).map_err(|Full| Refusal::ExamplesFull)?;
-        object.label = Some(label);
-        Ok(())
-    }
-
-    /// Forgets an example from the field.
-    ///
-    /// # Errors
-    /// [`Refusal::NoSuchExample`].
-    pub fn forget(&mut self, number: u8) -> Result<(), Refusal> {
-        if self.classifier.forget(number) { Ok(()) } else { Err(Refusal::NoSuchExample) }
-    }
-
-    /// Forgets all examples from the field.
-    pub fn forget_all(&mut self) {
-        for number in 0..taught::CAPACITY {
-            self.classifier.forget(number);
-        }
-    }
-
-    /// The last objects, the oldest first.
-    pub fn objects(&self) -> &[Judged] {
-        &self.objects
-    }
-
-    /// What tells plants from weeds.
-    pub fn classifier(&self) -> &C {
-        &self.classifier
-    }
-
-    /// The settings in use.
-    pub fn settings(&self) -> &Settings {
-        &self.settings
-    }
-
-    /// What the machine is doing.
-    pub fn state(&self) -> State {
-        self.state
-    }
-
-    /// Why the machine was reset.
-    pub fn cause(&self) -> Cause {
-        self.cause
-    }
-
-    /// Whether the tool is to be out of the row.
-    pub fn tool_out(&self) -> bool {
-        self.tool_out
-    }
-
-    /// The last readings.
-    pub fn readings(&self) -> &Readings {
-        &self.readings
-    }
-
-    /// The machine's speed in millimetres a second, negative backwards.
-    pub fn speed_mm_s(&self) -> i16 {
-        self.settings.wheel().millimetres(Ticks(self.meter.speed().0))
-    }
-
-    /// Windows at the tool or ahead of it, the one still being seen included.
-    pub fn windows(&self) -> u8 {
-        self.schedule.ahead(self.tool(), self.geometry.margin) + u8::from(self.watch.open().is_some())
-    }
-
-    /// How far the machine has to roll until ground that the beam has seen reaches the tool, in millimetres.
-    pub fn unseen_mm(&self) -> i16 {
-        let unseen = self.schedule.known_from() - self.tool();
-        self.settings.wheel().millimetres(unseen.max(Ticks::ZERO))
-    }
-
-    /// Why the tool is out of the row although the machine works.
-    pub fn reason(&self) -> Option<Reason> {
-        let tool = self.tool();
-        if !self.is_working() || !self.tool_out {
-            None
-        } else if self.encoder.is_doubtful() || self.encoder.is_quiet() {
-            Some(Reason::EncoderDoubtful)
-        } else if self.schedule.known_from().is_ahead_of(tool) {
-            Some(Reason::UnseenGround)
-        } else if self.outruns_the_beam(tool) {
-            Some(Reason::TooFast)
-        } else {
-            Some(Reason::Plant)
-        }
-    }
-
-    /// Times that closed ground reached the tool sooner than it could be out.
-    pub fn late(&self) -> u16 {
-        self.late
-    }
-
-    /// Lines that were not understood.
-    pub fn mistakes(&self) -> u16 {
-        self.mistakes
-    }
-
-    /// Counts a line that was not understood.
-    pub fn count_mistake(&mut self) {
-        self.mistakes = self.mistakes.saturating_add(1);
-    }
-
-    /// Whether the machine has worked for a long way without seeing a plant.
-    pub fn sees_no_plants(&self) -> bool {
-        self.warned
-    }
-
-    /// Turns the telling of events on or off.
-    pub fn tell_events(&mut self, on: bool) {
-        self.events_on = on;
-        self.events.clear();
-    }
-
-    /// Draws curves for a plotter, or no longer.
-    pub fn set_plot(&mut self, plot: Plot) {
-        self.plot = plot;
-    }
-
-    /// The curves of which the next points are due, which are due 20 times a second.
-    pub fn next_plot(&mut self) -> Option<Plot> {
-        if self.plot == Plot::Off || self.readings.now.coarse().since(self.plotted_at) < PLOT_PERIOD {
-            return None;
-        }
-        self.plotted_at = self.readings.now.coarse();
-        Some(self.plot)
-    }
-
-    /// Whether the beam is broken.
-    pub fn beam_is_broken(&self) -> bool {
-        self.beam_broken
-    }
-
-    /// Whether the status LED shines: while the servo is being timed, it marks the commands.
-    pub fn lamp_is_lit(&self) -> bool {
-        match self.bench {
-            Bench::Swings(_) => self.tool_out,
-            _ => lamp::is_lit(self.state, self.readings.now),
-        }
-    }
-
-    /// The next event to be told.
-    #[inline(never)]
-    pub fn next_event(&mut self) -> Option<Event> {
-        (!self.events.is_empty()).then(|| self.events.remove(0))
-    }
-
-    /// Events that found no room to wait in.
-    pub fn events_missed(&self) -> u16 {
-        self.events_missed
-    }
-
-    /// The ground that the tool works on.
-    fn tool(&self) -> Position {
-        self.readings.position - self.geometry.beam_to_tool
-    }
-
-    /// Whether closed ground comes up before the tool could be out of the row, or in its place again.
-    fn must_be_out(&self, tool: Position) -> bool {
-        let Leads { out, back, .. } = self.leads;
-        let one = Ticks(if out < Ticks::ZERO { -1 } else { 1 });
-        // The stretch of ground that must be open for the tool to be in the row when this decision shows.
-        let (near, far) = if self.tool_out {
-            // Coming back pays only if the tool can stay for as long as its stroke takes, the difference of the leads.
-            // That also keeps it out for the window that it left for, should the speed falter. The tick on either side
-            // is for an encoder that trembles on an edge.
-            (back - one, out + (out - back) + one)
-        } else {
-            // A window once left stays left while the measured speed wavers by less than a quarter.
-            (back + Ticks(back.0 / 4), out)
-        };
-        self.encoder.is_doubtful()
-            || self.tool_out && self.encoder.is_quiet()
-            || self.is_closed(tool + near, tool + far)
-            || self.outruns_the_beam(tool)
-    }
-
-    /// Whether the machine is so fast that a plant just behind the beam would be reached before the tool is out.
-    fn outruns_the_beam(&self, tool: Position) -> bool {
-        let out = self.leads.out;
-        // Slowing down by an eighth is what it takes to be trusted again.
-        let lead = if self.tool_out { out + Ticks(out.0 / 8) } else { out };
-        (tool + lead) - self.watch.frontier() >= -self.geometry.margin
-    }
-
-    /// The fault that the readings show, if any; the tool was at `tool_was_at` before them.
-    #[inline(never)]
-    fn fault(&mut self, tool_was_at: Position) -> Option<Alarm> {
-        let Readings { now, position, jumps, end_switch_on, stack_free, .. } = self.readings;
-        let working = self.is_working();
-        match self.encoder.read(now, position, jumps) {
-            // A machine at rest may tremble.
-            Some(Alarm::EncoderChannelDead) if !working => {}
-            None => {}
-            fault => return fault,
-        }
-        if let Some(leading) = self.watch.open()
-            && self.watch.is_broken()
-            && self.watch.frontier() - leading > self.geometry.max_width
-        {
-            return Some(Alarm::BeamBlocked);
-        }
-        if working && Ticks(self.meter.speed().0.abs()) > self.geometry.top_speed {
-            return Some(Alarm::TooFast);
-        }
-        let forgotten = |tool| self.schedule.has_forgotten() && self.schedule.known_from().is_ahead_of(tool);
-        if working && forgotten(self.tool()) && !forgotten(tool_was_at) {
-            return Some(Alarm::RolledBackTooFar);
-        }
-        self.end_switch.read(now, end_switch_on);
-        let swing = Interval::from_ms(u32::from(self.settings.get(Setting::LeadOutMs)) + END_SWITCH_GRACE_MS);
-        if self.settings.get(Setting::EndSwitch) != 0
-            && !self.bench.moves_the_tool()
-            && self.end_switch.is_on() != self.tool_out
-            && now - self.told_at > swing
-        {
-            return Some(Alarm::ToolStuck);
-        }
-        (stack_free < STACK_RESERVE).then_some(Alarm::StackLow)
-    }
-
-    /// Tells what the operator should know, once.
-    fn warn(&mut self, tool: Position) {
-        if !self.is_working() {
-            return;
-        }
-        if self.awaits_ground && self.is_closed(tool, tool) {
-            self.awaits_ground = false;
-            // An eighth of the lead is what the speed may waver by.
-            let lead_ms = u32::from(self.settings.get(Setting::LeadOutMs));
-            if self.readings.now - self.told_at < Interval::from_ms(lead_ms - lead_ms / 8) {
-                self.late = self.late.saturating_add(1);
-                self.tell(Event::Warning(Warning::LateCommand));
-            }
-        }
-        let no_plant = self.geometry.no_plant;
-        if !self.warned && no_plant > Ticks::ZERO && self.watch.frontier() - self.last_seen > no_plant {
-            self.warned = true;
-            self.tell(Event::Warning(Warning::NoPlants));
-        }
-    }
-
-    /// Whether any of the ground between two places is closed: unknown, or within the margin of a canopy, the one that is
-    /// still being seen included.
-    fn is_closed(&self, one: Position, other: Position) -> bool {
-        let margin = self.geometry.margin;
-        let far = if one.is_ahead_of(other) { one } else { other };
-        self.schedule.is_closed(one, other, margin) || self.watch.open().is_some_and(|leading| far - leading >= -margin)
-    }
-
     /// Classifies a complete object and schedules it unless it is a weed.
     fn judge(&mut self, object: Object) {
         (self.last_seen, self.warned) = (object.trailing, false);
@@ -811,33 +370,6 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     fn announce(&mut self, event: Event) {
         if self.events.push(event).is_err() {
             self.events_missed = self.events_missed.saturating_add(1);
-        }
-    }
-}
-
-impl Geometry {
-    fn of(settings: &Settings) -> Self {
-        Self {
-            beam_to_tool: settings.ticks(Setting::BeamToToolMm),
-            margin: settings.ticks(Setting::MarginMm),
-            max_width: settings.ticks(Setting::MaxWidthMm),
-            merge_gap: Ticks(i32::from(settings.get(Setting::MergeGapTicks))),
-            top_speed: settings.ticks(Setting::TopSpeedMmS),
-            no_plant: Ticks(settings.wheel().ticks(1000).0 * i32::from(settings.get(Setting::NoPlantM))),
-        }
-    }
-}
-
-impl Leads {
-    fn at(speed: TicksPerSecond, settings: &Settings) -> Self {
-        let out_ms = settings.get(Setting::LeadOutMs);
-        // A lead is longer by what a command takes to the pin in the mean: half a tick, half a turn of the loop, half a pulse.
-        // Without a lead the paper's schedule stands as it is.
-        let lead = |milliseconds: u16| speed.distance_in_ms(milliseconds + u16::from(milliseconds > 0));
-        Self {
-            out: lead(out_ms),
-            back: lead(settings.get(Setting::LeadInMs).min(out_ms)),
-            response: speed.distance_in_ms(settings.get(Setting::BeamResponseMs)),
         }
     }
 }

@@ -32,6 +32,7 @@ pub mod reply;
 pub mod reset;
 mod said;
 pub mod saved;
+mod say;
 pub mod schedule;
 pub mod servo;
 pub mod settings;

@@ -1,22 +1,29 @@
-//! What the console answers, a line at a time, and the wording of everything the machine says.
+//! What the console answers, a line at a time.
 //!
 //! An answer can be longer than the serial line's buffer, and nothing here may wait for it to drain. So an [`Answer`] is
 //! a place in a text that writes its next line whenever the firmware has room for one. Every line, the longest numbers
 //! included, fits in [`LINE`] bytes.
 
+mod errors;
+mod events;
+mod shown;
+
+pub use self::{events::write_event, shown::write_plot};
+
+use self::{
+    errors::{write_mistake, write_refusal},
+    shown::{write_counts, write_example, write_object, write_setting, write_status, write_version},
+};
 use crate::{
-    alarm::Warning,
-    calibration::{Leads, Outcome, Unfit},
-    classifier::{self, Class, Classifier, label},
-    console::{Argument, Command, Mistake, Plot, Word},
-    controller::{Controller, Judged, Refusal, State},
-    event::Event,
+    classifier::Classifier,
+    console::{Command, Mistake, Word},
+    controller::{Controller, Refusal},
     memory::Memory,
     said,
-    settings::{Contradiction, Setting},
-    text::Text,
+    say::{explain, say, say_number, write_state},
+    settings::Setting,
 };
-use ufmt::{uWrite, uwrite};
+use ufmt::uWrite;
 
 /// Room that a line needs, its end included.
 pub const LINE: usize = 127;
@@ -227,312 +234,5 @@ impl Answer {
             }
         };
         say(out, said::END)
-    }
-}
-
-/// Writes the line of an event, with its end.
-///
-/// # Errors
-/// What `out` reports.
-#[inline(never)]
-pub fn write_event<W: uWrite + ?Sized>(event: &Event, out: &mut W) -> Result<(), W::Error> {
-    match *event {
-        Event::Object { vote, leading, spacing, plan } => {
-            say(out, class_name(vote.class))?;
-            let numbers =
-                [leading.count(), vote.votes.into(), spacing.0, plan.delay.0, plan.hold.0, plan.actuation().0];
-            say_numbers(out, said::OBJECT, &numbers)?;
-        }
-        Event::Swing { out: leaves, position } => {
-            say(out, said::SWING)?;
-            say(out, place_name(leaves))?;
-            say_number(out, said::POS, position.count())?;
-        }
-        Event::State(state) => {
-            say(out, said::STATE_EVENT)?;
-            say(out, state_name(state))?;
-        }
-        Event::Warning(warning) => {
-            say(out, said::WARNING)?;
-            say(out, warning.text())?;
-        }
-        Event::Calibrated { outcome: Outcome::Measured(Leads { out_ms, in_ms }), fits } => {
-            say_numbers(out, said::CALIBRATED, &[out_ms.into(), in_ms.into()])?;
-            say(out, if fits { said::SET } else { said::NOT_SET })?;
-        }
-        Event::Calibrated { outcome: Outcome::Shown, .. } => {
-            say(out, said::CALIBRATED_BY_EYE)?;
-        }
-        Event::Calibrated { outcome: Outcome::Failed, .. } => {
-            say(out, said::NOT_CALIBRATED)?;
-        }
-        Event::Alarm { alarm, position } => {
-            say(out, said::ALARM)?;
-            say(out, alarm.text())?;
-            say_number(out, said::CODE, alarm.code().into())?;
-            say_number(out, said::POS, position.count())?;
-        }
-    }
-    say(out, said::END)
-}
-
-/// Writes the next points of a plotter's curves, each `label:value`, with the line's end.
-///
-/// # Errors
-/// What `out` reports.
-#[inline(never)]
-pub fn write_plot<C, M, W>(controller: &Controller<C, M>, plot: Plot, out: &mut W) -> Result<(), W::Error>
-where
-    C: Classifier,
-    M: Memory,
-    W: uWrite + ?Sized,
-{
-    let points = [
-        controller.speed_mm_s(),
-        if controller.tool_out() { 45 } else { 0 },
-        i16::from(controller.beam_is_broken()),
-        i16::from(controller.windows()),
-    ];
-    let curves = if plot == Plot::Teleplot { said::TELEPLOT } else { said::SERIAL_PLOTTER };
-    say_numbers(out, curves, &points.map(i32::from))?;
-    say(out, said::END)
-}
-
-fn write_status<C, M, W>(controller: &Controller<C, M>, out: &mut W) -> Result<(), W::Error>
-where
-    C: Classifier,
-    M: Memory,
-    W: uWrite + ?Sized,
-{
-    let readings = controller.readings();
-    say(out, said::STATE_IS)?;
-    say(out, state_name(controller.state()))?;
-    if let State::Alarm(alarm) = controller.state() {
-        say(out, said::ALARM_IS)?;
-        say(out, alarm.text())?;
-    }
-    say(out, said::TOOL_IS)?;
-    say(out, place_name(controller.tool_out()))?;
-    if let Some(reason) = controller.reason() {
-        say(out, said::FOR)?;
-        say(out, reason.text())?;
-    }
-    let numbers = [
-        readings.position.count(),
-        controller.speed_mm_s().into(),
-        controller.windows().into(),
-        controller.unseen_mm().into(),
-    ];
-    say_numbers(out, said::PLACE, &numbers)
-}
-
-fn write_counts<C, M, W>(controller: &Controller<C, M>, out: &mut W) -> Result<(), W::Error>
-where
-    C: Classifier,
-    M: Memory,
-    W: uWrite + ?Sized,
-{
-    let readings = controller.readings();
-    let numbers = [
-        readings.lost,
-        readings.jumps,
-        controller.late(),
-        controller.events_missed(),
-        controller.mistakes(),
-        readings.stack_free,
-    ];
-    let template = said::COUNTS;
-    say_numbers(out, template, &numbers.map(i32::from))?;
-    say(out, controller.cause().text())?;
-    if controller.sees_no_plants() {
-        say(out, said::WARNING_IS)?;
-        say(out, Warning::NoPlants.text())?;
-    }
-    Ok(())
-}
-
-#[inline(never)]
-fn write_setting<C, M, W>(controller: &Controller<C, M>, setting: Setting, out: &mut W) -> Result<(), W::Error>
-where
-    C: Classifier,
-    M: Memory,
-    W: uWrite + ?Sized,
-{
-    say(out, setting.text())?;
-    write_value(said::IS, setting, controller.settings().get(setting), out)?;
-    say(out, setting.unit())?;
-    write_range(setting, out)?;
-    write_value(said::DEFAULT, setting, setting.description().default, out)?;
-    match controller.saved(setting) {
-        None => say(out, said::NOT_SAVED),
-        Some(saved) if saved == controller.settings().get(setting) => Ok(()),
-        Some(saved) => write_value(said::SAVED, setting, saved, out),
-    }
-}
-
-/// A text and a setting's value after it.
-fn write_value<W: uWrite + ?Sized>(text: Text, setting: Setting, value: u16, out: &mut W) -> Result<(), W::Error> {
-    if !setting.is_switched() {
-        return say_number(out, text, value.into());
-    }
-    say(out, text)?;
-    say(out, if value == 0 { Argument::Off } else { Argument::On }.text())
-}
-
-fn write_range<W: uWrite + ?Sized>(setting: Setting, out: &mut W) -> Result<(), W::Error> {
-    if setting.is_switched() {
-        return say(out, said::ON_OR_OFF);
-    }
-    let description = setting.description();
-    say_number(out, said::FROM, description.least.into())?;
-    say_number(out, said::TO, description.greatest.into())
-}
-
-fn write_example<W: uWrite + ?Sized>(listed: &classifier::Listed, out: &mut W) -> Result<(), W::Error> {
-    say(out, if listed.from_field { said::FIELD } else { said::BUILT_IN })?;
-    say_number(out, said::BLANK, listed.number.into())?;
-    say(out, said::BLANK)?;
-    say(out, label_name(listed.example.label))?;
-    listed.example.features.iter().try_for_each(|&feature| say_number(out, said::BLANK, feature.into()))
-}
-
-fn write_object<W: uWrite + ?Sized>(object: &Judged, out: &mut W) -> Result<(), W::Error> {
-    for value in object.features().values() {
-        uwrite!(out, "{}", value)?;
-        say(out, said::COMMA)?;
-    }
-    say(out, class_name(object.vote.class))?;
-    say_number(out, said::COMMA, object.vote.votes.into())?;
-    say(out, said::COMMA)?;
-    object.label.map_or(Ok(()), |label| say(out, label_name(label)))
-}
-
-fn write_mistake<W: uWrite + ?Sized>(mistake: Mistake, out: &mut W) -> Result<(), W::Error> {
-    say(out, said::ERROR)?;
-    let what = match mistake {
-        Mistake::TooLong => said::TOO_LONG,
-        Mistake::NotText => said::NOT_TEXT,
-        Mistake::CharactersLost => said::CHARACTERS_LOST,
-        Mistake::UnknownCommand => said::UNKNOWN_COMMAND,
-        Mistake::UnknownSetting => said::UNKNOWN_SETTING,
-        Mistake::Usage(word) => {
-            say(out, said::USAGE)?;
-            return say(out, word.usage());
-        }
-        Mistake::Value(setting) => return write_allowed(setting, out),
-    };
-    say(out, what)
-}
-
-fn write_refusal<W>(refusal: Refusal, setting: Option<Setting>, out: &mut W) -> Result<(), W::Error>
-where
-    W: uWrite + ?Sized,
-{
-    say(out, said::ERROR)?;
-    match (refusal, setting) {
-        (Refusal::OutOfRange, Some(setting)) => write_allowed(setting, out),
-        (Refusal::NotInHold, Some(setting)) if setting.description().hold_only => {
-            say(out, setting.text())?;
-            say(out, said::HOLD_TO_SET)
-        }
-        (Refusal::NotInHold, _) => say(out, said::HOLD_FIRST),
-        (Refusal::Contradiction(Contradiction::PulsesEqual), _) => say(out, said::PULSES_EQUAL),
-        (Refusal::Contradiction(Contradiction::BeamTooNear { needed_mm }), _) => {
-            say_number(out, said::BEAM_TOO_NEAR, needed_mm.into())?;
-            say(out, said::BEAM_FARTHER)
-        }
-        (Refusal::NothingToLabel, _) => say(out, said::NOTHING_TO_LABEL),
-        (Refusal::NothingSaved, _) => say(out, said::NOTHING_SAVED),
-        (Refusal::Unfit(Unfit::NotBegun), _) => say(out, said::NOT_BEGUN),
-        (Refusal::Unfit(Unfit::TooShort), _) => say(out, said::TOO_SHORT),
-        (Refusal::Unfit(Unfit::Differs { counted, nominal }), _) => {
-            say_number(out, said::WHEEL_DIFFERS, counted.into())?;
-            say_number(out, said::WHEEL_HAS, nominal.into())?;
-            say(out, said::LOOK_AGAIN)
-        }
-        (Refusal::TestSpeed { fastest }, _) => say_number(out, said::TEST_SPEED, fastest.into()),
-        (Refusal::ExamplesFull, _) => say(out, said::EXAMPLES_FULL),
-        (Refusal::NoSuchExample, _) => say(out, said::NO_SUCH_EXAMPLE),
-        _ => say(out, said::ALARM_LATCHED),
-    }
-}
-
-fn write_allowed<W: uWrite + ?Sized>(setting: Setting, out: &mut W) -> Result<(), W::Error> {
-    say(out, setting.text())?;
-    say(out, if setting.is_switched() { said::TAKES } else { said::TAKES_A_NUMBER })?;
-    write_range(setting, out)
-}
-
-fn write_version<W: uWrite + ?Sized>(out: &mut W) -> Result<(), W::Error> {
-    say(out, said::WEEDER)
-}
-
-/// A name and what it stands for.
-fn explain<W: uWrite + ?Sized>(out: &mut W, name: Text, explanation: Text) -> Result<(), W::Error> {
-    say(out, name)?;
-    say(out, said::DASH)?;
-    say(out, explanation)
-}
-
-/// A text and a number after it: in one place, and in one width, which costs the least flash.
-#[inline(never)]
-fn say_number<W: uWrite + ?Sized>(out: &mut W, text: Text, number: i32) -> Result<(), W::Error> {
-    say(out, text)?;
-    uwrite!(out, "{}", number)
-}
-
-/// A text.
-#[inline(never)]
-fn say<W: uWrite + ?Sized>(out: &mut W, text: Text) -> Result<(), W::Error> {
-    say_numbers(out, text, &[])
-}
-
-/// A text in which each `#` stands for the next of the numbers.
-#[inline(never)]
-fn say_numbers<W: uWrite + ?Sized>(out: &mut W, text: Text, numbers: &[i32]) -> Result<(), W::Error> {
-    let mut numbers = numbers.iter();
-    for character in text.bytes() {
-        match numbers.as_slice() {
-            [number, ..] if character == b'#' => {
-                numbers.next();
-                uwrite!(out, "{}", *number)?;
-            }
-            _ => out.write_char(char::from(character))?,
-        }
-    }
-    Ok(())
-}
-
-/// The state, and which alarm.
-fn write_state<W: uWrite + ?Sized>(state: State, out: &mut W) -> Result<(), W::Error> {
-    say(out, state_name(state))?;
-    if let State::Alarm(alarm) = state {
-        say(out, said::BLANK)?;
-        say(out, alarm.text())?;
-    }
-    Ok(())
-}
-
-fn state_name(state: State) -> Text {
-    match state {
-        State::Hold => Word::Hold.text(),
-        State::Work => said::WORK,
-        State::Alarm(_) => said::IN_ALARM,
-    }
-}
-
-fn place_name(tool_out: bool) -> Text {
-    if tool_out { Argument::Out.text() } else { Argument::In.text() }
-}
-
-fn label_name(label: u8) -> Text {
-    if label == label::PLANT { Argument::Plant.text() } else { Argument::Weed.text() }
-}
-
-fn class_name(class: Class) -> Text {
-    match class {
-        Class::Plant => Argument::Plant.text(),
-        Class::Weed => Argument::Weed.text(),
-        Class::Unknown => said::UNKNOWN,
     }
 }

@@ -13,14 +13,14 @@ use crate::said::GROUPS;
 /// Fragments of what is said, sorted, each of which stands for itself as a byte from 0x80 on. They come from joining the most
 /// frequent pair again and again; any others would do that can be split into two.
 const FRAGMENTS: &[&str] = &[
-    " m", " the ", " the tool ", ", ", "0 ", ":#", "; ", "=#", "=# ", "_m", "_mm", "a ", "ac", "ad", "al", "alar",
-    "alarm", "am", "an", "an ", "and ", "ar", "as ", "at ", "be", "beam", "beam_", "br", "cal", "cali", "calibr",
-    "calibra", "calibrate", "ch", "ck", "co", "d ", "de", "e ", "ed", "ee", "eed", "el", "en", "enco", "encod", "er",
-    "er ", "es ", "ex", "exam", "examp", "example", "fi", "fir", "for", "fr", "ge", "gr", "in", "ing", "is", "is ",
-    "it", "l ", "la", "le", "lead", "li", "lo", "mm", "nam", "no", "no ", "not ", "of", "of ", "ol", "on", "or", "or ",
-    "ou", "oun", "out", "ow", "pl", "plan", "plant", "re", "row", "s ", "s, ", "s=# ", "s_", "sa", "sav", "se", "ser",
-    "servo", "set", "sett", "setting", "sp", "speed", "st", "st ", "sta", "star", "sw", "t ", "ta", "tak", "te", "th",
-    "the ", "ti", "tick", "to", "to ", "tool", "tool ", "tu", "ul", "um", "un", "ver", "vo", "wh",
+    " m", " mm", " p", " the ", ", ", "0 ", ":#", "; ", "=#", "=# ", "_m", "_mm", "a ", "ac", "ad", "al", "alar",
+    "alarm", "all", "am", "an", "an ", "and ", "ar", "as ", "at ", "be", "beam", "beam_", "br", "cal", "cali",
+    "calibr", "calibra", "ch", "ck", "co", "comm", "d ", "de", "e ", "e the ", "ed", "ee", "eed", "el", "en", "enco",
+    "encod", "er", "er ", "es ", "ex", "exam", "examp", "example", "fi", "fir", "first", "for", "fr", "ge", "gr",
+    "hol", "in", "ing", "is ", "it", "la", "lan", "lant", "le", "lead", "lead_", "li", "lo", "mm", "nam", "nd ", "no",
+    "not ", "of", "ok", "ol", "on", "or", "or ", "ou", "out", "ow", "re", "row", "s ", "s, ", "s=# ", "s_", "sa",
+    "sav", "se", "ser", "servo", "set", "sett", "setting", "sp", "st", "st ", "sta", "star", "sw", "t ", "ta", "tak",
+    "te", "th", "the ", "ti", "tick", "to", "to ", "tool", "tool ", "tu", "ul", "um", "un", "vo", "wh",
 ];
 
 /// The first byte that stands for a fragment.

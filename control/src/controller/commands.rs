@@ -1,0 +1,198 @@
+//! What the operator may ask of the machine, by switch or console, and why it may refuse.
+
+use super::{
+    Controller, State,
+    ground::{Geometry, Leads},
+};
+use crate::{
+    calibration::Unfit,
+    classifier::{Classifier, Full},
+    console::Plot,
+    memory::Memory,
+    settings::{Contradiction, Setting, Settings},
+    taught,
+};
+
+/// A command that the present state does not allow.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Refusal {
+    /// An alarm is latched.
+    AlarmLatched,
+    /// The setting changes where the tool is, or is to be saved, and the machine is at work.
+    NotInHold,
+    /// The value lies outside the setting's range.
+    OutOfRange,
+    /// The settings would contradict each other.
+    Contradiction(Contradiction),
+    /// There is no object to label yet, or the last one has its label.
+    NothingToLabel,
+    /// All places for examples are taken.
+    ExamplesFull,
+    /// No example from the field has this number.
+    NoSuchExample,
+    /// No settings are saved that could be taken back.
+    NothingSaved,
+    /// What was rolled tells nothing of the wheel.
+    Unfit(Unfit),
+    /// A row is not played at such a speed.
+    TestSpeed {
+        /// The highest speed at which it is, in mm/s.
+        fastest: u16,
+    },
+}
+
+impl<C: Classifier, M: Memory> Controller<C, M> {
+    /// Goes to work; with `now`, at once and over ground that the beam has not seen.
+    ///
+    /// # Errors
+    /// [`Refusal::AlarmLatched`] while an alarm is.
+    pub fn start(&mut self, now: bool) -> Result<(), Refusal> {
+        if let State::Alarm(_) = self.state {
+            return Err(Refusal::AlarmLatched);
+        }
+        if let Some(contradiction) = self.settings.contradiction() {
+            return Err(Refusal::Contradiction(contradiction));
+        }
+        if now {
+            // A margin behind the tool as well, so that it does not stand on the border of what is known.
+            self.schedule.trust_from(self.tool() - self.geometry.margin);
+        }
+        self.go_to_work();
+        Ok(())
+    }
+
+    /// Takes the tool out of the row. A latched alarm stays.
+    pub fn hold(&mut self) {
+        if !matches!(self.state, State::Alarm(_)) {
+            self.enter(State::Hold);
+        }
+    }
+
+    /// Clears an alarm; the machine is in HOLD afterwards.
+    pub fn clear(&mut self) {
+        if let State::Alarm(_) = self.state {
+            self.enter(State::Hold);
+        }
+    }
+
+    /// Sets a setting.
+    ///
+    /// # Errors
+    /// [`Refusal::NotInHold`], [`Refusal::OutOfRange`], and [`Refusal::Contradiction`] where there was none before; nothing
+    /// is changed then.
+    pub fn set(&mut self, setting: Setting, value: u16) -> Result<(), Refusal> {
+        if setting.description().hold_only && self.is_working() {
+            return Err(Refusal::NotInHold);
+        }
+        let before = self.settings.get(setting);
+        // Settings that contradict each other already are mended one at a time.
+        let contradicted = self.settings.contradiction().is_some();
+        self.settings.set(setting, value).map_err(|_| Refusal::OutOfRange)?;
+        if !contradicted && let Some(contradiction) = self.settings.contradiction() {
+            // What was set before is within its range.
+            let _ = self.settings.set(setting, before);
+            return Err(Refusal::Contradiction(contradiction));
+        }
+        // Another wheel is one that has not been measured.
+        if matches!(setting, Setting::WheelMm | Setting::TicksPerRev) {
+            let _ = self.settings.set(Setting::TicksPerM, 0);
+        }
+        self.follow_settings();
+        Ok(())
+    }
+
+    /// Takes all settings back that a new machine has; [`save`](Self::save) makes it last.
+    ///
+    /// # Errors
+    /// [`Refusal::NotInHold`].
+    pub fn take_defaults(&mut self) -> Result<(), Refusal> {
+        if self.is_working() {
+            return Err(Refusal::NotInHold);
+        }
+        self.settings = Settings::new();
+        self.follow_settings();
+        Ok(())
+    }
+
+    /// Takes all settings back that are saved.
+    ///
+    /// # Errors
+    /// [`Refusal::NotInHold`] and [`Refusal::NothingSaved`].
+    pub fn take_saved(&mut self) -> Result<(), Refusal> {
+        if self.is_working() {
+            return Err(Refusal::NotInHold);
+        }
+        self.settings = self.saved.load().ok_or(Refusal::NothingSaved)?;
+        self.follow_settings();
+        Ok(())
+    }
+
+    /// Works out what follows from the settings.
+    pub(super) fn follow_settings(&mut self) {
+        self.geometry = Geometry::of(&self.settings);
+        self.leads = Leads::at(self.meter.speed(), &self.settings);
+    }
+
+    /// Begins to save the settings, which [`carry_on`](Self::carry_on) finishes.
+    ///
+    /// # Errors
+    /// [`Refusal::NotInHold`] and [`Refusal::Contradiction`].
+    pub fn save(&mut self) -> Result<(), Refusal> {
+        if self.is_working() {
+            return Err(Refusal::NotInHold);
+        }
+        if let Some(contradiction) = self.settings.contradiction() {
+            return Err(Refusal::Contradiction(contradiction));
+        }
+        self.saved.save();
+        Ok(())
+    }
+
+    /// Carries on with what is being kept for good, settings and examples, without waiting; whether all has been written.
+    pub fn carry_on(&mut self) -> bool {
+        self.saved.carry_on(&self.settings) && self.classifier.carry_on()
+    }
+
+    /// Labels the last object and teaches it to the classifier.
+    ///
+    /// # Errors
+    /// [`Refusal::NothingToLabel`] and [`Refusal::ExamplesFull`].
+    pub fn label(&mut self, label: u8) -> Result<(), Refusal> {
+        let unlabelled = self.objects.last_mut().filter(|object| object.label.is_none());
+        let object = unlabelled.ok_or(Refusal::NothingToLabel)?;
+        self.classifier.teach(&object.features(), label).map_err(|Full| Refusal::ExamplesFull)?;
+        object.label = Some(label);
+        Ok(())
+    }
+
+    /// Forgets an example from the field.
+    ///
+    /// # Errors
+    /// [`Refusal::NoSuchExample`].
+    pub fn forget(&mut self, number: u8) -> Result<(), Refusal> {
+        if self.classifier.forget(number) { Ok(()) } else { Err(Refusal::NoSuchExample) }
+    }
+
+    /// Forgets all examples from the field.
+    pub fn forget_all(&mut self) {
+        for number in 0..taught::CAPACITY {
+            self.classifier.forget(number);
+        }
+    }
+
+    /// Turns the telling of events on or off.
+    pub fn tell_events(&mut self, on: bool) {
+        self.events_on = on;
+        self.events.clear();
+    }
+
+    /// Draws curves for a plotter, or no longer.
+    pub fn set_plot(&mut self, plot: Plot) {
+        self.plot = plot;
+    }
+
+    /// Counts a line that was not understood.
+    pub fn count_mistake(&mut self) {
+        self.mistakes = self.mistakes.saturating_add(1);
+    }
+}

@@ -1,0 +1,153 @@
+//! What the machine shows of itself: its state, what it has counted, and what there is to tell.
+
+use super::{Bench, Controller, Judged, Readings, State};
+use crate::{
+    classifier::Classifier,
+    console::Plot,
+    event::Event,
+    lamp,
+    memory::Memory,
+    reset::Cause,
+    settings::{Setting, Settings},
+    text::words,
+    units::{Coarse, Ticks},
+};
+
+/// Time between two points of a plotter's curves.
+const PLOT_PERIOD: u16 = Coarse::steps_in_ms(50);
+
+words! {
+    /// Why the tool is out of the row while the machine works.
+    pub enum Reason {
+        /// A plant is there, or comes up.
+        Plant = "plant",
+        /// The beam has not seen the ground.
+        UnseenGround = "unseen_ground",
+        /// A plant just behind the beam would be reached before the tool is out.
+        TooFast = "too_fast",
+        /// The beam broke and the encoder says that the machine stands.
+        EncoderDoubtful = "encoder_doubtful",
+    }
+}
+
+impl<C: Classifier, M: Memory> Controller<C, M> {
+    /// What the machine is doing.
+    pub fn state(&self) -> State {
+        self.state
+    }
+
+    /// Why the tool is out of the row although the machine works.
+    pub fn reason(&self) -> Option<Reason> {
+        let tool = self.tool();
+        if !self.is_working() || !self.tool_out {
+            None
+        } else if self.encoder.is_doubtful() || self.encoder.is_quiet() {
+            Some(Reason::EncoderDoubtful)
+        } else if self.schedule.known_from().is_ahead_of(tool) {
+            Some(Reason::UnseenGround)
+        } else if self.outruns_the_beam(tool) {
+            Some(Reason::TooFast)
+        } else {
+            Some(Reason::Plant)
+        }
+    }
+
+    /// The machine's speed in millimetres a second, negative backwards.
+    pub fn speed_mm_s(&self) -> i16 {
+        self.settings.wheel().millimetres(Ticks(self.meter.speed().0))
+    }
+
+    /// Windows at the tool or ahead of it, the one still being seen included.
+    pub fn windows(&self) -> u8 {
+        self.schedule.ahead(self.tool(), self.geometry.margin) + u8::from(self.watch.open().is_some())
+    }
+
+    /// How far the machine has to roll until ground that the beam has seen reaches the tool, in millimetres.
+    pub fn unseen_mm(&self) -> i16 {
+        let unseen = self.schedule.known_from() - self.tool();
+        self.settings.wheel().millimetres(unseen.max(Ticks::ZERO))
+    }
+
+    /// Whether the beam is broken.
+    pub fn beam_is_broken(&self) -> bool {
+        self.beam_broken
+    }
+
+    /// Whether the status LED shines: while the servo is being timed, it marks the commands.
+    pub fn lamp_is_lit(&self) -> bool {
+        match self.bench {
+            Bench::Swings(_) => self.tool_out,
+            _ => lamp::is_lit(self.state, self.readings.now),
+        }
+    }
+
+    /// Whether the tool is to be out of the row.
+    pub fn tool_out(&self) -> bool {
+        self.tool_out
+    }
+
+    /// The last readings.
+    pub fn readings(&self) -> &Readings {
+        &self.readings
+    }
+
+    /// The settings in use.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// The value of a setting that is saved, if any is.
+    pub fn saved(&self, setting: Setting) -> Option<u16> {
+        self.saved.value(setting)
+    }
+
+    /// What tells plants from weeds.
+    pub fn classifier(&self) -> &C {
+        &self.classifier
+    }
+
+    /// The last objects, the oldest first.
+    pub fn objects(&self) -> &[Judged] {
+        &self.objects
+    }
+
+    /// Why the machine was reset.
+    pub fn cause(&self) -> Cause {
+        self.cause
+    }
+
+    /// Times that closed ground reached the tool sooner than it could be out.
+    pub fn late(&self) -> u16 {
+        self.late
+    }
+
+    /// Lines that were not understood.
+    pub fn mistakes(&self) -> u16 {
+        self.mistakes
+    }
+
+    /// Events that found no room to wait in.
+    pub fn events_missed(&self) -> u16 {
+        self.events_missed
+    }
+
+    /// Whether the machine has worked for a long way without seeing a plant.
+    pub fn sees_no_plants(&self) -> bool {
+        self.warned
+    }
+
+    /// The next event to be told.
+    #[inline(never)]
+    pub fn next_event(&mut self) -> Option<Event> {
+        (!self.events.is_empty()).then(|| self.events.remove(0))
+    }
+
+    /// The curves of which the next points are due, which are due 20 times a second.
+    pub fn next_plot(&mut self) -> Option<Plot> {
+        if self.plot == Plot::Off || self.readings.now.coarse().since(self.plotted_at) < PLOT_PERIOD {
+            return None;
+        }
+        self.plotted_at = self.readings.now.coarse();
+        Some(self.plot)
+    }
+}
