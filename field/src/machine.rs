@@ -101,6 +101,11 @@ impl Machine {
         pulses.filter(|&pulse| self.dirt.hides(pulse)).count() as i64 * PULSE_TICKS
     }
 
+    /// How far the tool's middle is beside the row's line at an angle.
+    pub fn across_mm(&self, degrees: f64) -> f64 {
+        self.arm_mm * degrees.to_radians().sin()
+    }
+
     /// Angle from which on the tool no longer works the row's line.
     pub fn line_degrees(&self) -> f64 {
         (self.tool_width_mm / 2.0 / self.arm_mm).min(1.0).asin().to_degrees()

@@ -187,6 +187,13 @@ impl Row {
         union(self.things.iter().flat_map(Thing::blocks_mm).chain(self.dust_mm.iter().cloned()).collect())
     }
 
+    /// What stands in the first `length_mm` of the row's ground; none where nothing does.
+    pub fn beginning(&self, length_mm: f64) -> Option<Self> {
+        let end_mm = self.span_mm().start + length_mm;
+        let things: Vec<Thing> = self.things.iter().filter(|thing| thing.span_mm().end < end_mm).cloned().collect();
+        (!things.is_empty()).then_some(Self { things, dust_mm: Vec::new() })
+    }
+
     /// Everything that stands in the row, in ascending order of place.
     pub fn things(&self) -> &[Thing] {
         &self.things

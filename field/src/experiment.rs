@@ -1,0 +1,448 @@
+//! The paper's experiment: speeds by plant spacings by replications, in a simulated field, with several controllers on the
+//! same ground.
+//!
+//! Each plot's rows grow and are driven from the seed, the plot and the row alone, so that the result depends neither on the
+//! number of threads nor on which controllers take part. The firmware is either its native twin ([`crate::twin`]) or the ELF on the
+//! virtual Uno ([`crate::uno`]); its rivals ([`crate::rivals`]) are models in both cases. A plot comes out as somebody
+//! with a notebook would write it down ([`PlotRecord`]), and is judged by the same code as a real one.
+
+use crate::conditions::Conditions;
+use crate::driving::{Drive, drive};
+use crate::evaluation::PlotRecord;
+use crate::page::{Comparison, ControllerCurve, ControllerPoint};
+use crate::rivals;
+use crate::row::{Problem, Row};
+use crate::signal::Pulse;
+use crate::stand::Stand;
+use crate::tool_path::{Effect, effect};
+use crate::trial::{Start, Trial, TrialError};
+use crate::twin::{self, Refused};
+use crate::verdict::{Judgement, Timing, judge};
+use control::controller::State;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use thiserror::Error;
+
+/// What runs the firmware.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Engine {
+    /// Its code, compiled for the host.
+    Twin,
+    /// This ELF, on the virtual Uno.
+    Uno(PathBuf),
+}
+
+/// Who swings the tool.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Controller {
+    /// The firmware with its leads.
+    Firmware,
+    /// The firmware with both leads at 0: a queue of windows, without look-ahead.
+    WithoutLookAhead,
+    /// The paper's: one slot, no look-ahead, a loop that polls.
+    Paper,
+    /// Who knows where each plant stands: what is damaged nevertheless, nobody can avoid.
+    AllKnowing,
+}
+
+impl Controller {
+    /// All, the firmware first.
+    pub const ALL: [Self; 4] = [Self::Firmware, Self::WithoutLookAhead, Self::Paper, Self::AllKnowing];
+
+    /// What it is called.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Firmware => "this firmware",
+            Self::WithoutLookAhead => "queue without look-ahead",
+            Self::Paper => "as in the paper",
+            Self::AllKnowing => "who knows every plant",
+        }
+    }
+}
+
+/// An experiment: the full factorial of speeds and spacings.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Experiment {
+    /// Forward speeds, km/h.
+    pub speeds_km_h: Vec<f64>,
+    /// Plant spacings, cm.
+    pub spacings_cm: Vec<f64>,
+    /// How often each speed and spacing is tried.
+    pub replications: u32,
+    /// Who weeds.
+    pub controllers: Vec<Controller>,
+    /// Where.
+    pub conditions: Conditions,
+    /// Which of all the possible fields.
+    pub seed: u64,
+}
+
+/// One plot, weeded by one controller.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlotOutcome {
+    /// Who weeded it.
+    pub controller: Controller,
+    /// What is written down.
+    pub record: PlotRecord,
+    /// Plants and weeds, counted.
+    pub effect: Effect,
+    /// Share of the rows' ground that the tool weeded, from 0 to 1.
+    pub weeded_share: f64,
+    /// Share that could be weeded at best with this servo ([`crate::verdict::weedable_share`]).
+    pub weedable_share: f64,
+    /// Rows in which an alarm took the tool out.
+    pub alarms: u32,
+}
+
+/// Why an experiment had no outcome.
+#[derive(Debug, Error)]
+pub enum ExperimentError {
+    /// A row did not grow.
+    #[error("plants {spacing_cm} cm apart make no row: {problem}")]
+    Row {
+        /// The spacing.
+        spacing_cm: f64,
+        /// What is wrong.
+        problem: Problem,
+    },
+    /// The decisions refuse their settings.
+    #[error(transparent)]
+    Refused(#[from] Refused),
+    /// The virtual Uno failed.
+    #[error(transparent)]
+    Trial(#[from] TrialError),
+}
+
+/// A plot's place in the experiment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Plot {
+    index: u64,
+    replication: u32,
+    speed_km_h: f64,
+    spacing_cm: f64,
+}
+
+/// What one controller did in one row.
+#[derive(Clone, Copy, Debug)]
+struct RowOutcome {
+    effect: Effect,
+    weeded_share: f64,
+    weedable_share: f64,
+    seconds: f64,
+    alarm: bool,
+}
+
+/// Rows of a plot that are kept in memory at once.
+const BATCH: u32 = 256;
+
+/// Ground of the row that is drawn.
+const DRAWN_MM: f64 = 5000.0;
+
+impl Experiment {
+    /// The paper's: its Table 2, by all controllers.
+    pub fn as_in_the_paper(conditions: Conditions, seed: u64) -> Self {
+        Self {
+            speeds_km_h: vec![1.0, 1.5, 2.0, 2.5],
+            spacings_cm: vec![50.0, 60.0],
+            replications: 3,
+            controllers: Controller::ALL.to_vec(),
+            conditions,
+            seed,
+        }
+    }
+
+    /// All plots, by speed, spacing and replication.
+    fn plots(&self) -> Vec<Plot> {
+        let treatments = self.speeds_km_h.iter().flat_map(|&speed| self.spacings_cm.iter().map(move |&s| (speed, s)));
+        treatments
+            .flat_map(|treatment| (1..=self.replications).map(move |replication| (treatment, replication)))
+            .zip(0..)
+            .map(|(((speed_km_h, spacing_cm), replication), index)| Plot { index, replication, speed_km_h, spacing_cm })
+            .collect()
+    }
+
+    /// Number of rows that each controller weeds.
+    pub fn rows(&self) -> usize {
+        self.plots().len() * self.conditions.plot.rows as usize
+    }
+
+    /// Weeds the field: an outcome for each plot and each controller, by speed, spacing and replication. `progress` is told
+    /// the share of the rows done, from 0 to 1.
+    ///
+    /// # Errors
+    /// The first that a row meets.
+    pub fn run(&self, engine: &Engine, progress: impl Fn(f64) + Sync) -> Result<Vec<PlotOutcome>, ExperimentError> {
+        let (done, all) = (AtomicUsize::new(0), self.rows() as f64);
+        let row_done = || progress((done.fetch_add(1, Ordering::Relaxed) + 1) as f64 / all);
+        let of_plots: Vec<Vec<PlotOutcome>> = self
+            .plots()
+            .par_iter()
+            .map(|plot| self.weed_plot(plot, engine, &row_done))
+            .collect::<Result<_, ExperimentError>>()?;
+        Ok(of_plots.into_iter().flatten().collect())
+    }
+
+    /// One row of the experiment, the first plot's at the highest speed, and what the firmware did to it: its first metres, to
+    /// be drawn.
+    ///
+    /// # Errors
+    /// As [`Experiment::run`].
+    pub fn example(&self, engine: &Engine) -> Result<Option<(Row, Judgement)>, ExperimentError> {
+        let fastest = self.plots().into_iter().reduce(|a, b| if b.speed_km_h > a.speed_km_h { b } else { a });
+        let Some(plot) = fastest else { return Ok(None) };
+        let (_, _, trial) = self.grow(&plot, 0)?;
+        let weeded = weed(&trial, Controller::Firmware, engine)?;
+        let Trial { row, machine, motion, timing, .. } = &trial;
+        let judgement = judge(row, machine, motion, *timing, &weeded.pulses, weeded.start_cycle);
+        Ok(row.beginning(DRAWN_MM).map(|beginning| (beginning, judgement)))
+    }
+
+    fn weed_plot(
+        &self,
+        plot: &Plot,
+        engine: &Engine,
+        row_done: &(impl Fn() + Sync),
+    ) -> Result<Vec<PlotOutcome>, ExperimentError> {
+        let rows = self.conditions.plot.rows;
+        let mut outcomes: Vec<PlotOutcome> =
+            self.controllers.iter().map(|&controller| self.untouched(plot, controller)).collect();
+        for first in (0..rows).step_by(BATCH as usize) {
+            let batch = first..rows.min(first + BATCH);
+            let weeded: Vec<Vec<RowOutcome>> = batch
+                .into_par_iter()
+                .map(|row| {
+                    let outcomes = self.weed_row(plot, row, engine)?;
+                    row_done();
+                    Ok(outcomes)
+                })
+                .collect::<Result<_, ExperimentError>>()?;
+            for by_controller in weeded {
+                for (outcome, row) in outcomes.iter_mut().zip(by_controller) {
+                    outcome.add(&row, rows);
+                }
+            }
+        }
+        Ok(outcomes)
+    }
+
+    /// A plot that nobody has weeded yet.
+    fn untouched(&self, plot: &Plot, controller: Controller) -> PlotOutcome {
+        let Conditions { plot: area, machine, .. } = &self.conditions;
+        let width_m = area.row_spacing_mm / 1000.0;
+        let record = PlotRecord {
+            replication: plot.replication,
+            speed_km_h: plot.speed_km_h,
+            spacing_cm: plot.spacing_cm,
+            weeds_before: 0,
+            weeds_after: 0,
+            plants: 0,
+            damaged: 0,
+            area_m2: f64::from(area.rows) * area.row_m * width_m,
+            time_s: 0.0,
+            width_m,
+            power_hp: machine.power_hp,
+        };
+        PlotOutcome { controller, record, effect: Effect::default(), weeded_share: 0.0, weedable_share: 0.0, alarms: 0 }
+    }
+
+    /// What every controller does in the same row.
+    fn weed_row(&self, plot: &Plot, row: u32, engine: &Engine) -> Result<Vec<RowOutcome>, ExperimentError> {
+        let (stand, drive, trial) = self.grow(plot, row)?;
+        let outcome = |&controller: &Controller| {
+            let weeded = weed(&trial, controller, engine)?;
+            let Trial { row, machine, motion, timing, .. } = &trial;
+            let (pulses, start_cycle) = (&weeded.pulses, weeded.start_cycle);
+            let judgement = judge(row, machine, motion, *timing, pulses, start_cycle);
+            Ok(RowOutcome {
+                effect: effect(&stand, machine, &self.conditions.machine, motion, pulses, start_cycle),
+                weeded_share: judgement.weeded_share,
+                weedable_share: judgement.weedable_share,
+                seconds: drive.row_s + drive.turn_s,
+                alarm: weeded.alarm,
+            })
+        };
+        self.controllers.iter().map(outcome).collect()
+    }
+
+    /// A row that has grown, how it is driven, and both as a trial for the firmware.
+    fn grow(&self, plot: &Plot, row: u32) -> Result<(Stand, Drive, Trial), ExperimentError> {
+        let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
+        rng.set_stream(plot.index << 32 | u64::from(row));
+        let stand = Stand::grow(&self.conditions, plot.spacing_cm * 10.0, &mut rng)
+            .map_err(|problem| ExperimentError::Row { spacing_cm: plot.spacing_cm, problem })?;
+        let drive = drive(&self.conditions, &stand.span_mm, plot.speed_km_h, &mut rng);
+        let trial = Trial {
+            row: stand.row.clone(),
+            machine: self.conditions.machine(rng.random()),
+            motion: drive.motion.clone(),
+            timing: self.conditions.timing(),
+            start: Start::Command,
+            settings: self.conditions.told(),
+        };
+        Ok((stand, drive, trial))
+    }
+}
+
+/// What came of a row.
+struct Weeded {
+    pulses: Vec<Pulse>,
+    start_cycle: u64,
+    alarm: bool,
+}
+
+/// Has a controller weed a row.
+fn weed(trial: &Trial, controller: Controller, engine: &Engine) -> Result<Weeded, ExperimentError> {
+    let firmware = |trial: &Trial| match engine {
+        Engine::Twin => {
+            let weeded = twin::weed(trial)?;
+            Ok(Weeded { pulses: weeded.pulses, start_cycle: 0, alarm: weeded.state != State::Work })
+        }
+        Engine::Uno(elf) => {
+            let outcome = trial.run(elf, |_| ())?;
+            let alarm = outcome.status.state != "work";
+            Ok(Weeded { pulses: outcome.pulses, start_cycle: outcome.start_cycle, alarm })
+        }
+    };
+    let rival = |pulses| Ok(Weeded { pulses, start_cycle: 0, alarm: false });
+    match controller {
+        Controller::Firmware => firmware(trial),
+        Controller::WithoutLookAhead => {
+            let timing = Timing { lead_out_ms: 0, lead_in_ms: 0, ..trial.timing };
+            firmware(&Trial { timing, ..trial.clone() })
+        }
+        Controller::Paper => rival(rivals::as_in_the_paper(trial)),
+        Controller::AllKnowing => rival(rivals::all_knowing(trial)),
+    }
+}
+
+impl PlotOutcome {
+    /// Adds one of the plot's rows.
+    fn add(&mut self, row: &RowOutcome, rows: u32) {
+        self.effect += row.effect;
+        self.weeded_share += row.weeded_share / f64::from(rows);
+        self.weedable_share += row.weedable_share / f64::from(rows);
+        self.alarms += u32::from(row.alarm);
+        let Effect { plants, damaged, in_plot, .. } = self.effect;
+        self.record = PlotRecord {
+            weeds_before: in_plot.before,
+            weeds_after: in_plot.after,
+            plants,
+            damaged,
+            time_s: self.record.time_s + row.seconds,
+            ..self.record
+        };
+    }
+}
+
+/// The records of what one controller did.
+pub fn records(outcomes: &[PlotOutcome], controller: Controller) -> Vec<PlotRecord> {
+    outcomes.iter().filter(|outcome| outcome.controller == controller).map(|outcome| outcome.record).collect()
+}
+
+/// The controllers side by side, by speed: every spacing and replication together.
+pub fn compare(outcomes: &[PlotOutcome]) -> Comparison {
+    let mut speeds: Vec<f64> = outcomes.iter().map(|outcome| outcome.record.speed_km_h).collect();
+    speeds.sort_by(f64::total_cmp);
+    speeds.dedup();
+    let at = |controller: Controller, speed_km_h: f64| {
+        let is_there =
+            move |outcome: &&PlotOutcome| outcome.controller == controller && outcome.record.speed_km_h == speed_km_h;
+        outcomes.iter().filter(is_there)
+    };
+    let damage_percent = |controller, speed| {
+        let mut all = Effect::default();
+        at(controller, speed).for_each(|outcome| all += outcome.effect);
+        100.0 * f64::from(all.damaged) / f64::from(all.plants.max(1))
+    };
+    let mean_percent = |controller, speed, share: fn(&PlotOutcome) -> f64| {
+        100.0 * at(controller, speed).map(share).sum::<f64>() / at(controller, speed).count().max(1) as f64
+    };
+    let takes_part = |controller: &Controller| outcomes.iter().any(|outcome| outcome.controller == *controller);
+    let curve = |controller: Controller| ControllerCurve {
+        name: controller.title().to_owned(),
+        points: speeds
+            .iter()
+            .map(|&speed_km_h| ControllerPoint {
+                speed_km_h,
+                plant_damage_percent: damage_percent(controller, speed_km_h),
+                in_row_weeding_percent: mean_percent(controller, speed_km_h, |outcome| outcome.weeded_share),
+            })
+            .collect(),
+    };
+    let first = outcomes.first().map_or(Controller::Firmware, |outcome| outcome.controller);
+    let unavoidable: Vec<(f64, f64)> = if takes_part(&Controller::AllKnowing) {
+        speeds.iter().map(|&speed| (speed, damage_percent(Controller::AllKnowing, speed))).collect()
+    } else {
+        Vec::new()
+    };
+    Comparison {
+        controllers: Controller::ALL
+            .into_iter()
+            .filter(|&controller| controller != Controller::AllKnowing && takes_part(&controller))
+            .map(curve)
+            .collect(),
+        bound: speeds
+            .iter()
+            .map(|&speed| (speed, mean_percent(first, speed, |outcome| outcome.weedable_share)))
+            .collect(),
+        unavoidable: if unavoidable.iter().any(|&(_, percent)| percent > 0.0) { unavoidable } else { Vec::new() },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::evaluation::Analysis;
+
+    fn experiment(speeds_km_h: &[f64], preset: &str) -> Experiment {
+        let conditions = Conditions::load(preset).unwrap();
+        Experiment { speeds_km_h: speeds_km_h.to_vec(), replications: 1, ..Experiment::as_in_the_paper(conditions, 1) }
+    }
+
+    fn run(experiment: &Experiment) -> Vec<PlotOutcome> {
+        experiment.run(&Engine::Twin, |_| ()).unwrap()
+    }
+
+    #[test]
+    fn the_result_does_not_depend_on_the_number_of_threads() {
+        let experiment = experiment(&[2.0], "transplanted");
+        let on = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| run(&experiment))
+        };
+        assert_eq!(on(1), on(3));
+    }
+
+    #[test]
+    fn a_controller_finds_the_same_field_whoever_else_takes_part() {
+        let all = experiment(&[1.5], "transplanted");
+        let alone = Experiment { controllers: vec![Controller::Firmware], ..all.clone() };
+        assert_eq!(records(&run(&all), Controller::Firmware), records(&run(&alone), Controller::Firmware));
+    }
+
+    #[test]
+    fn the_firmware_damages_no_plant_and_weeds_up_to_the_bound_where_the_papers_damages_more_the_faster_it_goes() {
+        let outcomes = run(&experiment(&[1.0, 1.5, 2.0, 2.5], "transplanted"));
+        let comparison = compare(&outcomes);
+        let [firmware, _, paper] = comparison.controllers.as_slice() else { panic!("three controllers") };
+        for (point, (_, bound)) in firmware.points.iter().zip(&comparison.bound) {
+            assert_eq!(point.plant_damage_percent, 0.0, "{point:?}");
+            assert!(bound - point.in_row_weeding_percent < 5.0, "{point:?} with a bound of {bound} %");
+        }
+        let damage: Vec<f64> = paper.points.iter().map(|point| point.plant_damage_percent).collect();
+        assert!(damage.is_sorted() && damage[0] < damage[3], "{damage:?}");
+        assert!(comparison.unavoidable.is_empty());
+        assert!(outcomes.iter().all(|outcome| outcome.alarms == 0));
+    }
+
+    #[test]
+    fn every_plot_can_be_judged_like_a_real_one() {
+        let outcomes = run(&experiment(&[1.0, 2.5], "weedy"));
+        let analysis = Analysis::of(records(&outcomes, Controller::Firmware)).unwrap();
+        assert_eq!(analysis.records.len(), 4);
+        assert!(analysis.performances.iter().all(|plot| plot.field_efficiency_percent < 100.0));
+    }
+}
