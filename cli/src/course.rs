@@ -46,7 +46,7 @@ const SPACING_SCATTER: f64 = 0.08;
 const CANOPY_SCATTER: f64 = 0.15;
 
 /// A number in a range, for the command line.
-fn number_within(range: RangeInclusive<f64>) -> impl Fn(&str) -> Result<f64, String> + Clone {
+pub fn number_within(range: RangeInclusive<f64>) -> impl Fn(&str) -> Result<f64, String> + Clone {
     move |text| {
         let (least, greatest) = (range.start(), range.end());
         text.parse()

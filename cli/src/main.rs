@@ -19,7 +19,9 @@ mod replay;
 mod settings;
 mod sim;
 mod soak;
+mod sweep;
 mod train;
+mod trial;
 mod virtual_uno;
 
 use clap::{CommandFactory, Parser, Subcommand};
@@ -54,6 +56,10 @@ enum Command {
     BenchUno,
     /// Work for a day with everything going wrong now and then, and say what happened.
     Soak(soak::Arguments),
+    /// Run the paper's experiment in a simulated field, and say how the firmware and others did.
+    Trial(Box<trial::Arguments>),
+    /// Show a result of the simulated trial against one or two of its parameters.
+    Sweep(Box<sweep::Arguments>),
     /// Make an example table of labelled objects, and say how well it tells plants from weeds.
     Train(train::Arguments),
     /// Say what the firmware's classifier takes recorded objects for.
@@ -91,6 +97,8 @@ fn main() -> ExitCode {
         Command::VirtualUno(arguments) => virtual_uno::run(&arguments).map(|()| Finding::Good),
         Command::BenchUno => bench::run().map(|()| Finding::Good),
         Command::Soak(arguments) => soak::run(&arguments),
+        Command::Trial(arguments) => trial::run(&arguments),
+        Command::Sweep(arguments) => sweep::run(&arguments).map(|()| Finding::Good),
         Command::Train(arguments) => train::run(&arguments),
         Command::Classify(arguments) => classify::run(&arguments),
         Command::Monitor(arguments) => monitor::run(&arguments),

@@ -89,8 +89,8 @@ parameters! {
         spacing_scatter_mm: f64 = 30.0, 0 to 200, "a plant stands within this of its place along the row, evenly spread", "assumed";
         across_scatter_mm: f64 = 10.0, 0 to 50, "a plant stands within this of the row's line, evenly spread", "assumed";
         canopy_mm: f64 = 150.0, 20 to 350, "mean width of a canopy", "assumed, for chilli some weeks after transplanting";
-        canopy_scatter_mm: f64 = 25.0, 0 to 150, "a canopy's width is within this of its mean, evenly spread", "assumed";
-        protected_mm: f64 = 80.0, 2 to 350, "diameter of the zone round a stem that no tool may enter", "assumed: the stem and the roots next to it";
+        canopy_scatter_mm: f64 = 40.0, 0 to 150, "a canopy's width is within this of its mean, evenly spread", "assumed";
+        protected_mm: f64 = 110.0, 2 to 350, "diameter of the zone round a stem that no tool may enter", "assumed: the stem and most of the roots below the canopy";
         missing_percent: f64 = 3.0, 0 to 90, "share of the places without a plant", "assumed";
         double_percent: f64 = 2.0, 0 to 90, "share of the places with a second plant beside the first", "assumed";
         ragged_percent: f64 = 30.0, 0 to 100, "share of the canopies with gaps through which the beam passes", "assumed";
@@ -103,7 +103,7 @@ parameters! {
     /// The ground.
     ground: Ground {
         slip_percent: f64 = 5.0, 0 to 15, "mean slip of the wheel that the encoder counts", "assumed, for tilled soil";
-        slip_scatter_percent: f64 = 1.5, 0 to 10, "slip is within this of its mean, evenly spread, and changes every metre or two", "assumed";
+        slip_scatter_percent: f64 = 3.0, 0 to 10, "slip is within this of its mean, evenly spread, and changes every metre or two", "assumed";
     }
     /// The driving.
     driving: Driving {
@@ -125,10 +125,10 @@ parameters! {
         sweeps: u32 = 4, 0 to 12, "sweeps between the rows, half of them on each side", "the paper's Eq. 7";
         sweep_width_mm: f64 = 80.0, 10 to 400, "width of a sweep", "the paper's Table 1";
         sweep_from_mm: f64 = 40.0, 10 to 400, "from the row's line to the nearest sweep's edge", "assumed: four sweeps then fill the machine's width";
-        dead_time_ms: f64 = 60.0, 0 to 500, "mean time from a pulse until the servo moves", "hobby servos under load: 57 to 117 ms";
-        dead_time_scatter_ms: f64 = 10.0, 0 to 200, "dead time is within this of its mean, evenly spread", "assumed";
+        dead_time_ms: f64 = 65.0, 0 to 500, "mean time from a pulse until the servo moves", "hobby servos under load: 57 to 117 ms";
+        dead_time_scatter_ms: f64 = 15.0, 0 to 200, "dead time is within this of its mean, evenly spread", "assumed";
         travel_ms: f64 = 120.0, 10 to 2000, "time for 45 degrees without load", "60 kg cm servos: 98 to 120 ms";
-        load_percent: f64 = 10.0, 0 to 200, "the soil makes the travel longer by up to this, evenly spread", "up to 100 in the worst case";
+        load_percent: f64 = 20.0, 0 to 200, "the soil makes the travel longer by up to this, evenly spread", "up to 100 in the worst case";
         power_hp: f64 = 2.5, 0.1 to 50, "the engine's power, for the performance index", "the paper's Table 1";
     }
 }
@@ -356,4 +356,79 @@ fn line(text: &str, name: &str) -> Option<usize> {
     let root = DeTable::parse(text).ok()?;
     let (key, _) = root.get_ref().get(table)?.get_ref().as_table()?.get_key_value(key)?;
     Some(text[..key.span().start].lines().count().max(1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(text: &str) -> Result<Conditions, String> {
+        Conditions::parse(Path::new("field.toml"), text).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn every_default_and_every_preset_is_within_the_ranges() {
+        for preset in presets() {
+            assert!(Conditions::load(preset).is_ok(), "{preset}");
+        }
+    }
+
+    #[test]
+    fn a_file_says_what_differs_from_the_default() {
+        let conditions = parse("[crop]\nspacing_scatter_mm = 12.5\n[plot]\nrows = 2\n[settings]\nk = 5\n").unwrap();
+        let mut expected = Conditions::default();
+        expected.set("crop.spacing_scatter_mm", 12.5).unwrap();
+        expected.set("plot.rows", 2.0).unwrap();
+        expected.set("k", 5.0).unwrap();
+        assert_eq!(conditions, expected);
+        assert_eq!(conditions.told(), [(Setting::K, 5)]);
+    }
+
+    #[test]
+    fn margin_and_leads_are_told_once_as_the_timing() {
+        let conditions = parse("[settings]\nlead_out_ms = 200\nmargin_mm = 40\n").unwrap();
+        assert_eq!(conditions.timing(), Timing { lead_out_ms: 200, margin_mm: 40, ..Timing::default() });
+        assert!(conditions.told().is_empty());
+    }
+
+    #[test]
+    fn a_bad_file_is_named_with_its_line_and_what_would_be_right() {
+        for (text, error) in [
+            (
+                "[ground]\n\nslip_percent = 40\n",
+                "field.toml, line 3: ground.slip_percent is 40, but has to be 0 to 15: mean slip",
+            ),
+            (
+                "[settings]\nlead_out_ms = 900\n",
+                "field.toml, line 2: settings.lead_out_ms is 900, but has to be 0 to 500",
+            ),
+            (
+                "[settings]\nlead = 9\n",
+                "settings.lead is neither a parameter of the field nor a setting of the firmware",
+            ),
+            ("[ground]\nslip = 4\n", "field.toml: TOML parse error at line 2, column 1"),
+            ("[ground]\nslip_percent = \"much\"\n", "field.toml: TOML parse error at line 2, column 16"),
+            ("[ground]\nslip_percent = nan\n", "field.toml, line 2: ground.slip_percent is NaN"),
+        ] {
+            let said = parse(text).unwrap_err();
+            assert!(said.starts_with(error), "{said}");
+        }
+        let said = Conditions::load("no-such-field").unwrap_err().to_string();
+        assert!(said.starts_with("no-such-field is none of the presets (transplanted, even-stand"), "{said}");
+    }
+
+    #[test]
+    fn every_parameter_can_be_set_to_the_ends_of_its_range_and_not_beyond() {
+        for parameter in PARAMETERS {
+            let mut conditions = Conditions::default();
+            for end in [parameter.least, parameter.greatest] {
+                conditions.set(parameter.name, end).unwrap_or_else(|error| panic!("{error}"));
+                let (_, value) = conditions.values().find(|(known, _)| *known == parameter).unwrap();
+                assert_eq!(value, end, "{}", parameter.name);
+            }
+            let before = conditions.clone();
+            assert!(conditions.set(parameter.name, parameter.greatest + 1.0).is_err(), "{}", parameter.name);
+            assert_eq!(conditions, before);
+        }
+    }
 }

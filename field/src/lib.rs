@@ -44,6 +44,7 @@ pub mod signal;
 pub mod soak;
 pub mod stand;
 pub mod statistics;
+pub mod sweep;
 pub mod tool_path;
 pub mod training;
 pub mod trial;

@@ -1,0 +1,111 @@
+//! `weeder trial` and `weeder sweep`, as they are called.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+use tempfile::TempDir;
+
+/// A field so small that a trial in it takes a moment.
+const SMALL: &str = "[plot]\nrows = 1\nrow_m = 6\n";
+
+/// Runs `weeder` with these arguments in a folder.
+fn weeder(folder: &Path, arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
+    command.current_dir(folder).args(arguments).output().expect("cargo has built the command")
+}
+
+/// What a command says that has to succeed.
+#[track_caller]
+fn said(folder: &Path, arguments: &[&str]) -> String {
+    let output = weeder(folder, arguments);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+/// A folder with the file `small.toml`.
+fn folder() -> TempDir {
+    let folder = TempDir::new().unwrap();
+    fs::write(folder.path().join("small.toml"), SMALL).unwrap();
+    folder
+}
+
+/// Asserts status 2 and a message that contains `words`, and that nothing was written.
+#[track_caller]
+fn assert_refused(arguments: &[&str], words: &str) {
+    let folder = folder();
+    let output = weeder(folder.path(), arguments);
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{message}");
+    assert!(message.contains(words), "{message}");
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+}
+
+#[test]
+fn a_trial_says_who_damaged_what_and_writes_its_report() {
+    let folder = folder();
+    let words = said(folder.path(), &["trial", "--field", "small.toml", "--out", "report"]);
+    assert!(words.contains("Plants damaged by this firmware: none at any speed."), "{words}");
+    let page = fs::read_to_string(folder.path().join("report/report.html")).unwrap();
+    assert!(page.contains("weeder trial --field small.toml --out report") && page.contains("as in the paper"));
+    let controllers = fs::read_to_string(folder.path().join("report/controllers.csv")).unwrap();
+    // Four controllers, eight treatments, three replications, and the header.
+    assert_eq!(controllers.lines().count(), 4 * 8 * 3 + 1);
+}
+
+#[test]
+fn a_trial_s_table_can_be_judged_like_a_real_one() {
+    let folder = folder();
+    said(folder.path(), &["trial", "--field", "small.toml", "--out", "."]);
+    let words = said(folder.path(), &["evaluate", "trial.csv"]);
+    assert!(words.contains("Weeding efficiency"), "{words}");
+}
+
+#[test]
+fn the_same_seed_gives_the_same_files_and_another_seed_others() {
+    let folder = folder();
+    for (seed, out) in [("7", "a"), ("7", "b"), ("8", "c")] {
+        said(folder.path(), &["trial", "--field", "small.toml", "--seed", seed, "--out", out]);
+    }
+    let read = |out: &str| fs::read_to_string(folder.path().join(out).join("trial.csv")).unwrap();
+    assert_eq!(read("a"), read("b"));
+    assert_ne!(read("a"), read("c"));
+}
+
+#[test]
+fn a_trial_gives_programs_its_plots() {
+    let folder = folder();
+    let words = said(folder.path(), &["trial", "--field", "small.toml", "--speeds", "2", "--replications", "1", "--json"]);
+    let value: serde_json::Value = serde_json::from_str(&words).unwrap();
+    assert_eq!(value["plots"].as_array().unwrap().len(), 2 * 4);
+    assert_eq!(value["plots"][0]["record"]["damaged"], 0);
+}
+
+#[test]
+fn what_is_wrong_with_a_trial_is_named_and_nothing_is_written() {
+    assert_refused(&["trial", "--field", "wet"], "wet is none of the presets (transplanted, even-stand");
+    assert_refused(&["trial", "--speeds", "1,fast", "--out", "r"], "it has to be a number from 0.1 to 8");
+    assert_refused(&["trial", "--spacings", "1", "--out", "r"], "it has to be a number from 5 to 500");
+    assert_refused(&["trial", "--replications", "0", "--out", "r"], "0 is not in 1..=1000");
+    assert_refused(&["trial", "--spacings", "10", "--field", "small.toml"], "plants 10 cm apart make no row");
+}
+
+#[test]
+fn a_sweep_shows_each_result_along_one_axis_and_one_result_along_two() {
+    let folder = folder();
+    let words = said(folder.path(), &["sweep", "--field", "small.toml", "--x", "lead_out_ms=0..180:90"]);
+    assert!(words.contains("plant damage") && words.contains("in row bound"), "{words}");
+    let axes = ["--x", "lead_out_ms=0..180:90", "--y", "speed=1..3:1"];
+    let words = said(folder.path(), &[["sweep", "--field", "small.toml", "--out", "sweep.csv"].as_slice(), &axes].concat());
+    assert!(words.starts_with("plant_damage, lead_out_ms across, speed down"), "{words}");
+    let table = fs::read_to_string(folder.path().join("sweep.csv")).unwrap();
+    assert!(table.starts_with("lead_out_ms,speed,plant_damage,weeding_efficiency"), "{table}");
+    assert_eq!(table.lines().count(), 3 * 3 + 1);
+}
+
+#[test]
+fn what_is_wrong_with_a_sweep_is_named_and_nothing_is_written() {
+    assert_refused(&["sweep", "--x", "lead_out_ms", "--out", "s.csv"], "NAME=FROM..TO:STEP");
+    assert_refused(&["sweep", "--x", "lead=1..2:1", "--out", "s.csv"], "lead is neither a parameter of the field nor");
+    assert_refused(&["sweep", "--x", "speed=1..2:0", "--out", "s.csv"], "in steps above 0");
+    assert_refused(&["sweep", "--x", "k=1..3:1", "--result", "money"], "plant_damage");
+}

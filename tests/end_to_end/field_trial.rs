@@ -1,0 +1,27 @@
+//! The paper's experiment with the real firmware on the virtual Uno.
+
+use field::conditions::Conditions;
+use field::experiment::{Controller, Engine, Experiment};
+use field::firmware;
+
+/// In-row weeding may fall short of what the servo allows by this share of the ground.
+const SHORT_OF_BOUND: f64 = 0.05;
+
+#[test]
+fn the_firmware_damages_no_plant_at_any_of_the_papers_speeds_and_spacings_and_weeds_up_to_the_bound() {
+    let mut conditions = Conditions::default();
+    conditions.set("plot.rows", 1.0).unwrap();
+    conditions.set("plot.row_m", 8.0).unwrap();
+    let experiment = Experiment {
+        replications: 1,
+        controllers: vec![Controller::Firmware],
+        ..Experiment::as_in_the_paper(conditions, 2)
+    };
+    let outcomes = experiment.run(&Engine::Uno(firmware::build().unwrap()), |_| ()).unwrap();
+    assert_eq!(outcomes.len(), 8);
+    for outcome in &outcomes {
+        assert!(outcome.record.plants >= 10, "{outcome:?}");
+        assert_eq!((outcome.record.damaged, outcome.alarms), (0, 0), "{outcome:?}");
+        assert!(outcome.weedable_share - outcome.weeded_share < SHORT_OF_BOUND, "{outcome:?}");
+    }
+}

@@ -1,0 +1,60 @@
+//! The native twin and the firmware on the virtual Uno swing at the same places.
+
+use field::conditions::{Conditions, presets};
+use field::driving::drive;
+use field::stand::Stand;
+use field::trial::{Start, Trial};
+use field::{firmware, twin};
+use rand::seq::IndexedRandom;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+
+/// A servo's frame: what a swing may differ by.
+const FRAME_S: f64 = 0.020;
+
+/// A short row under the conditions of some preset, with a speed and a spacing of its own.
+fn random_row(seed: u64) -> Trial {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let presets: Vec<&str> = presets().collect();
+    let mut conditions = Conditions::load(presets.choose(&mut rng).unwrap()).unwrap();
+    conditions.set("plot.row_m", 3.0).unwrap();
+    conditions.set("driving.stops_per_100_m", 20.0).unwrap();
+    conditions.set("driving.stop_s", 1.0).unwrap();
+    let stand = Stand::grow(&conditions, rng.random_range(400.0..700.0), &mut rng).unwrap();
+    let drive = drive(&conditions, &stand.span_mm, rng.random_range(0.8..3.0), &mut rng);
+    Trial {
+        row: stand.row,
+        machine: conditions.machine(rng.random()),
+        motion: drive.motion,
+        timing: conditions.timing(),
+        start: Start::Command,
+        settings: conditions.told(),
+    }
+}
+
+#[test]
+fn the_native_twin_swings_as_the_firmware_does_on_fifty_random_rows() {
+    let elf = firmware::build().unwrap();
+    let swings: usize = (0..50_u64)
+        .into_par_iter()
+        .map(|seed| {
+            let trial = random_row(seed);
+            let servo = trial.machine.servo;
+            let on_the_uno = trial.run(&elf, |_| ()).unwrap();
+            let by_the_twin = twin::weed(&trial).unwrap();
+            let real = servo.commands(&on_the_uno.pulses);
+            let native = servo.commands(&by_the_twin.pulses);
+            assert_eq!(real.len(), native.len(), "row {seed}: {real:?} {native:?}");
+            // The first is the tool that is out from the beginning.
+            for (real, native) in real.iter().zip(&native).skip(1) {
+                assert_eq!(real.degrees, native.degrees, "row {seed}");
+                let real_s = (real.rise_cycle - on_the_uno.start_cycle) as f64 / 16e6;
+                let native_s = native.rise_cycle as f64 / 16e6;
+                assert!((real_s - native_s).abs() <= FRAME_S, "row {seed}: {real_s} s, not {native_s} s");
+            }
+            real.len() - 1
+        })
+        .sum();
+    assert!(swings > 400, "{swings}");
+}
