@@ -3,9 +3,10 @@
 use crate::course::number_within;
 use crate::progress::Progress;
 use anyhow::{Context, Result};
-use clap::{Args, builder::PossibleValuesParser};
+use clap::{Args, ValueEnum, builder::PossibleValuesParser};
 use comfy_table::{CellAlignment, Table, presets};
 use field::conditions::Conditions;
+use field::experiment::Controller;
 use field::sweep::{Axis, Point, Results, Sweep};
 use field::whole_file;
 use std::path::{Path, PathBuf};
@@ -16,6 +17,7 @@ use std::path::{Path, PathBuf};
 Examples:
   weeder sweep --x lead_out_ms=0..300:20 --y speed=1..4:0.5
   weeder sweep --x ground.slip_percent=0..15:1 --speed 2 --result in_row_weeding
+  weeder sweep --controller paper --x speed=0.5..3:0.5 --y crop.protected_mm=60..140:20
   weeder sweep --x margin_mm=0..100:10 --y machine.load_percent=0..100:25 --out margin.csv
 An axis is `speed` in km/h, `spacing` in cm, a parameter of the field as in its TOML file (table.key), or a setting of the
 firmware. `weeder sweep --x ?=0..1:1` lists them all.")]
@@ -29,6 +31,9 @@ pub struct Arguments {
     /// The result that a table with two axes shows.
     #[arg(long, default_value = "plant_damage", value_parser = PossibleValuesParser::new(Results::NAMES))]
     result: String,
+    /// Who weeds: the firmware, the firmware without its leads, the paper's controller, or who knows every plant.
+    #[arg(long, value_enum, default_value = "firmware")]
+    controller: ControllerName,
     /// The field's conditions: a preset, or a TOML file, as of `weeder trial`.
     #[arg(long, value_name = "PRESET|FILE.toml", default_value = "transplanted")]
     field: String,
@@ -46,6 +51,26 @@ pub struct Arguments {
     out: Option<PathBuf>,
 }
 
+/// The controllers by their names.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum ControllerName {
+    Firmware,
+    WithoutLookAhead,
+    Paper,
+    AllKnowing,
+}
+
+impl From<ControllerName> for Controller {
+    fn from(name: ControllerName) -> Self {
+        match name {
+            ControllerName::Firmware => Self::Firmware,
+            ControllerName::WithoutLookAhead => Self::WithoutLookAhead,
+            ControllerName::Paper => Self::Paper,
+            ControllerName::AllKnowing => Self::AllKnowing,
+        }
+    }
+}
+
 /// Runs it and prints the result.
 ///
 /// # Errors
@@ -54,6 +79,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let sweep = Sweep {
         x: arguments.x.clone(),
         y: arguments.y.clone(),
+        controller: arguments.controller.into(),
         conditions: Conditions::load(&arguments.field)?,
         speed_km_h: arguments.speed,
         spacing_cm: arguments.spacing,

@@ -74,7 +74,8 @@ fn the_same_seed_gives_the_same_files_and_another_seed_others() {
 #[test]
 fn a_trial_gives_programs_its_plots() {
     let folder = folder();
-    let words = said(folder.path(), &["trial", "--field", "small.toml", "--speeds", "2", "--replications", "1", "--json"]);
+    let words =
+        said(folder.path(), &["trial", "--field", "small.toml", "--speeds", "2", "--replications", "1", "--json"]);
     let value: serde_json::Value = serde_json::from_str(&words).unwrap();
     assert_eq!(value["plots"].as_array().unwrap().len(), 2 * 4);
     assert_eq!(value["plots"][0]["record"]["damaged"], 0);
@@ -95,7 +96,8 @@ fn a_sweep_shows_each_result_along_one_axis_and_one_result_along_two() {
     let words = said(folder.path(), &["sweep", "--field", "small.toml", "--x", "lead_out_ms=0..180:90"]);
     assert!(words.contains("plant damage") && words.contains("in row bound"), "{words}");
     let axes = ["--x", "lead_out_ms=0..180:90", "--y", "speed=1..3:1"];
-    let words = said(folder.path(), &[["sweep", "--field", "small.toml", "--out", "sweep.csv"].as_slice(), &axes].concat());
+    let words =
+        said(folder.path(), &[["sweep", "--field", "small.toml", "--out", "sweep.csv"].as_slice(), &axes].concat());
     assert!(words.starts_with("plant_damage, lead_out_ms across, speed down"), "{words}");
     let table = fs::read_to_string(folder.path().join("sweep.csv")).unwrap();
     assert!(table.starts_with("lead_out_ms,speed,plant_damage,weeding_efficiency"), "{table}");

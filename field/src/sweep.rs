@@ -122,6 +122,8 @@ pub struct Sweep {
     pub x: Axis,
     /// The second axis, if there is one.
     pub y: Option<Axis>,
+    /// Who weeds.
+    pub controller: Controller,
     /// What does not vary.
     pub conditions: Conditions,
     /// Speed where no axis has it, km/h.
@@ -208,7 +210,7 @@ impl Sweep {
             speeds_km_h: vec![self.speed_km_h],
             spacings_cm: vec![self.spacing_cm],
             replications: 1,
-            controllers: vec![Controller::Firmware],
+            controllers: vec![self.controller],
             conditions: self.conditions.clone(),
             seed: self.seed,
         };
@@ -243,6 +245,7 @@ mod tests {
         Sweep {
             x: x.parse().unwrap(),
             y: y.map(|y| y.parse().unwrap()),
+            controller: Controller::Firmware,
             conditions,
             speed_km_h: 2.5,
             spacing_cm: 50.0,

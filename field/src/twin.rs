@@ -177,8 +177,8 @@ fn instant(time_s: f64) -> Instant {
 /// Types a line into the decisions' console.
 fn type_line(weeder: &mut Weeder, command: &str) -> Result<(), Refused> {
     let mut line = LineBuffer::new();
-    let Some(command_typed) = command.bytes().chain([b'\n']).find_map(|byte| line.take(byte)) else { return Ok(()) };
-    let mut answer = reply::answer(command_typed, weeder);
+    let Some(typed) = command.bytes().chain(*b"\n").find_map(|byte| line.take(byte)) else { return Ok(()) };
+    let mut answer = reply::answer(typed, weeder);
     let mut said = String::new();
     while !answer.is_done() {
         let Ok(()) = answer.write_line(weeder, &mut said);
