@@ -242,7 +242,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// Edges of the beam were lost: what stood there is not known, and neither is the beam's level, which is now `broken`.
     pub fn beam_edges_lost(&mut self, broken: bool) {
-        self.watch = Watch::start(self.watch.frontier(), broken);
+        self.watch.restart(self.watch.frontier(), broken);
         self.raise(Alarm::BeamEdgesLost);
     }
 
@@ -329,7 +329,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// Latches an alarm. The schedule can no longer be trusted: all ground behind the beam becomes unknown.
     fn raise(&mut self, alarm: Alarm) {
         let frontier = self.watch.frontier();
-        self.watch = Watch::start(frontier, self.watch.is_broken());
+        self.watch.restart(frontier, self.watch.is_broken());
         self.schedule = Schedule::new(frontier);
         if let State::Alarm(_) = self.state {
             return;

@@ -47,6 +47,12 @@ impl Watch {
         Self { frontier: ground, broken, broken_at_frontier: broken, object }
     }
 
+    /// Begins anew at `ground`: what was seen before is forgotten.
+    #[inline(never)]
+    pub fn restart(&mut self, ground: Position, broken: bool) {
+        *self = Self::start(ground, broken);
+    }
+
     /// The farthest ground seen.
     pub fn frontier(&self) -> Position {
         self.frontier

@@ -8,7 +8,6 @@ use crate::{
     classifier::Classifier,
     event::Event,
     memory::Memory,
-    object::Watch,
     rehearsal::Rehearsal,
     schedule::Schedule,
     servo::{self, HalfMicros},
@@ -168,7 +167,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         let now = self.readings.now;
         self.meter = SpeedMeter::new(position, now);
         self.leads = super::Leads::default();
-        self.watch = Watch::start(position, broken);
+        self.watch.restart(position, broken);
         self.schedule = Schedule::new(position);
         self.last_plant = position;
         self.last_seen = position;
