@@ -355,7 +355,7 @@ fn line(text: &str, name: &str) -> Option<usize> {
     let (table, key) = name.split_once('.')?;
     let root = DeTable::parse(text).ok()?;
     let (key, _) = root.get_ref().get(table)?.get_ref().as_table()?.get_key_value(key)?;
-    Some(text[..key.span().start].lines().count().max(1))
+    Some(text[..key.span().start].matches('\n').count() + 1)
 }
 
 #[cfg(test)]

@@ -110,7 +110,8 @@ mod tests {
             drive.motion.wheel_mm(drive.motion.duration_s()) - drive.motion.start_mm(),
         );
         let slip_percent = 100.0 * (1.0 - rolled_mm / turned_mm);
-        assert!((slip_percent - 5.0).abs() < 1.0, "{slip_percent} %");
+        // The mean of some ten legs within 3 % of it.
+        assert!((slip_percent - 5.0).abs() < 2.0, "{slip_percent} %");
     }
 
     #[test]

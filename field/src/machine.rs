@@ -95,10 +95,17 @@ impl Machine {
         marks(motion.wheel_mm(time_s) - motion.start_mm(), self.tick_mm())
     }
 
-    /// Counts that dirt hides, between the beginning of a motion and `ticks` farther on.
-    pub fn hidden_ticks(&self, ticks: Range<i64>) -> i64 {
-        let pulses = ticks.start.div_euclid(PULSE_TICKS)..ticks.end.div_euclid(PULSE_TICKS);
+    /// Counts of the pulses that dirt hides, whose beginnings lie between two counts of a clean encoder.
+    pub fn hidden_ticks(&self, clean_ticks: Range<i64>) -> i64 {
+        let pulses = clean_ticks.start.div_euclid(PULSE_TICKS)..clean_ticks.end.div_euclid(PULSE_TICKS);
         pulses.filter(|&pulse| self.dirt.hides(pulse)).count() as i64 * PULSE_TICKS
+    }
+
+    /// Counts that are missing so far of the pulse in which a clean encoder is: while A is hidden, B alone counts one back and
+    /// then one forward.
+    pub fn hidden_in_pulse(&self, clean_ticks: i64) -> i64 {
+        let is_hidden = self.dirt.hides(clean_ticks.div_euclid(PULSE_TICKS));
+        if is_hidden { [0, 1, 3, 4][clean_ticks.rem_euclid(PULSE_TICKS) as usize] } else { 0 }
     }
 
     /// How far the tool's middle is beside the row's line at an angle.
@@ -254,6 +261,24 @@ mod tests {
 
     fn row() -> Row {
         Row::new(vec![Thing::plant(500.0, 150.0), Thing::weed(800.0, 15.0)]).unwrap()
+    }
+
+    #[test]
+    fn what_dirt_hides_is_missing_from_the_pins_as_from_the_count() {
+        let machine = Machine { dirt: Dirt { share: 0.05, seed: 3 }, ..Machine::default() };
+        let motion = Motion::steady(0.0, 1000.0, 500.0, 1000.0).change_speed(0.0, 1000.0);
+        let changes = machine.encoder_changes(&motion, START_CYCLE);
+        let clean = machine.ticks(&motion, motion.duration_s());
+        let missing = machine.hidden_ticks(0..clean) + machine.hidden_in_pulse(clean);
+        assert!((60..160).contains(&missing), "{missing} of {clean}");
+        assert_eq!(decode(&changes), clean - missing);
+        // Half way as well, wherever in a pulse that is.
+        for passing in motion.mark_passings(machine.tick_mm()).iter().skip(600).take(200) {
+            let so_far = changes.iter().filter(|change| change.cycle <= cycle_at(START_CYCLE, passing.time_s));
+            let ticks = machine.ticks(&motion, passing.time_s + 1e-7);
+            let missing = machine.hidden_ticks(0..ticks) + machine.hidden_in_pulse(ticks);
+            assert_eq!(decode(&so_far.copied().collect::<Vec<_>>()), ticks - missing);
+        }
     }
 
     #[test]

@@ -9,7 +9,6 @@
 
 use crate::link::settings::name;
 use crate::machine::time_at_s;
-use crate::motion::marks;
 use crate::signal::{CYCLES_PER_SECOND, PinChange, Pulse};
 use crate::trial::{Start, Trial};
 use control::classifier::Nearest;
@@ -116,17 +115,18 @@ impl<'a> Sensors<'a> {
     /// The encoder's count at a time, no earlier than the last one asked for.
     pub fn position(&mut self, time_s: f64) -> i64 {
         let Trial { machine, motion, .. } = self.trial;
-        let ticks = marks(motion.wheel_mm(time_s) - motion.start_mm(), machine.tick_mm());
-        if machine.dirt.share > 0.0 {
-            // What was hidden on the way there is not hidden on the way back.
-            self.hidden_ticks += if ticks >= self.clean_ticks {
-                machine.hidden_ticks(self.clean_ticks..ticks)
-            } else {
-                -machine.hidden_ticks(ticks..self.clean_ticks)
-            };
+        let ticks = machine.ticks(motion, time_s);
+        if machine.dirt.share == 0.0 {
+            return ticks;
         }
+        // What is lost on the way there comes back on the way back.
+        self.hidden_ticks += if ticks >= self.clean_ticks {
+            machine.hidden_ticks(self.clean_ticks..ticks)
+        } else {
+            -machine.hidden_ticks(ticks..self.clean_ticks)
+        };
         self.clean_ticks = ticks;
-        ticks - self.hidden_ticks
+        ticks - self.hidden_ticks - machine.hidden_in_pulse(ticks)
     }
 
     /// The next edge of the beam before a time: when it comes, and whether the beam is broken from then on.
