@@ -46,7 +46,9 @@ fn a_trial_says_who_damaged_what_and_writes_its_report() {
     let words = said(folder.path(), &["trial", "--field", "small.toml", "--out", "report"]);
     assert!(words.contains("Plants damaged by this firmware: none at any speed."), "{words}");
     let page = fs::read_to_string(folder.path().join("report/report.html")).unwrap();
-    assert!(page.contains("weeder trial --field small.toml --out report") && page.contains("as in the paper"));
+    assert!(
+        page.contains("weeder trial --field small.toml --out report") && page.contains("a queue without look-ahead")
+    );
     let controllers = fs::read_to_string(folder.path().join("report/controllers.csv")).unwrap();
     // Four controllers, eight treatments, three replications, and the header.
     assert_eq!(controllers.lines().count(), 4 * 8 * 3 + 1);

@@ -58,9 +58,9 @@ impl Controller {
     pub fn title(self) -> &'static str {
         match self {
             Self::Firmware => "this firmware",
-            Self::WithoutLookAhead => "queue without look-ahead",
-            Self::Paper => "as in the paper",
-            Self::AllKnowing => "who knows every plant",
+            Self::WithoutLookAhead => "a queue without look-ahead",
+            Self::Paper => "the paper's controller",
+            Self::AllKnowing => "whoever knows every plant",
         }
     }
 }
@@ -141,7 +141,7 @@ struct RowOutcome {
 const BATCH: u32 = 256;
 
 /// Ground of the row that is drawn.
-const DRAWN_MM: f64 = 5000.0;
+const DRAWN_MM: f64 = 4500.0;
 
 impl Experiment {
     /// The paper's: its Table 2, by all controllers.
@@ -387,18 +387,23 @@ pub fn write_csv(outcomes: &[PlotOutcome], controllers: &[Controller], to: impl 
             plants,
             damaged,
             area_m2,
-            time_s,
+            time_s: thousandth(time_s),
             width_m,
             power_hp,
             in_row_weeds_before: outcome.effect.in_row.before,
             in_row_weeds_after: outcome.effect.in_row.after,
-            in_row_weeded_percent: 100.0 * outcome.weeded_share,
-            in_row_bound_percent: 100.0 * outcome.weedable_share,
+            in_row_weeded_percent: thousandth(100.0 * outcome.weeded_share),
+            in_row_bound_percent: thousandth(100.0 * outcome.weedable_share),
             alarms: outcome.alarms,
         })?;
     }
     writer.flush()?;
     Ok(())
+}
+
+/// As many digits as mean anything.
+fn thousandth(value: f64) -> f64 {
+    (value * 1e3).round() / 1e3
 }
 
 /// The controllers side by side, by speed: every spacing and replication together.

@@ -1,10 +1,12 @@
-//! What stands in the manual and follows from the code: the wiring, every setting, and what to do about every alarm.
+//! What stands in the manual and follows from the code: the wiring, every setting, what to do about every alarm, and the
+//! simulated field.
 //!
 //! `UPDATE_EXPECT=1 cargo test -p field --test manual` writes it anew.
 
 use control::alarm::{Alarm, Warning};
 use control::settings::{Description, Setting};
 use expect_test::{ExpectFile, expect_file};
+use field::conditions::{Conditions, Parameter};
 use field::link::advice;
 use field::link::settings::{help, name, unit};
 use field::wiring;
@@ -39,6 +41,12 @@ fn the_settings_page_is_the_settings_table() {
 }
 
 #[test]
+fn the_simulated_field_s_page_is_the_table_of_its_parameters() {
+    let page = expect_file!["../../docs/field.md"];
+    page.assert_eq(&with_part(&page, "parameters", &parameters()));
+}
+
+#[test]
 fn the_settings_that_the_readme_names_have_the_defaults_that_it_gives() {
     let readme = expect_file!["../../README.md"].data();
     let mut found = 0;
@@ -70,6 +78,17 @@ fn the_faults_page_says_what_the_monitor_says_to_do() {
         let row = page.lines().find(|line| line.starts_with(&begin)).unwrap_or_else(|| panic!("no row {begin}"));
         assert!(row.ends_with(&format!(" | {advice} |")), "{row}: {advice}");
     }
+}
+
+/// Every parameter of the simulated field as a table in Markdown.
+fn parameters() -> String {
+    let mut table = "| name | default | from | to | what it is | where the number is from |\n".to_owned();
+    table += "| --- | --- | --- | --- | --- | --- |\n";
+    for (Parameter { name, meaning, source, least, greatest }, default) in Conditions::default().values() {
+        writeln!(table, "| `{name}` | {default} | {least} | {greatest} | {meaning} | {source} |")
+            .expect("a string takes everything");
+    }
+    table
 }
 
 /// Every setting as a table in Markdown.
