@@ -402,10 +402,7 @@ mod tests {
                 "[settings]\nlead_out_ms = 900\n",
                 "field.toml, line 2: settings.lead_out_ms is 900, but has to be 0 to 500",
             ),
-            (
-                "[settings]\nlead = 9\n",
-                "settings.lead is neither a parameter of the field nor a setting of the firmware",
-            ),
+            ("[settings]\nlead = 9\n", "field.toml, line 2: settings.lead is neither a parameter of the field"),
             ("[ground]\nslip = 4\n", "field.toml: TOML parse error at line 2, column 1"),
             ("[ground]\nslip_percent = \"much\"\n", "field.toml: TOML parse error at line 2, column 16"),
             ("[ground]\nslip_percent = nan\n", "field.toml, line 2: ground.slip_percent is NaN"),
