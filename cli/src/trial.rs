@@ -14,6 +14,7 @@ use field::{firmware, picture, whole_file};
 use serde_json::json;
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 use std::{env, fs};
 
 /// What the user asks of a trial.
@@ -86,9 +87,10 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
         (EngineName::Uno, Some(path)) => Engine::Uno(path.clone()),
         (EngineName::Uno, None) => Engine::Uno(firmware::build()?),
     };
-    let bar = Progress::new("weeding");
+    let (bar, began) = (Progress::new("weeding"), Instant::now());
     let outcomes = experiment.run(&engine, |share| bar.show(share))?;
     bar.finish();
+    let took_s = began.elapsed().as_secs_f64();
 
     let comparison = experiment::compare(&outcomes);
     let analysis = Analysis::of(experiment::records(&outcomes, Controller::Firmware))?;
@@ -98,6 +100,12 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     } else {
         println!("{}\n", side_by_side(&comparison));
         summary.iter().for_each(|sentence| println!("{sentence}"));
+        let worked_s: f64 = outcomes.iter().map(|outcome| outcome.moved_s).sum();
+        println!(
+            "Pace: {:.1} h of work in {took_s:.1} s, {:.0} times real time.",
+            worked_s / 3600.0,
+            worked_s / took_s
+        );
     }
     if let Some(folder) = &arguments.out {
         write_report(

@@ -97,6 +97,8 @@ pub struct PlotOutcome {
     pub weedable_share: f64,
     /// Rows in which an alarm took the tool out.
     pub alarms: u32,
+    /// Time that was simulated, run-ups included and turns not, s.
+    pub moved_s: f64,
 }
 
 /// Why an experiment had no outcome.
@@ -133,7 +135,9 @@ struct RowOutcome {
     effect: Effect,
     weeded_share: f64,
     weedable_share: f64,
+    /// For the row and its turn, and of these what was simulated.
     seconds: f64,
+    moved_s: f64,
     alarm: bool,
 }
 
@@ -247,7 +251,15 @@ impl Experiment {
             width_m,
             power_hp: machine.power_hp,
         };
-        PlotOutcome { controller, record, effect: Effect::default(), weeded_share: 0.0, weedable_share: 0.0, alarms: 0 }
+        PlotOutcome {
+            controller,
+            record,
+            effect: Effect::default(),
+            weeded_share: 0.0,
+            weedable_share: 0.0,
+            alarms: 0,
+            moved_s: 0.0,
+        }
     }
 
     /// What every controller does in the same row.
@@ -263,6 +275,7 @@ impl Experiment {
                 weeded_share: judgement.weeded_share,
                 weedable_share: judgement.weedable_share,
                 seconds: drive.row_s + drive.turn_s,
+                moved_s: motion.duration_s(),
                 alarm: weeded.alarm,
             })
         };
@@ -327,6 +340,7 @@ impl PlotOutcome {
         self.weeded_share += row.weeded_share / f64::from(rows);
         self.weedable_share += row.weedable_share / f64::from(rows);
         self.alarms += u32::from(row.alarm);
+        self.moved_s += row.moved_s;
         let Effect { plants, damaged, in_plot, .. } = self.effect;
         self.record = PlotRecord {
             weeds_before: in_plot.before,

@@ -22,7 +22,9 @@ const LANE_HEIGHT: f64 = 168.0;
 /// Heights within a lane, downwards.
 const CANOPY_Y: f64 = 30.0;
 const CANOPY_HALF_HEIGHT: f64 = 19.0;
-const BEAM_Y: f64 = 58.0;
+const BEAM_Y: f64 = 56.0;
+const WINDOW_Y: f64 = 63.0;
+const STRIP_HEIGHT: f64 = 4.0;
 const TOOL_Y: f64 = 72.0;
 const TOOL_HEIGHT: f64 = 12.0;
 const IN_Y: f64 = 132.0;
@@ -34,6 +36,7 @@ const MARGIN_CUT: &str = "#e0a526";
 const DAMAGED: &str = "#cf3a32";
 const WEED: &str = "#a0672c";
 const BEAM: &str = "#6a6fb5";
+const WINDOW: &str = "#c58fb8";
 const WEEDED: &str = "#b99a72";
 const OUT: &str = "#dfe7ee";
 const CURVE: &str = "#2a6f97";
@@ -64,14 +67,18 @@ fn draw_lane(row: &Row, judgement: &Judgement, ground: &Range<f64>) -> Group {
 
     let mut drawn = Group::new().set("clip-path", "url(#lane)");
     drawn = drawn.add(rectangle(0.0, TOOL_Y, length, TOOL_HEIGHT, WEEDED));
-    for clear in judgement.clear_mm.iter().filter(|clear| is_here(clear)) {
-        let (from, to) = (clear.start.max(ground.start), clear.end.min(ground.end));
-        drawn = drawn.add(rectangle(x(from), TOOL_Y, x(to) - x(from), TOOL_HEIGHT, OUT));
+    let strips =
+        [(&judgement.clear_mm, TOOL_Y, TOOL_HEIGHT, OUT), (&judgement.windows_mm, WINDOW_Y, STRIP_HEIGHT, WINDOW)];
+    for (stretches, y, height, colour) in strips {
+        for stretch in stretches.iter().filter(|stretch| is_here(stretch)) {
+            let (from, to) = (stretch.start.max(ground.start), stretch.end.min(ground.end));
+            drawn = drawn.add(rectangle(x(from), y, x(to) - x(from), height, colour));
+        }
     }
     for thing in row.things().iter().filter(|thing| is_here(&thing.span_mm())) {
         for block in thing.blocks_mm() {
             let width = (x(block.end) - x(block.start)).max(2.0);
-            drawn = drawn.add(rectangle(x(block.start), BEAM_Y, width, 4.0, BEAM));
+            drawn = drawn.add(rectangle(x(block.start), BEAM_Y, width, STRIP_HEIGHT, BEAM));
         }
         if thing.kind == Kind::Weed {
             drawn = drawn.add(weed(x(thing.position_mm)));
@@ -95,7 +102,7 @@ fn draw_lane(row: &Row, judgement: &Judgement, ground: &Range<f64>) -> Group {
     );
 
     Group::new()
-        .add(words(-8.0, BEAM_Y + 6.0, "beam", PALE_INK).set("text-anchor", "end"))
+        .add(words(-8.0, BEAM_Y + 5.0, "beam", PALE_INK).set("text-anchor", "end"))
         .add(words(-8.0, TOOL_Y + 10.0, "tool", PALE_INK).set("text-anchor", "end"))
         .add(words(-8.0, OUT_Y + 4.0, "out 45°", PALE_INK).set("text-anchor", "end"))
         .add(words(-8.0, IN_Y + 4.0, "in 0°", PALE_INK).set("text-anchor", "end"))
@@ -160,8 +167,9 @@ fn legend() -> Group {
     let entries = [
         (WEED, "tall weed"),
         (BEAM, "beam broken"),
-        (WEEDED, "tool in the row or swinging"),
-        (OUT, "tool clear of the row"),
+        (WINDOW, "window"),
+        (WEEDED, "tool in or swinging"),
+        (OUT, "tool clear"),
         (CURVE, "tool's angle"),
     ];
     let mut legend = Legend::new(SIDE, 22.0);

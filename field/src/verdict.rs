@@ -117,6 +117,8 @@ pub struct Judgement {
     pub plants: Vec<PlantOutcome>,
     /// Every tall weed, in the order of the row.
     pub weeds: Vec<WeedOutcome>,
+    /// Windows: the ground that the tool was to leave alone, each canopy with its margins.
+    pub windows_mm: Vec<Range<f64>>,
     /// Ground over which the tool was fully out.
     pub clear_mm: Vec<Range<f64>>,
     /// The tool's angle over the ground below it: places and degrees between which straight lines run.
@@ -204,8 +206,11 @@ pub fn judge(
         }
     }
 
+    let margin_mm = f64::from(timing.margin_mm);
+    let window = |plant: &Thing| plant.span_mm().start - margin_mm..plant.span_mm().end + margin_mm;
     Judgement {
         plants,
+        windows_mm: union(row.plants().map(window).collect()),
         weeds: row.weeds().map(|weed| weed_outcome(weed, machine, motion, &stroke)).collect(),
         clear_mm: between(&closed, &run),
         path: path(machine, motion, &stroke),
