@@ -1,5 +1,6 @@
 //! `weeder evaluate`: judges a field trial by what was counted and measured in its plots.
 
+use crate::output;
 use anyhow::{Context, Result};
 use clap::Args;
 use field::evaluation::{self, Analysis, ResponseAnalysis};
@@ -7,7 +8,6 @@ use field::page::Page;
 use field::whole_file;
 use serde_json::{Value, json};
 use std::fs;
-use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 /// The report's name in its folder.
@@ -42,18 +42,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let written =
         arguments.out.as_deref().map(|folder| write_report(&analysis, &arguments.file, folder)).transpose()?;
     if arguments.json {
-        return print(&format!("{:#}\n", in_json(&analysis)));
+        return output::print(&format!("{:#}\n", in_json(&analysis)));
     }
     let written = written.map(|path| format!("\nReport      {}\n", path.display()));
-    print(&format!("{analysis}{}", written.unwrap_or_default()))
-}
-
-/// Prints to whoever still listens: `weeder evaluate trial.csv | head` has read enough.
-fn print(text: &str) -> Result<()> {
-    match io::stdout().write_all(text.as_bytes()) {
-        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(error.into()),
-        _ => Ok(()),
-    }
+    output::print(&format!("{analysis}{}", written.unwrap_or_default()))
 }
 
 /// Writes the report, and returns where it is.

@@ -13,6 +13,7 @@ mod evaluate;
 mod flash;
 mod hex;
 mod monitor;
+mod output;
 mod progress;
 mod record;
 mod replay;

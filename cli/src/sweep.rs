@@ -1,6 +1,7 @@
 //! `weeder sweep`: a result of the simulated trial against one or two of its parameters.
 
 use crate::course::number_within;
+use crate::output;
 use crate::progress::Progress;
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum, builder::PossibleValuesParser};
@@ -88,26 +89,41 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let bar = Progress::new("sweeping");
     let points = sweep.run(|share| bar.show(share))?;
     bar.finish();
-    match &sweep.y {
-        Some(y) => {
-            println!("{}, {} across, {} down", arguments.result, sweep.x.parameter, y.parameter);
-            println!("{}", grid(&sweep, y, &points, &arguments.result));
-        }
-        None => println!("{}", list(&sweep, &points)),
+    let mut text = match &sweep.y {
+        Some(y) => format!(
+            "{}, {} across, {} down\n{}\n",
+            arguments.result,
+            sweep.x.parameter,
+            y.parameter,
+            grid(&sweep, y, &points, &arguments.result)
+        ),
+        None => format!("{}\n", list(&sweep, &points)),
+    };
+    if points.iter().any(|point| point.results.alarms_percent > 0.0) {
+        text += "! an alarm took the tool out in some of the rows: --result alarms says in how many\n";
     }
     if let Some(path) = &arguments.out {
         write(path, &sweep, &points).with_context(|| format!("{} cannot be written", path.display()))?;
-        println!("Written: {}", path.display());
+        text += &format!("Written: {}\n", path.display());
     }
-    Ok(())
+    output::print(&text)
+}
+
+/// A result for people: with a mark where alarms spoil it, and a stroke where there is none.
+fn shown(value: f64, point: &Point) -> String {
+    match (value.is_finite(), point.results.alarms_percent > 0.0) {
+        (false, _) => "-".to_owned(),
+        (true, true) => format!("{value:.1} !"),
+        (true, false) => format!("{value:.1}"),
+    }
 }
 
 /// A line a value of the second axis, a column a value of the first.
 fn grid(sweep: &Sweep, y: &Axis, points: &[Point], result: &str) -> Table {
-    let shown = Results::NAMES.iter().position(|name| *name == result).unwrap_or(0);
+    let result = Results::NAMES.iter().position(|name| *name == result).unwrap_or(0);
     let mut table = table([String::new()].into_iter().chain(sweep.x.values.iter().map(f64::to_string)));
     for (value, line) in y.values.iter().zip(points.chunks(sweep.x.values.len())) {
-        let results = line.iter().map(|point| format!("{:.1}", point.results.values()[shown]));
+        let results = line.iter().map(|point| shown(point.results.values()[result], point));
         table.add_row([value.to_string()].into_iter().chain(results));
     }
     right(table)
@@ -118,7 +134,7 @@ fn list(sweep: &Sweep, points: &[Point]) -> Table {
     let names = Results::NAMES.iter().map(|name| name.replace('_', " "));
     let mut table = table([sweep.x.parameter.clone()].into_iter().chain(names));
     for point in points {
-        let results = point.results.values().map(|value| format!("{value:.1}"));
+        let results = point.results.values().map(|value| shown(value, point));
         table.add_row([point.x.to_string()].into_iter().chain(results));
     }
     right(table)
@@ -142,7 +158,10 @@ fn write(path: &Path, sweep: &Sweep, points: &[Point]) -> Result<()> {
         writer.write_record(axes.chain(Results::NAMES))?;
         for point in points {
             let place = [Some(point.x), point.y].into_iter().flatten();
-            writer.write_record(place.chain(point.results.values()).map(|value| value.to_string()))?;
+            let values = place.chain(point.results.values());
+            // A result that there is not has an empty cell.
+            writer
+                .write_record(values.map(|value| if value.is_finite() { value.to_string() } else { String::new() }))?;
         }
         writer.flush()?;
         Ok(())

@@ -2,14 +2,16 @@
 
 use crate::Finding;
 use crate::course::number_within;
+use crate::output;
 use crate::progress::Progress;
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum, builder::RangedU64ValueParser};
 use comfy_table::{CellAlignment, Table, presets};
 use field::conditions::Conditions;
 use field::evaluation::Analysis;
-use field::experiment::{self, Controller, Engine, Experiment, PlotOutcome};
-use field::page::{Comparison, ControllerPoint, Page, RowPicture};
+use field::experiment::{self, Controller, Engine, Experiment, PlotOutcome, Total};
+use field::page::{Page, RowPicture};
+use field::tool_path::{Effect, WeedCount};
 use field::{firmware, picture, whole_file};
 use serde_json::json;
 use std::io::Write;
@@ -25,7 +27,7 @@ Examples:
   weeder trial --field soft-ground --out report      with its report as a page, report/report.html
   weeder trial --engine uno --replications 1         with the real firmware on the virtual Uno
   weeder trial --field my-field.toml --speeds 1,3 --spacings 30,40,50
-The status is 1 where the firmware damaged plants that could have been kept.")]
+The status is 1 where the firmware damaged a plant, or an alarm stopped it.")]
 pub struct Arguments {
     /// What runs the firmware: its code compiled for this computer, or the ELF on the virtual Uno, some 500 times slower.
     #[arg(long, value_enum, default_value = "twin")]
@@ -79,9 +81,6 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
         conditions: Conditions::load(&arguments.field)?,
         seed: arguments.seed,
     };
-    if let Some(folder) = &arguments.out {
-        fs::create_dir_all(folder).with_context(|| format!("the folder {} cannot be made", folder.display()))?;
-    }
     let engine = match (arguments.engine, &arguments.elf) {
         (EngineName::Twin, _) => Engine::Twin,
         (EngineName::Uno, Some(path)) => Engine::Uno(path.clone()),
@@ -92,44 +91,37 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     bar.finish();
     let took_s = began.elapsed().as_secs_f64();
 
-    let comparison = experiment::compare(&outcomes);
+    let totals = experiment::totals(&outcomes);
     let analysis = Analysis::of(experiment::records(&outcomes, Controller::Firmware))?;
-    let summary = summary(&experiment, &comparison);
-    if arguments.json {
-        println!("{:#}", json!({ "summary": summary, "plots": outcomes.iter().map(in_json).collect::<Vec<_>>() }));
+    let summary = summary(&experiment, &totals);
+    let mut text = if arguments.json {
+        format!("{:#}\n", json!({ "summary": summary, "plots": outcomes.iter().map(in_json).collect::<Vec<_>>() }))
     } else {
-        println!("{}\n", side_by_side(&comparison));
-        summary.iter().for_each(|sentence| println!("{sentence}"));
         let worked_s: f64 = outcomes.iter().map(|outcome| outcome.moved_s).sum();
-        println!(
+        let pace = format!(
             "Pace: {:.1} h of work in {took_s:.1} s, {:.0} times real time.",
             worked_s / 3600.0,
             worked_s / took_s
         );
-    }
+        format!("{}\n\n{}\n{pace}\n", by_speed(&totals), summary.join("\n"))
+    };
+    let alarms: u32 = of(&totals, Controller::Firmware).map(|total| total.alarms).sum();
+    let damaged: u32 = of(&totals, Controller::Firmware).map(|total| total.effect.damaged).sum();
     if let Some(folder) = &arguments.out {
-        write_report(
-            folder,
-            arguments,
-            &experiment,
-            &engine,
-            &Findings { outcomes: &outcomes, comparison, analysis, summary },
-        )?;
+        let findings = Findings { outcomes: &outcomes, totals, analysis, summary };
+        write_report(folder, arguments, &experiment, &engine, &findings)?;
         if !arguments.json {
-            println!("\nWritten: report.html, trial.csv and controllers.csv in {}", folder.display());
+            text += &format!("\nWritten: report.html, trial.csv and controllers.csv in {}\n", folder.display());
         }
     }
-    let damaged = |controller| -> u32 {
-        outcomes.iter().filter(|o| o.controller == controller).map(|outcome| outcome.effect.damaged).sum()
-    };
-    let is_good = damaged(Controller::Firmware) <= damaged(Controller::AllKnowing);
-    Ok(if is_good { Finding::Good } else { Finding::Bad })
+    output::print(&text)?;
+    Ok(if damaged == 0 && alarms == 0 { Finding::Good } else { Finding::Bad })
 }
 
 /// Everything that came of a trial.
 struct Findings<'a> {
     outcomes: &'a [PlotOutcome],
-    comparison: Comparison,
+    totals: Vec<Total>,
     analysis: Analysis,
     summary: Vec<String>,
 }
@@ -142,64 +134,74 @@ fn ascending(levels: &[f64]) -> Vec<f64> {
     levels
 }
 
-/// A line a speed: damage and weeding of each controller, and what bounds both.
-fn side_by_side(comparison: &Comparison) -> Table {
+/// What one controller did, by speed.
+fn of(totals: &[Total], controller: Controller) -> impl Iterator<Item = &Total> {
+    totals.iter().filter(move |total| total.controller == controller)
+}
+
+/// A line a speed and controller.
+fn by_speed(totals: &[Total]) -> Table {
     let mut table = Table::new();
-    table.load_style(presets::UTF8_BORDERS_ONLY);
-    let names = || comparison.controllers.iter().map(|curve| curve.name.as_str());
-    let header = ["speed\nkm/h".to_owned()].into_iter();
-    let header = header.chain(names().map(|name| format!("plants damaged, %\n{name}")));
-    let header = header.chain(names().map(|name| format!("row weeded, %\n{name}")));
-    table.set_header(header.chain(["row weeded, %\nat best".to_owned()]));
-    for (index, &(speed_km_h, bound_percent)) in comparison.bound.iter().enumerate() {
-        let of_all = |value: fn(&ControllerPoint) -> f64| {
-            let points = comparison.controllers.iter().filter_map(move |curve| curve.points.get(index));
-            points.map(move |point| format!("{:.1}", value(point)))
-        };
-        let cells = [format!("{speed_km_h}")].into_iter();
-        let cells = cells.chain(of_all(|point| point.plant_damage_percent));
-        let cells = cells.chain(of_all(|point| point.in_row_weeding_percent));
-        table.add_row(cells.chain([format!("{bound_percent:.1}")]));
+    table.load_style(presets::UTF8_BORDERS_ONLY).set_header([
+        "km/h",
+        "controller",
+        "plants\ndamaged, %",
+        "canopies\nreached, %",
+        "margins\ncut, %",
+        "ground of the\nrow weeded, %",
+        "with all margins\nkept at most, %",
+        "weeds gone\nin the row, %",
+        "in the whole\nplot, %",
+        "rows with\nan alarm",
+    ]);
+    for total in totals {
+        let efficiency = |weeds: WeedCount| weeds.efficiency_percent().map_or("-".to_owned(), |it| format!("{it:.1}"));
+        table.add_row([
+            total.speed_km_h.to_string(),
+            total.controller.title().to_owned(),
+            format!("{:.1}", total.plant_damage_percent()),
+            format!("{:.1}", total.canopies_reached_percent()),
+            format!("{:.1}", total.margins_cut_percent()),
+            format!("{:.1}", 100.0 * total.weeded_share),
+            format!("{:.1}", 100.0 * total.weedable_share),
+            efficiency(total.effect.in_row),
+            efficiency(total.effect.in_plot),
+            total.alarms.to_string(),
+        ]);
     }
-    table.column_iter_mut().for_each(|column| column.set_cell_alignment(CellAlignment::Right));
+    for (index, column) in table.column_iter_mut().enumerate() {
+        column.set_cell_alignment(if index == 1 { CellAlignment::Left } else { CellAlignment::Right });
+    }
     table
 }
 
 /// What came of it, in plain words.
-fn summary(experiment: &Experiment, comparison: &Comparison) -> Vec<String> {
-    let worst = |points: &[ControllerPoint]| {
-        let worst = points.iter().map(|point| (point.plant_damage_percent, point.speed_km_h));
-        worst.fold((0.0, 0.0), |worst, point| if point.0 > worst.0 { point } else { worst })
-    };
-    let mut sentences: Vec<String> = comparison
-        .controllers
-        .iter()
-        .map(|curve| match worst(&curve.points) {
-            (0.0, _) => format!("Plants damaged by {}: none at any speed.", curve.name),
-            (percent, speed) => {
-                format!("Plants damaged by {}: at most {percent:.1} %, at {speed} km/h.", curve.name)
-            }
-        })
-        .collect();
-    let unavoidable = comparison.unavoidable.iter().map(|&(speed, percent)| (percent, speed));
-    sentences.push(match unavoidable.fold((0.0, 0.0), |worst, point| if point.0 > worst.0 { point } else { worst }) {
-        (0.0, _) => "All of them could have been kept with this servo.".to_owned(),
-        (percent, speed) => format!("Up to {percent:.1} %, at {speed} km/h, could not be kept with this servo."),
-    });
-    if let Some(firmware) = comparison.controllers.first() {
-        let short = firmware
-            .points
-            .iter()
-            .zip(&comparison.bound)
-            .map(|(point, (_, bound))| bound - point.in_row_weeding_percent);
+fn summary(experiment: &Experiment, totals: &[Total]) -> Vec<String> {
+    let mut sentences: Vec<String> =
+        experiment.controllers.iter().map(|&controller| damage(totals, controller)).collect();
+    let alarms: u32 = of(totals, Controller::Firmware).map(|total| total.alarms).sum();
+    if alarms > 0 {
         sentences.push(format!(
-            "In the row the firmware weeds at most {:.1} points less of the ground than this servo allows at best; \
-             weeding efficiency over the whole plot, as in the paper, counts the ground between the rows as well.",
-            short.fold(0.0, f64::max)
+            "In {alarms} of {} rows an alarm took the firmware's tool out for the rest of the row: its figures are no good there.",
+            experiment.rows()
+        ));
+    }
+    let short_of_bound = of(totals, Controller::Firmware).map(|total| total.weedable_share - total.weeded_share);
+    sentences.push(format!(
+        "With every canopy and its margin kept, this servo could weed at most {:.1} points more of the row's ground than the \
+         firmware did.",
+        100.0 * short_of_bound.fold(0.0, f64::max)
+    ));
+    let mut weeds = Effect::default();
+    of(totals, Controller::Firmware).for_each(|total| weeds += total.effect);
+    if let (Some(in_row), Some(in_plot)) = (weeds.in_row.efficiency_percent(), weeds.in_plot.efficiency_percent()) {
+        sentences.push(format!(
+            "Of the weeds in the row the firmware removed {in_row:.0} %; of all weeds of the plot, as the paper counts them, \
+             {in_plot:.0} % were gone."
         ));
     }
     sentences.push(format!(
-        "Field: {} rows a controller of {} m, seed {}.",
+        "Field: {} rows of {} m for each controller, seed {}.",
         experiment.rows(),
         experiment.conditions.plot.row_m,
         experiment.seed
@@ -207,13 +209,26 @@ fn summary(experiment: &Experiment, comparison: &Comparison) -> Vec<String> {
     sentences
 }
 
+/// How many plants a controller damaged, and where most of them.
+fn damage(totals: &[Total], controller: Controller) -> String {
+    let name = controller.title();
+    let (damaged, plants) = of(totals, controller)
+        .fold((0, 0), |(damaged, plants), total| (damaged + total.effect.damaged, plants + total.effect.plants));
+    let worst = of(totals, controller).max_by(|a, b| a.plant_damage_percent().total_cmp(&b.plant_damage_percent()));
+    match worst {
+        Some(worst) if damaged > 0 => format!(
+            "Plants damaged by {name}: {damaged} of {plants}, most of them at {} km/h, {:.1} %.",
+            worst.speed_km_h,
+            worst.plant_damage_percent()
+        ),
+        _ => format!("Plants damaged by {name}: none of {plants}."),
+    }
+}
+
 /// The command that makes the same report again.
-fn command_line() -> String {
-    let words = env::args().skip(1).map(|word| {
-        let is_plain = word.chars().all(|c| c.is_ascii_alphanumeric() || "-_./,=:".contains(c));
-        if is_plain { word } else { format!("'{word}'") }
-    });
-    ["weeder".to_owned()].into_iter().chain(words).collect::<Vec<_>>().join(" ")
+fn command_line() -> Result<String> {
+    let words: Vec<String> = ["weeder".to_owned()].into_iter().chain(env::args().skip(1)).collect();
+    Ok(shlex::try_join(words.iter().map(String::as_str))?)
 }
 
 fn write_report(
@@ -245,13 +260,14 @@ fn write_report(
     let page = Page {
         title: "Field trial of the intra-row weeder, simulated",
         summary: findings.summary.clone(),
-        command: &command_line(),
+        command: &command_line()?,
         parameters: &parameters,
         analysis: &findings.analysis,
-        comparison: Some(&findings.comparison),
+        comparison: Some(&experiment::compare(&findings.totals)),
         row: row.as_ref(),
     };
     let html = page.html()?;
+    fs::create_dir_all(folder).with_context(|| format!("the folder {} cannot be made", folder.display()))?;
     let write = |name: &str, contents: &dyn Fn(&mut dyn Write) -> Result<()>| {
         let path = folder.join(name);
         whole_file::write(&path, |to| contents(to)).with_context(|| format!("{} cannot be written", path.display()))
@@ -271,6 +287,9 @@ fn in_json(outcome: &PlotOutcome) -> serde_json::Value {
         "in_row_weeds_after": in_row.after,
         "in_row_weeded_percent": 100.0 * outcome.weeded_share,
         "in_row_bound_percent": 100.0 * outcome.weedable_share,
+        "canopies": outcome.canopies.all,
+        "canopies_reached": outcome.canopies.reached,
+        "margins_cut": outcome.canopies.margins_cut,
         "alarms": outcome.alarms,
     })
 }

@@ -44,7 +44,7 @@ fn assert_refused(arguments: &[&str], words: &str) {
 fn a_trial_says_who_damaged_what_and_writes_its_report() {
     let folder = folder();
     let words = said(folder.path(), &["trial", "--field", "small.toml", "--out", "report"]);
-    assert!(words.contains("Plants damaged by this firmware: none at any speed."), "{words}");
+    assert!(words.contains("Plants damaged by this firmware: none of "), "{words}");
     let page = fs::read_to_string(folder.path().join("report/report.html")).unwrap();
     assert!(
         page.contains("weeder trial --field small.toml --out report") && page.contains("a queue without look-ahead")
@@ -89,7 +89,37 @@ fn what_is_wrong_with_a_trial_is_named_and_nothing_is_written() {
     assert_refused(&["trial", "--speeds", "1,fast", "--out", "r"], "it has to be a number from 0.1 to 8");
     assert_refused(&["trial", "--spacings", "1", "--out", "r"], "it has to be a number from 5 to 500");
     assert_refused(&["trial", "--replications", "0", "--out", "r"], "0 is not in 1..=1000");
-    assert_refused(&["trial", "--spacings", "10", "--field", "small.toml"], "plants 10 cm apart make no row");
+    assert_refused(&["trial", "--spacings", "10", "--field", "small.toml"], "plants 10 cm apart grow together");
+    let nowhere = ["trial", "--spacings", "10", "--field", "small.toml", "--out", "r"];
+    assert_refused(&nowhere, "ask for a larger spacing or narrower canopies");
+}
+
+#[test]
+fn a_machine_that_outruns_its_beam_is_told_and_is_no_success() {
+    let folder = folder();
+    let output = weeder(folder.path(), &["trial", "--field", "small.toml", "--speeds", "7", "--replications", "1"]);
+    let words = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{words}");
+    assert!(words.contains("an alarm took the firmware's tool out"), "{words}");
+    let words = said(folder.path(), &["sweep", "--field", "small.toml", "--x", "speed=2..7:5"]);
+    assert!(words.contains(" ! ") && words.contains("--result alarms says in how many"), "{words}");
+}
+
+#[test]
+fn a_firmware_whose_leads_are_set_to_nothing_is_no_success() {
+    let folder = folder();
+    fs::write(folder.path().join("led.toml"), format!("{SMALL}[settings]\nlead_out_ms = 0\nlead_in_ms = 0\n")).unwrap();
+    let output = weeder(folder.path(), &["trial", "--field", "led.toml", "--speeds", "4"]);
+    assert_eq!(output.status.code(), Some(1), "{}", String::from_utf8_lossy(&output.stdout));
+}
+
+#[test]
+fn a_reader_who_has_seen_enough_ends_it_well() {
+    let folder = folder();
+    let line = format!("'{}' sweep --field small.toml --x k=1..9:1 | head -n 1", env!("CARGO_BIN_EXE_weeder"));
+    let output =
+        Command::new("bash").current_dir(folder.path()).args(["-o", "pipefail", "-c", &line]).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }
 
 #[test]

@@ -46,7 +46,9 @@ pub fn drive(conditions: &Conditions, span_mm: &Range<f64>, speed_km_h: f64, rng
     let change_mm = fastest_mm_s.powi(2) * (0.5 / ACCELERATION_MM_S2 + 0.5 / BRAKING_MM_S2);
     let speed_mm_s = wander(rng);
     let run_up_mm = RUN_UP_MM + SWING_IN_S * speed_mm_s + speed_mm_s.powi(2) / (2.0 * ACCELERATION_MM_S2);
-    let end_mm = span_mm.end + machine.beam_to_tool_mm + RUN_OUT_MM;
+    // No braking before the tool is out of the row.
+    let braking_mm = fastest_mm_s.powi(2) * 0.5 / BRAKING_MM_S2;
+    let end_mm = span_mm.end + machine.beam_to_tool_mm + RUN_OUT_MM + braking_mm;
     let mut motion = Motion::starting_at(span_mm.start - run_up_mm).change_speed(speed_mm_s, ACCELERATION_MM_S2);
     loop {
         let leg_mm = change_mm + rng.random_range(LEG_MM);
@@ -91,6 +93,8 @@ mod tests {
         let drive = driven(&Conditions::load("even-stand").unwrap(), 2.0);
         assert!((drive.row_s - 36.0).abs() < 1e-9, "{} s", drive.row_s);
         assert!((3.0..9.0).contains(&drive.turn_s));
+        let fast = driven(&Conditions::load("even-stand").unwrap(), 8.0);
+        assert!((fast.row_s - 9.0).abs() < 1e-9, "{} s", fast.row_s);
     }
 
     #[test]
@@ -122,7 +126,8 @@ mod tests {
         for seed in 0..200 {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
             let drive = drive(&conditions, &(0.0..2000.0), 5.0, &mut rng);
-            assert!(drive.row_s > 0.0);
+            let least_s = 2.0 / (mm_s(5.0) * 1.5 / 1000.0);
+            assert!(drive.row_s >= least_s, "{} s", drive.row_s);
         }
     }
 }

@@ -11,19 +11,20 @@ use crate::driving::{Drive, drive};
 use crate::evaluation::PlotRecord;
 use crate::page::{Comparison, ControllerCurve, ControllerPoint};
 use crate::rivals;
-use crate::row::{Problem, Row};
+use crate::row::{MAX_WIDTH_MM, Problem, Row};
 use crate::signal::Pulse;
 use crate::stand::Stand;
 use crate::tool_path::{Effect, effect};
 use crate::trial::{Start, Trial, TrialError};
 use crate::twin::{self, Refused};
-use crate::verdict::{Judgement, Timing, judge};
+use crate::verdict::{Judgement, Timing, Verdict, judge};
 use control::controller::State;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::Serialize;
 use std::io;
+use std::ops::AddAssign;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use thiserror::Error;
@@ -46,7 +47,7 @@ pub enum Controller {
     WithoutLookAhead,
     /// The paper's: one slot, no look-ahead, a loop that polls.
     Paper,
-    /// Who knows where each plant stands: what is damaged nevertheless, nobody can avoid.
+    /// Who knows where each stem stands and how slow the servo may be: whose damage, if any, nobody can avoid.
     AllKnowing,
 }
 
@@ -91,6 +92,8 @@ pub struct PlotOutcome {
     pub record: PlotRecord,
     /// Plants and weeds, counted.
     pub effect: Effect,
+    /// Canopies, counted.
+    pub canopies: Canopies,
     /// Share of the rows' ground that the tool weeded, from 0 to 1.
     pub weeded_share: f64,
     /// Share that could be weeded at best with this servo ([`crate::verdict::weedable_share`]).
@@ -101,16 +104,48 @@ pub struct PlotOutcome {
     pub moved_s: f64,
 }
 
+/// Canopies as the beam sees them, and how the tool passed them: a stricter measure than damage, which is the tool in the zone
+/// round a stem ([`crate::verdict`]).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Canopies {
+    /// All of them; plants that have grown together have one.
+    pub all: u32,
+    /// Those over which the tool was not fully out.
+    pub reached: u32,
+    /// Those whose margin was cut, but not they.
+    pub margins_cut: u32,
+}
+
+impl AddAssign for Canopies {
+    fn add_assign(&mut self, other: Self) {
+        self.all += other.all;
+        self.reached += other.reached;
+        self.margins_cut += other.margins_cut;
+    }
+}
+
 /// Why an experiment had no outcome.
 #[derive(Debug, Error)]
 pub enum ExperimentError {
-    /// A row did not grow.
-    #[error("plants {spacing_cm} cm apart make no row: {problem}")]
-    Row {
+    /// The plants close up.
+    #[error(
+        "plants {spacing_cm} cm apart grow together to more than {MAX_WIDTH_MM} mm: \
+         ask for a larger spacing or narrower canopies"
+    )]
+    TooClose {
         /// The spacing.
         spacing_cm: f64,
-        /// What is wrong.
-        problem: Problem,
+    },
+    /// There is no plant, or none that the beam could see.
+    #[error(
+        "nothing for the beam stands in a row of {row_m} m with plants {spacing_cm} cm apart: \
+         ask for a longer row or a smaller spacing"
+    )]
+    TooShort {
+        /// The row's length.
+        row_m: f64,
+        /// The spacing.
+        spacing_cm: f64,
     },
     /// The decisions refuse their settings.
     #[error(transparent)]
@@ -133,6 +168,7 @@ struct Plot {
 #[derive(Clone, Copy, Debug)]
 struct RowOutcome {
     effect: Effect,
+    canopies: Canopies,
     weeded_share: f64,
     weedable_share: f64,
     /// For the row and its turn, and of these what was simulated.
@@ -199,8 +235,8 @@ impl Experiment {
     pub fn example(&self, engine: &Engine) -> Result<Option<(Row, Judgement)>, ExperimentError> {
         let fastest = self.plots().into_iter().reduce(|a, b| if b.speed_km_h > a.speed_km_h { b } else { a });
         let Some(plot) = fastest else { return Ok(None) };
-        let (_, _, trial) = self.grow(&plot, 0)?;
-        let weeded = weed(&trial, Controller::Firmware, engine)?;
+        let (stand, _, trial) = self.grow(&plot, 0)?;
+        let weeded = weed(&trial, &stand, Controller::Firmware, engine)?;
         let Trial { row, machine, motion, timing, .. } = &trial;
         let judgement = judge(row, machine, motion, *timing, &weeded.pulses, weeded.start_cycle);
         Ok(row.beginning(DRAWN_MM).map(|beginning| (beginning, judgement)))
@@ -255,6 +291,7 @@ impl Experiment {
             controller,
             record,
             effect: Effect::default(),
+            canopies: Canopies::default(),
             weeded_share: 0.0,
             weedable_share: 0.0,
             alarms: 0,
@@ -266,12 +303,17 @@ impl Experiment {
     fn weed_row(&self, plot: &Plot, row: u32, engine: &Engine) -> Result<Vec<RowOutcome>, ExperimentError> {
         let (stand, drive, trial) = self.grow(plot, row)?;
         let outcome = |&controller: &Controller| {
-            let weeded = weed(&trial, controller, engine)?;
+            let weeded = weed(&trial, &stand, controller, engine)?;
             let Trial { row, machine, motion, timing, .. } = &trial;
             let (pulses, start_cycle) = (&weeded.pulses, weeded.start_cycle);
             let judgement = judge(row, machine, motion, *timing, pulses, start_cycle);
             Ok(RowOutcome {
                 effect: effect(&stand, machine, &self.conditions.machine, motion, pulses, start_cycle),
+                canopies: Canopies {
+                    all: judgement.plants.len() as u32,
+                    reached: judgement.count(Verdict::Damaged) as u32,
+                    margins_cut: judgement.count(Verdict::MarginCut) as u32,
+                },
                 weeded_share: judgement.weeded_share,
                 weedable_share: judgement.weedable_share,
                 seconds: drive.row_s + drive.turn_s,
@@ -284,14 +326,22 @@ impl Experiment {
 
     /// A row that has grown, how it is driven, and both as a trial for the firmware.
     fn grow(&self, plot: &Plot, row: u32) -> Result<(Stand, Drive, Trial), ExperimentError> {
-        let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
-        rng.set_stream(plot.index << 32 | u64::from(row));
-        let stand = Stand::grow(&self.conditions, plot.spacing_cm * 10.0, &mut rng)
-            .map_err(|problem| ExperimentError::Row { spacing_cm: plot.spacing_cm, problem })?;
-        let drive = drive(&self.conditions, &stand.span_mm, plot.speed_km_h, &mut rng);
+        // What grows, how it is driven and what the machine is like have a chance of their own each.
+        let chance = |of: u64| {
+            let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
+            rng.set_stream(plot.index << 34 | u64::from(row) << 2 | of);
+            rng
+        };
+        let spacing_cm = plot.spacing_cm;
+        let stand =
+            Stand::grow(&self.conditions, spacing_cm * 10.0, &mut chance(0)).map_err(|problem| match problem {
+                Problem::Empty => ExperimentError::TooShort { row_m: self.conditions.plot.row_m, spacing_cm },
+                _ => ExperimentError::TooClose { spacing_cm },
+            })?;
+        let drive = drive(&self.conditions, &stand.span_mm, plot.speed_km_h, &mut chance(1));
         let trial = Trial {
             row: stand.row.clone(),
-            machine: self.conditions.machine(rng.random()),
+            machine: self.conditions.machine(chance(2).random()),
             motion: drive.motion.clone(),
             timing: self.conditions.timing(),
             start: Start::Command,
@@ -309,7 +359,7 @@ struct Weeded {
 }
 
 /// Has a controller weed a row.
-fn weed(trial: &Trial, controller: Controller, engine: &Engine) -> Result<Weeded, ExperimentError> {
+fn weed(trial: &Trial, stand: &Stand, controller: Controller, engine: &Engine) -> Result<Weeded, ExperimentError> {
     let firmware = |trial: &Trial| match engine {
         Engine::Twin => {
             let weeded = twin::weed(trial)?;
@@ -329,7 +379,7 @@ fn weed(trial: &Trial, controller: Controller, engine: &Engine) -> Result<Weeded
             firmware(&Trial { timing, ..trial.clone() })
         }
         Controller::Paper => rival(rivals::as_in_the_paper(trial)),
-        Controller::AllKnowing => rival(rivals::all_knowing(trial)),
+        Controller::AllKnowing => rival(rivals::all_knowing(trial, &stand.stems)),
     }
 }
 
@@ -337,6 +387,7 @@ impl PlotOutcome {
     /// Adds one of the plot's rows.
     fn add(&mut self, row: &RowOutcome, rows: u32) {
         self.effect += row.effect;
+        self.canopies += row.canopies;
         self.weeded_share += row.weeded_share / f64::from(rows);
         self.weedable_share += row.weedable_share / f64::from(rows);
         self.alarms += u32::from(row.alarm);
@@ -373,6 +424,9 @@ struct Line {
     time_s: f64,
     width_m: f64,
     power_hp: f64,
+    canopies: u32,
+    canopies_reached: u32,
+    margins_cut: u32,
     in_row_weeds_before: u32,
     in_row_weeds_after: u32,
     in_row_weeded_percent: f64,
@@ -404,6 +458,9 @@ pub fn write_csv(outcomes: &[PlotOutcome], controllers: &[Controller], to: impl 
             time_s: thousandth(time_s),
             width_m,
             power_hp,
+            canopies: outcome.canopies.all,
+            canopies_reached: outcome.canopies.reached,
+            margins_cut: outcome.canopies.margins_cut,
             in_row_weeds_before: outcome.effect.in_row.before,
             in_row_weeds_after: outcome.effect.in_row.after,
             in_row_weeded_percent: thousandth(100.0 * outcome.weeded_share),
@@ -420,59 +477,102 @@ fn thousandth(value: f64) -> f64 {
     (value * 1e3).round() / 1e3
 }
 
-/// The controllers side by side, by speed: every spacing and replication together.
-pub fn compare(outcomes: &[PlotOutcome]) -> Comparison {
-    let mut speeds: Vec<f64> = outcomes.iter().map(|outcome| outcome.record.speed_km_h).collect();
-    speeds.sort_by(f64::total_cmp);
-    speeds.dedup();
-    let at = |controller: Controller, speed_km_h: f64| {
-        let is_there =
-            move |outcome: &&PlotOutcome| outcome.controller == controller && outcome.record.speed_km_h == speed_km_h;
-        outcomes.iter().filter(is_there)
+/// All plots of one speed that one controller weeded.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Total {
+    /// Who weeded them.
+    pub controller: Controller,
+    /// The speed, km/h.
+    pub speed_km_h: f64,
+    /// Plants and weeds, counted.
+    pub effect: Effect,
+    /// Canopies, counted.
+    pub canopies: Canopies,
+    /// Share of the rows' ground that the tool weeded, from 0 to 1.
+    pub weeded_share: f64,
+    /// Share that this servo could weed with every canopy and margin kept.
+    pub weedable_share: f64,
+    /// Rows in which an alarm took the tool out.
+    pub alarms: u32,
+}
+
+impl Total {
+    /// Plants damaged, % (Eq. 23).
+    pub fn plant_damage_percent(&self) -> f64 {
+        percent(self.effect.damaged, self.effect.plants)
+    }
+
+    /// Canopies over which the tool was not fully out, % of all.
+    pub fn canopies_reached_percent(&self) -> f64 {
+        percent(self.canopies.reached, self.canopies.all)
+    }
+
+    /// Canopies whose margin was cut, but not they, % of all.
+    pub fn margins_cut_percent(&self) -> f64 {
+        percent(self.canopies.margins_cut, self.canopies.all)
+    }
+}
+
+fn percent(part: u32, whole: u32) -> f64 {
+    100.0 * f64::from(part) / f64::from(whole.max(1))
+}
+
+/// What each controller did at each speed, all spacings and replications together: by speed, then in the order in which the
+/// controllers took part.
+pub fn totals(outcomes: &[PlotOutcome]) -> Vec<Total> {
+    let mut totals: Vec<(Total, f64)> = Vec::new();
+    for outcome in outcomes {
+        let (controller, speed_km_h) = (outcome.controller, outcome.record.speed_km_h);
+        let is_its = |(total, _): &(Total, f64)| total.controller == controller && total.speed_km_h == speed_km_h;
+        let index = totals.iter().position(is_its).unwrap_or_else(|| {
+            let (effect, canopies) = Default::default();
+            let none =
+                Total { controller, speed_km_h, effect, canopies, weeded_share: 0.0, weedable_share: 0.0, alarms: 0 };
+            totals.push((none, 0.0));
+            totals.len() - 1
+        });
+        let (total, plots) = &mut totals[index];
+        total.effect += outcome.effect;
+        total.canopies += outcome.canopies;
+        total.weeded_share += outcome.weeded_share;
+        total.weedable_share += outcome.weedable_share;
+        total.alarms += outcome.alarms;
+        *plots += 1.0;
+    }
+    let mean = |(total, plots): (Total, f64)| Total {
+        weeded_share: total.weeded_share / plots,
+        weedable_share: total.weedable_share / plots,
+        ..total
     };
-    let damage_percent = |controller, speed| {
-        let mut all = Effect::default();
-        at(controller, speed).for_each(|outcome| all += outcome.effect);
-        100.0 * f64::from(all.damaged) / f64::from(all.plants.max(1))
+    let mut totals: Vec<Total> = totals.into_iter().map(mean).collect();
+    totals.sort_by(|a, b| a.speed_km_h.total_cmp(&b.speed_km_h));
+    totals
+}
+
+/// The controllers side by side, for the report.
+pub fn compare(totals: &[Total]) -> Comparison {
+    let point = |total: &Total| ControllerPoint {
+        speed_km_h: total.speed_km_h,
+        plant_damage_percent: total.plant_damage_percent(),
+        over_canopy_percent: total.canopies_reached_percent(),
+        in_row_weeding_percent: 100.0 * total.weeded_share,
     };
-    let mean_percent = |controller, speed, share: fn(&PlotOutcome) -> f64| {
-        100.0 * at(controller, speed).map(share).sum::<f64>() / at(controller, speed).count().max(1) as f64
-    };
-    let takes_part = |controller: &Controller| outcomes.iter().any(|outcome| outcome.controller == *controller);
+    let of = |controller: Controller| totals.iter().filter(move |total| total.controller == controller);
     let curve = |controller: Controller| ControllerCurve {
         name: controller.title().to_owned(),
-        points: speeds
-            .iter()
-            .map(|&speed_km_h| ControllerPoint {
-                speed_km_h,
-                plant_damage_percent: damage_percent(controller, speed_km_h),
-                in_row_weeding_percent: mean_percent(controller, speed_km_h, |outcome| outcome.weeded_share),
-            })
-            .collect(),
+        points: of(controller).map(point).collect(),
     };
-    let first = outcomes.first().map_or(Controller::Firmware, |outcome| outcome.controller);
-    let unavoidable: Vec<(f64, f64)> = if takes_part(&Controller::AllKnowing) {
-        speeds.iter().map(|&speed| (speed, damage_percent(Controller::AllKnowing, speed))).collect()
-    } else {
-        Vec::new()
-    };
+    let first = totals.first().map_or(Controller::Firmware, |total| total.controller);
     Comparison {
-        controllers: Controller::ALL
-            .into_iter()
-            .filter(|&controller| controller != Controller::AllKnowing && takes_part(&controller))
-            .map(curve)
-            .collect(),
-        bound: speeds
-            .iter()
-            .map(|&speed| (speed, mean_percent(first, speed, |outcome| outcome.weedable_share)))
-            .collect(),
-        unavoidable: if unavoidable.iter().any(|&(_, percent)| percent > 0.0) { unavoidable } else { Vec::new() },
+        controllers: Controller::ALL.into_iter().filter(|&one| of(one).next().is_some()).map(curve).collect(),
+        bound: of(first).map(|total| (total.speed_km_h, 100.0 * total.weedable_share)).collect(),
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::conditions::presets;
     use crate::evaluation::Analysis;
 
     fn experiment(speeds_km_h: &[f64], preset: &str) -> Experiment {
@@ -503,17 +603,50 @@ mod tests {
 
     #[test]
     fn the_firmware_damages_no_plant_and_weeds_up_to_the_bound_where_the_papers_damages_more_the_faster_it_goes() {
-        let outcomes = run(&experiment(&[1.0, 1.5, 2.0, 2.5], "transplanted"));
-        let comparison = compare(&outcomes);
-        let [firmware, _, paper] = comparison.controllers.as_slice() else { panic!("three controllers") };
-        for (point, (_, bound)) in firmware.points.iter().zip(&comparison.bound) {
-            assert_eq!(point.plant_damage_percent, 0.0, "{point:?}");
-            assert!(bound - point.in_row_weeding_percent < 5.0, "{point:?} with a bound of {bound} %");
+        for seed in 1..=3 {
+            let experiment = Experiment { seed, ..experiment(&[1.0, 1.5, 2.0, 2.5, 3.0, 3.5], "transplanted") };
+            let totals = totals(&run(&experiment));
+            let of = |controller| totals.iter().filter(move |total| total.controller == controller);
+            for total in of(Controller::Firmware) {
+                assert_eq!((total.effect.damaged, total.canopies.reached, total.alarms), (0, 0, 0), "{total:?}");
+                assert!(total.weedable_share - total.weeded_share < 0.05, "{total:?}");
+            }
+            assert!(of(Controller::AllKnowing).all(|total| total.effect.damaged == 0));
+            let damage: Vec<f64> = of(Controller::Paper).map(Total::plant_damage_percent).collect();
+            assert!(damage.is_sorted() && damage[3] < damage[4] && damage[4] < damage[5], "{damage:?}");
         }
-        let damage: Vec<f64> = paper.points.iter().map(|point| point.plant_damage_percent).collect();
-        assert!(damage.is_sorted() && damage[0] < damage[3], "{damage:?}");
-        assert!(comparison.unavoidable.is_empty());
-        assert!(outcomes.iter().all(|outcome| outcome.alarms == 0));
+    }
+
+    #[test]
+    fn whoever_knows_every_plant_damages_none_in_any_field_and_weeds_more_than_the_firmware() {
+        for preset in presets() {
+            let totals = totals(&run(&experiment(&[1.0, 2.5], preset)));
+            for pair in totals.chunks(Controller::ALL.len()) {
+                let (firmware, all_knowing) = (pair[0], pair[3]);
+                assert_eq!(
+                    (firmware.controller, all_knowing.controller),
+                    (Controller::Firmware, Controller::AllKnowing)
+                );
+                assert_eq!(all_knowing.effect.damaged, 0, "{preset}");
+                assert!(all_knowing.weeded_share > firmware.weeded_share, "{preset}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_firmware_that_is_told_wrong_leads_damages_what_could_have_been_kept() {
+        let mut experiment = experiment(&[3.5], "transplanted");
+        for lead in ["lead_out_ms", "lead_in_ms"] {
+            experiment.conditions.set(lead, 0.0).unwrap();
+        }
+        let totals = totals(&run(&experiment));
+        assert!(totals[0].effect.damaged > 0 && totals[3].effect.damaged == 0, "{totals:?}");
+    }
+
+    #[test]
+    fn a_machine_that_outruns_its_beam_ends_in_alarms_and_not_in_a_clean_result() {
+        let totals = totals(&run(&experiment(&[7.0], "transplanted")));
+        assert!(totals[0].alarms > 0, "{totals:?}");
     }
 
     #[test]

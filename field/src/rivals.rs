@@ -5,12 +5,17 @@
 //! led, and the Arduino's servo library shows a new pulse in the next frame. It measures the next canopy while the slot is
 //! still in use, closes the gaps in a canopy as the firmware does, and takes no weed for a plant.
 //!
-//! [`all_knowing`] commands each swing where the firmware's leads say, but for where the plants really stand: what it
-//! damages, slip and scatter of the servo make unavoidable. Both have the machine of the [`Trial`], with the same servo.
+//! Where the beam stands nearer to the tool than a canopy is wide, it is late for another reason than its authors knew.
+//!
+//! [`all_knowing`] knows where each stem stands and what the servo may take: it has the tool out over the zones round the stems, by the
+//! servo's slowest swing, and in the row everywhere else. What it damages nobody could keep, and what it weeds nobody can have more of
+//! without a risk. Both have the machine of the [`Trial`], with the same servo.
 
+use crate::ground::union;
 use crate::machine::Machine;
 use crate::servo::Servo;
 use crate::signal::Pulse;
+use crate::stand::Stem;
 use crate::trial::Trial;
 use crate::twin::{Sensors, ServoLine};
 use control::servo;
@@ -66,30 +71,29 @@ pub fn as_in_the_paper(trial: &Trial) -> Vec<Pulse> {
     })
 }
 
-/// Whoever knows where each plant stands weeds the trial's row: the first of the servo's pulses of each width.
-pub fn all_knowing(trial: &Trial) -> Vec<Pulse> {
-    let Trial { row, machine, motion, timing, .. } = trial;
-    let margin_mm = f64::from(timing.margin_mm);
-    // When the tool passes a place, less the way that the machine rolls in the lead.
-    let led_s = |place_mm: f64, lead_ms: u32| {
-        let passed_s = |place_mm: f64| motion.passings(place_mm + machine.beam_to_tool_mm).first().map(|p| p.time_s);
-        let speed_mm_s = motion.speed_mm_s(passed_s(place_mm)?);
-        passed_s(place_mm - speed_mm_s * f64::from(lead_ms) / 1000.0)
-    };
-    let windows: Vec<Range<f64>> = row
-        .plants()
-        .filter_map(|plant| {
-            let span = plant.span_mm();
-            let out_s = led_s(span.start - margin_mm, timing.lead_out_ms)?;
-            Some(out_s..led_s(span.end + margin_mm, timing.lead_in_ms)?)
-        })
+/// Whoever knows where each stem stands weeds the trial's row: the first of the servo's pulses of each width.
+pub fn all_knowing(trial: &Trial, stems: &[Stem]) -> Vec<Pulse> {
+    let Trial { machine, motion, .. } = trial;
+    let Servo { dead_time_ms, travel_ms, scatter, out_us, .. } = machine.servo;
+    // A command may wait for a pulse and the gap behind it, and the loop for its turn.
+    let wait_s = (out_us / 1000.0 + f64::from(SERVO_GAP_MS)) / 1000.0 + 2.0 * TURN_S;
+    let slowest_s = (dead_time_ms + scatter.dead_time_ms + travel_ms * (1.0 + scatter.load)) / 1000.0 + wait_s;
+    let quickest_s = ((dead_time_ms - scatter.dead_time_ms) / 1000.0).max(0.0);
+    let passed_s = |place_mm: f64| Some(motion.passings(place_mm + machine.beam_to_tool_mm).first()?.time_s);
+    let zones =
+        union(stems.iter().map(|stem| stem.along_mm - stem.protected_mm..stem.along_mm + stem.protected_mm).collect());
+    let windows: Vec<Range<f64>> = zones
+        .into_iter()
+        .filter_map(|zone| Some(passed_s(zone.start)? - slowest_s..passed_s(zone.end)? - quickest_s))
         .collect();
+    // A tool that has no time to be in the row and out again stays out.
+    let swings_s = union(windows.into_iter().map(|window| window.start..window.end + slowest_s).collect());
     let mut next = 0;
     swing(trial, machine.servo, TURN_S, SERVO_GAP_MS, |time_s| {
-        while windows.get(next).is_some_and(|window| window.end <= time_s) {
+        while swings_s.get(next).is_some_and(|swing| swing.end - slowest_s <= time_s) {
             next += 1;
         }
-        windows.get(next).is_some_and(|window| window.contains(&time_s))
+        swings_s.get(next).is_some_and(|swing| swing.start <= time_s)
     })
 }
 
@@ -112,8 +116,11 @@ mod tests {
     use crate::row::{Row, Thing};
     use crate::verdict::{Timing, Verdict, judge};
 
-    fn damaged_by(controller: fn(&Trial) -> Vec<Pulse>, speed_km_h: f64) -> usize {
-        let row = Row::new((1..9).map(|place| Thing::plant(500.0 * f64::from(place), 150.0)).collect()).unwrap();
+    const PLACES: [f64; 8] = [500.0, 1000.0, 1500.0, 2000.0, 2500.0, 3000.0, 3500.0, 4000.0];
+
+    /// Plants over whose canopy the tool was not fully out.
+    fn reached_by(controller: impl Fn(&Trial) -> Vec<Pulse>, speed_km_h: f64) -> usize {
+        let row = Row::new(PLACES.map(|place_mm| Thing::plant(place_mm, 150.0)).to_vec()).unwrap();
         let trial = Trial::at_speed(row, Machine::default(), Timing::default(), mm_s(speed_km_h));
         let pulses = controller(&trial);
         let judgement = judge(&trial.row, &trial.machine, &trial.motion, trial.timing, &pulses, 0);
@@ -122,15 +129,21 @@ mod tests {
     }
 
     #[test]
-    fn who_knows_everything_damages_nothing_at_any_of_the_papers_speeds() {
-        for speed_km_h in [1.0, 1.5, 2.0, 2.5] {
-            assert_eq!(damaged_by(all_knowing, speed_km_h), 0, "at {speed_km_h} km/h");
+    fn who_knows_everything_has_the_tool_out_over_whatever_zone_is_to_be_kept() {
+        for speed_km_h in [1.0, 1.5, 2.0, 2.5, 3.0] {
+            let reached = |protected_mm: f64| {
+                let stems = PLACES.map(|along_mm| Stem { along_mm, across_mm: 0.0, protected_mm });
+                reached_by(|trial| all_knowing(trial, &stems), speed_km_h)
+            };
+            // As wide as the canopy, and narrower.
+            assert_eq!(reached(75.0), 0, "at {speed_km_h} km/h");
+            assert_eq!(reached(40.0), PLACES.len(), "at {speed_km_h} km/h");
         }
     }
 
     #[test]
     fn the_papers_controller_serves_every_plant_and_is_too_late_for_all_of_them_at_speed() {
-        assert_eq!(damaged_by(as_in_the_paper, 0.5), 0);
-        assert_eq!(damaged_by(as_in_the_paper, 2.5), 8);
+        assert_eq!(reached_by(as_in_the_paper, 0.5), 0);
+        assert_eq!(reached_by(as_in_the_paper, 2.5), 8);
     }
 }

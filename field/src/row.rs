@@ -160,6 +160,8 @@ const COLUMNS: [&str; 3] = ["position_mm", "width_mm", "kind"];
 pub struct Row {
     things: Vec<Thing>,
     dust_mm: Vec<Range<f64>>,
+    /// Where its ends are known.
+    ground_mm: Option<Range<f64>>,
 }
 
 impl Row {
@@ -174,7 +176,12 @@ impl Row {
         things.iter().try_for_each(Thing::check)?;
         things.sort_by(|a, b| a.position_mm.total_cmp(&b.position_mm));
         things.windows(2).try_for_each(|pair| pair[1].check_after(&pair[0]))?;
-        Ok(Self { things, dust_mm: Vec::new() })
+        Ok(Self { things, dust_mm: Vec::new(), ground_mm: None })
+    }
+
+    /// The same row, which begins and ends where this ground does.
+    pub fn on_ground(self, ground_mm: Range<f64>) -> Self {
+        Self { ground_mm: Some(ground_mm), ..self }
     }
 
     /// The same row with dust that breaks the beam over these stretches.
@@ -191,7 +198,11 @@ impl Row {
     pub fn beginning(&self, length_mm: f64) -> Option<Self> {
         let end_mm = self.span_mm().start + length_mm;
         let things: Vec<Thing> = self.things.iter().filter(|thing| thing.span_mm().end < end_mm).cloned().collect();
-        (!things.is_empty()).then_some(Self { things, dust_mm: Vec::new() })
+        (!things.is_empty()).then_some(Self {
+            things,
+            dust_mm: Vec::new(),
+            ground_mm: Some(self.span_mm().start..end_mm),
+        })
     }
 
     /// Everything that stands in the row, in ascending order of place.
@@ -209,9 +220,12 @@ impl Row {
         self.things.iter().filter(|thing| thing.kind == Kind::Weed)
     }
 
-    /// The stretch of ground that counts as the row: half a mean spacing beyond the outermost plants, so that every plant
+    /// The stretch of ground that counts as the row. Where its ends were not given: half a mean spacing beyond the outermost plants, so that every plant
     /// has a spacing's length of its own, and in any case everything that stands in it.
     pub fn span_mm(&self) -> Range<f64> {
+        if let Some(ground_mm) = &self.ground_mm {
+            return ground_mm.clone();
+        }
         let (first, last) = (&self.things[0], &self.things[self.things.len() - 1]);
         let places: Vec<f64> = self.plants().map(|plant| plant.position_mm).collect();
         let around = match places.as_slice() {
@@ -248,10 +262,10 @@ impl Row {
             let (line, thing) = &pair[1];
             thing.check_after(&pair[0].1).map_err(|problem| line.error(problem.to_string()))?;
         }
-        Ok(Self { things: lines.into_iter().map(|(_, thing)| thing).collect(), dust_mm: Vec::new() })
+        Ok(Self { things: lines.into_iter().map(|(_, thing)| thing).collect(), dust_mm: Vec::new(), ground_mm: None })
     }
 
-    /// Writes the row as a CSV table that [`Row::read_csv`] reads. Gaps within a ragged canopy and dust are not kept.
+    /// Writes the row as a CSV table that [`Row::read_csv`] reads. Gaps within a ragged canopy, dust and the row's ends are not kept.
     ///
     /// # Errors
     /// Those of the writer.

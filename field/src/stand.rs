@@ -10,7 +10,8 @@ use crate::conditions::Conditions;
 use crate::ground::union;
 use crate::planting::{WEED_WIDTHS_MM, leaves, scatter};
 use crate::row::{Kind, Problem, Row, Thing};
-use rand::{Rng, RngExt};
+use rand::{Rng, RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Poisson};
 use std::ops::Range;
 
@@ -60,13 +61,15 @@ impl Stand {
     /// The stand that grows with plants `spacing_mm` apart.
     ///
     /// # Errors
-    /// Where canopies grow together to something that is no row.
+    /// Where canopies grow together to something that is no row, or the row is shorter than the spacing.
     pub fn grow(conditions: &Conditions, spacing_mm: f64, rng: &mut impl Rng) -> Result<Self, Problem> {
         let Conditions { plot, crop, weeds, sensors, .. } = conditions;
         let span_mm = 0.0..plot.row_m * 1000.0;
+        // Each has a chance of its own, so that a parameter of one leaves the others as they are.
+        let [mut leaf_rng, mut weed_rng, mut dust_rng] = [(); 3].map(|()| ChaCha8Rng::from_rng(rng));
         let mut stems = Vec::new();
         let mut things = Vec::new();
-        let places = (span_mm.end / spacing_mm).floor().max(1.0) as u32;
+        let places = (span_mm.end / spacing_mm).floor() as u32;
         for place in 0..places {
             let at_mm = (f64::from(place) + 0.5) * spacing_mm;
             // One stands in any case: a row without a plant is none.
@@ -76,10 +79,12 @@ impl Stand {
             for _ in 0..plants {
                 let width_mm = (crop.canopy_mm + scatter(rng, crop.canopy_scatter_mm)).max(MIN_CANOPY_MM);
                 let mut plant = Thing::plant(along_mm, width_mm);
-                if chance(rng, crop.ragged_percent) {
-                    plant.leaves = leaves(rng, plant.span_mm());
+                if chance(&mut leaf_rng, crop.ragged_percent) {
+                    plant.leaves = leaves(&mut leaf_rng, plant.span_mm());
                 }
-                things.push(plant);
+                if !chance(rng, sensors.unseen_percent) {
+                    things.push(plant);
+                }
                 let across_mm = scatter(rng, crop.across_scatter_mm);
                 stems.push(Stem { along_mm, across_mm, protected_mm: crop.protected_mm / 2.0 });
                 along_mm += rng.random_range(DOUBLE_MM);
@@ -87,26 +92,27 @@ impl Stand {
         }
         let half_mm = plot.row_spacing_mm / 2.0;
         let area_m2 = plot.row_m * plot.row_spacing_mm / 1000.0;
-        let mut grown: Vec<Weed> = (0..count(rng, weeds.short_per_m2 * area_m2))
+        let mut grown: Vec<Weed> = (0..count(&mut weed_rng, weeds.short_per_m2 * area_m2))
             .map(|_| Weed {
-                along_mm: rng.random_range(span_mm.clone()),
-                across_mm: rng.random_range(-half_mm..half_mm),
+                along_mm: weed_rng.random_range(span_mm.clone()),
+                across_mm: weed_rng.random_range(-half_mm..half_mm),
             })
             .collect();
-        for _ in 0..count(rng, weeds.tall_per_m * plot.row_m) {
-            let along_mm = rng.random_range(span_mm.clone());
-            things.push(Thing::weed(along_mm, rng.random_range(WEED_WIDTHS_MM)));
-            grown.push(Weed { along_mm, across_mm: scatter(rng, crop.across_scatter_mm) });
+        for _ in 0..count(&mut weed_rng, weeds.tall_per_m * plot.row_m) {
+            let along_mm = weed_rng.random_range(span_mm.clone());
+            things.push(Thing::weed(along_mm, weed_rng.random_range(WEED_WIDTHS_MM)));
+            grown.push(Weed { along_mm, across_mm: scatter(&mut weed_rng, crop.across_scatter_mm) });
         }
         let air_mm = span_mm.start - HEADLAND_MM..span_mm.end + HEADLAND_MM;
-        let dust_mm = (0..count(rng, sensors.dust_per_m * (air_mm.end - air_mm.start) / 1000.0))
+        let dust_mm = (0..count(&mut dust_rng, sensors.dust_per_m * (air_mm.end - air_mm.start) / 1000.0))
             .map(|_| {
-                let start_mm = rng.random_range(air_mm.clone());
-                start_mm..start_mm + rng.random_range(DUST_MM)
+                let start_mm = dust_rng.random_range(air_mm.clone());
+                start_mm..start_mm + dust_rng.random_range(DUST_MM)
             })
             .collect();
         stems.sort_by(|a, b| a.along_mm.total_cmp(&b.along_mm));
-        Ok(Self { row: Row::new(grown_together(things))?.with_dust(dust_mm), stems, weeds: grown, span_mm })
+        let row = Row::new(grown_together(things))?.with_dust(dust_mm).on_ground(span_mm.clone());
+        Ok(Self { row, stems, weeds: grown, span_mm })
     }
 }
 
@@ -150,8 +156,6 @@ fn grown_together(mut things: Vec<Thing>) -> Vec<Thing> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rand::SeedableRng;
-    use rand_chacha::ChaCha8Rng;
 
     fn grow(conditions: &Conditions, seed: u64) -> Stand {
         Stand::grow(conditions, 500.0, &mut ChaCha8Rng::seed_from_u64(seed)).expect("a row")
@@ -192,6 +196,26 @@ mod tests {
         let expected = 200.0 * 100.0 * 0.4 + 1.2 * 100.0;
         assert!((stand.weeds.len() as f64 - expected).abs() < 3.0 * f64::sqrt(expected), "{}", stand.weeds.len());
         assert!(stand.weeds.iter().all(|weed| stand.span_mm.contains(&weed.along_mm) && weed.across_mm.abs() <= 200.0));
+    }
+
+    #[test]
+    fn a_parameter_of_one_leaves_the_others_as_they_are() {
+        let closed = grow(&Conditions::default(), 1);
+        let mut conditions = Conditions::default();
+        conditions.set("crop.ragged_percent", 100.0).unwrap();
+        conditions.set("sensors.dust_per_m", 1.0).unwrap();
+        let ragged = grow(&conditions, 1);
+        assert_eq!((&closed.stems, &closed.weeds), (&ragged.stems, &ragged.weeds));
+        assert_ne!(closed.row, ragged.row);
+    }
+
+    #[test]
+    fn a_row_shorter_than_its_spacing_is_none() {
+        let mut conditions = Conditions::default();
+        conditions.set("plot.row_m", 2.0).unwrap();
+        conditions.set("weeds.tall_per_m", 0.0).unwrap();
+        let grown = Stand::grow(&conditions, 2500.0, &mut ChaCha8Rng::seed_from_u64(1));
+        assert_eq!(grown, Err(Problem::Empty));
     }
 
     #[test]

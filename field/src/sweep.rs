@@ -166,12 +166,12 @@ pub enum SweepError {
         unit: &'static str,
     },
     /// A point's plot could not be weeded.
-    #[error("at {place}: {source}")]
+    #[error("at {place}: {problem}")]
     Point {
         /// The point.
         place: String,
         /// What went wrong.
-        source: ExperimentError,
+        problem: ExperimentError,
     },
 }
 
@@ -190,10 +190,10 @@ impl Sweep {
         points
             .par_iter()
             .map(|(x, y, experiment)| {
-                let outcomes = experiment.run(&Engine::Twin, |_| ()).map_err(|source| {
+                let outcomes = experiment.run(&Engine::Twin, |_| ()).map_err(|problem| {
                     let second = self.y.as_ref().zip(*y).map(|(axis, y)| format!(", {} = {y}", axis.parameter));
                     let place = format!("{} = {x}{}", self.x.parameter, second.unwrap_or_default());
-                    SweepError::Point { place, source }
+                    SweepError::Point { place, problem }
                 })?;
                 progress((done.fetch_add(1, Ordering::Relaxed) + 1) as f64 / points.len() as f64);
                 // One speed, one spacing, one replication and one controller: one plot.
@@ -280,7 +280,7 @@ mod tests {
             let point = points.iter().find(|point| point.x == x && point.y == Some(y)).unwrap();
             point.results.plant_damage_percent
         };
-        assert!(damage(0.0, 4.0) > 50.0, "{points:?}");
+        assert!(damage(0.0, 4.0) > 20.0, "{points:?}");
         assert_eq!((damage(0.0, 1.0), damage(180.0, 4.0)), (0.0, 0.0), "{points:?}");
     }
 
@@ -288,7 +288,7 @@ mod tests {
     fn a_value_that_cannot_be_is_refused_before_anything_is_weeded() {
         let run = |x: &str| sweep(x, None).run(|_| panic!("nothing is weeded")).unwrap_err().to_string();
         assert!(run("lead_out_ms=400..600:200").contains("settings.lead_out_ms is 600, but has to be 0 to 500"));
-        assert!(run("ground.slip_percent=10..20:5").contains("ground.slip_percent is 20, but has to be 0 to 15"));
+        assert!(run("ground.slip_percent=10..20:5").contains("ground.slip_percent is 20, but has to be -15 to 15"));
         assert!(run("speed=1..40:13").contains("speed is 14, but has to be 0.1 to 8 km/h"));
         assert!(run("plot.rows=1..2:0.5").contains("plot.rows is 1.5, but has to be a whole number"));
         assert!(run("slip=1..2:1").contains("slip is neither a parameter of the field nor a setting"));

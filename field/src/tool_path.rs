@@ -1,13 +1,14 @@
 //! Damage and weeding as geometry: what the tools pass through, seen from above.
 //!
 //! The arm swings sideways, so the tool's middle is `arm * sin(angle)` to the left of the row's line. It is `tool_width` wide,
-//! across the row; along the row it is taken for a line. A plant is *damaged* where the tool passes through the protected zone
-//! round its stem. A weed is *removed* where the tool passes it, or one of the sweeps, which run between the rows without
-//! ever swinging: they damage no plant here, as no controller can help it.
+//! across the row; along the row it is taken for a line. (An arm that lies along the row also carries the tool along it, by 10 mm where it
+//! leaves a stem's zone: that is left out.) A plant is *damaged* where the tool passes through the protected zone round its stem.
+//! A weed is *removed* where the tool passes it, or one of the sweeps, which run between the rows without ever swinging and keep
+//! off the zones.
 //!
-//! Weeding efficiency is counted twice (Eq. 22). *In the row* are the weeds that the tool covers when it does not swing; what is
-//! left of them is the controller's doing. *In the whole plot* are all weeds between the middles of two gaps between rows, as in the
-//! paper's square metre: most of them fall to the sweeps, whatever the controller does.
+//! Weeding efficiency is counted twice (Eq. 22). *In the row* are the weeds between the sweeps on either side: what becomes of them
+//! is the controller's doing. *In the whole plot* are all weeds between the middles of two gaps between rows, as in the paper's
+//! square metre: most of them fall to the sweeps, whatever the controller does.
 
 use crate::conditions::Mechanism;
 use crate::machine::Machine;
@@ -17,7 +18,7 @@ use crate::signal::Pulse;
 use crate::stand::{Stand, Stem, Weed};
 use std::ops::{AddAssign, Range};
 
-/// Time between two looks at where the tool is in a protected zone: it moves by less than a millimetre.
+/// Time between two looks at where the tool is in a protected zone: at 2.5 km/h it moves by a millimetre or so.
 const LOOK_S: f64 = 0.000_5;
 
 /// Weeds, counted.
@@ -92,7 +93,7 @@ pub fn effect(
     for weed in &stand.weeds {
         let counted = WeedCount { before: 1, after: u32::from(!tools.remove(weed)) };
         effect.in_plot += counted;
-        if weed.across_mm.abs() <= machine.tool_width_mm / 2.0 {
+        if weed.across_mm.abs() < mechanism.sweep_from_mm {
             effect.in_row += counted;
         }
     }
@@ -125,8 +126,8 @@ impl Tools<'_> {
     }
 
     fn remove(&self, weed: &Weed) -> bool {
-        let Mechanism { sweeps, sweep_width_mm, sweep_from_mm, .. } = *self.mechanism;
-        let swept_mm = sweep_from_mm..sweep_from_mm + f64::from(sweeps / 2) * sweep_width_mm;
+        let Mechanism { sweeps_a_side, sweep_width_mm, sweep_from_mm, .. } = *self.mechanism;
+        let swept_mm = sweep_from_mm..sweep_from_mm + f64::from(sweeps_a_side) * sweep_width_mm;
         let passings = self.motion.passings(weed.along_mm + self.machine.beam_to_tool_mm);
         swept_mm.contains(&weed.across_mm.abs())
             || passings.iter().any(|passing| self.covered_mm(passing.time_s).contains(&weed.across_mm))
@@ -168,8 +169,8 @@ mod tests {
     fn a_tool_that_is_aside_in_time_damages_nothing_and_leaves_the_weed_beside_the_stem() {
         let effect = effect_of(800.0, 1100.0);
         assert_eq!((effect.plants, effect.damaged), (1, 0));
-        assert_eq!(effect.in_row, WeedCount { before: 2, after: 1 });
-        // The sweeps take the one at 100 mm; nothing reaches the one at 35 mm.
+        // Nothing reaches the one at 35 mm; the sweeps take the one at 100 mm.
+        assert_eq!(effect.in_row, WeedCount { before: 3, after: 2 });
         assert_eq!(effect.in_plot, WeedCount { before: 4, after: 2 });
     }
 
@@ -177,7 +178,7 @@ mod tests {
     fn a_tool_that_does_not_swing_in_time_damages_the_plant_and_takes_the_weed() {
         let effect = effect_of(1200.0, 1500.0);
         assert_eq!(effect.damaged, 1);
-        assert_eq!(effect.in_row, WeedCount { before: 2, after: 0 });
+        assert_eq!(effect.in_row, WeedCount { before: 3, after: 1 });
     }
 
     #[test]

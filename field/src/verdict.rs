@@ -191,12 +191,14 @@ pub fn judge(
     let mut plants: Vec<PlantOutcome> = row.plants().map(|plant| plant_outcome(plant, &closed, timing)).collect();
     let mut idle_swings = 0;
     for swing in &swings {
-        let covers = |plant: &PlantOutcome| swing.covers(&plant.plant.span_mm(), machine, motion);
-        let covered: Vec<usize> = (0..plants.len()).filter(|&i| covers(&plants[i])).collect();
-        for &index in &covered {
-            plants[index].swings += 1;
+        let passed = swing.passed_mm(machine, motion);
+        // Plants stand in ascending order, and apart.
+        let first = plants.partition_point(|plant| plant.plant.span_mm().end <= passed.start);
+        let behind = plants.partition_point(|plant| plant.plant.span_mm().start < passed.end);
+        for plant in plants.iter_mut().take(behind).skip(first) {
+            plant.swings += 1;
         }
-        if let (Some(&first), Some(&last)) = (covered.first(), covered.last()) {
+        if let (true, Some(last)) = (first < behind, behind.checked_sub(1)) {
             let error = SwingError { machine, motion, timing };
             plants[first].out_error_ticks =
                 swing.out_s.and_then(|time_s| error.out_ticks(time_s, &plants[first].plant));
@@ -250,10 +252,10 @@ impl Swing {
         swings
     }
 
-    /// Whether the tool passed any of the ground during the swing.
-    fn covers(&self, ground_mm: &Range<f64>, machine: &Machine, motion: &Motion) -> bool {
+    /// The ground that the tool passed during the swing.
+    fn passed_mm(&self, machine: &Machine, motion: &Motion) -> Range<f64> {
         let passed = motion.stretch_mm(&self.during_s);
-        machine.tool_mm(passed.start) < ground_mm.end && ground_mm.start < machine.tool_mm(passed.end)
+        machine.tool_mm(passed.start)..machine.tool_mm(passed.end)
     }
 }
 
