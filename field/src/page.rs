@@ -18,15 +18,14 @@ use svg::Document;
 use table::{Table, fixed, short};
 use thiserror::Error;
 
-/// Plant damage and in-row weeding of several controllers in the same field, and what no controller can beat.
+/// Plant damage, in-row weeding and canopies reached by several controllers in the same field.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Comparison {
     /// The controllers, in the order in which they are to be named.
     pub controllers: Vec<ControllerCurve>,
-    /// The most of the row that this servo allows to be weeded: speed in km/h, and % of the row's ground.
+    /// The most of the row that this servo can weed with every canopy and its margin kept: speed in km/h, and % of the row's
+    /// ground. Who is above it has cut margins or reached canopies, but not necessarily touched a stem.
     pub bound: Vec<(f64, f64)>,
-    /// The least damage that slip and scatter allow, empty where none is known: speed in km/h, and % of the plants.
-    pub unavoidable: Vec<(f64, f64)>,
 }
 
 /// What one controller did at each speed.
@@ -43,8 +42,10 @@ pub struct ControllerCurve {
 pub struct ControllerPoint {
     /// Speed of the machine, km/h.
     pub speed_km_h: f64,
-    /// Plants damaged, % of all.
+    /// Plants damaged, % of all: the tool was in the protected zone round the stem.
     pub plant_damage_percent: f64,
+    /// Canopies over which the tool was not fully out, % of all: stricter than damage. Plants that have grown together have one.
+    pub over_canopy_percent: f64,
     /// Ground of the row that the tool weeded, % of the row's length.
     pub in_row_weeding_percent: f64,
 }
@@ -141,8 +142,8 @@ struct Sheet<'a> {
 
 /// The controllers side by side, as plots and as tables.
 struct Headline {
-    figures: [Figure; 2],
-    tables: [Table; 2],
+    figures: [Figure; 3],
+    tables: [Table; 3],
 }
 
 impl Headline {
@@ -155,19 +156,18 @@ impl Headline {
             };
             comparison.controllers.iter().map(curve).collect::<Vec<(String, Vec<(f64, f64)>)>>()
         };
-        let mut damage = of_controllers(|point| point.plant_damage_percent);
+        let damage = of_controllers(|point| point.plant_damage_percent);
+        let canopies = of_controllers(|point| point.over_canopy_percent);
         let mut weeding = of_controllers(|point| point.in_row_weeding_percent);
-        if !comparison.unavoidable.is_empty() {
-            damage.push(("unavoidable".to_owned(), comparison.unavoidable.clone()));
-        }
         if !comparison.bound.is_empty() {
-            weeding.push(("physical bound".to_owned(), comparison.bound.clone()));
+            weeding.push((figure::BOUND.to_owned(), comparison.bound.clone()));
         }
         Ok(Self {
-            figures: [figure::damage(comparison)?, figure::weeding(comparison)?],
+            figures: [figure::damage(comparison)?, figure::weeding(comparison)?, figure::canopies(comparison)?],
             tables: [
                 by_speed("Plants damaged by each controller, %", &damage),
                 by_speed("Ground of the row weeded by each controller, %", &weeding),
+                by_speed("Canopies reached by each controller, %", &canopies),
             ],
         })
     }
@@ -178,13 +178,12 @@ impl Comparison {
     fn check(&self) -> Result<(), PageError> {
         let of_controllers = self.controllers.iter().flat_map(|controller| {
             controller.points.iter().flat_map(|point| {
-                let figures = [point.plant_damage_percent, point.in_row_weeding_percent];
+                let figures = [point.plant_damage_percent, point.over_canopy_percent, point.in_row_weeding_percent];
                 figures.map(|value| (controller.name.as_str(), point.speed_km_h, value))
             })
         });
-        let limits = [("the bound", &self.bound), ("what is unavoidable", &self.unavoidable)];
-        let of_limits = limits.into_iter().flat_map(|(what, limit)| limit.iter().map(move |at| (what, at.0, at.1)));
-        let wrong = of_controllers.chain(of_limits).find(|(_, speed, value)| !(speed + value).is_finite());
+        let of_bound = self.bound.iter().map(|&(speed_km_h, value)| ("the bound", speed_km_h, value));
+        let wrong = of_controllers.chain(of_bound).find(|(_, speed, value)| !(speed + value).is_finite());
         wrong.map_or(Ok(()), |(what, speed_km_h, value)| {
             Err(PageError::NotFinite { what: what.to_owned(), speed_km_h, value })
         })

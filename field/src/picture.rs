@@ -46,26 +46,25 @@ pub fn draw(row: &Row, judgement: &Judgement) -> Document {
     let span = row.span_mm();
     let lanes = ((span.end - span.start) / LANE_MM).ceil().max(1.0) as usize;
     let (width, height) = (LANE_WIDTH + 2.0 * SIDE, HEAD + lanes as f64 * LANE_HEIGHT + 8.0);
-    let clip = ClipPath::new().set("id", "lane").add(rectangle(0.0, 0.0, LANE_WIDTH, LANE_HEIGHT, "#000"));
-    let mut document =
-        document(width, height).add(Definitions::new().add(clip)).add(paper(width, height)).add(legend());
+    let mut document = document(width, height).add(paper(width, height)).add(legend());
     for lane in 0..lanes {
         let start_mm = span.start + lane as f64 * LANE_MM;
         let ground = start_mm..(start_mm + LANE_MM).min(span.end);
         let top = HEAD + lane as f64 * LANE_HEIGHT;
-        document =
-            document.add(draw_lane(row, judgement, &ground).set("transform", format!("translate({SIDE} {top})")));
+        let drawn = draw_lane(row, judgement, &ground, &format!("lane-{lane}"));
+        document = document.add(drawn.set("transform", format!("translate({SIDE} {top})")));
     }
     document
 }
 
-/// The part of the row in a lane, in a coordinate system that begins at its left end.
-fn draw_lane(row: &Row, judgement: &Judgement, ground: &Range<f64>) -> Group {
+/// The part of the row in a lane, in a coordinate system that begins at its left end. What reaches beyond the lane's ends is cut
+/// by a clip of that name.
+fn draw_lane(row: &Row, judgement: &Judgement, ground: &Range<f64>, clip: &str) -> Group {
     let x = |place_mm: f64| (place_mm - ground.start) * PIXELS_PER_MM;
     let is_here = |stretch: &Range<f64>| stretch.start < ground.end && ground.start < stretch.end;
     let length = x(ground.end);
 
-    let mut drawn = Group::new().set("clip-path", "url(#lane)");
+    let mut drawn = Group::new().set("clip-path", format!("url(#{clip})"));
     drawn = drawn.add(rectangle(0.0, TOOL_Y, length, TOOL_HEIGHT, WEEDED));
     let strips =
         [(&judgement.clear_mm, TOOL_Y, TOOL_HEIGHT, OUT), (&judgement.windows_mm, WINDOW_Y, STRIP_HEIGHT, WINDOW)];
@@ -87,27 +86,58 @@ fn draw_lane(row: &Row, judgement: &Judgement, ground: &Range<f64>) -> Group {
     for plant in judgement.plants.iter().filter(|plant| is_here(&plant.plant.span_mm())) {
         drawn = drawn.add(canopy(&plant.plant, x(plant.plant.position_mm), plant.verdict));
     }
-    let points: Vec<String> = judgement
-        .path
-        .iter()
-        .map(|&(place_mm, degrees)| format!("{:.1},{:.1}", x(place_mm), angle_y(degrees)))
-        .collect();
-    drawn = drawn.add(
-        Polyline::new()
-            .set("points", points.join(" "))
-            .set("fill", "none")
-            .set("stroke", CURVE)
-            .set("stroke-width", 1.6)
-            .set("stroke-linejoin", "round"),
-    );
+    for part in parts_within(&judgement.path, ground) {
+        let points: Vec<String> =
+            part.into_iter().map(|(place_mm, degrees)| format!("{:.1},{:.1}", x(place_mm), angle_y(degrees))).collect();
+        drawn = drawn.add(
+            Polyline::new()
+                .set("points", points.join(" "))
+                .set("fill", "none")
+                .set("stroke", CURVE)
+                .set("stroke-width", 1.6)
+                .set("stroke-linejoin", "round"),
+        );
+    }
 
+    let clip = ClipPath::new().set("id", clip).add(rectangle(0.0, 0.0, length, LANE_HEIGHT, "#000"));
     Group::new()
+        .add(Definitions::new().add(clip))
         .add(words(-8.0, BEAM_Y + 5.0, "beam", PALE_INK).set("text-anchor", "end"))
         .add(words(-8.0, TOOL_Y + 10.0, "tool", PALE_INK).set("text-anchor", "end"))
         .add(words(-8.0, OUT_Y + 4.0, "out 45°", PALE_INK).set("text-anchor", "end"))
         .add(words(-8.0, IN_Y + 4.0, "in 0°", PALE_INK).set("text-anchor", "end"))
         .add(drawn)
         .add(scale(ground))
+}
+
+/// The parts of a path of places and degrees that run over this ground, cut at its ends. There are several where the machine rolled
+/// back.
+fn parts_within(path: &[(f64, f64)], ground: &Range<f64>) -> Vec<Vec<(f64, f64)>> {
+    let mut parts: Vec<Vec<(f64, f64)>> = Vec::new();
+    for piece in path.windows(2) {
+        let Some((from, to)) = piece_within(piece[0], piece[1], ground) else { continue };
+        match parts.last_mut() {
+            Some(part) if part.last() == Some(&from) => part.push(to),
+            _ => parts.push(vec![from, to]),
+        }
+    }
+    parts
+}
+
+/// What of a straight piece runs over this ground.
+fn piece_within(from: (f64, f64), to: (f64, f64), ground: &Range<f64>) -> Option<((f64, f64), (f64, f64))> {
+    let (way_mm, turn) = (to.0 - from.0, to.1 - from.1);
+    if way_mm == 0.0 {
+        // The tool swung while the machine stood.
+        return ground.contains(&from.0).then_some((from, to));
+    }
+    let share_at = |place_mm: f64| (place_mm - from.0) / way_mm;
+    let (a, b) = (share_at(ground.start), share_at(ground.end));
+    let (first, last) = (a.min(b), a.max(b));
+    let at = |share: f64| (from.0 + share * way_mm, from.1 + share * turn);
+    let begin = if first > 0.0 { at(first) } else { from };
+    let end = if last < 1.0 { at(last) } else { to };
+    (first < 1.0 && last > 0.0).then_some((begin, end))
 }
 
 fn canopy(plant: &Thing, x: f64, verdict: Verdict) -> Group {
@@ -128,7 +158,7 @@ fn colour(verdict: Verdict) -> &'static str {
     }
 }
 
-/// What tells the verdicts apart where the colours do not: one stroke for a cut margin, a cross for damage.
+/// What tells the verdicts apart where the colours do not: one stroke for a cut margin, a cross for a reached canopy.
 fn strokes(x: f64, y: f64, reach: f64, verdict: Verdict) -> Path {
     let (left, right, top, bottom) = (tenth(x - reach), tenth(x + reach), tenth(y - reach), tenth(y + reach));
     let stroke = Data::new().move_to((left, bottom)).line_to((right, top));
@@ -162,14 +192,18 @@ fn scale(ground: &Range<f64>) -> Group {
 }
 
 fn legend() -> Group {
-    let verdicts =
-        [(Verdict::Kept, "plant kept"), (Verdict::MarginCut, "margin cut"), (Verdict::Damaged, "plant damaged")];
+    // They are held against the canopy, which is stricter than a plant's damage.
+    let verdicts = [
+        (Verdict::Kept, "canopy and margin kept"),
+        (Verdict::MarginCut, "margin cut"),
+        (Verdict::Damaged, "canopy reached"),
+    ];
     let entries = [
         (WEED, "tall weed"),
         (BEAM, "beam broken"),
         (WINDOW, "window"),
-        (WEEDED, "tool in or swinging"),
         (OUT, "tool clear"),
+        (WEEDED, "tool not clear"),
         (CURVE, "tool's angle"),
     ];
     let mut legend = Legend::new(SIDE, 22.0);
@@ -221,5 +255,32 @@ mod tests {
         let drawn = draw(&row, &outcome.judgement).to_string();
         // 12 m of row: half a spacing beyond either plant.
         assert_eq!(drawn.matches("out 45°").count(), 5);
+    }
+
+    #[test]
+    fn a_lane_holds_the_curve_over_its_ground_alone() {
+        let path = [(-1000.0, 45.0), (500.0, 45.0), (1500.0, 0.0), (9000.0, 0.0)];
+        assert_eq!(parts_within(&path, &(0.0..1000.0)), [[(0.0, 45.0), (500.0, 45.0), (1000.0, 22.5)]]);
+        assert_eq!(parts_within(&path, &(1000.0..3000.0)), [[(1000.0, 22.5), (1500.0, 0.0), (3000.0, 0.0)]]);
+        assert!(parts_within(&path, &(9000.0..9500.0)).is_empty());
+    }
+
+    #[test]
+    fn a_curve_that_leaves_a_lane_and_comes_back_is_broken_there() {
+        let path = [(0.0, 0.0), (2000.0, 0.0), (2000.0, 45.0), (500.0, 45.0), (500.0, 0.0)];
+        let parts = parts_within(&path, &(0.0..1000.0));
+        assert_eq!(parts, [vec![(0.0, 0.0), (1000.0, 0.0)], vec![(1000.0, 45.0), (500.0, 45.0), (500.0, 0.0)]]);
+    }
+
+    #[test]
+    fn the_curve_ends_with_the_rows_ground() {
+        let (trial, outcome) = ruined_row();
+        let drawn = draw(&trial.row, &outcome.judgement).to_string();
+        let ground = trial.row.span_mm();
+        let length = (ground.end - ground.start) * PIXELS_PER_MM;
+        let curves = drawn.split("points=\"").skip(1).map(|rest| rest.split('"').next().unwrap());
+        let xs = curves.flat_map(|points| points.split(' ')).map(|point| point.split(',').next().unwrap());
+        let xs: Vec<f64> = xs.map(|x| x.parse().unwrap()).collect();
+        assert!(!xs.is_empty() && xs.iter().all(|x| (0.0..=length + 0.05).contains(x)), "{xs:?} in {length}");
     }
 }

@@ -32,21 +32,23 @@ fn trial(damages: bool) -> Analysis {
 }
 
 fn comparison() -> Comparison {
-    let curve = |name: &str, damage: [f64; 2], weeding: [f64; 2]| ControllerCurve {
-        name: name.to_owned(),
-        points: vec![
-            ControllerPoint { speed_km_h: 1.0, plant_damage_percent: damage[0], in_row_weeding_percent: weeding[0] },
-            ControllerPoint { speed_km_h: 2.5, plant_damage_percent: damage[1], in_row_weeding_percent: weeding[1] },
-        ],
+    let curve = |name: &str, damage: [f64; 2], canopies: [f64; 2], weeding: [f64; 2]| {
+        let point = |index: usize, speed_km_h| ControllerPoint {
+            speed_km_h,
+            plant_damage_percent: damage[index],
+            over_canopy_percent: canopies[index],
+            in_row_weeding_percent: weeding[index],
+        };
+        ControllerCurve { name: name.to_owned(), points: vec![point(0, 1.0), point(1, 2.5)] }
     };
     Comparison {
         controllers: vec![
-            curve("this firmware", [0.0, 0.0], [42.1, 24.3]),
-            curve("a queue without look-ahead", [21.4, 86.2], [44.8, 33.9]),
-            curve("the paper's", [30.6, 97.7], [60.5, 50.1]),
+            curve("this firmware", [0.0, 0.0], [0.0, 1.2], [42.1, 24.3]),
+            curve("a queue without look-ahead", [0.0, 2.9], [21.4, 86.2], [44.8, 33.9]),
+            curve("the paper's", [0.0, 14.2], [30.6, 97.7], [60.5, 50.1]),
+            curve("whoever knows every plant", [0.0, 0.0], [93.5, 99.1], [71.0, 55.3]),
         ],
         bound: vec![(1.0, 43.2), (2.5, 26.9)],
-        unavoidable: Vec::new(),
     }
 }
 
@@ -231,6 +233,7 @@ fn controllers_are_compared_in_figures_and_in_a_table() {
                 "42.1",
                 "44.8",
                 "60.5",
+                "71.0",
                 "43.2",
             ],
             [
@@ -238,6 +241,7 @@ fn controllers_are_compared_in_figures_and_in_a_table() {
                 "24.3",
                 "33.9",
                 "50.1",
+                "55.3",
                 "26.9",
             ],
         ]
@@ -245,7 +249,36 @@ fn controllers_are_compared_in_figures_and_in_a_table() {
     .assert_debug_eq(&cells(&page, "Ground of the row weeded by each controller, %"));
     let words: Vec<_> = page.descendants().filter_map(|node| node.attribute("aria-label")).collect();
     let damage = words.iter().find(|words| words.starts_with("Plant damage in % of the plants")).unwrap();
-    assert!(damage.contains("the paper's: 30.6 at 1 km/h, 97.7 at 2.5 km/h."), "{damage}");
+    assert!(damage.contains("the paper's: 0.0 at 1 km/h, 14.2 at 2.5 km/h."), "{damage}");
+}
+
+#[test]
+fn canopies_reached_stand_beside_damage_and_the_page_says_how_they_differ() {
+    let xml = closed(&full_page());
+    let page = parse(&xml);
+    let rows = cells(&page, "Canopies reached by each controller, %");
+    assert_eq!(rows, [["1 km/h", "0.0", "21.4", "30.6", "93.5"], ["2.5 km/h", "1.2", "86.2", "97.7", "99.1"]]);
+    let damage = cells(&page, "Plants damaged by each controller, %");
+    assert_eq!(damage[1], ["2.5 km/h", "0.0", "2.9", "14.2", "0.0"]);
+    let words = text(page.root_element()).replace('\n', " ");
+    for difference in ["touched the zone round its stem", "not fully out of the row over the canopy"] {
+        assert!(words.contains(difference), "{difference}");
+    }
+}
+
+#[test]
+fn the_bound_is_named_for_what_is_kept_below_it() {
+    let xml = closed(&full_page());
+    let page = parse(&xml);
+    let name = "most with every canopy and margin kept";
+    let names = |tag: &str| {
+        page.descendants().filter(|node| node.has_tag_name(tag)).filter(|node| text(*node).trim() == name).count()
+    };
+    // The weeding's legend and table, and no other's.
+    assert_eq!((names("li"), names("th")), (1, 1));
+    let words = text(page.root_element()).to_lowercase();
+    assert!(words.contains("not necessarily with stems"));
+    assert!(words.matches(name).count() > 2, "it is explained too");
 }
 
 #[test]
@@ -260,8 +293,8 @@ fn every_picture_is_said_in_words_too() {
         assert!(picture.ancestors().any(|node| is_said(node) || is_hidden(node)));
         count += usize::from(picture.ancestors().any(is_said));
     }
-    // Two of the controllers, four measures, four of residuals, and the row.
-    assert_eq!(count, 11);
+    // Three of the controllers, four measures, four of residuals, and the row.
+    assert_eq!(count, 12);
 }
 
 #[test]
@@ -324,7 +357,7 @@ fn words_from_outside_stay_words() {
 #[test]
 fn a_figure_that_is_none_is_named() {
     let mut comparison = comparison();
-    comparison.controllers[1].points[1].plant_damage_percent = f64::NAN;
+    comparison.controllers[1].points[1].over_canopy_percent = f64::NAN;
     let analysis = trial(true);
     let page = Page {
         title: "A trial",

@@ -1,6 +1,6 @@
 //! The page's figures: which plot shows what, its legend, and the same in words for those who cannot see it.
 
-use super::plot::{DrawingError, Look, Plot, Series, Shade, key, range_of};
+use super::plot::{DrawingError, Look, Plot, Series, key, range_of};
 use super::table::{fixed, short};
 use super::{Comparison, ControllerPoint};
 use crate::evaluation::{Analysis, Response, ResponseAnalysis};
@@ -32,21 +32,29 @@ pub struct Key {
 
 const SPEED: &str = "speed, km/h";
 
+/// What the line is called that a controller can stay below without cutting a margin.
+pub const BOUND: &str = "most with every canopy and margin kept";
+
 /// Plant damage of each controller against speed.
 pub fn damage(comparison: &Comparison) -> Result<Figure, DrawingError> {
-    let limit = (comparison.unavoidable.as_slice(), Shade::Below, "unavoidable with this slip and scatter");
     let title = ("Plant damage", "% of the plants");
-    let caption = "Plants that the tool damaged, of all in the rows. Lower is better.";
-    curves(comparison, title, caption, |point| point.plant_damage_percent, limit)
+    let caption = "Plants in whose zone round the stem the tool was, of all in the rows. Lower is better.";
+    curves(comparison, title, caption, |point| point.plant_damage_percent, &[])
 }
 
 /// Weeding in the row of each controller against speed.
 pub fn weeding(comparison: &Comparison) -> Result<Figure, DrawingError> {
-    let limit = (comparison.bound.as_slice(), Shade::Above, "physical bound, above which plants are cut");
     let title = ("In-row weeding", "% of the row's ground");
-    let caption =
-        "Ground of the row that the tool worked. Higher is better, but above the bound it is paid for with plants.";
-    curves(comparison, title, caption, |point| point.in_row_weeding_percent, limit)
+    let caption = "Ground of the row that the tool worked. Higher is better, but what is above the line is paid for with \
+                   margins or canopies.";
+    curves(comparison, title, caption, |point| point.in_row_weeding_percent, &comparison.bound)
+}
+
+/// Canopies that each controller's tool reached against speed.
+pub fn canopies(comparison: &Comparison) -> Result<Figure, DrawingError> {
+    let title = ("Canopies reached", "% of the canopies");
+    let caption = "Canopies over which the tool was not fully out, of all in the rows. Lower is better.";
+    curves(comparison, title, caption, |point| point.over_canopy_percent, &[])
 }
 
 fn curves(
@@ -54,7 +62,7 @@ fn curves(
     (title, unit): (&str, &str),
     caption: &str,
     value: fn(&ControllerPoint) -> f64,
-    (limit, shade, meaning): (&[(f64, f64)], Shade, &str),
+    limit: &[(f64, f64)],
 ) -> Result<Figure, DrawingError> {
     let mut series = Vec::new();
     let mut legend = Vec::new();
@@ -67,8 +75,8 @@ fn curves(
         series.push(Series { look, line, cloud: Vec::new() });
     }
     if !limit.is_empty() {
-        words += &said(meaning, limit);
-        legend.push(Key { svg: key(Look::LIMIT, true)?, meaning: meaning.to_owned() });
+        words += &said(BOUND, limit);
+        legend.push(Key { svg: key(Look::LIMIT, true)?, meaning: BOUND.to_owned() });
     }
     // The first is drawn last: it is the one to be seen where lines meet.
     series.reverse();
@@ -78,7 +86,7 @@ fn curves(
         x: range_of(points().map(|point| point.0), false),
         y: range_of(points().map(|point| point.1), true),
         series: &series,
-        limit: (!limit.is_empty()).then_some((limit, shade)),
+        limit,
     };
     Ok(Figure { title: title.into(), unit: unit.into(), svg: plot.svg()?, legend, words, caption: caption.into() })
 }
@@ -116,7 +124,7 @@ pub fn response(analysis: &Analysis, response: Response) -> Result<Figure, Drawi
         x,
         y: range_of(points().map(|point| point.1), response == Response::PlantDamage),
         series: &series,
-        limit: None,
+        limit: &[],
     };
     Ok(Figure {
         title: response.title().into(),
@@ -143,7 +151,7 @@ pub fn residuals(analysis: &Analysis, of: &ResponseAnalysis, model: &LinearModel
     let farthest = model.residuals.iter().fold(0.0, |farthest: f64, residual| farthest.max(residual.abs()));
     let unit = of.response.unit();
     let label = format!("by the model, {unit}");
-    let plot = Plot { x_label: &label, x, y: range_of([-farthest, farthest], false), series: &series, limit: None };
+    let plot = Plot { x_label: &label, x, y: range_of([-farthest, farthest], false), series: &series, limit: &[] };
     Ok(Figure {
         title: "Residuals".into(),
         unit: unit.into(),

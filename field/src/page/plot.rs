@@ -17,7 +17,7 @@ pub type DrawingError = DrawingAreaErrorKind<io::Error>;
 const PLOT_SIZE: (u32, u32) = (840, 572);
 const KEY_SIZE: (u32, u32) = (88, 36);
 
-/// Ink for words, for axes, for the mesh, and for what is out of reach.
+/// Ink for words, for axes, for the mesh, and for limits.
 const INK: RGBColor = RGBColor(0x33, 0x31, 0x2C);
 const AXIS: RGBColor = RGBColor(0x8A, 0x85, 0x7A);
 const MESH: RGBColor = RGBColor(0xE6, 0xE2, 0xD6);
@@ -48,7 +48,7 @@ enum Marker {
 }
 
 impl Look {
-    /// A limit that nature sets, which is not measured and so has no markers.
+    /// A limit, which is not measured and so has no markers.
     pub const LIMIT: Self = Self { colour: LIMIT, marker: None };
 
     /// The look of one of many series; they recur after four.
@@ -71,15 +71,6 @@ pub struct Series {
     pub cloud: Vec<(f64, f64)>,
 }
 
-/// Ground on one side of a line that is out of reach.
-#[derive(Clone, Copy, PartialEq)]
-pub enum Shade {
-    /// From the line upwards.
-    Above,
-    /// From the line downwards.
-    Below,
-}
-
 /// A plot: what is in it, and which part of the plane it shows.
 pub struct Plot<'a> {
     /// What is to the right, with its unit.
@@ -90,8 +81,8 @@ pub struct Plot<'a> {
     pub y: Range<f64>,
     /// What is drawn, the last on top.
     pub series: &'a [Series],
-    /// A limit, and the side of it that nothing reaches.
-    pub limit: Option<(&'a [(f64, f64)], Shade)>,
+    /// A limit, shaded from the line upwards; empty where there is none.
+    pub limit: &'a [(f64, f64)],
 }
 
 impl Plot<'_> {
@@ -124,10 +115,10 @@ impl Plot<'_> {
                 .axis_desc_style(words)
                 .set_all_tick_mark_size(10)
                 .draw()?;
-            if let Some((limit, shade)) = self.limit {
-                let base = if shade == Shade::Above { self.y.end } else { self.y.start };
-                chart.draw_series(AreaSeries::new(limit.iter().copied(), base, LIMIT.mix(0.12)))?;
-                chart.draw_series(LineSeries::new(limit.iter().copied(), Look::LIMIT.stroke()))?;
+            if !self.limit.is_empty() {
+                let limit = || self.limit.iter().copied();
+                chart.draw_series(AreaSeries::new(limit(), self.y.end, LIMIT.mix(0.12)))?;
+                chart.draw_series(LineSeries::new(limit(), Look::LIMIT.stroke()))?;
             }
             for series in self.series {
                 let colour = series.look.colour;
