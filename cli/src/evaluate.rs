@@ -54,7 +54,7 @@ fn write_report(analysis: &Analysis, file: &Path, folder: &Path) -> Result<PathB
     let page = Page {
         title: &format!("Field trial: {name}"),
         summary: analysis.findings(),
-        command: &format!("weeder evaluate {} --out {}", file.display(), folder.display()),
+        command: &output::command_line()?,
         parameters: &[
             ("plots from".to_owned(), name.to_string()),
             ("weeder's version".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),

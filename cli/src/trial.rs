@@ -14,10 +14,10 @@ use field::page::{Page, RowPicture};
 use field::tool_path::{Effect, WeedCount};
 use field::{firmware, picture, whole_file};
 use serde_json::json;
+use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use std::{env, fs};
 
 /// What the user asks of a trial.
 #[derive(Args)]
@@ -225,12 +225,6 @@ fn damage(totals: &[Total], controller: Controller) -> String {
     }
 }
 
-/// The command that makes the same report again.
-fn command_line() -> Result<String> {
-    let words: Vec<String> = ["weeder".to_owned()].into_iter().chain(env::args().skip(1)).collect();
-    Ok(shlex::try_join(words.iter().map(String::as_str))?)
-}
-
 fn write_report(
     folder: &Path,
     arguments: &Arguments,
@@ -260,7 +254,7 @@ fn write_report(
     let page = Page {
         title: "Field trial of the intra-row weeder, simulated",
         summary: findings.summary.clone(),
-        command: &command_line()?,
+        command: &output::command_line()?,
         parameters: &parameters,
         analysis: &findings.analysis,
         comparison: Some(&experiment::compare(&findings.totals)),

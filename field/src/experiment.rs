@@ -6,10 +6,12 @@
 //! virtual Uno ([`crate::uno`]); its rivals ([`crate::rivals`]) are models in both cases. A plot comes out as somebody
 //! with a notebook would write it down ([`PlotRecord`]), and is judged by the same code as a real one.
 
+pub mod table;
+pub mod total;
+
 use crate::conditions::Conditions;
 use crate::driving::{Drive, drive};
 use crate::evaluation::PlotRecord;
-use crate::page::{Comparison, ControllerCurve, ControllerPoint};
 use crate::rivals;
 use crate::row::{MAX_WIDTH_MM, Problem, Row};
 use crate::signal::Pulse;
@@ -22,12 +24,13 @@ use control::controller::State;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use serde::Serialize;
-use std::io;
 use std::ops::AddAssign;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use thiserror::Error;
+
+pub use table::write_csv;
+pub use total::{Total, compare, totals};
 
 /// What runs the firmware.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -407,166 +410,6 @@ impl PlotOutcome {
 /// The records of what one controller did.
 pub fn records(outcomes: &[PlotOutcome], controller: Controller) -> Vec<PlotRecord> {
     outcomes.iter().filter(|outcome| outcome.controller == controller).map(|outcome| outcome.record).collect()
-}
-
-/// A line of [`write_csv`]: a [`PlotRecord`], and what only a simulated field can tell.
-#[derive(Serialize)]
-struct Line {
-    controller: &'static str,
-    replication: u32,
-    speed_km_h: f64,
-    spacing_cm: f64,
-    weeds_before: u32,
-    weeds_after: u32,
-    plants: u32,
-    damaged: u32,
-    area_m2: f64,
-    time_s: f64,
-    width_m: f64,
-    power_hp: f64,
-    canopies: u32,
-    canopies_reached: u32,
-    margins_cut: u32,
-    in_row_weeds_before: u32,
-    in_row_weeds_after: u32,
-    in_row_weeded_percent: f64,
-    in_row_bound_percent: f64,
-    alarms: u32,
-}
-
-/// Writes what some of the controllers did as CSV, a line a plot: a table that [`crate::evaluation::read_csv`] reads where it is one
-/// controller's.
-///
-/// # Errors
-/// Those of the writer.
-pub fn write_csv(outcomes: &[PlotOutcome], controllers: &[Controller], to: impl io::Write) -> Result<(), csv::Error> {
-    let mut writer = csv::Writer::from_writer(to);
-    for outcome in outcomes.iter().filter(|outcome| controllers.contains(&outcome.controller)) {
-        let PlotRecord { replication, speed_km_h, spacing_cm, weeds_before, weeds_after, plants, damaged, .. } =
-            outcome.record;
-        let PlotRecord { area_m2, time_s, width_m, power_hp, .. } = outcome.record;
-        writer.serialize(Line {
-            controller: outcome.controller.title(),
-            replication,
-            speed_km_h,
-            spacing_cm,
-            weeds_before,
-            weeds_after,
-            plants,
-            damaged,
-            area_m2,
-            time_s: thousandth(time_s),
-            width_m,
-            power_hp,
-            canopies: outcome.canopies.all,
-            canopies_reached: outcome.canopies.reached,
-            margins_cut: outcome.canopies.margins_cut,
-            in_row_weeds_before: outcome.effect.in_row.before,
-            in_row_weeds_after: outcome.effect.in_row.after,
-            in_row_weeded_percent: thousandth(100.0 * outcome.weeded_share),
-            in_row_bound_percent: thousandth(100.0 * outcome.weedable_share),
-            alarms: outcome.alarms,
-        })?;
-    }
-    writer.flush()?;
-    Ok(())
-}
-
-/// As many digits as mean anything.
-fn thousandth(value: f64) -> f64 {
-    (value * 1e3).round() / 1e3
-}
-
-/// All plots of one speed that one controller weeded.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Total {
-    /// Who weeded them.
-    pub controller: Controller,
-    /// The speed, km/h.
-    pub speed_km_h: f64,
-    /// Plants and weeds, counted.
-    pub effect: Effect,
-    /// Canopies, counted.
-    pub canopies: Canopies,
-    /// Share of the rows' ground that the tool weeded, from 0 to 1.
-    pub weeded_share: f64,
-    /// Share that this servo could weed with every canopy and margin kept.
-    pub weedable_share: f64,
-    /// Rows in which an alarm took the tool out.
-    pub alarms: u32,
-}
-
-impl Total {
-    /// Plants damaged, % (Eq. 23).
-    pub fn plant_damage_percent(&self) -> f64 {
-        percent(self.effect.damaged, self.effect.plants)
-    }
-
-    /// Canopies over which the tool was not fully out, % of all.
-    pub fn canopies_reached_percent(&self) -> f64 {
-        percent(self.canopies.reached, self.canopies.all)
-    }
-
-    /// Canopies whose margin was cut, but not they, % of all.
-    pub fn margins_cut_percent(&self) -> f64 {
-        percent(self.canopies.margins_cut, self.canopies.all)
-    }
-}
-
-fn percent(part: u32, whole: u32) -> f64 {
-    100.0 * f64::from(part) / f64::from(whole.max(1))
-}
-
-/// What each controller did at each speed, all spacings and replications together: by speed, then in the order in which the
-/// controllers took part.
-pub fn totals(outcomes: &[PlotOutcome]) -> Vec<Total> {
-    let mut totals: Vec<(Total, f64)> = Vec::new();
-    for outcome in outcomes {
-        let (controller, speed_km_h) = (outcome.controller, outcome.record.speed_km_h);
-        let is_its = |(total, _): &(Total, f64)| total.controller == controller && total.speed_km_h == speed_km_h;
-        let index = totals.iter().position(is_its).unwrap_or_else(|| {
-            let (effect, canopies) = Default::default();
-            let none =
-                Total { controller, speed_km_h, effect, canopies, weeded_share: 0.0, weedable_share: 0.0, alarms: 0 };
-            totals.push((none, 0.0));
-            totals.len() - 1
-        });
-        let (total, plots) = &mut totals[index];
-        total.effect += outcome.effect;
-        total.canopies += outcome.canopies;
-        total.weeded_share += outcome.weeded_share;
-        total.weedable_share += outcome.weedable_share;
-        total.alarms += outcome.alarms;
-        *plots += 1.0;
-    }
-    let mean = |(total, plots): (Total, f64)| Total {
-        weeded_share: total.weeded_share / plots,
-        weedable_share: total.weedable_share / plots,
-        ..total
-    };
-    let mut totals: Vec<Total> = totals.into_iter().map(mean).collect();
-    totals.sort_by(|a, b| a.speed_km_h.total_cmp(&b.speed_km_h));
-    totals
-}
-
-/// The controllers side by side, for the report.
-pub fn compare(totals: &[Total]) -> Comparison {
-    let point = |total: &Total| ControllerPoint {
-        speed_km_h: total.speed_km_h,
-        plant_damage_percent: total.plant_damage_percent(),
-        over_canopy_percent: total.canopies_reached_percent(),
-        in_row_weeding_percent: 100.0 * total.weeded_share,
-    };
-    let of = |controller: Controller| totals.iter().filter(move |total| total.controller == controller);
-    let curve = |controller: Controller| ControllerCurve {
-        name: controller.title().to_owned(),
-        points: of(controller).map(point).collect(),
-    };
-    let first = totals.first().map_or(Controller::Firmware, |total| total.controller);
-    Comparison {
-        controllers: Controller::ALL.into_iter().filter(|&one| of(one).next().is_some()).map(curve).collect(),
-        bound: of(first).map(|total| (total.speed_km_h, 100.0 * total.weedable_share)).collect(),
-    }
 }
 
 #[cfg(test)]

@@ -1,0 +1,74 @@
+//! An experiment's plots as a CSV table.
+
+use super::{Controller, PlotOutcome};
+use crate::evaluation::PlotRecord;
+use serde::Serialize;
+use std::io;
+
+/// A line of [`write_csv`]: a [`PlotRecord`], and what only a simulated field can tell.
+#[derive(Serialize)]
+struct Line {
+    controller: &'static str,
+    replication: u32,
+    speed_km_h: f64,
+    spacing_cm: f64,
+    weeds_before: u32,
+    weeds_after: u32,
+    plants: u32,
+    damaged: u32,
+    area_m2: f64,
+    time_s: f64,
+    width_m: f64,
+    power_hp: f64,
+    canopies: u32,
+    canopies_reached: u32,
+    margins_cut: u32,
+    in_row_weeds_before: u32,
+    in_row_weeds_after: u32,
+    in_row_weeded_percent: f64,
+    in_row_bound_percent: f64,
+    alarms: u32,
+}
+
+/// Writes what some of the controllers did as CSV, a line a plot: a table that [`crate::evaluation::read_csv`] reads where it is one
+/// controller's.
+///
+/// # Errors
+/// Those of the writer.
+pub fn write_csv(outcomes: &[PlotOutcome], controllers: &[Controller], to: impl io::Write) -> Result<(), csv::Error> {
+    let mut writer = csv::Writer::from_writer(to);
+    for outcome in outcomes.iter().filter(|outcome| controllers.contains(&outcome.controller)) {
+        let PlotRecord { replication, speed_km_h, spacing_cm, weeds_before, weeds_after, plants, damaged, .. } =
+            outcome.record;
+        let PlotRecord { area_m2, time_s, width_m, power_hp, .. } = outcome.record;
+        writer.serialize(Line {
+            controller: outcome.controller.title(),
+            replication,
+            speed_km_h,
+            spacing_cm,
+            weeds_before,
+            weeds_after,
+            plants,
+            damaged,
+            area_m2,
+            time_s: thousandth(time_s),
+            width_m,
+            power_hp,
+            canopies: outcome.canopies.all,
+            canopies_reached: outcome.canopies.reached,
+            margins_cut: outcome.canopies.margins_cut,
+            in_row_weeds_before: outcome.effect.in_row.before,
+            in_row_weeds_after: outcome.effect.in_row.after,
+            in_row_weeded_percent: thousandth(100.0 * outcome.weeded_share),
+            in_row_bound_percent: thousandth(100.0 * outcome.weedable_share),
+            alarms: outcome.alarms,
+        })?;
+    }
+    writer.flush()?;
+    Ok(())
+}
+
+/// As many digits as mean anything.
+fn thousandth(value: f64) -> f64 {
+    (value * 1e3).round() / 1e3
+}
