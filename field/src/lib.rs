@@ -8,8 +8,10 @@
 //! - **Trials**: [`trial`] joins them, [`verdict`] judges what happened to each plant, [`report`] and [`picture`] show it,
 //!   and [`waveform`] writes down what was on the pins. [`replay`] plays a recording ([`capture`]) instead of a row, and
 //!   [`mod@bench`] counts cycles and bytes.
-//! - **Field trials**: [`evaluation`] judges the plots of a trial, real or simulated, with the [`statistics`] that this takes,
-//!   and [`page`] shows them in a browser.
+//! - **Field trials**: under some [`conditions`], [`stand`] grows what the tools meet and [`driving`] rolls through it; [`experiment`]
+//!   has the firmware weed it, on the virtual Uno or as its native [`twin`], and its [`rivals`] after it; [`tool_path`] counts plants and
+//!   weeds, [`sweep`] maps a result against parameters. [`evaluation`] judges the plots of a trial, real or simulated, with the
+//!   [`statistics`] that this takes, and [`page`] shows them in a browser.
 //! - **Soak**: [`soak`] has everything go wrong now and then, for hours.
 //! - **Training**: [`training`] makes the example table that the firmware carries, of labelled objects.
 //! - **Files**: [`whole_file`] writes one whole or not at all.
