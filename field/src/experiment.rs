@@ -415,7 +415,7 @@ pub fn records(outcomes: &[PlotOutcome], controller: Controller) -> Vec<PlotReco
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::conditions::presets;
+    use crate::conditions::{PARAMETERS, presets};
     use crate::evaluation::Analysis;
 
     fn experiment(speeds_km_h: &[f64], preset: &str) -> Experiment {
@@ -490,6 +490,33 @@ mod tests {
     fn a_machine_that_outruns_its_beam_ends_in_alarms_and_not_in_a_clean_result() {
         let totals = totals(&run(&experiment(&[7.0], "transplanted")));
         assert!(totals[0].alarms > 0, "{totals:?}");
+    }
+
+    #[test]
+    fn no_parameter_at_an_end_of_its_range_upsets_a_trial() {
+        for parameter in PARAMETERS.iter().filter(|parameter| !["plot.rows", "plot.row_m"].contains(&parameter.name)) {
+            for end in [parameter.least, parameter.greatest] {
+                let mut experiment = experiment(&[1.0, 4.0], "transplanted");
+                let small = [("plot.rows", 1.0), ("plot.row_m", 4.0), ("machine.sweeps_a_side", 0.0)];
+                for (name, value) in small.into_iter().chain([(parameter.name, end)]) {
+                    // Sweeps so wide would run through the next row, and are refused.
+                    let _ = experiment.conditions.set(name, value);
+                }
+                match experiment.run(&Engine::Twin, |_| ()) {
+                    Ok(outcomes) => assert!(
+                        outcomes
+                            .iter()
+                            .all(|outcome| { outcome.record.check().is_ok() && outcome.weeded_share.is_finite() })
+                    ),
+                    Err(error) => {
+                        let place = format!("{} = {end}", parameter.name);
+                        let is_told =
+                            matches!(error, ExperimentError::TooClose { .. } | ExperimentError::TooShort { .. });
+                        assert!(is_told, "{place}: {error}");
+                    }
+                }
+            }
+        }
     }
 
     #[test]
