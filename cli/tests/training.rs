@@ -1,5 +1,6 @@
 //! `weeder train` and `weeder classify`, as they are called.
 
+use field::training::MOST_EXAMPLES;
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
@@ -92,8 +93,10 @@ fn objects_without_labels_are_classified_without_a_score() {
 
 #[test]
 fn a_table_larger_than_the_flash_budget_is_refused_by_name() {
-    let room = "too many examples for the flash budget: --max is 129 and there is room for 128";
-    assert_refused("", &["train", "--synthetic", "--max", "129"], room);
+    let above = MOST_EXAMPLES + 1;
+    let room =
+        format!("too many examples for the flash budget: --max is {above} and there is room for {MOST_EXAMPLES}");
+    assert_refused("", &["train", "--synthetic", "--max", &above.to_string()], &room);
     assert_refused("", &["train", "--synthetic", "--max", "9"], "too many examples for the flash budget");
 }
 
@@ -106,10 +109,14 @@ fn objects_that_take_more_examples_than_the_flash_has_room_for_are_refused_by_na
         format!("694,{spacing_mm},226,{hold_mm},500,{label}\n").repeat(4)
     };
     let chessboard: String = (0..400).map(square).collect();
-    for most in ["64", "128"] {
+    for most in ["64".to_owned(), MOST_EXAMPLES.to_string()] {
         let room = format!("and there is room for {most}: take out objects with a wrong label");
-        assert_refused(&chessboard, &["train", "objects.csv", "--max", most], "too many examples for the flash budget");
-        assert_refused(&chessboard, &["train", "objects.csv", "--max", most], &room);
+        assert_refused(
+            &chessboard,
+            &["train", "objects.csv", "--max", &most],
+            "too many examples for the flash budget",
+        );
+        assert_refused(&chessboard, &["train", "objects.csv", "--max", &most], &room);
     }
 }
 

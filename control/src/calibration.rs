@@ -66,8 +66,11 @@ const ROUNDS: u8 = 3;
 /// The time given to a swing, several times what any servo takes.
 const SWING: Interval = Interval::from_ms(1500);
 
-/// What a round of [`Swings`] adds to the longest way out: two servo pulses, for a command that comes when it is least welcome.
-const SPARE_MS: u16 = 10;
+/// What a command may wait beside the servo's gap: for the longest pulse on the line, and for some turns of the loop.
+const SPARE_MS: u8 = 7;
+
+/// What a command may wait in frames that are never cut short.
+const FRAME_MS: u8 = 20;
 
 /// The servo's times, measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -98,13 +101,24 @@ pub struct Swings {
     /// Whether the switch has followed this swing.
     followed: bool,
     watched: bool,
+    /// What the longest way out may have missed of a command that comes when it is least welcome.
+    spare_ms: u8,
     leads: Leads,
 }
 
 impl Swings {
-    /// The first swing, into the row, begins. `watched` tells whether there is an end switch.
-    pub const fn new(now: Instant, watched: bool) -> Self {
-        Self { left: 2 * ROUNDS, since: now, followed: false, watched, leads: Leads { out_ms: 0, in_ms: u16::MAX } }
+    /// The first swing, into the row, begins. `watched` tells whether there is an end switch, `gap_ms` the shortest gap between
+    /// servo pulses; 0 stands for fixed frames.
+    pub const fn new(now: Instant, watched: bool, gap_ms: u8) -> Self {
+        let wait_ms = if gap_ms == 0 { FRAME_MS } else { gap_ms };
+        Self {
+            left: 2 * ROUNDS,
+            since: now,
+            followed: false,
+            watched,
+            spare_ms: SPARE_MS + wait_ms,
+            leads: Leads { out_ms: 0, in_ms: u16::MAX },
+        }
     }
 
     /// Whether the tool is to be out.
@@ -123,7 +137,7 @@ impl Swings {
             }
             let lasted_ms = (lasted.steps() / (Interval::STEPS_PER_SECOND / 1000)) as u16;
             if self.tool_out() {
-                self.leads.out_ms = self.leads.out_ms.max(lasted_ms + 1 + SPARE_MS);
+                self.leads.out_ms = self.leads.out_ms.max(lasted_ms + 1 + u16::from(self.spare_ms));
             } else {
                 self.leads.in_ms = self.leads.in_ms.min(lasted_ms);
             }
@@ -179,7 +193,7 @@ mod tests {
 
     /// Runs the swings with a switch that follows the tool so many milliseconds after the command, in the order of the swings.
     fn run(watched: bool, follows_ms: [u32; 6]) -> (Outcome, u32) {
-        let mut swings = Swings::new(at_ms(0), watched);
+        let mut swings = Swings::new(at_ms(0), watched, 3);
         let (mut told, mut out, mut count) = (0, true, 0);
         for now in 0_u32.. {
             if swings.tool_out() != out {

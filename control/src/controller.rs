@@ -241,9 +241,13 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     }
 
     /// Edges of the beam were lost: what stood there is not known, and neither is the beam's level, which is now `broken`.
+    /// While a row is played, that is nothing: no sensor needs to be wired then.
     pub fn beam_edges_lost(&mut self, broken: bool) {
-        self.watch.restart(self.watch.frontier(), broken);
-        self.raise(Alarm::BeamEdgesLost);
+        self.beam_broken = broken;
+        if !matches!(self.bench, Bench::Row(_)) {
+            self.watch.restart(self.watch.frontier(), broken);
+            self.raise(Alarm::BeamEdgesLost);
+        }
     }
 
     /// Takes the machine's readings and decides where the tool is to be.

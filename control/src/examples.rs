@@ -41,8 +41,8 @@ pub const RADIUS: u32 = table::RADIUS;
 /// Examples that vote, as the table was trained.
 pub const K: u8 = table::K;
 
-/// Most examples that the flash budget has room for, at 6 bytes each.
-pub const CAPACITY: usize = 128;
+/// Most examples that the flash below the older bootloader has room for, at 6 bytes each.
+pub const CAPACITY: usize = 72;
 
 /// Examples in the table.
 pub const COUNT: usize = table::TAUGHT.len();

@@ -59,7 +59,7 @@ settings! {
         "diameter of the ground wheel";
     /// Encoder counts a metre, measured.
     TicksPerM "ticks_per_m": 0 to 20000, 0, true,
-        "encoder counts a metre, as calibrated; 0: by wheel and encoder";
+        "encoder counts a metre, as calibrated; 0 for what wheel and encoder give";
     /// X: how far the beam stands ahead of the tool.
     BeamToToolMm "beam_to_tool_mm" in "mm": 100 to 2000, 400, true,
         "X, how far the beam stands ahead of the tool";
@@ -84,7 +84,7 @@ settings! {
     /// Examples that vote.
     K "k": 1 to 15, 3, false,
         "nearest examples that vote on what an object is";
-    /// Width above which an object cannot be a plant.
+    /// Ground over which the beam may be broken before that is an alarm.
     MaxWidthMm "max_width_mm" in "mm": 20 to 1500, 400, false,
         "a beam broken over more ground than this raises an alarm";
     /// Gaps in a canopy shorter than this belong to it.

@@ -429,6 +429,20 @@ fn saved(settings: &Settings) -> Volatile {
 }
 
 #[test]
+fn a_test_row_that_contradicting_settings_refuse_leaves_what_stands_in_the_beam() {
+    let mut settings = Settings::new();
+    settings.set(Setting::ServoInUs, 2000).unwrap();
+    let mut machine = Controller::new(ByWidth, saved(&settings), woken_up(Cause::PowerOn));
+    machine.clear();
+    machine.step(readings(0, 0));
+    machine.beam_edge(readings(0, 0).position, true);
+    machine.step(readings(1000, 0));
+    assert_eq!(machine.windows(), 1);
+    assert_eq!(machine.test_row(500), Err(Refusal::Contradiction(Contradiction::PulsesEqual)));
+    assert_eq!(machine.windows(), 1);
+}
+
+#[test]
 fn saved_settings_that_contradict_each_other_are_an_alarm_and_do_not_start() {
     let mut settings = Settings::new();
     settings.set(Setting::ServoInUs, 2000).unwrap();

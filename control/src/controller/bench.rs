@@ -8,12 +8,13 @@ use crate::{
     classifier::Classifier,
     event::Event,
     memory::Memory,
+    monitor::EncoderMonitor,
     rehearsal::Rehearsal,
     schedule::Schedule,
     servo::{self, HalfMicros},
     settings::Setting,
     speed::SpeedMeter,
-    units::{Position, Wheel},
+    units::Wheel,
 };
 
 /// What is being tried.
@@ -88,7 +89,8 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// [`Refusal::NotInHold`] and [`Refusal::AlarmLatched`].
     pub fn calibrate_servo(&mut self) -> Result<(), Refusal> {
         self.expect_hold()?;
-        self.bench = Bench::Swings(Swings::new(self.readings.now, self.settings.get(Setting::EndSwitch) != 0));
+        let (watched, gap_ms) = (self.settings.get(Setting::EndSwitch) != 0, self.settings.get(Setting::ServoGapMs));
+        self.bench = Bench::Swings(Swings::new(self.readings.now, watched, gap_ms as u8));
         Ok(())
     }
 
@@ -100,7 +102,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// Sets the wheel's ticks a metre by a distance that was rolled since [`calibrate_start`](Self::calibrate_start).
     ///
     /// # Errors
-    /// [`Refusal::Unfit`], [`Refusal::NotInHold`] and [`Refusal::OutOfRange`]; nothing is changed then.
+    /// [`Refusal::Unfit`], [`Refusal::NotInHold`], [`Refusal::OutOfRange`] and [`Refusal::Contradiction`]; nothing is changed then.
     pub fn calibrate(&mut self, distance_mm: u16, force: bool) -> Result<(), Refusal> {
         let nominal = Wheel { ticks_per_m: 0, ..self.settings.wheel() }.ticks(1000).0 as u16;
         let ended = self.distance.end(self.readings.position, distance_mm, nominal, force);
@@ -118,9 +120,10 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         if !(Setting::TopSpeedMmS.description().least..=fastest).contains(&speed_mm_s) {
             return Err(Refusal::TestSpeed { fastest });
         }
-        let Readings { now, position, .. } = self.readings;
-        self.begin_anew(position, false);
+        // What is refused leaves the machine as it was: so the ground is forgotten last.
         self.start(false)?;
+        let Readings { now, position, .. } = self.readings;
+        self.begin_anew(self.readings, false);
         let ticks_per_m = self.settings.wheel().ticks(1000).0 as u16;
         self.bench = Bench::Row(Rehearsal { begin: now, start: position, speed_mm_s, ticks_per_m });
         Ok(())
@@ -139,6 +142,8 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             Bench::Row(row) => {
                 let rolled_mm = row.rolled_mm(readings.now);
                 readings.position = row.position(rolled_mm);
+                // The encoder need not be wired, and its contacts may pick up anything.
+                readings.jumps = self.readings.jumps;
                 match Rehearsal::beam_is_broken(rolled_mm, self.settings.get(Setting::BeamToToolMm)) {
                     None => self.enter(State::Hold),
                     Some(broken) if broken != self.watch.is_broken() => self.take_edge(readings.position, broken),
@@ -147,7 +152,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             }
             Bench::RowEnded => {
                 self.bench = Bench::Idle;
-                self.begin_anew(readings.position, self.beam_broken);
+                self.begin_anew(readings, self.beam_broken);
             }
         }
         readings
@@ -163,9 +168,10 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     }
 
     /// Forgets all ground: the machine is somewhere else than it knows.
-    fn begin_anew(&mut self, position: Position, broken: bool) {
-        let now = self.readings.now;
+    fn begin_anew(&mut self, readings: Readings, broken: bool) {
+        let Readings { now, position, jumps, .. } = readings;
         self.meter = SpeedMeter::new(position, now);
+        self.encoder = EncoderMonitor::new(now, position, jumps);
         self.leads = super::Leads::default();
         self.watch.restart(position, broken);
         self.schedule = Schedule::new(position);

@@ -45,7 +45,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// Goes to work; with `now`, at once and over ground that the beam has not seen.
     ///
     /// # Errors
-    /// [`Refusal::AlarmLatched`] while an alarm is.
+    /// [`Refusal::AlarmLatched`] while an alarm is, and [`Refusal::Contradiction`].
     pub fn start(&mut self, now: bool) -> Result<(), Refusal> {
         if let State::Alarm(_) = self.state {
             return Err(Refusal::AlarmLatched);

@@ -25,7 +25,7 @@ words! {
         UnseenGround = "unseen_ground",
         /// A plant just behind the beam would be reached before the tool is out.
         TooFast = "too_fast",
-        /// The beam broke and the encoder says that the machine stands.
+        /// The encoder fell silent while the machine rolled, or the beam broke while it stands.
         EncoderDoubtful = "encoder_doubtful",
     }
 }
