@@ -25,7 +25,7 @@ An Uno with an empty flash and a bootloader, to be flashed by avrdude:
   weeder virtual-uno --link /tmp/uno --bootloader optiboot
   weeder flash --port /tmp/uno
 
-Or with the old bootloader, as Debian's arduino-core-avr has it, for firmware of up to 30,720 bytes:
+Or with the old bootloader, as Debian's arduino-core-avr has it:
 
   weeder virtual-uno --link /tmp/uno --bootloader ATmegaBOOT_168_atmega328.hex
   weeder flash --port /tmp/uno --old-bootloader

@@ -152,6 +152,11 @@ impl Setting {
         self.description().greatest == 1
     }
 
+    /// Whether another value means another wheel or encoder: one whose `ticks_per_m` nobody has measured.
+    pub const fn is_of_the_wheel(self) -> bool {
+        matches!(self, Self::WheelMm | Self::TicksPerRev)
+    }
+
     /// The numbers that the table gives for it.
     #[inline(never)]
     pub fn description(self) -> Description {

@@ -55,6 +55,19 @@ fn settings_are_pushed_whatever_stands_in_each_other_s_way() {
 }
 
 #[test]
+fn another_wheel_is_pushed_with_what_was_measured_of_it_or_with_nothing() {
+    let mut link = link();
+    link.ask("clear").and_then(|_| link.ask("set ticks_per_m 1950")).expect("the firmware knows the commands");
+    let ticks_per_m = |link: &mut _| settings::read(link).expect("the firmware tells them").get(Setting::TicksPerM);
+    let changed = settings::push(&mut link, &[(Setting::WheelMm, 410)], false).expect("the firmware takes it");
+    assert_eq!((changed, ticks_per_m(&mut link)), (vec![Setting::WheelMm, Setting::TicksPerM], 0));
+    link.ask("set ticks_per_m 1950").expect("the firmware knows the command");
+    let both = [(Setting::WheelMm, 400), (Setting::TicksPerM, 1950)];
+    let changed = settings::push(&mut link, &both, true).expect("the firmware takes both");
+    assert_eq!((changed, ticks_per_m(&mut link)), (vec![Setting::WheelMm], 1950));
+}
+
+#[test]
 fn settings_that_contradict_each_other_are_not_sent() {
     let mut link = link();
     let error = settings::push(&mut link, &[(Setting::MarginMm, 20), (Setting::BeamToToolMm, 150)], false).unwrap_err();

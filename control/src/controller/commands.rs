@@ -94,7 +94,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             return Err(Refusal::Contradiction(contradiction));
         }
         // Another wheel is one that has not been measured.
-        if matches!(setting, Setting::WheelMm | Setting::TicksPerRev) {
+        if setting.is_of_the_wheel() {
             let _ = self.settings.set(Setting::TicksPerM, 0);
         }
         self.follow_settings();

@@ -135,8 +135,17 @@ pub fn steps(from: &Settings, to: &Settings) -> Vec<(Setting, u16)> {
             // Both pulses wait for each other.
             None => (first, beside(first, &now, to)),
         };
-        let _ = now.set(setting, value);
+        take(&mut now, setting, value);
         steps.push((setting, value));
+    }
+}
+
+/// Sets a value as the firmware does: it forgets what was measured of another wheel.
+fn take(settings: &mut Settings, setting: Setting, value: u16) {
+    // Values of settings are in their ranges.
+    let _ = settings.set(setting, value);
+    if setting.is_of_the_wheel() {
+        let _ = settings.set(Setting::TicksPerM, 0);
     }
 }
 
@@ -162,6 +171,12 @@ pub fn push(link: &mut Link, wanted: &[(Setting, u16)], save: bool) -> Result<Ve
     let mut after = before.clone();
     for &(setting, value) in wanted {
         after.set(setting, value).map_err(|_| SettingsError::Unknown { setting: name(setting) })?;
+    }
+    let names = |wheel: Setting| wanted.iter().any(|&(setting, _)| setting == wheel);
+    let is_another = |setting: Setting| setting.is_of_the_wheel() && before.get(setting) != after.get(setting);
+    if Setting::all().any(is_another) && !names(Setting::TicksPerM) {
+        // Nobody has measured that wheel yet.
+        let _ = after.set(Setting::TicksPerM, 0);
     }
     if let Some(contradiction) = after.contradiction() {
         return Err(SettingsError::Contradiction(explain(contradiction)));
@@ -211,7 +226,7 @@ mod tests {
         let mut now = from.clone();
         for (setting, value) in steps(from, to) {
             let was_right = now.contradiction().is_none();
-            now.set(setting, value).unwrap();
+            take(&mut now, setting, value);
             assert!(!was_right || now.contradiction().is_none(), "{setting:?} {value} from {from:?} to {to:?}");
         }
         assert_eq!(&now, to);
@@ -223,6 +238,14 @@ mod tests {
         let far = settings(&[(Setting::BeamToToolMm, 2000), (Setting::MarginMm, 200), (Setting::LeadOutMs, 500)]);
         assert_leads(&near, &far);
         assert_leads(&far, &near);
+    }
+
+    #[test]
+    fn a_measured_wheel_is_told_after_the_wheel() {
+        let one = settings(&[(Setting::WheelMm, 400), (Setting::TicksPerM, 1950)]);
+        let other = settings(&[(Setting::WheelMm, 410), (Setting::TicksPerM, 1950)]);
+        assert_leads(&one, &other);
+        assert_leads(&other, &one);
     }
 
     #[test]
