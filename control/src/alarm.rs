@@ -40,6 +40,11 @@ words! {
 }
 
 impl Alarm {
+    /// Whether beam or encoder shows it.
+    pub const fn is_of_a_sensor(self) -> bool {
+        (self as u8) < Self::TooFast as u8
+    }
+
     /// The code that the LED blinks. First digit: 1 beam, 2 encoder, 3 driving, 4 tool, 5 settings, 6 the controller itself.
     pub const fn code(self) -> u8 {
         // The first alarm of each digit. A list of codes would cost SRAM.

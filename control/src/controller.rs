@@ -8,15 +8,11 @@
 mod bench;
 mod commands;
 mod faults;
-mod ground;
 mod shown;
 
 pub use self::{commands::Refusal, shown::Reason};
 
-use self::{
-    bench::Bench,
-    ground::{Geometry, Leads},
-};
+use self::{bench::Bench, faults::Limits};
 use crate::{
     alarm::Alarm,
     calibration::Distance,
@@ -24,12 +20,11 @@ use crate::{
     console::Plot,
     event::Event,
     features::{self, Features},
+    ground::{Ground, watch::Object},
     memory::Memory,
     monitor::{BeamMonitor, EncoderMonitor},
-    object::{Object, Watch},
     reset::Cause,
     saved::SavedSettings,
-    schedule::{Plan, Schedule},
     servo::{self, HalfMicros},
     settings::{Setting, Settings},
     speed::SpeedMeter,
@@ -128,8 +123,8 @@ pub struct Controller<C, M> {
     classifier: C,
     settings: Settings,
     saved: SavedSettings<M>,
-    geometry: Geometry,
-    leads: Leads,
+    ground: Ground,
+    limits: Limits,
     cause: Cause,
     readings: Readings,
     switch: Switch,
@@ -140,11 +135,10 @@ pub struct Controller<C, M> {
     bench: Bench,
     distance: Distance,
     meter: SpeedMeter,
-    watch: Watch,
-    schedule: Schedule,
     state: State,
     tool_out: bool,
-    /// When the tool was last told to swing.
+    /// The servo's pulse, and since when it has been told to be that.
+    pulse: HalfMicros,
     told_at: Instant,
     /// Whether the ground for which the tool was told to leave the row is yet to come.
     awaits_ground: bool,
@@ -155,8 +149,6 @@ pub struct Controller<C, M> {
     /// Where the last object ended, or work began, and whether the operator was warned since.
     last_seen: Position,
     warned: bool,
-    /// The last plant's leading edge, or where watching began.
-    last_plant: Position,
     /// The last objects, the oldest first.
     objects: Vec<Judged, OBJECTS>,
     events: Vec<Event, EVENTS>,
@@ -179,12 +171,14 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             Some(settings) => settings.contradiction().map(|_| Alarm::SettingsContradict),
         };
         let settings = loaded.unwrap_or_default();
+        let mut ground = Ground::default();
+        ground.begin(&settings, position, beam_broken);
         Self {
             classifier,
-            geometry: Geometry::of(&settings),
+            ground,
+            limits: Limits::of(&settings),
             settings,
             saved,
-            leads: Leads::default(),
             cause,
             readings,
             switch: Switch::new(readings.switch_on),
@@ -195,17 +189,15 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             bench: Bench::Idle,
             distance: Distance::default(),
             meter: SpeedMeter::new(position, now),
-            watch: Watch::start(position, beam_broken),
-            schedule: Schedule::new(position),
             state: fault.map_or(State::Hold, State::Alarm),
             tool_out: true,
+            pulse: 0,
             told_at: now,
             awaits_ground: false,
             late: 0,
             mistakes: 0,
             last_seen: position,
             warned: false,
-            last_plant: position,
             objects: Vec::new(),
             events: Vec::new(),
             events_on: false,
@@ -218,14 +210,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// Takes an edge of the beam, with the position at which it came.
     pub fn beam_edge(&mut self, position: Position, broken: bool) {
         self.beam_broken = broken;
-        if !matches!(self.bench, Bench::Row(_)) {
-            self.take_edge(position, broken);
-        }
-    }
-
-    fn take_edge(&mut self, position: Position, broken: bool) {
-        let now = self.readings.now;
-        if let Some(alarm) = self.beam.edge(now) {
+        if let Some(alarm) = self.beam.edge(self.readings.now) {
             self.raise(alarm);
         }
         if broken
@@ -234,30 +219,24 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         {
             self.raise(alarm);
         }
-        let ground = position - self.leads.response;
-        if let Some(object) = self.watch.edge(ground, broken, self.geometry.merge_gap) {
+        if let Some(object) = self.ground.edge(position, broken) {
             self.judge(object);
         }
     }
 
     /// Edges of the beam were lost: what stood there is not known, and neither is the beam's level, which is now `broken`.
-    /// While a row is played, that is nothing: no sensor needs to be wired then.
     pub fn beam_edges_lost(&mut self, broken: bool) {
         self.beam_broken = broken;
-        if !matches!(self.bench, Bench::Row(_)) {
-            self.watch.restart(self.watch.frontier(), broken);
-            self.raise(Alarm::BeamEdgesLost);
-        }
+        self.ground.lose_edges(broken);
+        self.raise(Alarm::BeamEdgesLost);
     }
 
     /// Takes the machine's readings and decides where the tool is to be.
     #[inline(never)]
     pub fn step(&mut self, readings: Readings) -> Orders {
-        let tool_was_at = self.tool();
-        let readings = self.try_on(readings);
         self.readings = readings;
         if let Some(speed) = self.meter.read(readings.now, readings.position) {
-            self.leads = Leads::at(speed, &self.settings);
+            self.ground.lead(&self.settings, speed);
         }
         match self.switch.read(readings.now, readings.switch_on) {
             // An alarm wants to be cleared first, if by nothing else then by the switch going off.
@@ -265,27 +244,24 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             Some(false) => self.enter(State::Hold),
             _ => {}
         }
-        let ground = readings.position - self.leads.response;
-        if let Some(object) = self.watch.roll_to(ground, self.geometry.merge_gap) {
+        if let Some(object) = self.ground.roll_to(readings.position) {
             self.judge(object);
         }
-        if let Some(alarm) = self.fault(tool_was_at) {
+        if let Some(alarm) = self.fault() {
             self.raise(alarm);
         }
-        let tool = self.tool();
-        self.schedule.forget_behind(tool);
-        let out = match &self.bench {
-            Bench::Swings(swings) => swings.tool_out(),
-            _ => !self.is_working() || self.must_be_out(tool),
-        };
+        let out = self.try_out().unwrap_or(!self.is_working() || self.must_be_out());
         if out != self.tool_out {
             self.tool_out = out;
-            self.told_at = readings.now;
             self.awaits_ground = out && self.is_working();
             self.tell(Event::Swing { out, position: readings.position });
         }
-        self.warn(tool);
-        self.orders()
+        let orders = self.orders();
+        if orders.pulse != self.pulse {
+            (self.pulse, self.told_at) = (orders.pulse, readings.now);
+        }
+        self.warn();
+        orders
     }
 
     /// What the machine is to do as of the last step.
@@ -299,13 +275,19 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         }
     }
 
-    /// Classifies a complete object and schedules it unless it is a weed.
+    /// Whether the encoder's silence or the ground keeps the tool out of the row.
+    fn must_be_out(&self) -> bool {
+        self.encoder.is_doubtful() || self.tool_out && self.encoder.is_quiet() || self.ground.must_be_out(self.tool_out)
+    }
+
+    /// Classifies a complete object and remembers it unless it is a weed.
     fn judge(&mut self, object: Object) {
-        (self.last_seen, self.warned) = (object.trailing, false);
+        let position = self.readings.position;
+        (self.last_seen, self.warned) = (position, false);
         let wheel = self.settings.wheel();
-        let spacing = object.leading - self.last_plant;
+        let spacing = self.ground.spacing(&object);
         let speed_class_mm_s = features::speed_class(self.speed_mm_s());
-        let (spacing_mm, width_mm) = (wheel.millimetres(spacing), wheel.millimetres(object.width()));
+        let (spacing_mm, width_mm) = (wheel.millimetres(spacing), wheel.millimetres(self.ground.ticks(object.width())));
         let features = Features::describe(speed_class_mm_s, spacing_mm, width_mm);
         // What is left of an object whose beginning was not seen may be as narrow as a weed.
         let vote = if object.cut {
@@ -313,29 +295,24 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         } else {
             self.classifier.classify(&features, self.settings.get(Setting::K) as u8)
         };
-        let (distance_mm, margin_mm) = (self.settings.get(Setting::BeamToToolMm), self.settings.get(Setting::MarginMm));
-        let plan = Plan::new(wheel, distance_mm, margin_mm, object.width());
         if self.objects.is_full() {
             self.objects.remove(0);
         }
         // There is room, as was just seen to.
         let _ = self.objects.push(Judged { speed_class_mm_s, spacing_mm, width_mm, vote, label: None });
-        self.tell(Event::Object { vote, leading: object.leading, spacing, plan });
-        if vote.class == Class::Weed {
-            return;
-        }
-        self.last_plant = object.leading;
-        if self.schedule.push(object, self.tool(), self.geometry.margin).is_err() {
+        let leading = self.ground.position_of(object.leading, position);
+        self.tell(Event::Object { vote, leading, spacing, plan: self.ground.plan(&object) });
+        if vote.class != Class::Weed && self.ground.keep(object).is_err() {
             self.raise(Alarm::ScheduleFull);
         }
     }
 
-    /// Latches an alarm. The schedule can no longer be trusted: all ground behind the beam becomes unknown.
+    /// Latches an alarm. What was seen can no longer be trusted.
     fn raise(&mut self, alarm: Alarm) {
-        let frontier = self.watch.frontier();
-        self.watch.restart(frontier, self.watch.is_broken());
-        self.schedule = Schedule::new(frontier);
-        if let State::Alarm(_) = self.state {
+        self.ground.forget();
+        // No sensor need be wired for the servo to be tried.
+        let nobody_asks = alarm.is_of_a_sensor() && matches!(self.bench, Bench::Row(_));
+        if nobody_asks || matches!(self.state, State::Alarm(_)) {
             return;
         }
         self.tell(Event::Alarm { alarm, position: self.readings.position });
@@ -351,13 +328,13 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             self.raise(Alarm::SettingsContradict);
             return;
         }
-        (self.last_seen, self.warned) = (self.watch.frontier(), false);
+        (self.last_seen, self.warned) = (self.readings.position, false);
         self.enter(State::Work);
     }
 
     fn enter(&mut self, state: State) {
-        // What moves the tool by hand ends by `hold` as well, and by the switch going off.
-        self.bench.interrupted(state);
+        // What is tried ends by `hold` as well, and by the switch going off.
+        self.bench = Bench::Idle;
         if state != self.state {
             self.state = state;
             self.tell(Event::State(state));

@@ -5,7 +5,7 @@ use crate::{
     calibration::Outcome,
     classifier::Vote,
     controller::State,
-    schedule::Plan,
+    ground::schedule::Plan,
     units::{Position, Ticks},
 };
 

@@ -1,8 +1,8 @@
 //! The weeder's decisions, from beam edge to swing, without a register, a clock, a float or a heap.
 //!
-//! The data's way: a beam edge with its position becomes an [`object`], the object's [`features`] a class by the
-//! [`classifier`], a plant a window of the [`schedule`], and the schedule with the present [`speed`] tells whether the tool
-//! has to be out of the row. [`controller`] is the front door through which all of that, the operator's [`switch`] and the
+//! The data's way: a beam edge with its position becomes an object of the [`ground`], the object's [`features`] a class by the
+//! [`classifier`], a plant a window on the ground, and that with the present [`speed`] tells whether the tool has to be out
+//! of the row. [`controller`] is the front door through which all of that, the operator's [`switch`] and the
 //! [`console`] pass; [`reply`] words what comes back.
 //!
 //! Position and time are arguments everywhere, so that a test can bend both. What this crate does not do: read a pin,
@@ -22,10 +22,10 @@ pub mod controller;
 pub mod event;
 pub mod examples;
 pub mod features;
+pub mod ground;
 pub mod lamp;
 pub mod memory;
 pub mod monitor;
-pub mod object;
 pub mod quadrature;
 pub mod rehearsal;
 pub mod reply;
@@ -33,7 +33,6 @@ pub mod reset;
 mod said;
 pub mod saved;
 mod say;
-pub mod schedule;
 pub mod servo;
 pub mod settings;
 pub mod speed;

@@ -1,52 +1,52 @@
-//! A rehearsal: a row that is only thought of, to see the servo swing without a field or a sensor.
+//! A rehearsal: the servo swings as for a row of plants, without a field or a sensor.
 //!
-//! It gives the place and the beam of a machine that rolls past plants of 150 mm, 500 mm apart, at a steady speed. What it gives
-//! goes through the same decisions as a real row. Place is counted in millimetres here, and all of it follows from the time.
+//! The row has plants of 150 mm, 500 mm apart, on ground that is all known; the tool rolls along it at a steady speed. The
+//! swings follow from margin, leads and speed by the very rule of real ground ([`Leads::stretch`]), all in millimetres, and
+//! from nothing else: what the machine knows of the ground that it really stands on is neither asked nor changed.
 
-use crate::units::{Instant, Interval, Position, Ticks};
+use crate::{
+    ground::reach::Leads,
+    settings::{Setting, Settings},
+    units::{Grain, Instant, Interval, Length, TicksPerSecond},
+};
 
 /// Plants in the row.
-pub const PLANTS: u16 = 6;
+pub const PLANTS: i16 = 6;
 
-const SPACING_MM: u16 = 500;
-const CANOPY_MM: u16 = 150;
+const SPACING_MM: i16 = 500;
+const CANOPY_MM: i16 = 150;
 
 /// A row that is being played.
 #[derive(Clone, Copy, Debug)]
 pub struct Rehearsal {
-    /// When and where it began.
-    pub begin: Instant,
-    /// Where it began.
-    pub start: Position,
-    /// The machine's speed in mm/s.
-    pub speed_mm_s: u16,
-    /// The wheel's ticks a metre.
-    pub ticks_per_m: u16,
+    begin: Instant,
+    speed_mm_s: u16,
 }
 
 impl Rehearsal {
-    /// How far the machine has rolled, in millimetres; it is to be asked for a minute and a half at the most.
-    pub fn rolled_mm(&self, now: Instant) -> u16 {
+    /// The tool begins to roll, half a metre before the first plant, at a speed in mm/s.
+    pub const fn new(begin: Instant, speed_mm_s: u16) -> Self {
+        Self { begin, speed_mm_s }
+    }
+
+    /// Whether the tool has to be out now, if it was told to be out or not before; `None` when it has passed the last plant.
+    /// To be asked often enough to see the end: within a minute and a half.
+    pub fn tool_out(&self, now: Instant, was_out: bool, settings: &Settings) -> Option<bool> {
         let milliseconds = (now - self.begin).steps() / (Interval::STEPS_PER_SECOND / 1000);
-        (milliseconds * u32::from(self.speed_mm_s) / 1000) as u16
-    }
-
-    /// Where a machine is that has rolled so far.
-    pub fn position(&self, rolled_mm: u16) -> Position {
-        self.start + Ticks((u32::from(rolled_mm) * u32::from(self.ticks_per_m) / 1000) as i32)
-    }
-
-    /// Whether the beam is broken after so many millimetres; `None` when the tool has passed the last plant. The tool comes into the
-    /// row, which begins `distance_mm` behind the beam, before the first plant reaches it.
-    pub const fn beam_is_broken(rolled_mm: u16, distance_mm: u16) -> Option<bool> {
-        let first_mm = distance_mm + SPACING_MM;
-        if rolled_mm > first_mm + PLANTS * SPACING_MM + distance_mm {
+        let tool_mm = (milliseconds * u32::from(self.speed_mm_s) / 1000) as u16;
+        let last_mm = SPACING_MM * (PLANTS + 1);
+        if tool_mm > last_mm as u16 {
             return None;
         }
-        match rolled_mm.checked_sub(first_mm) {
-            Some(place_mm) if place_mm < PLANTS * SPACING_MM => Some(place_mm % SPACING_MM < CANOPY_MM),
-            _ => Some(false),
-        }
+        // A millimetre stands for a tick here.
+        let leads = Leads::at(TicksPerSecond(self.speed_mm_s.into()), settings, Grain::default());
+        let (Length(from_mm), Length(to_mm)) = leads.stretch(was_out);
+        let margin_mm = settings.get(Setting::MarginMm) as i16;
+        let (from_mm, to_mm) = (tool_mm as i16 + from_mm - margin_mm, tool_mm as i16 + to_mm + margin_mm);
+        Some((1..=PLANTS).any(|plant| {
+            let leading_mm = SPACING_MM * plant;
+            leading_mm <= to_mm && leading_mm + CANOPY_MM >= from_mm
+        }))
     }
 }
 
@@ -56,32 +56,54 @@ mod tests {
     use super::*;
     use std::vec::Vec;
 
+    /// The swings of a rehearsal at a speed, as the place of each in millimetres and whether it is one out.
+    fn swings(speed_mm_s: u16, settings: &Settings) -> Vec<(u32, bool)> {
+        let begin = Instant::new(u32::MAX - 300_000);
+        let row = Rehearsal::new(begin, speed_mm_s);
+        let (mut out, mut swings) = (true, Vec::new());
+        for milliseconds in 0.. {
+            let now = begin + Interval::from_ms(milliseconds);
+            let Some(told) = row.tool_out(now, out, settings) else { break };
+            if told != out {
+                out = told;
+                swings.push((milliseconds * u32::from(speed_mm_s) / 1000, out));
+            }
+        }
+        assert!(!out, "the tool is in behind the last plant");
+        swings
+    }
+
     #[test]
-    fn the_row_has_its_plants_at_their_places_and_an_end() {
-        for distance_mm in [100, 400, 2000] {
-            let edges: Vec<(u16, Option<bool>)> = (1..=u16::MAX)
-                .map(|rolled_mm| (rolled_mm, Rehearsal::beam_is_broken(rolled_mm, distance_mm)))
-                .filter(|&(rolled_mm, broken)| broken != Rehearsal::beam_is_broken(rolled_mm - 1, distance_mm))
-                .collect();
-            let first = distance_mm + 500;
-            let plants = (0..6).flat_map(|plant| {
-                let leading = first + 500 * plant;
-                [(leading, Some(true)), (leading + 150, Some(false))]
-            });
-            let expected: Vec<_> = plants.chain([(first + 3000 + distance_mm + 1, None)]).collect();
-            assert_eq!(edges, expected, "{distance_mm}");
+    fn the_tool_leaves_and_returns_once_for_each_plant_at_its_margin_and_lead() {
+        for speed_mm_s in [100, 278, 500, 694] {
+            let swings = swings(speed_mm_s, &Settings::new());
+            assert_eq!(swings.len(), 13, "in, and out and in for each of six plants: {swings:?}");
+            let speed = u32::from(speed_mm_s);
+            for (plant, pair) in (1..).zip(swings[1..].chunks(2)) {
+                let [(leaves_mm, true), (returns_mm, false)] = pair else { panic!("{swings:?}") };
+                let [leaves_at, returns_at] = [450 - speed * 181 / 1000, 700 - speed * 41 / 1000];
+                let [off_out, off_in] = [
+                    leaves_mm.abs_diff(500 * (plant - 1) + leaves_at),
+                    returns_mm.abs_diff(500 * (plant - 1) + returns_at),
+                ];
+                assert!(off_out <= 2 && off_in <= 4, "plant {plant} at {speed} mm/s: {swings:?}");
+            }
         }
     }
 
     #[test]
-    fn the_machine_rolls_at_its_speed_over_the_clocks_and_the_counters_wrap() {
-        let begin = Instant::new(u32::MAX - 300_000);
-        let start = Position::new(i32::MAX - 1000);
-        let row = Rehearsal { begin, start, speed_mm_s: 694, ticks_per_m: 1910 };
-        for (milliseconds, rolled_mm, ticks) in [(0, 0, 0), (1000, 694, 1325), (10_000, 6940, 13_255)] {
-            let now = begin + Interval::from_ms(milliseconds);
-            assert_eq!(row.rolled_mm(now), rolled_mm);
-            assert_eq!((row.position(rolled_mm) - start).0, ticks);
+    fn windows_too_near_for_two_strokes_are_one() {
+        assert_eq!(swings(1000, &Settings::new()).len(), 3, "in, out for all of them, and in");
+    }
+
+    #[test]
+    fn leads_that_are_level_give_one_swing_each_way_a_plant() {
+        for lead_ms in [0, 100, 180, 240] {
+            let mut settings = Settings::new();
+            for lead in [Setting::LeadOutMs, Setting::LeadInMs] {
+                settings.set(lead, lead_ms).expect("within its range");
+            }
+            assert_eq!(swings(556, &settings).len(), 13, "{lead_ms} ms");
         }
     }
 }

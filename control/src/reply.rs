@@ -91,10 +91,7 @@ where
         Command::Save => done(controller.save(), None),
         Command::Revert => done(controller.take_saved(), None),
         Command::Defaults => done(controller.take_defaults(), None),
-        Command::CalibrateStart => {
-            controller.calibrate_start();
-            Answer::Ok
-        }
+        Command::CalibrateStart => done(controller.calibrate_start(), None),
         Command::Calibrate { distance_mm, force } => match controller.calibrate(distance_mm, force) {
             Ok(()) => Answer::Get(Setting::TicksPerM),
             refused => done(refused, Some(Setting::TicksPerM)),

@@ -33,8 +33,10 @@ pub struct SavedSettings<M> {
     /// The newest copy, 0 or 1, and its sequence number.
     newest: u8,
     sequence: u8,
-    /// The byte of that copy that is to be written next; [`COPY`] when all are.
-    next: u8,
+    /// What was to be saved when that was asked for, whatever is set meanwhile.
+    image: [u8; COPY],
+    /// Bytes of it that are still to be written, the last ones.
+    left: u8,
     /// Whether there is a copy.
     exists: bool,
 }
@@ -42,7 +44,7 @@ pub struct SavedSettings<M> {
 impl<M: Memory> SavedSettings<M> {
     /// The settings in a memory, which are yet to be loaded.
     pub const fn new(memory: M) -> Self {
-        Self { memory, newest: 1, sequence: 0, next: COPY as u8, exists: false }
+        Self { memory, newest: 1, sequence: 0, image: [0; COPY], left: 0, exists: false }
     }
 
     /// Loads the newest copy that is whole; `None` where neither is.
@@ -62,30 +64,29 @@ impl<M: Memory> SavedSettings<M> {
         None
     }
 
-    /// Begins to save. The settings must not change until [`carry_on`](Self::carry_on) has finished.
-    pub const fn save(&mut self) {
+    /// Begins to save the settings as they are now; [`carry_on`](Self::carry_on) finishes it.
+    pub fn save(&mut self, settings: &Settings) {
         self.exists = true;
         self.newest ^= 1;
         self.sequence = self.sequence.wrapping_add(1);
-        self.next = 0;
+        self.image = image(settings, self.sequence);
+        self.left = COPY as u8;
     }
 
     /// Carries on with a save, without waiting; whether all has been written.
     #[inline(never)]
-    pub fn carry_on(&mut self, settings: &Settings) -> bool {
+    pub fn carry_on(&mut self) -> bool {
         if !self.memory.is_ready() {
             return false;
         }
-        if self.next < COPY as u8 {
-            let copy = image(settings, self.sequence);
-            while let Some(&byte) = copy.get(usize::from(self.next)) {
-                let address = address(self.newest) + u16::from(self.next);
-                self.next += 1;
-                // What is right already is left alone: an EEPROM wears out.
-                if self.memory.read(address) != byte {
-                    self.memory.write(address, byte);
-                    return false;
-                }
+        while self.left > 0 {
+            let place = COPY as u8 - self.left;
+            let (address, byte) = (address(self.newest) + u16::from(place), self.image[usize::from(place)]);
+            self.left -= 1;
+            // What is right already is left alone: an EEPROM wears out.
+            if self.memory.read(address) != byte {
+                self.memory.write(address, byte);
+                return false;
             }
         }
         true
@@ -150,8 +151,8 @@ mod tests {
     fn save(memory: Volatile, settings: &Settings) -> Volatile {
         let mut saved = SavedSettings::new(memory);
         saved.load();
-        saved.save();
-        while !saved.carry_on(settings) {}
+        saved.save(settings);
+        while !saved.carry_on() {}
         saved.into_memory()
     }
 

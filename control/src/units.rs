@@ -3,6 +3,10 @@
 //! Place is counted in encoder ticks, time in steps of 4 µs (Timer0 behind its prescaler of 64). A point and a distance
 //! between two points are different types, and all arithmetic wraps: a counter that runs over its end changes nothing,
 //! as long as two points that are compared lie within half the counter's range.
+//!
+//! There are two counters of the way. The odometer, [`Position`] and [`Ticks`], has 32 bits: what the operator reads, and
+//! what is measured over a long stretch. The ground that is remembered around the tool, [`Place`] and [`Length`], has 16,
+//! which the chip compares in half the time and half the code; [`Grain`] leads from the one to the other.
 
 use core::ops::{Add, Neg, Sub};
 
@@ -30,7 +34,7 @@ impl Position {
     }
 }
 
-/// A distance along the ground in ticks, positive forward.
+/// A distance that the odometer has counted, in ticks, positive forward.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Ticks(pub i32);
 
@@ -39,45 +43,125 @@ impl Ticks {
     pub const ZERO: Self = Self(0);
 }
 
-impl Sub for Position {
-    type Output = Ticks;
-    fn sub(self, from: Self) -> Ticks {
-        Ticks(self.0.wrapping_sub(from.0))
+/// A place on the ground that is remembered, in units of a [`Grain`], wrapping.
+///
+/// Places are ordered by the distance between them, never by their number, so there is no `Ord`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Place(i16);
+
+impl Place {
+    /// The place that a counter of units stands for.
+    pub const fn new(count: i16) -> Self {
+        Self(count)
+    }
+
+    /// The counter at this place.
+    pub const fn count(self) -> i16 {
+        self.0
+    }
+
+    /// Whether this place lies ahead of `other`.
+    #[inline(never)]
+    pub fn is_ahead_of(self, other: Self) -> bool {
+        (self - other).0 > 0
     }
 }
 
-impl Add<Ticks> for Position {
-    type Output = Self;
-    fn add(self, distance: Ticks) -> Self {
-        Self(self.0.wrapping_add(distance.0))
-    }
+/// A distance along the ground that is remembered, in units of a [`Grain`], positive forward.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Length(pub i16);
+
+impl Length {
+    /// No distance at all.
+    pub const ZERO: Self = Self(0);
 }
 
-impl Sub<Ticks> for Position {
-    type Output = Self;
-    fn sub(self, distance: Ticks) -> Self {
-        Self(self.0.wrapping_sub(distance.0))
-    }
+/// A point and the distance between two: their differences and sums, all of which wrap.
+macro_rules! points_and_distances {
+    ($($Point:ident $Distance:ident;)*) => {$(
+        impl Sub for $Point {
+            type Output = $Distance;
+            fn sub(self, from: Self) -> $Distance {
+                $Distance(self.0.wrapping_sub(from.0))
+            }
+        }
+
+        impl Add<$Distance> for $Point {
+            type Output = Self;
+            fn add(self, distance: $Distance) -> Self {
+                Self(self.0.wrapping_add(distance.0))
+            }
+        }
+
+        impl Sub<$Distance> for $Point {
+            type Output = Self;
+            fn sub(self, distance: $Distance) -> Self {
+                Self(self.0.wrapping_sub(distance.0))
+            }
+        }
+
+        impl Add for $Distance {
+            type Output = Self;
+            fn add(self, other: Self) -> Self {
+                Self(self.0.wrapping_add(other.0))
+            }
+        }
+
+        impl Sub for $Distance {
+            type Output = Self;
+            fn sub(self, other: Self) -> Self {
+                Self(self.0.wrapping_sub(other.0))
+            }
+        }
+
+        impl Neg for $Distance {
+            type Output = Self;
+            fn neg(self) -> Self {
+                Self(self.0.wrapping_neg())
+            }
+        }
+    )*};
 }
 
-impl Add for Ticks {
-    type Output = Self;
-    fn add(self, other: Self) -> Self {
-        Self(self.0.wrapping_add(other.0))
-    }
+points_and_distances! {
+    Position Ticks;
+    Place Length;
 }
 
-impl Sub for Ticks {
-    type Output = Self;
-    fn sub(self, other: Self) -> Self {
-        Self(self.0.wrapping_sub(other.0))
-    }
+/// How many ticks make a unit of the ground that is remembered: a power of two, 1 for any wheel of up to [`Grain::FINEST`]
+/// ticks a metre.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Grain {
+    shift: u8,
 }
 
-impl Neg for Ticks {
-    type Output = Self;
-    fn neg(self) -> Self {
-        Self(self.0.wrapping_neg())
+impl Grain {
+    /// Units that a metre has at the most, 0.42 mm each: 13 m are within half of 16 bits.
+    pub const FINEST: i32 = 2400;
+
+    /// The grain for a wheel of so many ticks a metre.
+    pub const fn of(ticks_per_m: Ticks) -> Self {
+        let mut shift = 0;
+        while ticks_per_m.0 >> shift > Self::FINEST {
+            shift += 1;
+        }
+        Self { shift }
+    }
+
+    /// The place at which the odometer has counted so far.
+    #[inline(never)]
+    pub const fn place(self, position: Position) -> Place {
+        Place((position.0 >> self.shift) as i16)
+    }
+
+    /// A distance in units, which is to be less than 13 m.
+    pub const fn length(self, distance: Ticks) -> Length {
+        Length((distance.0 >> self.shift) as i16)
+    }
+
+    /// A distance in ticks.
+    pub const fn ticks(self, length: Length) -> Ticks {
+        Ticks((length.0 as i32) << self.shift)
     }
 }
 

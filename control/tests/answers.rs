@@ -10,10 +10,10 @@ use control::{
     console::{LineBuffer, Plot, Word},
     controller::{Controller, Readings, State},
     event::Event,
+    ground::schedule::Plan,
     memory::Volatile,
     reply::{self, LINE},
     reset::Cause,
-    schedule::Plan,
     settings::Setting,
     units::{Position, Ticks},
 };

@@ -423,8 +423,8 @@ fn saved_settings_are_in_use_after_a_restart() {
 /// A memory with these settings, right or not.
 fn saved(settings: &Settings) -> Volatile {
     let mut saved = SavedSettings::new(Volatile::new());
-    saved.save();
-    while !saved.carry_on(settings) {}
+    saved.save(settings);
+    while !saved.carry_on() {}
     saved.into_memory()
 }
 

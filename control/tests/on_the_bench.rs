@@ -1,4 +1,4 @@
-//! What is tried on the bench: the tool by hand, calibration, a row that is only thought of, and settings taken back.
+//! What is tried on the bench: the tool by hand, calibration, the swings of a row, and settings taken back.
 
 mod common;
 
@@ -85,7 +85,7 @@ fn a_distance_that_was_rolled_sets_the_wheel() {
     machine.set(Setting::WheelMm, 410).unwrap();
     stand(&mut machine, 0, 1, 0);
     assert_eq!(machine.calibrate(5000, false), Err(Refusal::Unfit(Unfit::NotBegun)));
-    machine.calibrate_start();
+    machine.calibrate_start().unwrap();
     stand(&mut machine, 1, 1, 18_500);
     assert_eq!(machine.calibrate(999, false), Err(Refusal::Unfit(Unfit::TooShort)));
     assert!(matches!(machine.calibrate(5000, false), Err(Refusal::Unfit(Unfit::Differs { counted: 3700, .. }))));
@@ -158,70 +158,120 @@ fn swings_can_be_ended() {
 }
 
 #[test]
-fn a_row_is_played_through_the_decisions_without_a_sensor() {
+fn the_tool_swings_as_for_a_row_whatever_the_sensors_say() {
     let mut machine = machine();
     stand(&mut machine, 0, 100, 77);
     machine.test_row(500).unwrap();
     machine.tell_events(true);
-    let (mut plants, mut swings) = (0, 0);
-    for now in 100..20_000 {
+    let mut swings = Vec::new();
+    for now in 100..10_000 {
         // Nothing is wired: the beam flickers faster than anybody can count, and the encoder's contacts pick up hum.
         machine.beam_edge(readings(0, 77).position, now % 2 == 0);
         if now % 5 == 0 {
             machine.beam_edges_lost(now % 2 == 0);
         }
         machine.step(Readings { jumps: now as u16, ..readings(now * 1000, 77) });
-        while let Some(event) = machine.next_event() {
-            plants += u32::from(matches!(event, Event::Object { .. }));
-            swings += u32::from(matches!(event, Event::Swing { .. }));
-        }
-        if machine.state() == State::Hold {
+        assert_eq!(machine.state(), State::Hold);
+        swings.extend(std::iter::from_fn(|| machine.next_event()));
+        if swings.len() == 14 {
             break;
         }
+        assert_eq!(machine.lamp_is_lit(), machine.tool_out(), "the LED marks the commands");
     }
-    assert_eq!((plants, swings), (6, 14), "into the row, out and in for each plant, and out at the end");
-    // The machine is where it was, and knows no ground.
-    for now in 20_000..20_010 {
-        machine.step(Readings { jumps: 20_000, ..readings(now * 1000, 77) });
-    }
-    assert_eq!((machine.state(), machine.readings().position.count(), machine.unseen_mm()), (State::Hold, 77, 400));
-    assert_eq!(machine.windows(), 0);
+    let position = readings(0, 77).position;
+    let expected: Vec<_> = (0..14).map(|swing| Event::Swing { out: swing % 2 == 1, position }).collect();
+    assert_eq!(swings, expected, "into the row, out and in for each plant, and out at the end");
 }
 
 #[test]
-fn what_comes_to_stand_in_the_beam_while_a_row_is_played_is_known_afterwards() {
-    for lost in [false, true] {
+fn a_row_that_is_played_leaves_what_is_known_of_the_ground_alone() {
+    // A canopy is known, another stands in the beam, and a row is played.
+    let row = |played: bool| {
         let mut machine = machine();
-        machine.test_row(1000).unwrap();
-        stand(&mut machine, 0, 500, 0);
-        if lost {
-            machine.beam_edges_lost(true);
-        } else {
-            machine.beam_edge(readings(0, 0).position, true);
+        let mut milliseconds = 0;
+        for count in 0..2000 {
+            milliseconds += 1;
+            if matches!(count, 1000 | 1300 | 1900) {
+                machine.beam_edge(readings(0, count).position, count != 1300);
+            }
+            machine.step(readings(milliseconds * 1000, count));
         }
-        machine.hold();
-        stand(&mut machine, 500, 10, 0);
-        assert_eq!(machine.windows(), 1);
-    }
-}
-
-#[test]
-fn a_row_that_is_played_can_be_ended_and_leaves_nothing_behind() {
-    for lost in [false, true] {
-        let mut machine = machine();
-        machine.test_row(1000).unwrap();
-        stand(&mut machine, 0, 2500, 0);
-        if lost {
-            machine.beam_edges_lost(false);
+        if played {
+            machine.test_row(1000).unwrap();
         }
-        assert_eq!(machine.state(), State::Work);
-        machine.hold();
-        let orders = stand(&mut machine, 2500, 10, 0);
-        assert_eq!(orders.pulse, orders.pulse_out);
+        stand(&mut machine, milliseconds, 9000, 1999);
+        let played_on = format!("{:?} {:?} {}", machine.windows(), machine.unseen_mm(), machine.objects().len());
         machine.start(false).unwrap();
-        stand(&mut machine, 2600, 10, 0);
-        assert!(machine.tool_out() && machine.unseen_mm() >= 399);
+        // Which way the tool goes, millisecond for millisecond, over both canopies.
+        let mut tool = Vec::new();
+        for count in 2000..4500 {
+            milliseconds += 1;
+            if count == 2200 {
+                machine.beam_edge(readings(0, count).position, false);
+            }
+            machine.step(readings((milliseconds + 9000) * 1000, count));
+            tool.push(machine.tool_out());
+        }
+        (played_on, tool)
+    };
+    assert_eq!(row(true), row(false));
+}
+
+#[test]
+fn whatever_comes_in_the_turn_in_which_a_row_ends_the_next_real_plant_keeps_the_tool_out() {
+    type Command = fn(&mut Machine) -> Result<(), Refusal>;
+    let commands: [Command; 7] = [
+        |_| Ok(()),
+        Machine::servo_in,
+        Machine::servo_out,
+        Machine::calibrate_servo,
+        |machine| machine.test_row(1000),
+        |machine| machine.start(false),
+        |machine| {
+            machine.hold();
+            Ok(())
+        },
+    ];
+    for (number, command) in commands.iter().enumerate() {
+        for at_ms in (3_400..3_600).step_by(1) {
+            let mut machine = machine();
+            machine.test_row(1000).unwrap();
+            stand(&mut machine, 0, at_ms, 0);
+            command(&mut machine).unwrap();
+            stand(&mut machine, at_ms, 20, 0);
+            machine.hold();
+            machine.start(false).unwrap();
+            let mut milliseconds = at_ms + 20;
+            for count in 0..3000 {
+                milliseconds += 1;
+                let plant = (1000..1300).contains(&count);
+                if matches!(count, 1000 | 1300) {
+                    machine.beam_edge(readings(0, count).position, plant);
+                }
+                machine.step(readings(milliseconds * 1000, count));
+                let window = (1010..2150).contains(&count);
+                assert!(!window || machine.windows() == 1, "command {number}, {count}");
+                // What the command leads by, on its way in.
+                let tool = count - 764 + 42;
+                let over = (1000 - 95 + 42..=1300 + 95).contains(&tool) || tool < 0;
+                assert!(machine.tool_out() || !over, "command {number} at {at_ms} ms: in at {tool}");
+            }
+            assert!(!machine.tool_out());
+        }
     }
+}
+
+#[test]
+fn a_row_that_is_played_can_be_ended() {
+    let mut machine = machine();
+    machine.test_row(1000).unwrap();
+    stand(&mut machine, 0, 100, 0);
+    assert!(!machine.tool_out());
+    machine.hold();
+    let orders = stand(&mut machine, 100, 10, 0);
+    assert_eq!(orders.pulse, orders.pulse_out);
+    stand(&mut machine, 110, 5000, 0);
+    assert!(machine.tool_out());
 }
 
 #[test]

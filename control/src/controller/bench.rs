@@ -1,19 +1,17 @@
-//! What is tried on the bench: the tool by hand, the servo's times, the wheel's ticks, and a row that is only thought of.
+//! What is tried on the bench: the tool by hand, the servo's times, the wheel's ticks, and the swings of a row.
 //!
-//! All of it needs the machine in HOLD, and ends when the machine is told to do something else.
+//! All of it needs the machine in HOLD, where it stays, and ends when the machine is told to do something else. None of it
+//! touches what the machine knows of the ground.
 
-use super::{Controller, Readings, Refusal, State};
+use super::{Controller, Refusal, State};
 use crate::{
     calibration::{Leads, Outcome, Swings},
     classifier::Classifier,
     event::Event,
     memory::Memory,
-    monitor::EncoderMonitor,
     rehearsal::Rehearsal,
-    schedule::Schedule,
     servo::{self, HalfMicros},
     settings::Setting,
-    speed::SpeedMeter,
     units::Wheel,
 };
 
@@ -27,26 +25,8 @@ pub(super) enum Bench {
     ByHand(HalfMicros),
     /// The servo swings to and fro, to be timed.
     Swings(Swings),
-    /// A row that is only thought of is played.
+    /// The tool swings as for a row of plants.
     Row(Rehearsal),
-    /// It was, and the machine does not know its place any more.
-    RowEnded,
-}
-
-impl Bench {
-    /// Whether the tool is where something else than the machine's decisions has put it.
-    pub(super) fn moves_the_tool(&self) -> bool {
-        matches!(self, Self::ByHand(_) | Self::Swings(_))
-    }
-
-    /// What is left of it when the machine goes from one state to another.
-    pub(super) fn interrupted(&mut self, state: State) {
-        *self = match self {
-            Self::Row(_) if state == State::Work => return,
-            Self::Row(_) | Self::RowEnded => Self::RowEnded,
-            _ => Self::Idle,
-        };
-    }
 }
 
 impl<C: Classifier, M: Memory> Controller<C, M> {
@@ -79,7 +59,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// [`Refusal::NotInHold`] and [`Refusal::AlarmLatched`].
     pub fn servo_out(&mut self) -> Result<(), Refusal> {
         self.expect_hold()?;
-        self.bench.interrupted(State::Hold);
+        self.bench = Bench::Idle;
         Ok(())
     }
 
@@ -95,8 +75,13 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     }
 
     /// Begins to measure a distance, from where the machine stands.
-    pub fn calibrate_start(&mut self) {
+    ///
+    /// # Errors
+    /// [`Refusal::NotInHold`] and [`Refusal::AlarmLatched`].
+    pub fn calibrate_start(&mut self) -> Result<(), Refusal> {
+        self.expect_hold()?;
         self.distance.begin(self.readings.position);
+        Ok(())
     }
 
     /// Sets the wheel's ticks a metre by a distance that was rolled since [`calibrate_start`](Self::calibrate_start).
@@ -109,75 +94,51 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         self.set(Setting::TicksPerM, ended.map_err(Refusal::Unfit)?)
     }
 
-    /// Plays a row that is only thought of, at a speed in mm/s.
+    /// Swings the tool as for a row of plants, at a speed in mm/s.
     ///
     /// # Errors
     /// [`Refusal::NotInHold`], [`Refusal::AlarmLatched`], [`Refusal::Contradiction`], and [`Refusal::TestSpeed`] for what
     /// the machine would not work at.
     pub fn test_row(&mut self, speed_mm_s: u16) -> Result<(), Refusal> {
         self.expect_hold()?;
+        self.expect_no_contradiction()?;
         let fastest = self.settings.get(Setting::TopSpeedMmS);
         if !(Setting::TopSpeedMmS.description().least..=fastest).contains(&speed_mm_s) {
             return Err(Refusal::TestSpeed { fastest });
         }
-        // What is refused leaves the machine as it was: so the ground is forgotten last.
-        self.start(false)?;
-        let Readings { now, position, .. } = self.readings;
-        self.begin_anew(self.readings, false);
-        let ticks_per_m = self.settings.wheel().ticks(1000).0 as u16;
-        self.bench = Bench::Row(Rehearsal { begin: now, start: position, speed_mm_s, ticks_per_m });
+        self.bench = Bench::Row(Rehearsal::new(self.readings.now, speed_mm_s));
         Ok(())
     }
 
-    /// Carries on with what is being tried, before the machine decides; returns the readings that it is to decide by.
-    pub(super) fn try_on(&mut self, mut readings: Readings) -> Readings {
-        match &mut self.bench {
-            Bench::Idle | Bench::ByHand(_) => {}
-            Bench::Swings(swings) => {
-                if let Some(outcome) = swings.step(readings.now, readings.end_switch_on) {
-                    self.bench = Bench::Idle;
+    /// Carries on with what is being tried; whether it has the tool out, if it says.
+    pub(super) fn try_out(&mut self) -> Option<bool> {
+        let now = self.readings.now;
+        let out = match &mut self.bench {
+            Bench::Idle | Bench::ByHand(_) => return None,
+            Bench::Swings(swings) => match swings.step(now, self.readings.end_switch_on) {
+                None => Some(swings.tool_out()),
+                Some(outcome) => {
                     self.finish_swings(outcome);
+                    None
                 }
-            }
-            Bench::Row(row) => {
-                let rolled_mm = row.rolled_mm(readings.now);
-                readings.position = row.position(rolled_mm);
-                // The encoder need not be wired, and its contacts may pick up anything.
-                readings.jumps = self.readings.jumps;
-                match Rehearsal::beam_is_broken(rolled_mm, self.settings.get(Setting::BeamToToolMm)) {
-                    None => self.enter(State::Hold),
-                    Some(broken) if broken != self.watch.is_broken() => self.take_edge(readings.position, broken),
-                    Some(_) => {}
-                }
-            }
-            Bench::RowEnded => {
-                self.bench = Bench::Idle;
-                self.begin_anew(readings, self.beam_broken);
-            }
+            },
+            Bench::Row(row) => row.tool_out(now, self.tool_out, &self.settings),
+        };
+        if out.is_none() {
+            self.bench = Bench::Idle;
         }
-        readings
+        out
     }
 
     /// Sets the leads by what was measured, if they fit, and tells how it ended.
     fn finish_swings(&mut self, outcome: Outcome) {
-        let mut fits = false;
-        if let Outcome::Measured(Leads { out_ms, in_ms }) = outcome {
-            fits = self.set(Setting::LeadOutMs, out_ms).is_ok() && self.set(Setting::LeadInMs, in_ms).is_ok();
-        }
+        let fits = match outcome {
+            Outcome::Measured(Leads { out_ms, in_ms }) => {
+                self.change(&[(Setting::LeadOutMs, out_ms), (Setting::LeadInMs, in_ms)]).is_ok()
+            }
+            _ => false,
+        };
         self.announce(Event::Calibrated { outcome, fits });
-    }
-
-    /// Forgets all ground: the machine is somewhere else than it knows.
-    fn begin_anew(&mut self, readings: Readings, broken: bool) {
-        let Readings { now, position, jumps, .. } = readings;
-        self.meter = SpeedMeter::new(position, now);
-        self.encoder = EncoderMonitor::new(now, position, jumps);
-        self.leads = super::Leads::default();
-        self.watch.restart(position, broken);
-        self.schedule = Schedule::new(position);
-        self.last_plant = position;
-        self.last_seen = position;
-        self.readings.position = position;
     }
 
     #[inline(never)]

@@ -1,9 +1,6 @@
 //! What the operator may ask of the machine, by switch or console, and why it may refuse.
 
-use super::{
-    Controller, State,
-    ground::{Geometry, Leads},
-};
+use super::{Controller, State, faults::Limits};
 use crate::{
     calibration::Unfit,
     classifier::{Classifier, Full},
@@ -50,12 +47,9 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         if let State::Alarm(_) = self.state {
             return Err(Refusal::AlarmLatched);
         }
-        if let Some(contradiction) = self.settings.contradiction() {
-            return Err(Refusal::Contradiction(contradiction));
-        }
+        self.expect_no_contradiction()?;
         if now {
-            // A margin behind the tool as well, so that it does not stand on the border of what is known.
-            self.schedule.trust_from(self.tool() - self.geometry.margin);
+            self.ground.trust();
         }
         self.go_to_work();
         Ok(())
@@ -81,22 +75,33 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// [`Refusal::NotInHold`], [`Refusal::OutOfRange`], and [`Refusal::Contradiction`] where there was none before; nothing
     /// is changed then.
     pub fn set(&mut self, setting: Setting, value: u16) -> Result<(), Refusal> {
-        if setting.description().hold_only && self.is_working() {
-            return Err(Refusal::NotInHold);
+        self.change(&[(setting, value)])
+    }
+
+    /// Sets several settings, or none of them.
+    ///
+    /// # Errors
+    /// As [`set`](Self::set).
+    #[inline(never)]
+    pub(super) fn change(&mut self, changes: &[(Setting, u16)]) -> Result<(), Refusal> {
+        let mut settings = self.settings.clone();
+        for &(setting, value) in changes {
+            if setting.description().hold_only && self.is_working() {
+                return Err(Refusal::NotInHold);
+            }
+            settings.set(setting, value).map_err(|_| Refusal::OutOfRange)?;
+            // Another wheel is one that has not been measured.
+            if setting.is_of_the_wheel() {
+                let _ = settings.set(Setting::TicksPerM, 0);
+            }
         }
-        let before = self.settings.get(setting);
         // Settings that contradict each other already are mended one at a time.
-        let contradicted = self.settings.contradiction().is_some();
-        self.settings.set(setting, value).map_err(|_| Refusal::OutOfRange)?;
-        if !contradicted && let Some(contradiction) = self.settings.contradiction() {
-            // What was set before is within its range.
-            let _ = self.settings.set(setting, before);
+        if let Some(contradiction) = settings.contradiction()
+            && self.settings.contradiction().is_none()
+        {
             return Err(Refusal::Contradiction(contradiction));
         }
-        // Another wheel is one that has not been measured.
-        if setting.is_of_the_wheel() {
-            let _ = self.settings.set(Setting::TicksPerM, 0);
-        }
+        self.settings = settings;
         self.follow_settings();
         Ok(())
     }
@@ -129,8 +134,8 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// Works out what follows from the settings.
     pub(super) fn follow_settings(&mut self) {
-        self.geometry = Geometry::of(&self.settings);
-        self.leads = Leads::at(self.meter.speed(), &self.settings);
+        self.limits = Limits::of(&self.settings);
+        self.ground.follow(&self.settings, self.readings.position, self.meter.speed());
     }
 
     /// Begins to save the settings, which [`carry_on`](Self::carry_on) finishes.
@@ -141,16 +146,14 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         if self.is_working() {
             return Err(Refusal::NotInHold);
         }
-        if let Some(contradiction) = self.settings.contradiction() {
-            return Err(Refusal::Contradiction(contradiction));
-        }
-        self.saved.save();
+        self.expect_no_contradiction()?;
+        self.saved.save(&self.settings);
         Ok(())
     }
 
     /// Carries on with what is being kept for good, settings and examples, without waiting; whether all has been written.
     pub fn carry_on(&mut self) -> bool {
-        self.saved.carry_on(&self.settings) && self.classifier.carry_on()
+        self.saved.carry_on() && self.classifier.carry_on()
     }
 
     /// Labels the last object and teaches it to the classifier.
@@ -189,6 +192,11 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// Draws curves for a plotter, or no longer.
     pub fn set_plot(&mut self, plot: Plot) {
         self.plot = plot;
+    }
+
+    #[inline(never)]
+    pub(super) fn expect_no_contradiction(&self) -> Result<(), Refusal> {
+        self.settings.contradiction().map_or(Ok(()), |contradiction| Err(Refusal::Contradiction(contradiction)))
     }
 
     /// Counts a line that was not understood.

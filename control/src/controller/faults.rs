@@ -1,13 +1,13 @@
 //! Faults and warnings: what the readings show that the machine cannot work with, and what the operator should know.
 
-use super::{Controller, Readings};
+use super::{Controller, Readings, bench::Bench};
 use crate::{
     alarm::{Alarm, Warning},
     classifier::Classifier,
     event::Event,
     memory::Memory,
-    settings::Setting,
-    units::{Interval, Position, Ticks},
+    settings::{Setting, Settings},
+    units::{Interval, Ticks},
 };
 
 /// What the end switch may take longer than the lead: a servo frame, the contacts' bouncing, and some patience.
@@ -16,10 +16,28 @@ const END_SWITCH_GRACE_MS: u32 = 100;
 /// Free bytes of stack below which the machine does not work on: two interrupts' worth.
 const STACK_RESERVE: u16 = 48;
 
+/// What the machine is not to go beyond, in ticks of the present wheel.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Limits {
+    /// In ticks a second.
+    top_speed: i32,
+    /// Zero for none.
+    no_plant: Ticks,
+}
+
+impl Limits {
+    pub(super) fn of(settings: &Settings) -> Self {
+        Self {
+            top_speed: settings.ticks(Setting::TopSpeedMmS).0,
+            no_plant: Ticks(settings.wheel().ticks(1000).0 * i32::from(settings.get(Setting::NoPlantM))),
+        }
+    }
+}
+
 impl<C: Classifier, M: Memory> Controller<C, M> {
-    /// The fault that the readings show, if any; the tool was at `tool_was_at` before them.
+    /// The fault that the readings show, if any.
     #[inline(never)]
-    pub(super) fn fault(&mut self, tool_was_at: Position) -> Option<Alarm> {
+    pub(super) fn fault(&mut self) -> Option<Alarm> {
         let Readings { now, position, jumps, end_switch_on, stack_free, .. } = self.readings;
         let working = self.is_working();
         match self.encoder.read(now, position, jumps) {
@@ -28,23 +46,19 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             None => {}
             fault => return fault,
         }
-        if let Some(leading) = self.watch.open()
-            && self.watch.is_broken()
-            && self.watch.frontier() - leading > self.geometry.max_width
-        {
+        if self.ground.is_blocked() {
             return Some(Alarm::BeamBlocked);
         }
-        if working && Ticks(self.meter.speed().0.abs()) > self.geometry.top_speed {
+        if working && self.meter.speed().0.abs() > self.limits.top_speed {
             return Some(Alarm::TooFast);
         }
-        let forgotten = |tool| self.schedule.has_forgotten() && self.schedule.known_from().is_ahead_of(tool);
-        if working && forgotten(self.tool()) && !forgotten(tool_was_at) {
+        if working && self.ground.rolled_back_too_far() {
             return Some(Alarm::RolledBackTooFar);
         }
         self.end_switch.read(now, end_switch_on);
         let swing = Interval::from_ms(u32::from(self.settings.get(Setting::LeadOutMs)) + END_SWITCH_GRACE_MS);
         if self.settings.get(Setting::EndSwitch) != 0
-            && !self.bench.moves_the_tool()
+            && !matches!(self.bench, Bench::ByHand(_) | Bench::Swings(_))
             && self.end_switch.is_on() != self.tool_out
             && now - self.told_at > swing
         {
@@ -54,11 +68,11 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     }
 
     /// Tells what the operator should know, once.
-    pub(super) fn warn(&mut self, tool: Position) {
+    pub(super) fn warn(&mut self) {
         if !self.is_working() {
             return;
         }
-        if self.awaits_ground && self.is_closed(tool, tool) {
+        if self.awaits_ground && self.ground.is_closed_at_tool() {
             self.awaits_ground = false;
             // An eighth of the lead is what the speed may waver by.
             let lead_ms = u32::from(self.settings.get(Setting::LeadOutMs));
@@ -67,8 +81,8 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
                 self.tell(Event::Warning(Warning::LateCommand));
             }
         }
-        let no_plant = self.geometry.no_plant;
-        if !self.warned && no_plant > Ticks::ZERO && self.watch.frontier() - self.last_seen > no_plant {
+        let no_plant = self.limits.no_plant;
+        if !self.warned && no_plant > Ticks::ZERO && self.readings.position - self.last_seen > no_plant {
             self.warned = true;
             self.tell(Event::Warning(Warning::NoPlants));
         }

@@ -38,14 +38,13 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// Why the tool is out of the row although the machine works.
     pub fn reason(&self) -> Option<Reason> {
-        let tool = self.tool();
         if !self.is_working() || !self.tool_out {
             None
         } else if self.encoder.is_doubtful() || self.encoder.is_quiet() {
             Some(Reason::EncoderDoubtful)
-        } else if self.schedule.known_from().is_ahead_of(tool) {
+        } else if self.ground.is_unseen() {
             Some(Reason::UnseenGround)
-        } else if self.outruns_the_beam(tool) {
+        } else if self.ground.outruns_the_beam(true) {
             Some(Reason::TooFast)
         } else {
             Some(Reason::Plant)
@@ -59,13 +58,12 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// Windows at the tool or ahead of it, the one still being seen included.
     pub fn windows(&self) -> u8 {
-        self.schedule.ahead(self.tool(), self.geometry.margin) + u8::from(self.watch.open().is_some())
+        self.ground.windows()
     }
 
     /// How far the machine has to roll until ground that the beam has seen reaches the tool, in millimetres.
     pub fn unseen_mm(&self) -> i16 {
-        let unseen = self.schedule.known_from() - self.tool();
-        self.settings.wheel().millimetres(unseen.max(Ticks::ZERO))
+        self.settings.wheel().millimetres(self.ground.unseen())
     }
 
     /// Whether the beam is broken.
@@ -73,10 +71,10 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         self.beam_broken
     }
 
-    /// Whether the status LED shines: while the servo is being timed, it marks the commands.
+    /// Whether the status LED shines: while the servo is being tried, it marks the commands.
     pub fn lamp_is_lit(&self) -> bool {
         match self.bench {
-            Bench::Swings(_) => self.tool_out,
+            Bench::Swings(_) | Bench::Row(_) => self.tool_out,
             _ => lamp::is_lit(self.state, self.readings.now),
         }
     }

@@ -1,0 +1,304 @@
+//! The ground: what the beam has seen of it, and the one question whether the tool may work on it.
+//!
+//! [`watch`] makes objects of the beam's edges, [`schedule`] remembers the canopies among them, and [`reach`] knows how far
+//! ahead the servo has to be told. [`Ground`] holds the three together, so that none of them can forget by itself: whatever
+//! the reason, [`Ground::forget`] closes all that was seen, and what is open at the frontier becomes the rest of something.
+//!
+//! Places have 16 bits, so ground is left behind before the counter could come round: see [`Ground::roll_to`]. What an
+//! object is, plant or weed, is decided elsewhere.
+
+pub mod reach;
+pub mod schedule;
+pub mod watch;
+
+use self::{
+    reach::{Geometry, Leads},
+    schedule::{Full, Plan, Schedule},
+    watch::{Object, Watch},
+};
+use crate::{
+    settings::Settings,
+    units::{Length, Place, Position, Ticks, TicksPerSecond},
+};
+
+/// What is known of the ground around the machine.
+#[derive(Clone, Debug, Default)]
+pub struct Ground {
+    geometry: Geometry,
+    leads: Leads,
+    /// The ground that the beam is at.
+    beam: Place,
+    watch: Watch,
+    schedule: Schedule,
+    /// The last plant's leading edge, or where watching began; no farther behind than is remembered.
+    last_plant: Place,
+    /// Whether the tool has just come to ground that had to be left behind.
+    rolled_back_too_far: bool,
+}
+
+impl Ground {
+    /// Ground of which nothing has been seen, with the beam at a position, broken or not.
+    #[inline(never)]
+    pub fn begin(&mut self, settings: &Settings, position: Position, broken: bool) {
+        self.geometry = Geometry::of(settings);
+        self.beam = self.geometry.grain.place(position);
+        self.watch = Watch::start(self.beam, broken);
+        self.schedule = Schedule::new(self.beam);
+        self.last_plant = self.beam;
+    }
+
+    /// Works out what follows from other settings. With another grain, what was seen means nothing any more.
+    #[inline(never)]
+    pub fn follow(&mut self, settings: &Settings, position: Position, speed: TicksPerSecond) {
+        let before = self.geometry.grain;
+        self.geometry = Geometry::of(settings);
+        self.lead(settings, speed);
+        if self.geometry.grain != before {
+            self.beam = self.geometry.grain.place(position);
+            self.begin_here();
+        }
+    }
+
+    /// Works out what follows from another speed.
+    pub fn lead(&mut self, settings: &Settings, speed: TicksPerSecond) {
+        self.leads = Leads::at(speed, settings, self.geometry.grain);
+    }
+
+    /// Takes an edge of the beam, with the position at which it came; returns the object that was complete before it.
+    #[inline(never)]
+    pub fn edge(&mut self, position: Position, broken: bool) -> Option<Object> {
+        let place = self.geometry.grain.place(position) - self.leads.response;
+        self.watch.edge(place, broken, self.geometry.merge_gap)
+    }
+
+    /// The machine has rolled to a position; returns the object that this completes.
+    #[inline(never)]
+    pub fn roll_to(&mut self, position: Position) -> Option<Object> {
+        let had_left = self.schedule.has_left(self.tool());
+        self.beam = self.geometry.grain.place(position);
+        let memory = self.geometry.memory;
+        // Ground ahead of the beam that lies so far ahead is seen anew when the machine comes back to it.
+        if self.watch.frontier() - self.beam > memory {
+            self.begin_here();
+        }
+        let complete = self.watch.roll_to(self.beam - self.leads.response, self.geometry.merge_gap);
+        self.schedule.leave(self.tool() - memory);
+        let farthest = self.watch.frontier() - memory;
+        if farthest.is_ahead_of(self.last_plant) {
+            self.last_plant = farthest;
+        }
+        self.rolled_back_too_far = !had_left && self.schedule.has_left(self.tool());
+        complete
+    }
+
+    /// Forgets everything: none of what was seen is to be relied on, and the tool keeps off it.
+    #[inline(never)]
+    pub fn forget(&mut self) {
+        self.watch.forget();
+        self.schedule.spoil(self.watch.frontier());
+    }
+
+    /// Edges of the beam were lost, and with them what stood there; its level is now `broken`.
+    pub fn lose_edges(&mut self, broken: bool) {
+        self.watch.lose_edges(broken);
+        self.forget();
+    }
+
+    /// Forgets everything, and begins to watch where the beam is.
+    fn begin_here(&mut self) {
+        self.watch = Watch::start(self.beam, self.watch.is_broken());
+        self.last_plant = self.beam;
+        self.forget();
+    }
+
+    /// Takes the operator's word that no plant stands under the tool and ahead of it where the beam has not been.
+    pub fn trust(&mut self) {
+        // A margin behind the tool as well, so that it does not stand on the border of what is known.
+        self.schedule.trust_from(self.tool() - self.geometry.margin);
+    }
+
+    /// Remembers an object as a plant.
+    ///
+    /// # Errors
+    /// [`Full`] when more plants stand between beam and tool than can be remembered.
+    pub fn keep(&mut self, plant: Object) -> Result<(), Full> {
+        self.last_plant = plant.leading;
+        self.schedule.push(plant, self.tool(), self.geometry.margin)
+    }
+
+    /// From the last plant's leading edge, or where watching began, to that of an object; what is remembered, at the most.
+    pub fn spacing(&self, object: &Object) -> Ticks {
+        self.ticks(object.leading - self.last_plant)
+    }
+
+    /// The paper's schedule of an object.
+    pub fn plan(&self, object: &Object) -> Plan {
+        Plan::new(&self.geometry, object.width())
+    }
+
+    /// A length in ticks.
+    pub fn ticks(&self, length: Length) -> Ticks {
+        self.geometry.grain.ticks(length)
+    }
+
+    /// What the odometer shows at a place, if it shows `position` where the beam is.
+    pub fn position_of(&self, place: Place, position: Position) -> Position {
+        position + self.ticks(place - self.beam)
+    }
+
+    /// Whether the beam has been broken over more ground than a canopy covers.
+    pub fn is_blocked(&self) -> bool {
+        let too_wide = |leading| self.watch.frontier() - leading > self.geometry.max_width;
+        self.watch.is_broken() && self.watch.open().is_some_and(too_wide)
+    }
+
+    /// Whether the tool has just come to ground that had to be left behind.
+    pub fn rolled_back_too_far(&self) -> bool {
+        self.rolled_back_too_far
+    }
+
+    /// Whether the tool is on ground that the beam has not seen.
+    pub fn is_unseen(&self) -> bool {
+        self.schedule.known_from().is_ahead_of(self.tool())
+    }
+
+    /// How far the machine has to roll until ground that the beam has seen reaches the tool.
+    pub fn unseen(&self) -> Ticks {
+        self.ticks((self.schedule.known_from() - self.tool()).max(Length::ZERO))
+    }
+
+    /// Windows at the tool or ahead of it, the one still being seen included.
+    pub fn windows(&self) -> u8 {
+        self.schedule.ahead(self.tool(), self.geometry.margin) + u8::from(self.watch.open().is_some())
+    }
+
+    /// Whether closed ground comes up before the tool could be out of the row, or in its place again.
+    pub fn must_be_out(&self, tool_out: bool) -> bool {
+        let (from, to) = self.leads.stretch(tool_out);
+        self.is_closed(from, to) || self.outruns_the_beam(tool_out)
+    }
+
+    /// Whether the tool is at closed ground.
+    pub fn is_closed_at_tool(&self) -> bool {
+        self.is_closed(Length::ZERO, Length::ZERO)
+    }
+
+    /// Whether the machine is so fast that a plant just behind the beam would be reached before the tool is out.
+    pub fn outruns_the_beam(&self, tool_out: bool) -> bool {
+        let out = self.leads.out;
+        // Slowing down by an eighth is what it takes to be trusted again.
+        let lead = if tool_out { out + Length(out.0 / 8) } else { out };
+        (self.tool() + lead) - self.watch.frontier() >= -self.geometry.margin
+    }
+
+    /// Whether any of the ground between two distances from the tool is closed: unknown, or within the margin of a canopy, the
+    /// one that is still being seen included.
+    fn is_closed(&self, one: Length, other: Length) -> bool {
+        let margin = self.geometry.margin;
+        let (near, far) = (self.tool() + one.min(other), self.tool() + one.max(other));
+        self.schedule.is_closed(near, far, margin) || self.watch.open().is_some_and(|leading| far - leading >= -margin)
+    }
+
+    /// The ground that the tool works on.
+    fn tool(&self) -> Place {
+        self.beam - self.geometry.beam_to_tool
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::settings::Setting;
+
+    const SPEED: TicksPerSecond = TicksPerSecond(1000);
+
+    /// Ground that the beam has seen from 0 to 3000, with a canopy from 1000 to 1300, without leads.
+    fn ground() -> (Ground, Settings) {
+        let mut settings = Settings::new();
+        for setting in [Setting::LeadOutMs, Setting::LeadInMs, Setting::BeamResponseMs] {
+            settings.set(setting, 0).expect("within its range");
+        }
+        let mut ground = Ground::default();
+        ground.begin(&settings, Position::new(0), false);
+        ground.lead(&settings, SPEED);
+        ground.edge(Position::new(1000), true);
+        ground.edge(Position::new(1300), false);
+        let canopy = ground.roll_to(Position::new(1400)).expect("the gap has been seen");
+        assert_eq!((ground.spacing(&canopy), canopy.width()), (Ticks(1000), Length(300)));
+        ground.keep(canopy).expect("there is room");
+        (ground, settings)
+    }
+
+    /// The first place from one on where the tool may be in, with the beam at the place and the tool behind it.
+    fn opens(ground: &mut Ground, from: i32) -> i32 {
+        let beam_to_tool = i32::from(ground.geometry.beam_to_tool.0);
+        (from..from + 5000)
+            .find(|&tool| {
+                ground.roll_to(Position::new(tool + beam_to_tool));
+                !ground.is_closed_at_tool()
+            })
+            .expect("somewhere the ground is open")
+    }
+
+    #[test]
+    fn what_is_forgotten_is_closed_up_to_a_margin_ahead_of_the_frontier() {
+        let margin = 95;
+        let (mut known, _) = ground();
+        assert_eq!(opens(&mut known, 1000), 1300 + margin + 1);
+        for frontier in 1400..1420 {
+            let (mut forgetful, _) = ground();
+            forgetful.roll_to(Position::new(frontier));
+            forgetful.forget();
+            assert_eq!(forgetful.windows(), 0, "no plant is known any more");
+            assert_eq!(opens(&mut forgetful, 1000), frontier + margin);
+        }
+    }
+
+    #[test]
+    fn ground_is_seen_anew_after_rolling_back_farther_than_it_is_remembered() {
+        let (mut ground, _) = ground();
+        for position in (-40_000..1400).rev().step_by(100) {
+            assert_eq!(ground.roll_to(Position::new(position)), None);
+            assert!(ground.is_closed_at_tool() || position > -400, "{position}");
+        }
+        let mut seen = 0;
+        for position in -40_000..2000 {
+            if position == 1000 || position == 1300 {
+                ground.edge(Position::new(position), position == 1000);
+            }
+            seen += u8::from(ground.roll_to(Position::new(position)).is_some());
+        }
+        assert_eq!(seen, 1);
+    }
+
+    #[test]
+    fn a_wheel_of_another_grain_begins_anew_and_closes_what_was_seen() {
+        let (mut ground, mut settings) = ground();
+        settings.set(Setting::TicksPerM, 15_000).expect("within its range");
+        ground.follow(&settings, Position::new(1400), SPEED);
+        assert_eq!((ground.windows(), ground.is_unseen()), (0, true));
+        let (beam_to_tool, margin) = (6000, 750);
+        let grain = ground.ticks(Length(1)).0;
+        assert_eq!(grain, 8);
+        let open_from = (1400 + beam_to_tool + margin..20_000).find(|&position| {
+            ground.roll_to(Position::new(position));
+            !ground.is_closed_at_tool()
+        });
+        assert!(
+            open_from.is_some_and(|position| position - 1400 - beam_to_tool - margin <= 3 * grain),
+            "{open_from:?}"
+        );
+    }
+
+    #[test]
+    fn the_spacing_is_no_longer_than_what_is_remembered() {
+        let (mut ground, _) = ground();
+        for position in (1400..200_000).step_by(50) {
+            ground.roll_to(Position::new(position));
+        }
+        ground.edge(Position::new(200_000), true);
+        ground.edge(Position::new(200_300), false);
+        let canopy = ground.roll_to(Position::new(200_400)).expect("the gap has been seen");
+        assert!((14_800..15_280).contains(&ground.spacing(&canopy).0), "{:?}", ground.spacing(&canopy));
+    }
+}

@@ -1,0 +1,127 @@
+//! Where the tool may be in the row: the machine's distances, and the stretch of ground that its servo needs to be open.
+
+use crate::{
+    settings::{Setting, Settings},
+    units::{Grain, Length, Ticks, TicksPerSecond},
+};
+
+/// How far behind the tool ground is remembered, in metres. Ahead of it are 4 m at most: twice the longest X. Together with
+/// the widest canopy that is less than the 13 m that a [`Length`] holds.
+const MEMORY_M: i16 = 8;
+
+/// Distances that follow from the settings, for the present wheel.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Geometry {
+    /// Ticks in a unit of the others.
+    pub grain: Grain,
+    /// X.
+    pub beam_to_tool: Length,
+    /// Ground left alone on both sides of a canopy.
+    pub margin: Length,
+    /// What no canopy is wider than.
+    pub max_width: Length,
+    /// Clear ground behind which a canopy is over.
+    pub merge_gap: Length,
+    /// How far behind the tool ground is remembered.
+    pub memory: Length,
+}
+
+impl Geometry {
+    /// Those of the settings.
+    pub fn of(settings: &Settings) -> Self {
+        let metre = settings.wheel().ticks(1000);
+        let grain = Grain::of(metre);
+        let length = |setting| grain.length(settings.ticks(setting));
+        Self {
+            grain,
+            beam_to_tool: length(Setting::BeamToToolMm),
+            margin: length(Setting::MarginMm),
+            max_width: length(Setting::MaxWidthMm),
+            merge_gap: grain.length(Ticks(settings.get(Setting::MergeGapTicks).into())),
+            memory: Length(grain.length(metre).0 * MEMORY_M),
+        }
+    }
+}
+
+/// Distances rolled at the present speed while something answers; negative when rolling backwards.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Leads {
+    /// While the tool swings out.
+    pub out: Length,
+    /// Before the tool begins to come back: never longer than `out`.
+    pub back: Length,
+    /// While the beam's sensor answers.
+    pub response: Length,
+}
+
+impl Leads {
+    /// Those at a speed, in units of the grain.
+    pub fn at(speed: TicksPerSecond, settings: &Settings, grain: Grain) -> Self {
+        let out_ms = settings.get(Setting::LeadOutMs);
+        let rolled = |milliseconds| grain.length(speed.distance_in_ms(milliseconds));
+        // A lead is longer by what a command takes to the pin in the mean: half a tick, half a turn of the loop, half a pulse.
+        // Without a lead the paper's schedule stands as it is.
+        let lead = |milliseconds: u16| rolled(milliseconds + u16::from(milliseconds > 0));
+        Self {
+            out: lead(out_ms),
+            back: lead(settings.get(Setting::LeadInMs).min(out_ms)),
+            response: rolled(settings.get(Setting::BeamResponseMs)),
+        }
+    }
+
+    /// The stretch of ground, from the tool on, that has to be open for the tool to be in the row when a decision made now
+    /// shows: where it begins and where it ends, in the direction of rolling.
+    ///
+    /// What keeps a tool in the row is a part of what lets it in, so at a steady speed it goes out once for a window and comes
+    /// in once behind it.
+    pub fn stretch(&self, tool_out: bool) -> (Length, Length) {
+        let Self { out, back, .. } = *self;
+        let one = Length(if out < Length::ZERO { -1 } else { 1 });
+        if tool_out {
+            // Coming back pays only if the tool can stay for as long as its stroke takes, the difference of the leads.
+            // That also keeps it out for the window that it left for, should the speed falter. The tick on either side
+            // is for an encoder that trembles on an edge.
+            return (back - one, out + (out - back) + one);
+        }
+        // A window once left stays left while the measured speed wavers by less than a quarter. What lies farther than the
+        // lead out is not asked for yet.
+        let wavering = back + Length(back.0 / 4);
+        let is_farther = if out < Length::ZERO { wavering < out } else { wavering > out };
+        (if is_farther { out } else { wavering }, out)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_keeps_the_tool_in_is_a_part_of_what_lets_it_in() {
+        for out in -300..=300_i16 {
+            for back in 0..=out.abs() {
+                let leads = Leads { out: Length(out), back: Length(back * out.signum()), response: Length::ZERO };
+                let sorted = |(one, other): (Length, Length)| (one.min(other), one.max(other));
+                let (stays_from, stays_to) = sorted(leads.stretch(false));
+                let (enters_from, enters_to) = sorted(leads.stretch(true));
+                assert!(enters_from < stays_from && stays_to < enters_to, "{leads:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn lengths_of_every_wheel_fit_what_is_remembered() {
+        for ticks_per_m in 40..=20_000 {
+            let mut settings = Settings::new();
+            for (setting, value) in
+                [(Setting::TicksPerM, ticks_per_m), (Setting::BeamToToolMm, 2000), (Setting::MaxWidthMm, 1500)]
+            {
+                settings.set(setting, value).expect("within its range");
+            }
+            let Geometry { grain, beam_to_tool, max_width, memory, .. } = Geometry::of(&settings);
+            let farthest = i32::from(memory.0) + 2 * i32::from(beam_to_tool.0) + i32::from(max_width.0);
+            assert!(farthest < i16::MAX.into(), "{ticks_per_m} a metre: {farthest}");
+            let error = grain.ticks(beam_to_tool).0 - 2 * i32::from(ticks_per_m);
+            assert!(error <= 0 && -error < 16, "{ticks_per_m} a metre: {error}");
+        }
+    }
+}
