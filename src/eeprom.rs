@@ -10,28 +10,35 @@ use avr_device::{
 use control::memory::{Memory, SIZE};
 use core::arch::asm;
 
-/// A half of the EEPROM.
-pub struct Half {
-    base: u16,
-}
+/// A half of the EEPROM: the one that begins at address `BASE`.
+pub struct Half<const BASE: u16>(());
 
-/// Both halves: the lower and the upper one.
-pub fn halves(_: EEPROM) -> (Half, Half) {
-    (Half { base: 0 }, Half { base: SIZE as u16 })
-}
+/// The half with the settings.
+pub type Lower = Half<0>;
 
-impl Half {
+/// The half with the examples taught in the field.
+pub type Upper = Half<{ SIZE as u16 }>;
+
+impl<const BASE: u16> Half<BASE> {
+    /// The half.
+    ///
+    /// # Safety
+    /// To be had once for each `BASE`, by the loop alone, before anybody else uses the EEPROM.
+    pub const unsafe fn new() -> Self {
+        Self(())
+    }
+
     fn registers(&self) -> &eeprom::RegisterBlock {
-        // SAFETY: `halves` took the EEPROM, so nobody else has it, and both halves are used by the loop alone.
+        // SAFETY: who made the halves vouches that the loop alone uses the EEPROM.
         unsafe { &*EEPROM::ptr() }
     }
 
     fn choose(&self, address: u16) {
-        self.registers().eear().write(|w| w.set(self.base + address));
+        self.registers().eear().write(|w| w.set(BASE + address));
     }
 }
 
-impl Memory for Half {
+impl<const BASE: u16> Memory for Half<BASE> {
     fn read(&self, address: u16) -> u8 {
         // It is there in 3.4 ms at the most.
         while !self.is_ready() {}

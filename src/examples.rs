@@ -19,8 +19,27 @@ avr_progmem::progmem! {
 }
 
 /// The built-in examples.
-pub fn built_in() -> InFlash {
-    InFlash(BUILT_IN.as_slice())
+pub struct BuiltIn;
+
+impl BuiltIn {
+    fn table() -> InFlash {
+        InFlash(BUILT_IN.as_slice())
+    }
+}
+
+impl Examples<{ features::COUNT }> for BuiltIn {
+    fn len(&self) -> usize {
+        examples::COUNT
+    }
+
+    fn example(&self, index: usize) -> Option<Example<{ features::COUNT }>> {
+        Self::table().example(index)
+    }
+
+    #[inline]
+    fn visit_near(&self, query: &[u8; features::COUNT], reach: u32, visit: &mut impl FnMut(u32, u8) -> u32) -> u32 {
+        Self::table().visit_near(query, reach, visit)
+    }
 }
 
 /// Examples as rows, for a table in flash.

@@ -25,23 +25,21 @@ mod shared;
 mod stack;
 mod watchdog;
 
-use avr_device::{
-    atmega328p::{EEPROM, Peripherals},
-    interrupt,
-};
+use avr_device::{atmega328p::Peripherals, interrupt};
 use control::{
     classifier::Nearest,
     console::LineBuffer,
-    controller::{Controller, Readings, WakeUp},
+    controller::{Asleep, Controller, Readings, WakeUp},
     reply::{self, Answer},
     units::Position,
 };
 use embedded_hal::digital::{InputPin, OutputPin};
 use embedded_hal_nb::serial::Read;
-use static_cell::StaticCell;
+use static_cell::ConstStaticCell;
 
 /// The decisions, with the memories of this machine.
-type Weeder = Controller<Nearest<examples::InFlash, eeprom::Half>, eeprom::Half>;
+type Weeder = Controller<Nearest<examples::BuiltIn, eeprom::Upper>, eeprom::Lower>;
+type WeederAsleep = Asleep<Nearest<examples::BuiltIn, eeprom::Upper>, eeprom::Lower>;
 
 #[avr_device::entry]
 fn main() -> ! {
@@ -72,7 +70,7 @@ fn run(line: &mut LineBuffer) -> ! {
         Readings { now, position: Position::new(position), switch_on, lost, jumps, end_switch_on, stack_free }
     };
     let cause = reset::cause(&peripherals.CPU);
-    let controller = wake_up(peripherals.EEPROM, WakeUp { readings: read(), beam_broken: beam.is_broken(), cause });
+    let controller = wake_up(WakeUp { readings: read(), beam_broken: beam.is_broken(), cause });
     // The settings say which pulse has the tool out, so there is none before they are loaded.
     let mut servo = servo::Servo::new(peripherals.TC1, &peripherals.PORTB, controller.orders().pulse);
 
@@ -117,8 +115,11 @@ fn run(line: &mut LineBuffer) -> ! {
 /// Wakes the decisions up, with what the EEPROM holds. A function of its own, so that the loop's stack does not hold for
 /// ever what only this needs.
 #[inline(never)]
-fn wake_up(eeprom: EEPROM, wake_up: WakeUp) -> &'static mut Weeder {
-    static WEEDER: StaticCell<Weeder> = StaticCell::new();
-    let (for_settings, for_examples) = eeprom::halves(eeprom);
-    WEEDER.init_with(|| Controller::new(Nearest::new(examples::built_in(), for_examples), for_settings, wake_up))
+fn wake_up(wake_up: WakeUp) -> &'static mut Weeder {
+    static WEEDER: ConstStaticCell<WeederAsleep> = ConstStaticCell::new({
+        // SAFETY: these are the only halves, and what holds them is taken once, by the loop.
+        let (settings, examples) = unsafe { (eeprom::Lower::new(), eeprom::Upper::new()) };
+        Asleep::new(Nearest::asleep(examples::BuiltIn, examples), settings)
+    });
+    WEEDER.take().wake_up(wake_up)
 }

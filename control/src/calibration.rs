@@ -29,10 +29,13 @@ pub enum Unfit {
 }
 
 /// The stretch that is being measured.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub struct Distance(Option<Position>);
 
 impl Distance {
+    /// None that has begun.
+    pub const NONE: Self = Self(None);
+
     /// The stretch begins here.
     pub const fn begin(&mut self, position: Position) {
         self.0 = Some(position);
@@ -163,7 +166,7 @@ mod tests {
     use super::*;
 
     fn counted(ticks: i32, length_mm: u16, forced: bool) -> Result<u16, Unfit> {
-        let mut distance = Distance::default();
+        let mut distance = Distance::NONE;
         distance.begin(Position::new(i32::MAX - 100));
         distance.end(Position::new((i32::MAX - 100).wrapping_add(ticks)), length_mm, 1910, forced)
     }
@@ -177,7 +180,7 @@ mod tests {
 
     #[test]
     fn a_stretch_that_cannot_be_right_is_refused_and_can_be_forced() {
-        assert_eq!(Distance::default().end(Position::new(0), 5000, 1910, true), Err(Unfit::NotBegun));
+        assert_eq!(Distance::NONE.end(Position::new(0), 5000, 1910, true), Err(Unfit::NotBegun));
         assert_eq!(counted(1900, 999, false), Err(Unfit::TooShort));
         assert_eq!(counted(24_830, 10_000, false), Ok(2483));
         assert_eq!(counted(24_840, 10_000, false), Err(Unfit::Differs { counted: 2484, nominal: 1910 }));

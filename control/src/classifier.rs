@@ -59,6 +59,9 @@ pub struct Full;
 
 /// Tells plants from weeds, and may be taught.
 pub trait Classifier {
+    /// Looks what was kept over the loss of power; to be called once, before anything else.
+    fn wake_up(&mut self);
+
     /// Classifies an object by its `k` nearest examples.
     fn classify(&self, features: &Features, k: u8) -> Vote;
 
@@ -91,11 +94,22 @@ pub struct Nearest<B, M> {
 impl<B: Examples<{ features::COUNT }>, M: Memory> Nearest<B, M> {
     /// A classifier with the built-in examples and those that the memory holds.
     pub fn new(built_in: B, memory: M) -> Self {
-        Self { built_in, field: FieldExamples::new(memory) }
+        let mut nearest = Self::asleep(built_in, memory);
+        nearest.wake_up();
+        nearest
+    }
+
+    /// A classifier that has not looked at its memory yet.
+    pub const fn asleep(built_in: B, memory: M) -> Self {
+        Self { built_in, field: FieldExamples::asleep(memory) }
     }
 }
 
 impl<B: Examples<{ features::COUNT }>, M: Memory> Classifier for Nearest<B, M> {
+    fn wake_up(&mut self) {
+        self.field.wake_up();
+    }
+
     #[inline(never)]
     fn classify(&self, features: &Features, k: u8) -> Vote {
         let query = examples::scale().quantise(&features.values());

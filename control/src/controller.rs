@@ -41,6 +41,8 @@ const EVENTS: usize = 6;
 
 /// What the machine is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+// HOLD is 0, as the memory is before anybody has woken up.
+#[repr(u8)]
 pub enum State {
     /// The tool stays out, whatever comes.
     Hold,
@@ -158,53 +160,83 @@ pub struct Controller<C, M> {
     plotted_at: Coarse,
 }
 
-impl<C: Classifier, M: Memory> Controller<C, M> {
-    /// A controller for a machine that just woke up: in HOLD, with the tool out, and with no ground known. Where the memory
-    /// holds no settings, or some that cannot be right, that is an alarm.
-    pub fn new(classifier: C, memory: M, wake_up: WakeUp) -> Self {
-        let WakeUp { readings, beam_broken, cause } = wake_up;
-        let Readings { now, position, jumps, .. } = readings;
-        let mut saved = SavedSettings::new(memory);
-        let loaded = saved.load();
-        let fault = match &loaded {
-            None => Some(Alarm::SettingsLost),
-            Some(settings) => settings.contradiction().map(|_| Alarm::SettingsContradict),
-        };
-        let settings = loaded.unwrap_or_default();
-        let mut ground = Ground::default();
-        ground.begin(&settings, position, beam_broken);
-        Self {
+/// A controller before the machine has woken up: nothing but zeros and what it is made of, so that a `static` can hold it
+/// without a copy in flash, and it is woken up where it lies.
+#[derive(Debug)]
+pub struct Asleep<C, M>(Controller<C, M>);
+
+impl<C: Classifier, M: Memory> Asleep<C, M> {
+    /// A controller with a classifier and a memory of which nobody has read anything.
+    pub const fn new(classifier: C, memory: M) -> Self {
+        let (start, place) = (Instant::ZERO, Position::new(0));
+        Self(Controller {
             classifier,
-            ground,
-            limits: Limits::of(&settings),
-            settings,
-            saved,
-            cause,
-            readings,
-            switch: Switch::new(readings.switch_on),
-            end_switch: Switch::new(readings.end_switch_on),
-            encoder: EncoderMonitor::new(now, position, jumps),
-            beam: BeamMonitor::new(now),
-            beam_broken,
+            ground: Ground::NONE,
+            limits: Limits::NONE,
+            settings: Settings::NONE,
+            saved: SavedSettings::new(memory),
+            cause: Cause::PowerOn,
+            readings: Readings { stack_free: 0, ..Readings::new(start, place) },
+            switch: Switch::new(false),
+            end_switch: Switch::new(false),
+            encoder: EncoderMonitor::new(start, place, 0),
+            beam: BeamMonitor::new(start),
+            beam_broken: false,
             bench: Bench::Idle,
-            distance: Distance::default(),
-            meter: SpeedMeter::new(position, now),
-            state: fault.map_or(State::Hold, State::Alarm),
-            tool_out: true,
+            distance: Distance::NONE,
+            meter: SpeedMeter::NONE,
+            state: State::Hold,
+            tool_out: false,
             pulse: 0,
-            told_at: now,
+            told_at: start,
             awaits_ground: false,
             late: 0,
             mistakes: 0,
-            last_seen: position,
+            last_seen: place,
             warned: false,
             objects: Vec::new(),
             events: Vec::new(),
             events_on: false,
             events_missed: 0,
             plot: Plot::Off,
-            plotted_at: now.coarse(),
-        }
+            plotted_at: Coarse::ZERO,
+        })
+    }
+
+    /// Wakes the machine up: in HOLD, with the tool out, and with no ground known. Where the memory holds no settings, or some
+    /// that cannot be right, that is an alarm.
+    pub fn wake_up(&mut self, wake_up: WakeUp) -> &mut Controller<C, M> {
+        let WakeUp { readings, beam_broken, cause } = wake_up;
+        let Readings { now, position, jumps, .. } = readings;
+        let controller = &mut self.0;
+        controller.classifier.wake_up();
+        let loaded = controller.saved.load();
+        let fault = match &loaded {
+            None => Some(Alarm::SettingsLost),
+            Some(settings) => settings.contradiction().map(|_| Alarm::SettingsContradict),
+        };
+        controller.state = fault.map_or(State::Hold, State::Alarm);
+        controller.settings = loaded.unwrap_or_default();
+        controller.follow_settings();
+        controller.ground.begin(&controller.settings, position, beam_broken);
+        (controller.cause, controller.readings, controller.beam_broken) = (cause, readings, beam_broken);
+        controller.switch = Switch::new(readings.switch_on);
+        controller.end_switch = Switch::new(readings.end_switch_on);
+        controller.encoder = EncoderMonitor::new(now, position, jumps);
+        controller.beam = BeamMonitor::new(now);
+        controller.meter = SpeedMeter::new(position, now);
+        (controller.tool_out, controller.told_at) = (true, now);
+        (controller.last_seen, controller.plotted_at) = (position, now.coarse());
+        controller
+    }
+}
+
+impl<C: Classifier, M: Memory> Controller<C, M> {
+    /// A controller for a machine that just woke up, see [`Asleep::wake_up`].
+    pub fn new(classifier: C, memory: M, wake_up: WakeUp) -> Self {
+        let mut asleep = Asleep::new(classifier, memory);
+        asleep.wake_up(wake_up);
+        asleep.0
     }
 
     /// Takes an edge of the beam, with the position at which it came.

@@ -22,7 +22,7 @@ use crate::{
 };
 
 /// What is known of the ground around the machine.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Ground {
     geometry: Geometry,
     leads: Leads,
@@ -37,6 +37,17 @@ pub struct Ground {
 }
 
 impl Ground {
+    /// Ground on which nobody has begun to watch.
+    pub const NONE: Self = Self {
+        geometry: Geometry::NONE,
+        leads: Leads::NONE,
+        beam: Place::new(0),
+        watch: Watch::NONE,
+        schedule: Schedule::NONE,
+        last_plant: Place::new(0),
+        rolled_back_too_far: false,
+    };
+
     /// Ground of which nothing has been seen, with the beam at a position, broken or not.
     #[inline(never)]
     pub fn begin(&mut self, settings: &Settings, position: Position, broken: bool) {
@@ -218,7 +229,7 @@ mod tests {
         for setting in [Setting::LeadOutMs, Setting::LeadInMs, Setting::BeamResponseMs] {
             settings.set(setting, 0).expect("within its range");
         }
-        let mut ground = Ground::default();
+        let mut ground = Ground::NONE;
         ground.begin(&settings, Position::new(0), false);
         ground.lead(&settings, SPEED);
         ground.edge(Position::new(1000), true);

@@ -39,7 +39,7 @@ impl Rehearsal {
             return None;
         }
         // A millimetre stands for a tick here.
-        let leads = Leads::at(TicksPerSecond(self.speed_mm_s.into()), settings, Grain::default());
+        let leads = Leads::at(TicksPerSecond(self.speed_mm_s.into()), settings, Grain::TICK);
         let (Length(from_mm), Length(to_mm)) = leads.stretch(was_out);
         let margin_mm = settings.get(Setting::MarginMm) as i16;
         let (from_mm, to_mm) = (tool_mm as i16 + from_mm - margin_mm, tool_mm as i16 + to_mm + margin_mm);

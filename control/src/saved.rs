@@ -44,7 +44,7 @@ pub struct SavedSettings<M> {
 impl<M: Memory> SavedSettings<M> {
     /// The settings in a memory, which are yet to be loaded.
     pub const fn new(memory: M) -> Self {
-        Self { memory, newest: 1, sequence: 0, image: [0; COPY], left: 0, exists: false }
+        Self { memory, newest: 0, sequence: 0, image: [0; COPY], left: 0, exists: false }
     }
 
     /// Loads the newest copy that is whole; `None` where neither is.

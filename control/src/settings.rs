@@ -175,9 +175,12 @@ pub struct Settings {
 pub struct OutOfRange;
 
 impl Settings {
+    /// No settings: values that are yet to be given.
+    pub const NONE: Self = Self { values: [0; Setting::COUNT as usize] };
+
     /// The defaults.
     pub fn new() -> Self {
-        let mut settings = Self { values: [0; Setting::COUNT as usize] };
+        let mut settings = Self::NONE;
         for (value, setting) in settings.values.iter_mut().zip(Setting::all()) {
             *value = setting.description().default;
         }

@@ -42,10 +42,20 @@ pub struct SpeedMeter {
 }
 
 impl SpeedMeter {
+    /// A meter that nobody has read.
+    pub const NONE: Self = Self {
+        samples: [Sample { place: 0, time: Coarse::ZERO }; SAMPLES as usize],
+        count: 0,
+        next: 0,
+        last: Sample { place: 0, time: Coarse::ZERO },
+        patience: 0,
+        speed: TicksPerSecond(0),
+    };
+
     /// A meter for a machine that stands at `position`.
-    pub fn new(position: Position, now: Instant) -> Self {
+    pub const fn new(position: Position, now: Instant) -> Self {
         let last = Sample { place: position.count() as u16, time: now.coarse() };
-        Self { samples: Default::default(), count: 0, next: 0, last, patience: STANDSTILL, speed: TicksPerSecond(0) }
+        Self { last, patience: STANDSTILL, ..Self::NONE }
     }
 
     /// The speed as of the last reading.

@@ -49,20 +49,23 @@ enum Slot {
 }
 
 impl<M: Memory> FieldExamples<M> {
-    /// Looks through a memory for the examples that it holds.
-    #[inline(never)]
-    pub fn new(memory: M) -> Self {
+    /// The store in a memory that nobody has looked through.
+    pub const fn asleep(memory: M) -> Self {
         let slots = [Slot::Free; CAPACITY as usize];
-        let mut store = Self { memory, slots, spoiled: 0, writing: 0, bytes: [ERASED; SLOT], left: 0 };
+        Self { memory, slots, spoiled: 0, writing: 0, bytes: [0; SLOT], left: 0 }
+    }
+
+    /// Looks through the memory for the examples that it holds.
+    #[inline(never)]
+    pub fn wake_up(&mut self) {
         for number in 0..CAPACITY {
-            let bytes = store.read(number);
+            let bytes = self.read(number);
             if bytes == encode(example_in(bytes)) {
-                store.slots[usize::from(number)] = Slot::Held;
+                self.slots[usize::from(number)] = Slot::Held;
             } else if bytes != [ERASED; SLOT] {
-                store.spoiled += 1;
+                self.spoiled += 1;
             }
         }
-        store
     }
 
     /// Slots that were found spoiled.
@@ -206,7 +209,13 @@ mod tests {
     use std::vec::Vec;
 
     fn store() -> FieldExamples<Volatile> {
-        FieldExamples::new(Volatile::new())
+        wake_up(Volatile::new())
+    }
+
+    fn wake_up(memory: Volatile) -> FieldExamples<Volatile> {
+        let mut store = FieldExamples::asleep(memory);
+        store.wake_up();
+        store
     }
 
     fn example(number: u8) -> Taught {
@@ -214,7 +223,7 @@ mod tests {
     }
 
     fn restart(store: FieldExamples<Volatile>) -> FieldExamples<Volatile> {
-        FieldExamples::new(store.into_memory().with_power())
+        wake_up(store.into_memory().with_power())
     }
 
     #[test]

@@ -136,6 +136,9 @@ pub struct Grain {
 }
 
 impl Grain {
+    /// A tick is a unit.
+    pub const TICK: Self = Self { shift: 0 };
+
     /// Units that a metre has at the most, 0.42 mm each: 13 m are within half of 16 bits.
     pub const FINEST: i32 = 2400;
 
@@ -170,6 +173,9 @@ impl Grain {
 pub struct Instant(u32);
 
 impl Instant {
+    /// The first moment of all.
+    pub const ZERO: Self = Self(0);
+
     /// The moment that the clock's counter stands for.
     pub const fn new(steps: u32) -> Self {
         Self(steps)
@@ -191,6 +197,9 @@ impl Instant {
 pub struct Coarse(u16);
 
 impl Coarse {
+    /// The first moment of all.
+    pub const ZERO: Self = Self(0);
+
     /// Steps in a second.
     pub const STEPS_PER_SECOND: u32 = Interval::STEPS_PER_SECOND >> 4;
 

@@ -16,10 +16,11 @@ use crate::{
 };
 
 /// What is being tried.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
+// Nothing is 0, as the memory is before anybody has woken up.
+#[repr(u8)]
 pub(super) enum Bench {
     /// Nothing.
-    #[default]
     Idle,
     /// The servo has this pulse.
     ByHand(HalfMicros),

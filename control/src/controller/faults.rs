@@ -17,7 +17,7 @@ const END_SWITCH_GRACE_MS: u32 = 100;
 const STACK_RESERVE: u16 = 48;
 
 /// What the machine is not to go beyond, in ticks of the present wheel.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Limits {
     /// In ticks a second.
     top_speed: i32,
@@ -26,6 +26,8 @@ pub(super) struct Limits {
 }
 
 impl Limits {
+    pub(super) const NONE: Self = Self { top_speed: 0, no_plant: Ticks::ZERO };
+
     pub(super) fn of(settings: &Settings) -> Self {
         Self {
             top_speed: settings.ticks(Setting::TopSpeedMmS).0,

@@ -10,7 +10,7 @@ use crate::{
 const MEMORY_M: i16 = 8;
 
 /// Distances that follow from the settings, for the present wheel.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub struct Geometry {
     /// Ticks in a unit of the others.
     pub grain: Grain,
@@ -27,6 +27,16 @@ pub struct Geometry {
 }
 
 impl Geometry {
+    /// No distances.
+    pub const NONE: Self = Self {
+        grain: Grain::TICK,
+        beam_to_tool: Length::ZERO,
+        margin: Length::ZERO,
+        max_width: Length::ZERO,
+        merge_gap: Length::ZERO,
+        memory: Length::ZERO,
+    };
+
     /// Those of the settings.
     pub fn of(settings: &Settings) -> Self {
         let metre = settings.wheel().ticks(1000);
@@ -44,7 +54,7 @@ impl Geometry {
 }
 
 /// Distances rolled at the present speed while something answers; negative when rolling backwards.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub struct Leads {
     /// While the tool swings out.
     pub out: Length,
@@ -55,6 +65,9 @@ pub struct Leads {
 }
 
 impl Leads {
+    /// Those of a machine at rest.
+    pub const NONE: Self = Self { out: Length::ZERO, back: Length::ZERO, response: Length::ZERO };
+
     /// Those at a speed, in units of the grain.
     pub fn at(speed: TicksPerSecond, settings: &Settings, grain: Grain) -> Self {
         let out_ms = settings.get(Setting::LeadOutMs);

@@ -17,10 +17,9 @@ use heapless::Vec;
 pub const CAPACITY: usize = 16;
 
 /// What is known of the ground behind the place from which on it is known.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Behind {
     /// It was never seen.
-    #[default]
     Unseen,
     /// It was seen, and a fault has made it worth nothing.
     Spoiled,
@@ -29,7 +28,7 @@ enum Behind {
 }
 
 /// The canopies known, in the order in which the beam saw them.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Schedule {
     canopies: Vec<Object, CAPACITY>,
     /// Everything behind this place is unknown.
@@ -42,9 +41,12 @@ pub struct Schedule {
 pub struct Full;
 
 impl Schedule {
+    /// A schedule of no ground.
+    pub const NONE: Self = Self::new(Place::new(0));
+
     /// An empty schedule that knows the ground from `known_from` on.
-    pub fn new(known_from: Place) -> Self {
-        Self { known_from, ..Self::default() }
+    pub const fn new(known_from: Place) -> Self {
+        Self { canopies: Vec::new(), known_from, behind: Behind::Unseen }
     }
 
     /// The place from which on the ground is known.

@@ -41,7 +41,7 @@ impl Object {
 }
 
 /// Watches the row through the beam.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Watch {
     frontier: Place,
     /// The beam's level where the machine now is, at or behind the frontier.
@@ -53,6 +53,14 @@ pub struct Watch {
 }
 
 impl Watch {
+    /// A watch that has not begun.
+    pub const NONE: Self = Self {
+        frontier: Place::new(0),
+        broken: false,
+        broken_at_frontier: false,
+        object: Some(Object { leading: Place::new(0), trailing: Place::new(0), cut: false }),
+    };
+
     /// Begins to watch at a place, with the beam broken or not.
     pub fn start(place: Place, broken: bool) -> Self {
         Self { frontier: place, broken, broken_at_frontier: broken, object: Some(Object::cut_at(place)) }
