@@ -34,7 +34,7 @@ words! {
         Calibrate = "calibrate",
         /// Moves the tool by hand.
         Servo = "servo",
-        /// Plays a row that is only thought of.
+        /// Swings the tool as for a row.
         Test = "test",
         /// Goes to work.
         Start = "start",

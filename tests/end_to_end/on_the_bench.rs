@@ -87,7 +87,7 @@ fn a_row_without_sensors_swings_the_servo_for_each_plant() {
     run_for_ms(&mut uno, 12_000);
     let lines: Vec<String> = uno.received().lines().map(str::to_owned).collect();
     let told = |name: &str| lines.iter().filter(|line| line.split_whitespace().next() == Some(name)).count();
-    assert_eq!((told("plant") + told("unknown"), told("alarm")), (6, 0), "{lines:#?}");
+    assert_eq!((told("swing"), told("state"), told("alarm")), (14, 0, 0), "{lines:#?}");
     let commands = Servo::default().commands(&uno.servo_pulses()[before..]);
     // Out at first, into the row, and out and in for each plant; out for good at the end.
     assert_eq!(commands.len(), 1 + 1 + 2 * 6 + 1, "{commands:?}");
