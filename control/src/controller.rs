@@ -316,10 +316,10 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     fn judge(&mut self, object: Object) {
         let position = self.readings.position;
         (self.last_seen, self.warned) = (position, false);
-        let wheel = self.settings.wheel();
         let spacing = self.ground.spacing(&object);
         let speed_class_mm_s = features::speed_class(self.speed_mm_s());
-        let (spacing_mm, width_mm) = (wheel.millimetres(spacing), wheel.millimetres(self.ground.ticks(object.width())));
+        let (spacing_mm, width_mm) =
+            (self.ground.millimetres(spacing), self.ground.millimetres(self.ground.ticks(object.width())));
         let features = Features::describe(speed_class_mm_s, spacing_mm, width_mm);
         // What is left of an object whose beginning was not seen may be as narrow as a weed.
         let vote = if object.cut {

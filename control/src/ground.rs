@@ -147,6 +147,11 @@ impl Ground {
         Plan::new(&self.geometry, object.width())
     }
 
+    /// A distance in millimetres.
+    pub fn millimetres(&self, distance: Ticks) -> i16 {
+        self.geometry.wheel.millimetres(distance)
+    }
+
     /// A length in ticks.
     pub fn ticks(&self, length: Length) -> Ticks {
         self.geometry.grain.ticks(length)

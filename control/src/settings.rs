@@ -223,11 +223,15 @@ impl Settings {
 
     /// The ground wheel with its encoder.
     pub fn wheel(&self) -> Wheel {
-        Wheel {
-            ticks_per_rev: self.get(Setting::TicksPerRev),
-            diameter_mm: self.get(Setting::WheelMm),
-            ticks_per_m: self.get(Setting::TicksPerM),
+        match self.get(Setting::TicksPerM) {
+            0 => self.nominal_wheel(),
+            ticks_per_m => Wheel::measured(ticks_per_m),
         }
+    }
+
+    /// The ground wheel as its diameter and its encoder give it, whatever was measured.
+    pub fn nominal_wheel(&self) -> Wheel {
+        Wheel::of_diameter(self.get(Setting::TicksPerRev), self.get(Setting::WheelMm))
     }
 
     /// A setting in millimetres as ticks of the present wheel.

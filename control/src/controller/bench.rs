@@ -12,7 +12,6 @@ use crate::{
     rehearsal::Rehearsal,
     servo::{self, HalfMicros},
     settings::Setting,
-    units::Wheel,
 };
 
 /// What is being tried.
@@ -90,7 +89,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// # Errors
     /// [`Refusal::Unfit`], [`Refusal::NotInHold`], [`Refusal::OutOfRange`] and [`Refusal::Contradiction`]; nothing is changed then.
     pub fn calibrate(&mut self, distance_mm: u16, force: bool) -> Result<(), Refusal> {
-        let nominal = Wheel { ticks_per_m: 0, ..self.settings.wheel() }.ticks(1000).0 as u16;
+        let nominal = self.settings.nominal_wheel().ticks(1000).0 as u16;
         let ended = self.distance.end(self.readings.position, distance_mm, nominal, force);
         self.set(Setting::TicksPerM, ended.map_err(Refusal::Unfit)?)
     }

@@ -29,9 +29,10 @@ impl Limits {
     pub(super) const NONE: Self = Self { top_speed: 0, no_plant: Ticks::ZERO };
 
     pub(super) fn of(settings: &Settings) -> Self {
+        let wheel = settings.wheel();
         Self {
-            top_speed: settings.ticks(Setting::TopSpeedMmS).0,
-            no_plant: Ticks(settings.wheel().ticks(1000).0 * i32::from(settings.get(Setting::NoPlantM))),
+            top_speed: wheel.ticks(settings.get(Setting::TopSpeedMmS)).0,
+            no_plant: Ticks(wheel.ticks(1000).0 * i32::from(settings.get(Setting::NoPlantM))),
         }
     }
 }

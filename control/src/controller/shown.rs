@@ -53,7 +53,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// The machine's speed in millimetres a second, negative backwards.
     pub fn speed_mm_s(&self) -> i16 {
-        self.settings.wheel().millimetres(Ticks(self.meter.speed().0))
+        self.ground.millimetres(Ticks(self.meter.speed().0))
     }
 
     /// Windows at the tool or ahead of it, the one still being seen included.
@@ -63,7 +63,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// How far the machine has to roll until ground that the beam has seen reaches the tool, in millimetres.
     pub fn unseen_mm(&self) -> i16 {
-        self.settings.wheel().millimetres(self.ground.unseen())
+        self.ground.millimetres(self.ground.unseen())
     }
 
     /// Whether the beam is broken.

@@ -2,7 +2,7 @@
 
 use crate::{
     settings::{Setting, Settings},
-    units::{Grain, Length, Ticks, TicksPerSecond},
+    units::{Grain, Length, Ticks, TicksPerSecond, Wheel},
 };
 
 /// How far behind the tool ground is remembered, in metres. Ahead of it are 4 m at most: twice the longest X. Together with
@@ -12,6 +12,8 @@ const MEMORY_M: i16 = 8;
 /// Distances that follow from the settings, for the present wheel.
 #[derive(Clone, Copy, Debug)]
 pub struct Geometry {
+    /// The wheel by which the others are measured.
+    pub wheel: Wheel,
     /// Ticks in a unit of the others.
     pub grain: Grain,
     /// X.
@@ -29,6 +31,7 @@ pub struct Geometry {
 impl Geometry {
     /// No distances.
     pub const NONE: Self = Self {
+        wheel: Wheel::NONE,
         grain: Grain::TICK,
         beam_to_tool: Length::ZERO,
         margin: Length::ZERO,
@@ -39,10 +42,12 @@ impl Geometry {
 
     /// Those of the settings.
     pub fn of(settings: &Settings) -> Self {
-        let metre = settings.wheel().ticks(1000);
+        let wheel = settings.wheel();
+        let metre = wheel.ticks(1000);
         let grain = Grain::of(metre);
-        let length = |setting| grain.length(settings.ticks(setting));
+        let length = |setting| grain.length(wheel.ticks(settings.get(setting)));
         Self {
+            wheel,
             grain,
             beam_to_tool: length(Setting::BeamToToolMm),
             margin: length(Setting::MarginMm),
