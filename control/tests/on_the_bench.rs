@@ -85,7 +85,7 @@ fn a_distance_that_was_rolled_sets_the_wheel() {
     machine.set(Setting::WheelMm, 410).unwrap();
     stand(&mut machine, 0, 1, 0);
     assert_eq!(machine.calibrate(5000, false), Err(Refusal::Unfit(Unfit::NotBegun)));
-    machine.calibrate_start();
+    machine.calibrate_start().unwrap();
     stand(&mut machine, 1, 1, 18_500);
     assert_eq!(machine.calibrate(999, false), Err(Refusal::Unfit(Unfit::TooShort)));
     assert!(matches!(machine.calibrate(5000, false), Err(Refusal::Unfit(Unfit::Differs { counted: 3700, .. }))));

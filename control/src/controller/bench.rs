@@ -95,8 +95,13 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     }
 
     /// Begins to measure a distance, from where the machine stands.
-    pub fn calibrate_start(&mut self) {
+    ///
+    /// # Errors
+    /// [`Refusal::NotInHold`] and [`Refusal::AlarmLatched`].
+    pub fn calibrate_start(&mut self) -> Result<(), Refusal> {
+        self.expect_hold()?;
         self.distance.begin(self.readings.position);
+        Ok(())
     }
 
     /// Sets the wheel's ticks a metre by a distance that was rolled since [`calibrate_start`](Self::calibrate_start).
