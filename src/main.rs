@@ -30,16 +30,20 @@ use control::{
     classifier::Nearest,
     console::LineBuffer,
     controller::{Asleep, Controller, Readings, WakeUp},
-    reply::{self, Answer},
+    reply::Console,
     units::Position,
 };
 use embedded_hal::digital::{InputPin, OutputPin};
 use embedded_hal_nb::serial::Read;
 use static_cell::ConstStaticCell;
+use ufmt::uWrite;
 
 /// The decisions, with the memories of this machine.
 type Weeder = Controller<Nearest<examples::BuiltIn, eeprom::Upper>, eeprom::Lower>;
 type WeederAsleep = Asleep<Nearest<examples::BuiltIn, eeprom::Upper>, eeprom::Lower>;
+
+/// Bytes that a turn of the loop reads or writes at most: twice what the line carries meanwhile.
+const CONSOLE_BYTES: u8 = 8;
 
 #[avr_device::entry]
 fn main() -> ! {
@@ -49,7 +53,7 @@ fn main() -> ! {
 
 /// Sets everything up, and turns the loop.
 #[inline(never)]
-fn run(line: &mut LineBuffer) -> ! {
+fn run(typed: &mut LineBuffer) -> ! {
     // SAFETY: the entry point is the first code to run and runs once, as this does, so nobody else holds the peripherals.
     let peripherals = unsafe { Peripherals::steal() };
     let board::Pins { mut lamp, mut work_switch, mut end_switch } = board::pins(&peripherals.PORTB, &peripherals.PORTD);
@@ -70,11 +74,12 @@ fn run(line: &mut LineBuffer) -> ! {
         Readings { now, position: Position::new(position), switch_on, lost, jumps, end_switch_on, stack_free }
     };
     let cause = reset::cause(&peripherals.CPU);
+    static CONSOLE: ConstStaticCell<Console> = ConstStaticCell::new(Console::new());
+    let console = CONSOLE.take();
     let controller = wake_up(WakeUp { readings: read(), beam_broken: beam.is_broken(), cause });
     // The settings say which pulse has the tool out, so there is none before they are loaded.
     let mut servo = servo::Servo::new(peripherals.TC1, &peripherals.PORTB, controller.orders().pulse);
 
-    let mut answer = Answer::Greeting;
     loop {
         watchdog::feed();
         // The readings come first: an edge that is still in the queue is then never farther than the next readings.
@@ -91,22 +96,23 @@ fn run(line: &mut LineBuffer) -> ! {
         servo.command(orders.pulse, orders.gap_ms);
         let Ok(()) = lamp.set_state(controller.lamp_is_lit().into());
 
-        // A line is carried out only when the one before it has been answered in full; until then the bytes wait.
-        while answer.is_done()
-            && let Ok(byte) = serial.read()
-        {
-            if let Some(command) = line.take(byte) {
-                answer = reply::answer(command, controller);
-            }
-        }
-        // An answer waits for what its command wrote to the EEPROM: `ok` means that it is there.
-        if controller.carry_on() && serial.room() >= reply::LINE {
-            if !answer.is_done() {
-                let Ok(()) = answer.write_line(controller, &mut serial);
-            } else if let Some(event) = controller.next_event() {
-                let Ok(()) = reply::write_event(&event, &mut serial);
-            } else if let Some(plot) = controller.next_plot() {
-                let Ok(()) = reply::write_plot(controller, plot, &mut serial);
+        // A turn has little time for the console: some bytes, or one thing that takes longer than a byte does.
+        for _ in 0..CONSOLE_BYTES {
+            if serial.room() > 0
+                && let Some(byte) = console.next_byte()
+            {
+                // There is room, as was just seen.
+                let _ = serial.write_char(byte.into());
+            } else if console.listens()
+                && let Ok(byte) = serial.read()
+            {
+                if let Some(said) = typed.take(byte) {
+                    console.take(said);
+                    break;
+                }
+            } else {
+                console.carry_on(controller);
+                break;
             }
         }
     }

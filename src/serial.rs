@@ -7,7 +7,7 @@
 
 use crate::{ring::Ring, shared::Byte};
 use avr_device::atmega328p::{USART0, usart0};
-use control::{console::GAP_MARK, reply};
+use control::console::GAP_MARK;
 use core::convert::Infallible;
 use embedded_hal_nb::serial::{ErrorType, Read, Write};
 
@@ -19,10 +19,10 @@ static RECEIVED: Ring<RECEIVED_SLOTS> = Ring::new();
 static RECEIVED_BYTES: [Byte; RECEIVED_SLOTS] = [const { Byte::new(0) }; RECEIVED_SLOTS];
 const RECEIVED_SLOTS: usize = 64;
 
-/// Bytes to be sent: the longest line.
+/// Bytes to be sent: 2.8 ms of a full line, in which the loop turns some times.
 static TO_SEND: Ring<TO_SEND_SLOTS> = Ring::new();
 static TO_SEND_BYTES: [Byte; TO_SEND_SLOTS] = [const { Byte::new(0) }; TO_SEND_SLOTS];
-const TO_SEND_SLOTS: usize = reply::LINE.next_power_of_two();
+const TO_SEND_SLOTS: usize = 32;
 
 /// The serial line, as the loop sees it.
 pub struct Serial {
@@ -40,8 +40,8 @@ impl Serial {
     }
 
     /// Bytes that can be written now.
-    pub fn room(&self) -> usize {
-        TO_SEND.room().into()
+    pub fn room(&self) -> u8 {
+        TO_SEND.room()
     }
 }
 
@@ -70,21 +70,17 @@ impl Write for Serial {
     }
 }
 
-/// Text for a line whose room was asked for; what does not fit is dropped rather than waited for.
+/// Text, a character at a time: one for which there is no room is refused, as nothing here waits.
 impl ufmt::uWrite for Serial {
-    type Error = Infallible;
+    type Error = nb::Error<Infallible>;
 
-    fn write_char(&mut self, character: char) -> Result<(), Infallible> {
-        // The console speaks ASCII.
-        let _ = self.write(character as u8);
-        Ok(())
+    fn write_str(&mut self, text: &str) -> Result<(), Self::Error> {
+        text.bytes().try_for_each(|byte| self.write(byte))
     }
 
-    fn write_str(&mut self, text: &str) -> Result<(), Infallible> {
-        for byte in text.bytes() {
-            let _ = self.write(byte);
-        }
-        Ok(())
+    fn write_char(&mut self, character: char) -> Result<(), Self::Error> {
+        // The console speaks ASCII.
+        self.write(character as u8)
     }
 }
 

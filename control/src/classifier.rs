@@ -65,6 +65,11 @@ pub trait Classifier {
     /// Classifies an object by its `k` nearest examples.
     fn classify(&self, features: &Features, k: u8) -> Vote;
 
+    /// What the built-in examples alone take an object for. Where there are none, nothing is known.
+    fn built_in_class(&self, _features: &Features) -> Class {
+        Class::Unknown
+    }
+
     /// Adds an object as an example of the class `label`, to be kept over a loss of power.
     ///
     /// # Errors
@@ -103,17 +108,12 @@ impl<B: Examples<{ features::COUNT }>, M: Memory> Nearest<B, M> {
     pub const fn asleep(built_in: B, memory: M) -> Self {
         Self { built_in, field: FieldExamples::asleep(memory) }
     }
-}
 
-impl<B: Examples<{ features::COUNT }>, M: Memory> Classifier for Nearest<B, M> {
-    fn wake_up(&mut self) {
-        self.field.wake_up();
-    }
-
+    /// Asks the `k` nearest of the built-in examples and, `with_field`, of those from the field.
     #[inline(never)]
-    fn classify(&self, features: &Features, k: u8) -> Vote {
+    fn vote(&self, features: &Features, k: u8, with_field: bool) -> Vote {
         let query = examples::scale().quantise(&features.values());
-        let all = (&self.built_in, &self.field);
+        let all = (&self.built_in, FromField { examples: &self.field, vote: with_field });
         let answer = knn::classify::<{ features::COUNT }, { label::COUNT }>(&all, &query, k, examples::RADIUS);
         let Ok(Answer { label, votes, kind, .. }) = answer else {
             return Vote { class: Class::Unknown, votes: 0 };
@@ -125,6 +125,37 @@ impl<B: Examples<{ features::COUNT }>, M: Memory> Classifier for Nearest<B, M> {
         };
         let votes = votes.get(usize::from(label)).copied().unwrap_or(0);
         Vote { class, votes: votes as u8 }
+    }
+}
+
+/// The examples from the field, which may have no vote.
+struct FromField<'a, M> {
+    examples: &'a FieldExamples<M>,
+    vote: bool,
+}
+
+impl<M: Memory> Examples<{ features::COUNT }> for FromField<'_, M> {
+    fn len(&self) -> usize {
+        if self.vote { self.examples.len() } else { 0 }
+    }
+
+    fn example(&self, index: usize) -> Option<Example<{ features::COUNT }>> {
+        self.examples.example(index).filter(|_| self.vote)
+    }
+
+    fn visit_near(&self, query: &[u8; features::COUNT], reach: u32, visit: &mut impl FnMut(u32, u8) -> u32) -> u32 {
+        if self.vote { self.examples.visit_near(query, reach, visit) } else { reach }
+    }
+}
+
+impl<B: Examples<{ features::COUNT }>, M: Memory> Classifier for Nearest<B, M> {
+    fn classify(&self, features: &Features, k: u8) -> Vote {
+        self.vote(features, k, true)
+    }
+
+    fn built_in_class(&self, features: &Features) -> Class {
+        // As many vote as when they were trained, whatever the settings say for all together.
+        self.vote(features, examples::K, false).class
     }
 
     fn teach(&mut self, features: &Features, label: u8) -> Result<(), Full> {

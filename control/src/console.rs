@@ -115,8 +115,13 @@ pub enum Command {
     Events(bool),
     /// `plot on|off|teleplot`.
     Plot(Plot),
-    /// `label plant|weed`, with the [`label`].
-    Label(u8),
+    /// `label plant|weed`, or `label plant|weed force`.
+    Label {
+        /// The [`label`].
+        label: u8,
+        /// Whatever the built-in examples say.
+        force: bool,
+    },
     /// `examples`.
     Examples,
     /// `forget N`.
@@ -178,7 +183,7 @@ words! {
         Start = "start",
         /// Of `calibrate`.
         Servo = "servo",
-        /// Of `calibrate`.
+        /// Of `calibrate` and `label`.
         Force = "force",
         /// Of `servo`.
         In = "in",
@@ -209,7 +214,7 @@ pub fn parse(line: &[u8]) -> Result<Command, Mistake> {
     // Few commands take two words, and `set` nothing less.
     let fits = match word {
         Word::Set => !second.is_empty(),
-        Word::Calibrate | Word::Test => true,
+        Word::Calibrate | Word::Test | Word::Label => true,
         _ => second.is_empty(),
     };
     if !fits || !rest.iter().all(is_blank) {
@@ -240,6 +245,11 @@ pub fn parse(line: &[u8]) -> Result<Command, Mistake> {
             _ => value(setting, second).map(|value| Command::Set(setting, value)).ok_or(Mistake::Value(setting)),
         };
     }
+    // What is refused because it looks wrong can be insisted on.
+    let force = Argument::find(second) == Some(Argument::Force);
+    if !second.is_empty() && !force && word != Word::Test {
+        return usage;
+    }
     let command = match (word, Argument::find(first), number(first)) {
         (Word::Start, Some(Argument::Now), _) => Command::Start { now: true },
         (Word::Events, Some(Argument::On), _) => Command::Events(true),
@@ -247,22 +257,16 @@ pub fn parse(line: &[u8]) -> Result<Command, Mistake> {
         (Word::Plot, Some(Argument::On), _) => Command::Plot(Plot::Arduino),
         (Word::Plot, Some(Argument::Off), _) => Command::Plot(Plot::Off),
         (Word::Plot, Some(Argument::Teleplot), _) => Command::Plot(Plot::Teleplot),
-        (Word::Label, Some(Argument::Plant), _) => Command::Label(label::PLANT),
-        (Word::Label, Some(Argument::Weed), _) => Command::Label(label::WEED),
+        (Word::Label, Some(Argument::Plant), _) => Command::Label { label: label::PLANT, force },
+        (Word::Label, Some(Argument::Weed), _) => Command::Label { label: label::WEED, force },
         (Word::Forget, Some(Argument::All), _) => Command::ForgetAll,
         (Word::Forget, _, Some(number @ 0..=255)) => Command::Forget(number as u8),
         (Word::Servo, Some(Argument::In), _) => Command::ServoIn,
         (Word::Servo, Some(Argument::Out), _) => Command::ServoOut,
         (Word::Servo, _, Some(pulse_us)) => Command::Servo(pulse_us),
-        (Word::Calibrate, _, Some(distance_mm)) => {
-            let force = Argument::find(second) == Some(Argument::Force);
-            if !force && !second.is_empty() {
-                return usage;
-            }
-            Command::Calibrate { distance_mm, force }
-        }
-        (Word::Calibrate, Some(Argument::Start), _) if second.is_empty() => Command::CalibrateStart,
-        (Word::Calibrate, Some(Argument::Servo), _) if second.is_empty() => Command::CalibrateServo,
+        (Word::Calibrate, _, Some(distance_mm)) => Command::Calibrate { distance_mm, force },
+        (Word::Calibrate, Some(Argument::Start), _) if !force => Command::CalibrateStart,
+        (Word::Calibrate, Some(Argument::Servo), _) if !force => Command::CalibrateServo,
         (Word::Test, Some(Argument::Row), _) if second.is_empty() => Command::TestRow { speed_mm_s: TEST_SPEED_MM_S },
         (Word::Test, Some(Argument::Row), _) => match number(second) {
             Some(speed_mm_s) => Command::TestRow { speed_mm_s },
@@ -306,7 +310,7 @@ fn number(digits: &[u8]) -> Option<u16> {
 /// Collects bytes to lines.
 #[derive(Clone, Debug, Default)]
 pub struct LineBuffer {
-    characters: Vec<u8, LINE_LENGTH>,
+    characters: Vec<u8, LINE_LENGTH, u8>,
     mistake: Option<Mistake>,
 }
 
@@ -395,8 +399,9 @@ mod tests {
             (b"clear", Command::Clear),
             (b"events on", Command::Events(true)),
             (b"events off", Command::Events(false)),
-            (b"label plant", Command::Label(label::PLANT)),
-            (b"label weed", Command::Label(label::WEED)),
+            (b"label plant", Command::Label { label: label::PLANT, force: false }),
+            (b"label weed", Command::Label { label: label::WEED, force: false }),
+            (b"label weed force", Command::Label { label: label::WEED, force: true }),
             (b"examples", Command::Examples),
             (b"forget 31", Command::Forget(31)),
             (b"forget all", Command::ForgetAll),
@@ -428,6 +433,9 @@ mod tests {
             (b"events maybe", Mistake::Usage(Word::Events)),
             (b"calibrate", Mistake::Usage(Word::Calibrate)),
             (b"calibrate me", Mistake::Usage(Word::Calibrate)),
+            (b"calibrate start force", Mistake::Usage(Word::Calibrate)),
+            (b"calibrate servo force", Mistake::Usage(Word::Calibrate)),
+            (b"test row force", Mistake::Usage(Word::Test)),
             (b"calibrate 10000 faster", Mistake::Usage(Word::Calibrate)),
             (b"calibrate start now", Mistake::Usage(Word::Calibrate)),
             (b"calibrate 70000", Mistake::Usage(Word::Calibrate)),
@@ -440,6 +448,9 @@ mod tests {
             (b"plot", Mistake::Usage(Word::Plot)),
             (b"plot start", Mistake::Usage(Word::Plot)),
             (b"label tree", Mistake::Usage(Word::Label)),
+            (b"label weed now", Mistake::Usage(Word::Label)),
+            (b"label weed force now", Mistake::Usage(Word::Label)),
+            (b"label force", Mistake::Usage(Word::Label)),
             (b"forget", Mistake::Usage(Word::Forget)),
             (b"forget 256", Mistake::Usage(Word::Forget)),
         ] {

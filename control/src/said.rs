@@ -1,6 +1,6 @@
 //! Everything that the machine says, but for its settings and the words that it also reads, which stand where they belong.
 //!
-//! A `#` in a text stands for a number.
+//! A `#` in a text stands for a number of its line.
 
 use crate::{
     alarm::{Alarm, Warning},
@@ -52,13 +52,12 @@ said! {
     TOOL_OUT = ", tool out; help lists the commands";
     DASH = " - ";
     BLANK = " ";
-    COMMA = ",";
+    NUMBER = "#";
     IS = "=";
     DEFAULT = ", default ";
     SAVED = ", saved ";
     NOT_SAVED = ", not saved";
-    FROM = " from ";
-    TO = " to ";
+    RANGE = " from # to #";
     ON_OR_OFF = " on or off";
     TAKES = " takes";
     TAKES_A_NUMBER = " takes a whole number";
@@ -71,27 +70,31 @@ said! {
     WARNING_IS = " warning=";
     OBJECT = " pos=# votes=# spacing=# delay=# hold=# actuation=#";
     SWING = "swing tool=";
-    POS = " pos=";
+    POS = " pos=#";
     STATE_EVENT = "state is=";
     WARNING = "warning name=";
     CALIBRATED = "calibrated lead_out_ms=# lead_in_ms=#";
     SET = " set=yes";
     NOT_SET = " set=no";
     CALIBRATED_BY_EYE = "calibrated by=eye, set lead_out_ms and lead_in_ms to what you saw";
-    NOT_CALIBRATED = "calibrated by=nobody, the end switch did not follow";
+    NOT_CALIBRATED = "calibrated by=none, the end switch did not follow";
     ALARM = "alarm name=";
-    CODE = " code=";
+    CODE = " code=#";
     SERIAL_PLOTTER = "speed_mm_s:#,tool_deg:#,beam_broken:#,windows:#";
     TELEPLOT = ">speed_mm_s:#\r\n>tool_deg:#\r\n>beam_broken:#\r\n>windows:#";
     FIELD = "field";
     BUILT_IN = "built_in";
-    SPOILED = "spoiled=";
+    EXAMPLE = " # ";
+    FEATURES = " # # # # #";
+    SPOILED = "spoiled=#";
+    DUMPED = "#,#,#,#,#,";
+    VOTES = ",#,";
     DUMP = "speed_mm_s,spacing_mm,delay_mm,hold_mm,actuation_mm,answer,votes,label";
     WORK = "work";
     UNKNOWN = "unknown";
     IN_ALARM = "alarm";
-    TOO_LONG = "the line is longer than 80 characters, send a shorter one";
-    NOT_TEXT = "the line is not plain text, send letters, digits and blanks only";
+    TOO_LONG = "send 80 characters at most";
+    NOT_TEXT = "send letters, digits and blanks only";
     CHARACTERS_LOST = "characters of this line were lost, send it again";
     UNKNOWN_COMMAND = "no such command, help lists them all";
     UNKNOWN_SETTING = "no such setting, get lists them all";
@@ -99,16 +102,15 @@ said! {
     HOLD_TO_SET = " changes where the tool is, hold first";
     HOLD_FIRST = "the machine is at work, hold first";
     PULSES_EQUAL = "servo_in_us and servo_out_us would be equal, and the tool would not move";
-    BEAM_TOO_NEAR = "margin, leads and top speed would need beam_to_tool_mm ";
-    BEAM_FARTHER = " or more, change one of them first";
+    BEAM_TOO_NEAR = "margin, leads and top speed would need beam_to_tool_mm # or more, change one of them first";
     NOTHING_TO_LABEL = "there is no object without a label, let the beam see one first";
     NOTHING_SAVED = "no settings are saved, save does it";
     NOT_BEGUN = "calibrate start first, then roll";
     TOO_SHORT = "roll 1000 mm at least, 10000 are better";
-    WHEEL_DIFFERS = "that would be ticks_per_m ";
-    WHEEL_HAS = ", the wheel has ";
+    WHEEL_DIFFERS = "that would be ticks_per_m #, the wheel has #";
+    TAKEN_FOR = "the built-in examples say ";
     LOOK_AGAIN = ", look again, or add force";
-    TEST_SPEED = "test row takes a speed in mm/s from 100 to ";
+    TEST_SPEED = "test row takes a speed in mm/s from 100 to #";
     EXAMPLES_FULL = "all 32 places are taken, forget one first";
     NO_SUCH_EXAMPLE = "no field example has this number, examples lists them";
     ALARM_LATCHED = "an alarm is latched, see status, then clear it";
@@ -174,7 +176,7 @@ commands! {
         "tell of plants, swings and alarms as they come";
     Plot "plot on|off|teleplot",
         "curves for the Arduino Serial Plotter, or Teleplot";
-    Label "label plant|weed",
+    Label "label plant|weed [force]",
         "say what the last object was, and teach it";
     Examples "examples",
         "all examples, with source and class";

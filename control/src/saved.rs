@@ -195,7 +195,7 @@ mod tests {
     #[test]
     fn a_spoiled_copy_gives_way_to_the_other() {
         let memory = save(save(Volatile::new(), &with_k(5)), &with_k(7));
-        for (copy, left) in [(0, 7), (1, 5)] {
+        for (copy, left) in [(1, 7), (0, 5)] {
             for place in 0..COPY {
                 for bit in 0..8 {
                     let mut spoiled = memory.clone();

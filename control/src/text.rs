@@ -26,11 +26,18 @@ const FRAGMENTS: &[&str] = &[
 /// The first byte that stands for a fragment.
 const FIRST_FRAGMENT: u8 = 0x80;
 
-/// Second halves of fragments that wait while the first ones are unpacked, at most; a power of two, for short arithmetic.
-const WAITING: usize = 8;
+/// Characters and second halves of fragments that wait while others are unpacked, at most; a power of two, for short arithmetic.
+const WAITING: usize = 16;
+
+/// Of these, the longest number may have so many.
+const DIGITS: usize = "-2147483648".len();
 
 /// Texts from one entry of the index to the next; from there on, a text is found by the lengths of those before it.
 const STRIDE: u8 = 16;
+
+/// The bits of a text's header that tell its packed length. The others are its [`mark`], by which most of the words that are not
+/// the one looked for are passed over without being unpacked.
+const LENGTH: u8 = 0x3F;
 
 /// Where the index begins in the table, behind the fragments, and where the texts do.
 const INDEX: usize = 2 * FRAGMENTS.len();
@@ -51,6 +58,9 @@ fn byte(place: usize) -> u8 {
 pub struct Text(u8);
 
 impl Text {
+    /// The table's first.
+    pub(crate) const FIRST: Self = Self(0);
+
     /// The first text of a group.
     pub(crate) const fn first_of(group: &[&str]) -> Self {
         let (mut first, mut place) = (0, 0);
@@ -67,23 +77,44 @@ impl Text {
     }
 
     /// The characters, ASCII.
-    #[inline(never)]
     pub fn bytes(self) -> Characters {
+        let mut characters = Characters::NONE;
+        characters.begin(self);
+        characters
+    }
+
+    /// Which of `count` texts from this one on reads as `word`; `count` where none does.
+    #[inline(never)]
+    pub(crate) fn find(self, count: u8, word: &[u8]) -> u8 {
+        if word.is_empty() {
+            return count;
+        }
+        let mark = mark(word);
+        let mut start = self.start();
+        let mut characters = Characters::NONE;
+        for place in 0..count {
+            let header = byte(start);
+            if header & !LENGTH == mark {
+                characters.begin_at(start);
+                if word.iter().all(|&character| characters.next() == Some(character)) && characters.next().is_none() {
+                    return place;
+                }
+            }
+            // The texts lie one behind the other.
+            start += 1 + usize::from(header & LENGTH);
+        }
+        count
+    }
+
+    /// Where it begins in the table.
+    #[inline(never)]
+    fn start(self) -> usize {
         let entry = INDEX + 2 * usize::from(self.0 / STRIDE);
         let mut start = usize::from(u16::from_le_bytes([byte(entry), byte(entry + 1)]));
         for _ in 0..self.0 % STRIDE {
-            start += 1 + usize::from(byte(start));
+            start += 1 + usize::from(byte(start) & LENGTH);
         }
-        Characters { next: start + 1, left: byte(start), waiting: [0; WAITING], halves: 0 }
-    }
-
-    /// Which of `count` texts from this one on reads as `word`.
-    #[inline(never)]
-    pub(crate) fn find(self, count: u8, word: &[u8]) -> Option<u8> {
-        (0..count).find(|&place| {
-            let mut characters = self.plus(place).bytes();
-            word.iter().all(|&character| characters.next() == Some(character)) && characters.next().is_none()
-        })
+        start
     }
 }
 
@@ -93,9 +124,55 @@ pub struct Characters {
     /// Where the next byte lies, and how many there are.
     next: usize,
     left: u8,
-    /// Second halves of fragments, the last one first, and how many of them wait.
+    /// What waits, the last one first: digits, and second halves of fragments; and how many they are.
     waiting: [u8; WAITING],
     halves: u8,
+}
+
+impl Characters {
+    /// None at all.
+    pub(crate) const NONE: Self = Self { next: 0, left: 0, waiting: [0; WAITING], halves: 0 };
+
+    /// Begins a text; what is left of another is dropped.
+    pub(crate) fn begin(&mut self, text: Text) {
+        self.begin_at(text.start());
+    }
+
+    /// Inserts a number before what is left of the text.
+    #[inline(never)]
+    pub(crate) fn insert(&mut self, number: i32) {
+        let mut rest = number.unsigned_abs();
+        loop {
+            let tenth = tenth(rest);
+            // The remainder is less than 10, so that eight bits of it are enough. What waits last comes first.
+            self.wait((rest as u8).wrapping_sub((tenth as u8).wrapping_mul(10)) + b'0');
+            rest = tenth;
+            if rest == 0 {
+                break;
+            }
+        }
+        if number < 0 {
+            self.wait(b'-');
+        }
+    }
+
+    #[inline(never)]
+    fn wait(&mut self, code: u8) {
+        self.waiting[usize::from(self.halves) % WAITING] = code;
+        self.halves += 1;
+    }
+
+    /// Begins the text at this place in the table.
+    #[inline(never)]
+    fn begin_at(&mut self, start: usize) {
+        (self.next, self.left, self.halves) = (start + 1, byte(start) & LENGTH, 0);
+    }
+}
+
+/// A tenth, rounded down: in a function of its own, as the division needs most of the chip's registers.
+#[inline(never)]
+fn tenth(number: u32) -> u32 {
+    number / 10
 }
 
 impl Iterator for Characters {
@@ -113,11 +190,18 @@ impl Iterator for Characters {
         };
         while let Some(fragment) = code.checked_sub(FIRST_FRAGMENT) {
             let pair = 2 * usize::from(fragment);
-            self.waiting[usize::from(self.halves) % WAITING] = byte(pair + 1);
-            self.halves += 1;
+            self.wait(byte(pair + 1));
             code = byte(pair);
         }
         Some(code)
+    }
+}
+
+/// Two bits that words differ in, at the place that the length leaves.
+const fn mark(word: &[u8]) -> u8 {
+    match word.last() {
+        Some(&last) => last.wrapping_add(word.len() as u8) << LENGTH.count_ones(),
+        None => 0,
     }
 }
 
@@ -132,14 +216,14 @@ const fn count() -> u8 {
     count as u8
 }
 
-/// The table and its length: the fragments, the index, and the texts, each behind a byte with its packed length.
+/// The table and its length: the fragments, the index, and the texts, each behind a byte with its mark and packed length.
 const fn table<const SIZE: usize>() -> ([u8; SIZE], usize) {
     let mut table = [0; SIZE];
     let mut place = 0;
     while place < FRAGMENTS.len() {
         let [first, second] = split(FRAGMENTS[place].as_bytes());
         (table[2 * place], table[2 * place + 1]) = (first, second);
-        assert!(waiting(first) < WAITING && waiting(second) <= WAITING);
+        assert!(waiting(first) + DIGITS < WAITING && waiting(second) + DIGITS <= WAITING);
         place += 1;
     }
     let (mut number, mut end, mut group) = (0, TEXTS, 0);
@@ -152,7 +236,8 @@ const fn table<const SIZE: usize>() -> ([u8; SIZE], usize) {
             }
             let start = end + 1;
             end = pack(GROUPS[group][place], &mut table, start);
-            table[start - 1] = (end - start) as u8;
+            assert!(end - start <= LENGTH as usize, "six bits tell a text's packed length");
+            table[start - 1] = mark(GROUPS[group][place].as_bytes()) | (end - start) as u8;
             number += 1;
             place += 1;
         }
@@ -305,7 +390,7 @@ macro_rules! words {
 
             /// The one that `word` stands for.
             pub fn find(word: &[u8]) -> Option<Self> {
-                Self::FIRST.find(Self::COUNT, word).and_then(Self::from_index)
+                Self::from_index(Self::FIRST.find(Self::COUNT, word))
             }
         }
     };
@@ -339,10 +424,11 @@ mod tests {
         let group = GROUPS.last().expect("there are groups");
         let first = Text::first_of(group);
         for (place, word) in (0..).zip(*group) {
-            assert_eq!(first.find(group.len() as u8, word.as_bytes()), Some(place));
-            assert_eq!(first.find(place, word.as_bytes()), None, "the group ends before it");
-            assert_eq!(first.find(group.len() as u8, &word.as_bytes()[1..]), None);
-            assert_eq!(first.find(group.len() as u8, &[word.as_bytes(), b"_"].concat()), None);
+            assert_eq!(first.find(group.len() as u8, word.as_bytes()), place);
+            assert_eq!(first.find(place, word.as_bytes()), place, "the group ends before it");
+            for no_word in [&word.as_bytes()[1..], &[word.as_bytes(), b"_"].concat()] {
+                assert_eq!(first.find(group.len() as u8, no_word), group.len() as u8);
+            }
         }
     }
 }

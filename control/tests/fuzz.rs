@@ -10,6 +10,7 @@ use control::{
     console::{LineBuffer, Word},
     controller::{Controller, Readings, State, WakeUp},
     examples::EXAMPLES,
+    line::Line,
     memory::{ERASED, Memory, SIZE, Volatile},
     reply::{self, Answer, LINE},
     reset::Cause,
@@ -18,7 +19,6 @@ use control::{
     taught,
     units::{Instant, Position},
 };
-use std::convert::Infallible;
 
 /// The machine as the firmware has it, with these contents of its EEPROM's halves.
 fn machine(for_settings: Volatile, for_examples: Volatile) -> Controller<impl Classifier, impl Memory> {
@@ -59,18 +59,6 @@ impl Typed {
     }
 }
 
-/// A line as it goes to the terminal.
-struct Line(Vec<u8>);
-
-impl ufmt::uWrite for Line {
-    type Error = Infallible;
-
-    fn write_str(&mut self, text: &str) -> Result<(), Infallible> {
-        self.0.extend(text.bytes());
-        Ok(())
-    }
-}
-
 #[test]
 fn every_line_that_comes_is_answered_by_lines_that_fit_and_one_verdict() {
     check!().with_type::<Vec<Typed>>().with_iterations(1500).for_each(|typed| {
@@ -87,9 +75,9 @@ fn every_line_that_comes_is_answered_by_lines_that_fit_and_one_verdict() {
             let mut verdicts = 0;
             while !answer.is_done() {
                 assert_eq!(verdicts, 0, "{command:?} has an answer behind its verdict");
-                let mut out = Line(Vec::new());
-                let Ok(()) = answer.write_line(&machine, &mut out);
-                let Line(out) = out;
+                let mut out = Line::new();
+                answer.write_line(&machine, &mut out);
+                let out: Vec<u8> = out.collect();
                 assert!(out.len() <= LINE, "{:?} has {} bytes", String::from_utf8_lossy(&out), out.len());
                 let text = out.strip_suffix(b"\r\n").expect("a line ends");
                 assert!(text.iter().all(|byte| (b' '..=b'~').contains(byte)), "{}", text.escape_ascii());
@@ -97,9 +85,10 @@ fn every_line_that_comes_is_answered_by_lines_that_fit_and_one_verdict() {
             }
             assert_eq!((verdicts, answer), (1, Answer::Done), "{command:?}");
             while let Some(event) = machine.next_event() {
-                let mut out = Line(Vec::new());
-                let Ok(()) = reply::write_event(&event, &mut out);
-                assert!(out.0.len() <= LINE && out.0.ends_with(b"\r\n"), "{}", out.0.escape_ascii());
+                let mut out = Line::new();
+                reply::write_event(&event, &mut out);
+                let out: Vec<u8> = out.collect();
+                assert!(out.len() <= LINE && out.ends_with(b"\r\n"), "{}", out.escape_ascii());
             }
         }
     });

@@ -16,6 +16,7 @@ use control::console::LineBuffer;
 use control::controller::{Controller, Readings, State, WakeUp};
 use control::examples::EXAMPLES;
 use control::features;
+use control::line::Line;
 use control::memory::Volatile;
 use control::reply;
 use control::reset::Cause;
@@ -181,7 +182,9 @@ fn type_line(weeder: &mut Weeder, command: &str) -> Result<(), Refused> {
     let mut answer = reply::answer(typed, weeder);
     let mut said = String::new();
     while !answer.is_done() {
-        let Ok(()) = answer.write_line(weeder, &mut said);
+        let mut written = Line::new();
+        answer.write_line(weeder, &mut written);
+        said.extend(written.map(char::from));
     }
     if said.trim_end().ends_with("ok") {
         return Ok(());

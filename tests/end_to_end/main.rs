@@ -29,6 +29,7 @@ mod soak;
 mod stops_and_rolls_back;
 mod tall_weeds;
 mod the_schedule_on_the_pins;
+mod turns_of_the_loop;
 mod twin;
 mod wakes_up_in_hold;
 mod weeds_at_every_speed;

@@ -3,7 +3,7 @@
 use super::{Controller, State, faults::Limits};
 use crate::{
     calibration::Unfit,
-    classifier::{Classifier, Full},
+    classifier::{Class, Classifier, Full, label},
     console::Plot,
     memory::Memory,
     settings::{Contradiction, Setting, Settings},
@@ -23,6 +23,8 @@ pub enum Refusal {
     Contradiction(Contradiction),
     /// There is no object to label yet, or the last one has its label.
     NothingToLabel,
+    /// The built-in examples are sure that the object is of this class, which is not the label's.
+    TakenFor(Class),
     /// All places for examples are taken.
     ExamplesFull,
     /// No example from the field has this number.
@@ -156,14 +158,22 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         self.saved.carry_on() && self.classifier.carry_on()
     }
 
-    /// Labels the last object and teaches it to the classifier.
+    /// Labels the last object and teaches it to the classifier; if it is `forced`, against the built-in examples too.
     ///
     /// # Errors
-    /// [`Refusal::NothingToLabel`] and [`Refusal::ExamplesFull`].
-    pub fn label(&mut self, label: u8) -> Result<(), Refusal> {
+    /// [`Refusal::NothingToLabel`], [`Refusal::TakenFor`] and [`Refusal::ExamplesFull`]; the object has no label then.
+    pub fn label(&mut self, label: u8, forced: bool) -> Result<(), Refusal> {
         let unlabelled = self.objects.last_mut().filter(|object| object.label.is_none());
         let object = unlabelled.ok_or(Refusal::NothingToLabel)?;
-        self.classifier.teach(&object.features(), label).map_err(|Full| Refusal::ExamplesFull)?;
+        let features = object.features();
+        // A label that is wrong would turn the class of all that come after it, and nobody would see why.
+        if !forced {
+            let taken_for = self.classifier.built_in_class(&features);
+            if taken_for == if label == label::PLANT { Class::Weed } else { Class::Plant } {
+                return Err(Refusal::TakenFor(taken_for));
+            }
+        }
+        self.classifier.teach(&features, label).map_err(|Full| Refusal::ExamplesFull)?;
         object.label = Some(label);
         Ok(())
     }

@@ -1,18 +1,17 @@
 //! Lines that say what is wrong, and what would be right.
 
-use super::shown::write_allowed;
+use super::{names::class_name, shown::write_allowed};
 use crate::{
     calibration::Unfit,
-    console::Mistake,
+    console::{Mistake, Word},
     controller::Refusal,
+    line::Line,
     said,
-    say::{say, say_number},
     settings::{Contradiction, Setting},
 };
-use ufmt::uWrite;
 
-pub(super) fn write_mistake<W: uWrite + ?Sized>(mistake: Mistake, out: &mut W) -> Result<(), W::Error> {
-    say(out, said::ERROR)?;
+pub(super) fn write_mistake(mistake: Mistake, line: &mut Line) {
+    line.say(said::ERROR);
     let what = match mistake {
         Mistake::TooLong => said::TOO_LONG,
         Mistake::NotText => said::NOT_TEXT,
@@ -20,43 +19,52 @@ pub(super) fn write_mistake<W: uWrite + ?Sized>(mistake: Mistake, out: &mut W) -
         Mistake::UnknownCommand => said::UNKNOWN_COMMAND,
         Mistake::UnknownSetting => said::UNKNOWN_SETTING,
         Mistake::Usage(word) => {
-            say(out, said::USAGE)?;
-            return say(out, word.usage());
+            line.say(said::USAGE);
+            word.usage()
         }
-        Mistake::Value(setting) => return write_allowed(setting, out),
+        Mistake::Value(setting) => return write_allowed(setting.text(), setting, line),
     };
-    say(out, what)
+    line.say(what);
 }
 
-pub(super) fn write_refusal<W>(refusal: Refusal, setting: Option<Setting>, out: &mut W) -> Result<(), W::Error>
-where
-    W: uWrite + ?Sized,
-{
-    say(out, said::ERROR)?;
-    match (refusal, setting) {
-        (Refusal::OutOfRange, Some(setting)) => write_allowed(setting, out),
-        (Refusal::NotInHold, Some(setting)) if setting.description().hold_only => {
-            say(out, setting.text())?;
-            say(out, said::HOLD_TO_SET)
+pub(super) fn write_refusal(refusal: Refusal, setting: Option<Setting>, line: &mut Line) {
+    line.say(said::ERROR);
+    let what = match (refusal, setting) {
+        (Refusal::OutOfRange, Some(setting)) => return write_allowed(setting.text(), setting, line),
+        // Of all commands, this one alone takes a value that is no setting's.
+        (Refusal::OutOfRange, None) => return write_allowed(Word::Servo.text(), Setting::ServoOutUs, line),
+        (Refusal::NotInHold, Some(setting)) => {
+            line.say(setting.text());
+            said::HOLD_TO_SET
         }
-        (Refusal::NotInHold, _) => say(out, said::HOLD_FIRST),
-        (Refusal::Contradiction(Contradiction::PulsesEqual), _) => say(out, said::PULSES_EQUAL),
+        (Refusal::NotInHold, _) => said::HOLD_FIRST,
+        (Refusal::AlarmLatched, _) => said::ALARM_LATCHED,
+        (Refusal::Contradiction(Contradiction::PulsesEqual), _) => said::PULSES_EQUAL,
         (Refusal::Contradiction(Contradiction::BeamTooNear { needed_mm }), _) => {
-            say_number(out, said::BEAM_TOO_NEAR, needed_mm.into())?;
-            say(out, said::BEAM_FARTHER)
+            line.count(needed_mm);
+            said::BEAM_TOO_NEAR
         }
-        (Refusal::NothingToLabel, _) => say(out, said::NOTHING_TO_LABEL),
-        (Refusal::NothingSaved, _) => say(out, said::NOTHING_SAVED),
-        (Refusal::Unfit(Unfit::NotBegun), _) => say(out, said::NOT_BEGUN),
-        (Refusal::Unfit(Unfit::TooShort), _) => say(out, said::TOO_SHORT),
+        (Refusal::NothingToLabel, _) => said::NOTHING_TO_LABEL,
+        (Refusal::TakenFor(class), _) => {
+            line.say(said::TAKEN_FOR);
+            line.say(class_name(class));
+            said::LOOK_AGAIN
+        }
+        (Refusal::NothingSaved, _) => said::NOTHING_SAVED,
+        (Refusal::Unfit(Unfit::NotBegun), _) => said::NOT_BEGUN,
+        (Refusal::Unfit(Unfit::TooShort), _) => said::TOO_SHORT,
         (Refusal::Unfit(Unfit::Differs { counted, nominal }), _) => {
-            say_number(out, said::WHEEL_DIFFERS, counted.into())?;
-            say_number(out, said::WHEEL_HAS, nominal.into())?;
-            say(out, said::LOOK_AGAIN)
+            line.say(said::WHEEL_DIFFERS);
+            line.count(counted);
+            line.count(nominal);
+            said::LOOK_AGAIN
         }
-        (Refusal::TestSpeed { fastest }, _) => say_number(out, said::TEST_SPEED, fastest.into()),
-        (Refusal::ExamplesFull, _) => say(out, said::EXAMPLES_FULL),
-        (Refusal::NoSuchExample, _) => say(out, said::NO_SUCH_EXAMPLE),
-        _ => say(out, said::ALARM_LATCHED),
-    }
+        (Refusal::TestSpeed { fastest }, _) => {
+            line.count(fastest);
+            said::TEST_SPEED
+        }
+        (Refusal::ExamplesFull, _) => said::EXAMPLES_FULL,
+        (Refusal::NoSuchExample, _) => said::NO_SUCH_EXAMPLE,
+    };
+    line.say(what);
 }

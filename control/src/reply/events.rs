@@ -1,55 +1,57 @@
 //! The lines of events.
 
+use super::names::{class_name, place_name, state_name};
 use crate::{
     calibration::{Leads, Outcome},
     event::Event,
+    line::Line,
     said,
-    say::{class_name, place_name, say, say_number, say_numbers, state_name},
 };
-use ufmt::uWrite;
 
-/// Writes the line of an event, with its end.
-///
-/// # Errors
-/// What `out` reports.
+/// Puts the line of an event together.
 #[inline(never)]
-pub fn write_event<W: uWrite + ?Sized>(event: &Event, out: &mut W) -> Result<(), W::Error> {
+pub fn write_event(event: &Event, line: &mut Line) {
     match *event {
         Event::Object { vote, leading, spacing, plan } => {
-            say(out, class_name(vote.class))?;
-            let numbers =
-                [leading.count(), vote.votes.into(), spacing.0, plan.delay.0, plan.hold.0, plan.actuation().0];
-            say_numbers(out, said::OBJECT, &numbers)?;
+            line.say(class_name(vote.class));
+            line.say(said::OBJECT);
+            line.number(leading.count());
+            line.count(vote.votes.into());
+            line.number(spacing.0);
+            line.number(plan.delay.0);
+            line.number(plan.hold.0);
+            line.number(plan.actuation().0);
         }
-        Event::Swing { out: leaves, position } => {
-            say(out, said::SWING)?;
-            say(out, place_name(leaves))?;
-            say_number(out, said::POS, position.count())?;
+        Event::Swing { out, position } => {
+            line.say(said::SWING);
+            line.say(place_name(out));
+            line.say(said::POS);
+            line.number(position.count());
         }
         Event::State(state) => {
-            say(out, said::STATE_EVENT)?;
-            say(out, state_name(state))?;
+            line.say(said::STATE_EVENT);
+            line.say(state_name(state));
         }
         Event::Warning(warning) => {
-            say(out, said::WARNING)?;
-            say(out, warning.text())?;
+            line.say(said::WARNING);
+            line.say(warning.text());
         }
         Event::Calibrated { outcome: Outcome::Measured(Leads { out_ms, in_ms }), fits } => {
-            say_numbers(out, said::CALIBRATED, &[out_ms.into(), in_ms.into()])?;
-            say(out, if fits { said::SET } else { said::NOT_SET })?;
+            line.say(said::CALIBRATED);
+            line.count(out_ms);
+            line.count(in_ms);
+            line.say(if fits { said::SET } else { said::NOT_SET });
         }
-        Event::Calibrated { outcome: Outcome::Shown, .. } => {
-            say(out, said::CALIBRATED_BY_EYE)?;
-        }
-        Event::Calibrated { outcome: Outcome::Failed, .. } => {
-            say(out, said::NOT_CALIBRATED)?;
-        }
+        Event::Calibrated { outcome: Outcome::Shown, .. } => line.say(said::CALIBRATED_BY_EYE),
+        Event::Calibrated { outcome: Outcome::Failed, .. } => line.say(said::NOT_CALIBRATED),
         Event::Alarm { alarm, position } => {
-            say(out, said::ALARM)?;
-            say(out, alarm.text())?;
-            say_number(out, said::CODE, alarm.code().into())?;
-            say_number(out, said::POS, position.count())?;
+            line.say(said::ALARM);
+            line.say(alarm.text());
+            line.say(said::CODE);
+            line.count(alarm.code().into());
+            line.say(said::POS);
+            line.number(position.count());
         }
     }
-    say(out, said::END)
+    line.say(said::END);
 }

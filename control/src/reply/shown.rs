@@ -1,164 +1,134 @@
 //! Lines that show the machine: its status, its curves, its settings, examples and objects.
 
+use super::names::{class_name, label_name, place_name, state_name};
 use crate::{
     alarm::Warning,
-    classifier::{self, Classifier},
+    classifier::{Classifier, Listed},
     console::{Argument, Plot},
     controller::{Controller, Judged, State},
+    line::Line,
     memory::Memory,
     said,
-    say::{class_name, label_name, place_name, say, say_number, say_numbers, state_name},
     settings::Setting,
     text::Text,
 };
-use ufmt::{uWrite, uwrite};
 
-pub(super) fn write_status<C, M, W>(controller: &Controller<C, M>, out: &mut W) -> Result<(), W::Error>
-where
-    C: Classifier,
-    M: Memory,
-    W: uWrite + ?Sized,
-{
-    let readings = controller.readings();
-    say(out, said::STATE_IS)?;
-    say(out, state_name(controller.state()))?;
-    if let State::Alarm(alarm) = controller.state() {
-        say(out, said::ALARM_IS)?;
-        say(out, alarm.text())?;
+/// The state, and which alarm, with a text between them.
+pub(super) fn write_state(state: State, between: Text, line: &mut Line) {
+    line.say(state_name(state));
+    if let State::Alarm(alarm) = state {
+        line.say(between);
+        line.say(alarm.text());
     }
-    say(out, said::TOOL_IS)?;
-    say(out, place_name(controller.tool_out()))?;
+}
+
+pub(super) fn write_status<C: Classifier, M: Memory>(controller: &Controller<C, M>, line: &mut Line) {
+    line.say(said::STATE_IS);
+    write_state(controller.state(), said::ALARM_IS, line);
+    line.say(said::TOOL_IS);
+    line.say(place_name(controller.tool_out()));
     if let Some(reason) = controller.reason() {
-        say(out, said::FOR)?;
-        say(out, reason.text())?;
+        line.say(said::FOR);
+        line.say(reason.text());
     }
-    let numbers = [
-        readings.position.count(),
-        controller.speed_mm_s().into(),
-        controller.windows().into(),
-        controller.unseen_mm().into(),
-    ];
-    say_numbers(out, said::PLACE, &numbers)
+    line.say(said::PLACE);
+    line.number(controller.readings().position.count());
+    line.number(controller.speed_mm_s().into());
+    line.count(controller.windows().into());
+    line.number(controller.unseen_mm().into());
 }
 
-pub(super) fn write_counts<C, M, W>(controller: &Controller<C, M>, out: &mut W) -> Result<(), W::Error>
-where
-    C: Classifier,
-    M: Memory,
-    W: uWrite + ?Sized,
-{
+pub(super) fn write_counts<C: Classifier, M: Memory>(controller: &Controller<C, M>, line: &mut Line) {
     let readings = controller.readings();
-    let numbers = [
-        readings.lost,
-        readings.jumps,
-        controller.late(),
-        controller.events_missed(),
-        controller.mistakes(),
-        readings.stack_free,
-    ];
-    let template = said::COUNTS;
-    say_numbers(out, template, &numbers.map(i32::from))?;
-    say(out, controller.cause().text())?;
+    line.say(said::COUNTS);
+    line.count(readings.lost);
+    line.count(readings.jumps);
+    line.count(controller.late());
+    line.count(controller.events_missed());
+    line.count(controller.mistakes());
+    line.count(readings.stack_free);
+    line.say(controller.cause().text());
     if controller.sees_no_plants() {
-        say(out, said::WARNING_IS)?;
-        say(out, Warning::NoPlants.text())?;
+        line.say(said::WARNING_IS);
+        line.say(Warning::NoPlants.text());
     }
-    Ok(())
 }
 
-/// Writes the next points of a plotter's curves, each `label:value`, with the line's end.
-///
-/// # Errors
-/// What `out` reports.
+/// Puts the next points of a plotter's curves together, each `label:value`.
 #[inline(never)]
-pub fn write_plot<C, M, W>(controller: &Controller<C, M>, plot: Plot, out: &mut W) -> Result<(), W::Error>
-where
-    C: Classifier,
-    M: Memory,
-    W: uWrite + ?Sized,
-{
-    let points = [
-        controller.speed_mm_s(),
-        if controller.tool_out() { 45 } else { 0 },
-        i16::from(controller.beam_is_broken()),
-        i16::from(controller.windows()),
-    ];
-    let curves = if plot == Plot::Teleplot { said::TELEPLOT } else { said::SERIAL_PLOTTER };
-    say_numbers(out, curves, &points.map(i32::from))?;
-    say(out, said::END)
-}
-
-pub(super) fn write_version<W: uWrite + ?Sized>(out: &mut W) -> Result<(), W::Error> {
-    say(out, said::WEEDER)
+pub fn write_plot<C: Classifier, M: Memory>(controller: &Controller<C, M>, plot: Plot, line: &mut Line) {
+    line.say(if plot == Plot::Teleplot { said::TELEPLOT } else { said::SERIAL_PLOTTER });
+    line.number(controller.speed_mm_s().into());
+    line.number(if controller.tool_out() { 45 } else { 0 });
+    line.count(controller.beam_is_broken().into());
+    line.count(controller.windows().into());
+    line.say(said::END);
 }
 
 #[inline(never)]
-pub(super) fn write_setting<C, M, W>(
+pub(super) fn write_setting<C: Classifier, M: Memory>(
     controller: &Controller<C, M>,
     setting: Setting,
-    out: &mut W,
-) -> Result<(), W::Error>
-where
-    C: Classifier,
-    M: Memory,
-    W: uWrite + ?Sized,
-{
-    say(out, setting.text())?;
-    write_value(said::IS, setting, controller.settings().get(setting), out)?;
-    say(out, setting.unit())?;
-    write_range(setting, out)?;
-    write_value(said::DEFAULT, setting, setting.description().default, out)?;
+    line: &mut Line,
+) {
+    let value = controller.settings().get(setting);
+    line.say(setting.text());
+    write_value(said::IS, setting, value, line);
+    line.say(setting.unit());
+    write_range(setting, line);
+    write_value(said::DEFAULT, setting, setting.description().default, line);
     match controller.saved(setting) {
-        None => say(out, said::NOT_SAVED),
-        Some(saved) if saved == controller.settings().get(setting) => Ok(()),
-        Some(saved) => write_value(said::SAVED, setting, saved, out),
+        None => line.say(said::NOT_SAVED),
+        Some(saved) if saved == value => {}
+        Some(saved) => write_value(said::SAVED, setting, saved, line),
     }
 }
 
 /// A text and a setting's value after it.
-pub(super) fn write_value<W: uWrite + ?Sized>(
-    text: Text,
-    setting: Setting,
-    value: u16,
-    out: &mut W,
-) -> Result<(), W::Error> {
+#[inline(never)]
+fn write_value(text: Text, setting: Setting, value: u16, line: &mut Line) {
+    line.say(text);
     if !setting.is_switched() {
-        return say_number(out, text, value.into());
+        line.say(said::NUMBER);
+        return line.count(value);
     }
-    say(out, text)?;
-    say(out, if value == 0 { Argument::Off } else { Argument::On }.text())
+    line.say(if value == 0 { Argument::Off } else { Argument::On }.text());
 }
 
-pub(super) fn write_range<W: uWrite + ?Sized>(setting: Setting, out: &mut W) -> Result<(), W::Error> {
+fn write_range(setting: Setting, line: &mut Line) {
     if setting.is_switched() {
-        return say(out, said::ON_OR_OFF);
+        return line.say(said::ON_OR_OFF);
     }
     let description = setting.description();
-    say_number(out, said::FROM, description.least.into())?;
-    say_number(out, said::TO, description.greatest.into())
+    line.say(said::RANGE);
+    line.count(description.least);
+    line.count(description.greatest);
 }
 
-pub(super) fn write_allowed<W: uWrite + ?Sized>(setting: Setting, out: &mut W) -> Result<(), W::Error> {
-    say(out, setting.text())?;
-    say(out, if setting.is_switched() { said::TAKES } else { said::TAKES_A_NUMBER })?;
-    write_range(setting, out)
+/// What may be given for a setting, or for something else that has the same range.
+#[inline(never)]
+pub(super) fn write_allowed(name: Text, setting: Setting, line: &mut Line) {
+    line.say(name);
+    line.say(if setting.is_switched() { said::TAKES } else { said::TAKES_A_NUMBER });
+    write_range(setting, line);
 }
 
-pub(super) fn write_example<W: uWrite + ?Sized>(listed: &classifier::Listed, out: &mut W) -> Result<(), W::Error> {
-    say(out, if listed.from_field { said::FIELD } else { said::BUILT_IN })?;
-    say_number(out, said::BLANK, listed.number.into())?;
-    say(out, said::BLANK)?;
-    say(out, label_name(listed.example.label))?;
-    listed.example.features.iter().try_for_each(|&feature| say_number(out, said::BLANK, feature.into()))
+pub(super) fn write_example(listed: &Listed, line: &mut Line) {
+    line.say(if listed.from_field { said::FIELD } else { said::BUILT_IN });
+    line.say(said::EXAMPLE);
+    line.count(listed.number.into());
+    line.say(label_name(listed.example.label));
+    line.say(said::FEATURES);
+    listed.example.features.iter().for_each(|&feature| line.count(feature.into()));
 }
 
-pub(super) fn write_object<W: uWrite + ?Sized>(object: &Judged, out: &mut W) -> Result<(), W::Error> {
-    for value in object.features().values() {
-        uwrite!(out, "{}", value)?;
-        say(out, said::COMMA)?;
+pub(super) fn write_object(object: &Judged, line: &mut Line) {
+    line.say(said::DUMPED);
+    object.features().values().iter().for_each(|&value| line.number(value));
+    line.say(class_name(object.vote.class));
+    line.say(said::VOTES);
+    line.count(object.vote.votes.into());
+    if let Some(label) = object.label {
+        line.say(label_name(label));
     }
-    say(out, class_name(object.vote.class))?;
-    say_number(out, said::COMMA, object.vote.votes.into())?;
-    say(out, said::COMMA)?;
-    object.label.map_or(Ok(()), |label| say(out, label_name(label)))
 }

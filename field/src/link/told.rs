@@ -187,15 +187,16 @@ mod tests {
     use control::classifier::Vote;
     use control::controller::State;
     use control::event::Event;
+    use control::line::Line;
     use control::reply::write_event;
     use control::schedule::Plan;
     use control::units::{Position, Ticks};
 
     /// The event as the firmware writes it.
     fn line(event: Event) -> String {
-        let mut line = String::new();
-        write_event(&event, &mut line).unwrap();
-        line.trim_end().to_owned()
+        let mut line = Line::new();
+        write_event(&event, &mut line);
+        line.map(char::from).collect::<String>().trim_end().to_owned()
     }
 
     #[test]

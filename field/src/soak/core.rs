@@ -13,6 +13,7 @@ use control::{
     controller::{Controller, Readings, State, WakeUp},
     event::Event,
     examples::EXAMPLES,
+    line::Line,
     memory::{Memory, Volatile},
     reply,
     reset::Cause,
@@ -83,17 +84,6 @@ impl Shared {
     fn recover(&self) {
         let found = self.0.borrow().clone().with_power();
         *self.0.borrow_mut() = found;
-    }
-}
-
-/// Takes what the console says.
-struct Nowhere;
-
-impl ufmt::uWrite for Nowhere {
-    type Error = std::convert::Infallible;
-
-    fn write_str(&mut self, _: &str) -> Result<(), Self::Error> {
-        Ok(())
     }
 }
 
@@ -536,7 +526,9 @@ impl Field {
         if let Some(command) = self.line.take(byte) {
             let mut answer = reply::answer(command, &mut self.weeder);
             while !answer.is_done() {
-                let Ok(()) = answer.write_line(&self.weeder, &mut Nowhere);
+                let mut line = Line::new();
+                answer.write_line(&self.weeder, &mut line);
+                line.for_each(drop);
             }
         }
     }

@@ -228,8 +228,8 @@ impl<'a> Player<'a> {
                 // Refused here as there.
                 let _ = self.controller.set(setting, value);
             }
-            Ok(Command::Label(label)) => {
-                let _ = self.controller.label(label);
+            Ok(Command::Label { label, force }) => {
+                let _ = self.controller.label(label, force);
             }
             Ok(Command::Forget(_) | Command::ForgetAll) => return false,
             _ => {

@@ -1,0 +1,181 @@
+//! How long the main loop takes to turn, whatever is typed and told.
+//!
+//! Between two turns nobody looks at the ground: what the loop decides is as late as a turn is long. A turn may therefore take a
+//! millisecond, in which a machine at 5 km/h rolls 1.4 mm. It is counted in cycles from one reset of the watchdog to the next, what
+//! interrupts take of it included.
+
+use crate::common::{Run, run_for_ms, steady, trial, woken_up};
+use control::console::{LINE_LENGTH, Word};
+use control::settings::Setting;
+use field::link::settings::name;
+use field::planting::Planting;
+use field::signal::CYCLES_PER_SECOND;
+use field::uno::Uno;
+
+/// A turn's cycles at most: 1 ms.
+const TURN: u64 = CYCLES_PER_SECOND / 1000;
+
+/// Every line that the grammar knows, and some for each way in which a line can be wrong.
+fn lines() -> Vec<String> {
+    let mut lines: Vec<String> = [
+        "help",
+        "status",
+        "get",
+        "save",
+        "revert",
+        "defaults",
+        "calibrate start",
+        "calibrate 999",
+        "calibrate 1000",
+        "calibrate 60000",
+        "calibrate 10000 force",
+        "calibrate servo",
+        "servo in",
+        "servo out",
+        "servo 1750",
+        "servo 499",
+        "servo 9999",
+        "test row",
+        "test row 99",
+        "test row 700",
+        "test row 1400",
+        "start",
+        "hold",
+        "start now",
+        "hold",
+        "clear",
+        "events off",
+        "events on",
+        "plot teleplot",
+        "plot on",
+        "label plant",
+        "label weed",
+        "label plant force",
+        "label weed force",
+        "examples",
+        "forget 0",
+        "forget 31",
+        "forget all",
+        "dump",
+        "version",
+        "hepl",
+        "HELP",
+        "h",
+        "versions",
+        "calibrat",
+        "set",
+        "set k",
+        "set k 3 4",
+        "set nothing 3",
+        "set top_speed_mm_ 3",
+        "get nothing",
+        "help nothing",
+        "calibrate",
+        "calibrate 10000 faster",
+        "calibrate 70000",
+        "calibrate start now",
+        "servo",
+        "servo up",
+        "servo 70000",
+        "test",
+        "test row fast",
+        "test teleplot teleplot",
+        "start later",
+        "events teleplot",
+        "plot",
+        "plot weed",
+        "label",
+        "label tree",
+        "label weed weed",
+        "label weed force force",
+        "forget",
+        "forget 256",
+        "forget teleplot",
+        "\u{7}hold",
+        "h\u{f6}ld",
+    ]
+    .map(str::to_owned)
+    .to_vec();
+    lines.extend((0..).map_while(Word::from_index).map(|word| {
+        let word = String::from_utf8(word.text().bytes().collect()).expect("ASCII");
+        format!("{word} end_switch end_switch end_switch")
+    }));
+    for setting in Setting::all() {
+        let (name, range) = (name(setting), setting.description());
+        lines.extend([
+            format!("help {name}"),
+            format!("get {name}"),
+            format!("set {name} x"),
+            format!("set {name} 65535"),
+        ]);
+        lines.extend([range.least, range.greatest, range.default].map(|value| format!("set {name} {value}")));
+    }
+    lines.push("defaults".to_owned());
+    // Of every length, and one that is too long.
+    lines.extend((1..=LINE_LENGTH + 1).step_by(8).map(|length| "s".repeat(length)));
+    lines.extend((4..=LINE_LENGTH + 1).step_by(8).map(|length| format!("{:length$}", "get")));
+    lines
+}
+
+/// A machine on its way along a row at 5 km/h, telling all that it sees.
+fn under_way() -> Run {
+    let row = Planting { plants: 60, weeds: 30, spacing_mm: 300.0, ragged: true, ..Planting::default() }.grow(1);
+    let row = row.expect("everything has room");
+    let end_mm = row.span_mm().end;
+    Run::begin(trial(row, steady(1000.0, end_mm)), &["plot on"])
+}
+
+#[test]
+fn no_turn_takes_more_than_a_millisecond_whatever_is_typed_and_told() {
+    let mut run = under_way();
+    let mut left = run.cycles().end;
+    let mut rolling = Vec::new();
+    for line in lines() {
+        if run.uno.cycle() + CYCLES_PER_SECOND >= left {
+            run = under_way();
+            left = run.cycles().end;
+        }
+        // An alarm would have the machine stand still in its decisions.
+        for typed in [line.as_str(), "clear", "start"] {
+            rolling.push((typed_takes(&mut run.uno, typed), typed.to_owned()));
+        }
+    }
+    assert_short(rolling);
+}
+
+#[test]
+fn no_turn_takes_more_than_a_millisecond_while_the_machine_stands() {
+    let mut uno = woken_up();
+    assert_short(lines().into_iter().map(|line| (typed_takes(&mut uno, &line), line)).collect());
+}
+
+/// Each of these lines was answered in short turns; they come with the cycles of the longest.
+#[track_caller]
+fn assert_short(mut took: Vec<(u64, String)>) {
+    took.sort();
+    for (cycles, line) in
+        took.iter().rev().take(std::env::var("SHOW").map_or(3, |lines| lines.parse().expect("a number")))
+    {
+        println!("{cycles} of {TURN} cycles: {line}");
+    }
+    let (worst, line) = took.last().expect("there are lines");
+    assert!(*worst <= TURN, "a turn took {worst} cycles: {line}");
+}
+
+/// Types a line and waits for its verdict; returns the cycles of the longest turn until then.
+fn typed_takes(uno: &mut Uno, line: &str) -> u64 {
+    uno.received();
+    uno.measure_turns();
+    uno.send(format!("{line}\n").as_bytes());
+    let mut answer = String::new();
+    for _ in 0..2000 {
+        run_for_ms(uno, 2);
+        answer += &uno.received();
+        let verdicts = answer.lines().filter(|line| *line == "ok" || line.starts_with("error: ")).count();
+        assert!(verdicts <= 1, "{line}: {answer}");
+        if verdicts == 1 && answer.ends_with('\n') {
+            return uno.turns().expect("they are measured").longest;
+        }
+    }
+    panic!("{line:?} is not answered: {answer}");
+}
