@@ -5,6 +5,11 @@
 //! round within those two edges; with no step before it, its direction is unknown and it is counted as lost.
 //!
 //! The firmware's interrupt looks its steps up in a table that the compiler makes of this decoder.
+//!
+//! At walking speed no edge can be missed, and a jump is noise on both wires: the decoder adds two ticks when it comes and two
+//! more when it goes. The interrupt cannot tell, as it knows no time. So the [`Odometer`] takes them back when it reads the count.
+
+use crate::units::{Position, Ticks, TicksPerSecond};
 
 /// Both channels' levels: A in bit 1, B in bit 0; values 0 to 3.
 pub type Channels = u8;
@@ -63,6 +68,56 @@ impl Quadrature {
     }
 }
 
+/// Ticks a second from which on an edge can be missed. They stand 30 us apart, and 20 where an encoder spaces them unevenly by a
+/// third: the interrupt looks again within that. It is 62 km/h with 0.5 mm a tick, and 6 km/h with the finest that can be set.
+const CAN_BE_MISSED: u32 = 1 << 15;
+
+/// Ticks in a turn of the loop that no machine rolls, noise included: the speed is measured too late for a wheel that is flung.
+const FLUNG: u16 = 16;
+
+/// More ticks than this are not told to be in doubt: it is enough.
+const ENOUGH: u16 = 32;
+
+/// Where the machine is by the encoder's count, without what noise on both channels has added to it.
+#[derive(Clone, Debug)]
+pub struct Odometer {
+    /// The count at the last reading, of which the lower half is enough, and the jumps until then.
+    counted: u16,
+    jumps: u16,
+    /// What noise has added to the count.
+    surplus: Ticks,
+}
+
+impl Odometer {
+    /// An odometer that believes what was `counted` until now.
+    #[inline(always)]
+    pub const fn new(counted: Position, jumps: u16) -> Self {
+        Self { counted: counted.count() as u16, jumps, surplus: Ticks::ZERO }
+    }
+
+    /// Takes a reading of the count and of the jumps in it, modulo 65,536, at a speed; returns how many ticks, 32 at the most, came
+    /// by jumps that are not believed.
+    pub fn read(&mut self, counted: Position, jumps: u16, speed: TicksPerSecond) -> u8 {
+        let counted = counted.count() as u16;
+        let moved = counted.wrapping_sub(self.counted).cast_signed();
+        let jumped = jumps.wrapping_sub(self.jumps).wrapping_mul(2);
+        (self.counted, self.jumps) = (counted, jumps);
+        if jumped == 0 || moved.unsigned_abs() > FLUNG || speed.0.unsigned_abs() >= CAN_BE_MISSED {
+            return 0;
+        }
+        // No more than it moved: a wheel at rest that trembles may have taken a step back in between.
+        let added = Ticks(moved.unsigned_abs().min(jumped).into());
+        self.surplus = if moved < 0 { self.surplus - added } else { self.surplus + added };
+        jumped.min(ENOUGH) as u8
+    }
+
+    /// The place that a count stands for.
+    #[inline(never)]
+    pub fn place(&self, counted: Position) -> Position {
+        counted - self.surplus
+    }
+}
+
 /// The place of both channels' levels in the forward sequence, 0 to 3.
 const fn phase(channels: Channels) -> u8 {
     let a = channels >> 1 & 1;
@@ -105,5 +160,40 @@ mod tests {
         assert_eq!(decoder.step(0b01), Step::Ticks(-2));
         assert_eq!(decoder.step(0b00), Step::Ticks(1));
         assert_eq!(decoder.step(0b11), Step::Ticks(2));
+    }
+
+    const WALK: TicksPerSecond = TicksPerSecond(1061);
+
+    /// The odometer's place after these readings of count and jumps, and the ticks that it does not believe.
+    fn read(readings: &[(i32, u16)], speed: TicksPerSecond) -> (i32, u8) {
+        let mut odometer = Odometer::new(Position::new(readings[0].0), readings[0].1);
+        let mut doubted = 0;
+        let mut place = 0;
+        for &(count, jumps) in readings {
+            doubted += odometer.read(Position::new(count), jumps, speed);
+            place = odometer.place(Position::new(count)).count();
+        }
+        (place, doubted)
+    }
+
+    #[test]
+    fn at_walking_speed_a_jump_is_not_believed_whichever_way_the_wheel_turns() {
+        assert_eq!(read(&[(100, 7), (101, 7), (106, 9), (107, 9)], WALK), (103, 4));
+        assert_eq!(read(&[(100, 7), (99, 7), (94, 9), (93, 9)], TicksPerSecond(-1061)), (97, 4));
+        assert_eq!(read(&[(0, u16::MAX), (-2, 0), (-4, 1)], TicksPerSecond(0)), (0, 4), "at rest");
+        assert_eq!(read(&[(32_767, 0), (32_770, 1), (32_772, 2)], WALK), (32_768, 4), "over the end of its lower half");
+    }
+
+    #[test]
+    fn where_an_edge_can_be_missed_a_jump_is_one() {
+        assert_eq!(read(&[(0, 0), (12, 1)], TicksPerSecond(1 << 15)), (12, 0));
+        assert_eq!(read(&[(0, 0), (-12, 1)], TicksPerSecond(-(1 << 15))), (-12, 0));
+        assert_eq!(read(&[(0, 0), (17, 3)], TicksPerSecond(0)), (17, 0), "flung from standstill");
+    }
+
+    #[test]
+    fn a_jump_that_nothing_resolves_has_added_nothing() {
+        assert_eq!(read(&[(0, 0), (0, 1), (-1, 1)], WALK), (-1, 2));
+        assert_eq!(read(&[(0, 0), (1, 1)], WALK), (0, 2));
     }
 }

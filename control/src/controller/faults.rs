@@ -6,6 +6,7 @@ use crate::{
     classifier::Classifier,
     event::Event,
     memory::Memory,
+    monitor::Tolerance,
     settings::{Setting, Settings},
     units::{Interval, Ticks},
 };
@@ -23,27 +24,34 @@ pub(super) struct Limits {
     top_speed: i32,
     /// Zero for none.
     no_plant: Ticks,
+    encoder: Tolerance,
 }
 
 impl Limits {
-    pub(super) const NONE: Self = Self { top_speed: 0, no_plant: Ticks::ZERO };
+    pub(super) const NONE: Self = Self { top_speed: 0, no_plant: Ticks::ZERO, encoder: Tolerance::NONE };
 
     pub(super) fn of(settings: &Settings) -> Self {
         let wheel = settings.wheel();
         Self {
             top_speed: wheel.ticks(settings.get(Setting::TopSpeedMmS)).0,
             no_plant: Ticks(wheel.ticks(1000).0 * i32::from(settings.get(Setting::NoPlantM))),
+            encoder: Tolerance::of(wheel, settings.get(Setting::MarginMm)),
         }
     }
 }
 
 impl<C: Classifier, M: Memory> Controller<C, M> {
-    /// The fault that the readings show, if any.
+    /// The fault that the readings show, if any; so many of the encoder's ticks are `doubted`.
     #[inline(never)]
-    pub(super) fn fault(&mut self) -> Option<Alarm> {
-        let Readings { now, position, jumps, end_switch_on, stack_free, .. } = self.readings;
+    pub(super) fn fault(&mut self, doubted: u8) -> Option<Alarm> {
+        let Readings { now, position, end_switch_on, stack_free, .. } = self.readings;
         let working = self.is_working();
-        match self.encoder.read(now, position, jumps) {
+        let fault = self.encoder.read(now, position, doubted, &self.limits.encoder);
+        if self.encoder.is_silent() {
+            // Nobody knows how far the machine has rolled since.
+            self.ground.forget();
+        }
+        match fault {
             // A machine at rest may tremble.
             Some(Alarm::EncoderChannelDead) if !working => {}
             None => {}
