@@ -182,7 +182,7 @@ impl<C: Classifier, M: Memory> Asleep<C, M> {
             switch: Switch::new(false),
             end_switch: Switch::new(false),
             odometer: Odometer::new(place, 0),
-            encoder: EncoderMonitor::new(start, place),
+            encoder: EncoderMonitor::NONE,
             beam: BeamMonitor::new(start),
             beam_broken: false,
             bench: Bench::Idle,
@@ -269,11 +269,12 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// Takes the machine's readings and decides where the tool is to be.
     #[inline(never)]
-    pub fn step(&mut self, mut readings: Readings) -> Orders {
-        let doubted = self.odometer.read(readings.position, readings.jumps, self.meter.speed());
-        readings.position = self.odometer.place(readings.position);
+    pub fn step(&mut self, readings: Readings) -> Orders {
         self.readings = readings;
-        if let Some(speed) = self.meter.read(readings.now, readings.position) {
+        let doubted = self.odometer.read(readings.position, readings.jumps);
+        let position = self.odometer.place(readings.position);
+        self.readings.position = position;
+        if let Some(speed) = self.meter.read(readings.now, position) {
             self.ground.lead(&self.settings, speed);
         }
         match self.switch.read(readings.now, readings.switch_on) {
@@ -282,7 +283,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             Some(false) => self.enter(State::Hold),
             _ => {}
         }
-        if let Some(object) = self.ground.roll_to(readings.position) {
+        if let Some(object) = self.ground.roll_to(position) {
             self.judge(object);
         }
         if let Some(alarm) = self.fault(doubted) {
@@ -292,7 +293,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         if out != self.tool_out {
             self.tool_out = out;
             self.awaits_ground = out && self.is_working();
-            self.tell(Event::Swing { out, position: readings.position });
+            self.tell(Event::Swing { out, position });
         }
         let orders = self.orders();
         if orders.pulse != self.pulse {

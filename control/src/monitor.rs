@@ -60,7 +60,7 @@ const PRICE: u16 = 32;
 /// How far the encoder may go, on this wheel.
 #[derive(Clone, Copy, Debug)]
 pub struct Tolerance {
-    /// Ticks that are progress: about two millimetres, so that it means the same for every encoder, and four at least. That is
+    /// Ticks that are progress: a little more than two millimetres, so that it means the same for every encoder, and four at least. That is
     /// a whole cycle of both channels, over which it does not matter that an encoder spaces its edges unevenly, and more
     /// than a wheel makes that trembles on an edge, or one dead channel.
     progress: u8,
@@ -76,7 +76,7 @@ impl Tolerance {
     pub fn of(wheel: Wheel, margin_mm: u16) -> Self {
         // Without a margin, 16 ticks.
         let debt = (wheel.ticks(margin_mm).0 as u16 + 32) * (PRICE / 2);
-        Self { progress: (wheel.ticks(2).0 as u8).max(4), debt }
+        Self { progress: ((wheel.ticks(9).0 / 4) as u8).max(4), debt }
     }
 }
 
@@ -126,6 +126,9 @@ pub struct EncoderMonitor {
 }
 
 impl EncoderMonitor {
+    /// A monitor that nobody has read.
+    pub const NONE: Self = Self { took: 0, took_before: 0, ..Self::new(Instant::ZERO, Position::new(0)) };
+
     /// A monitor for a machine that stands at `position`.
     pub const fn new(now: Instant, position: Position) -> Self {
         Self {

@@ -9,7 +9,7 @@
 //! At walking speed no edge can be missed, and a jump is noise on both wires: the decoder adds two ticks when it comes and two
 //! more when it goes. The interrupt cannot tell, as it knows no time. So the [`Odometer`] takes them back when it reads the count.
 
-use crate::units::{Position, Ticks, TicksPerSecond};
+use crate::units::{Position, Ticks};
 
 /// Both channels' levels: A in bit 1, B in bit 0; values 0 to 3.
 pub type Channels = u8;
@@ -68,12 +68,10 @@ impl Quadrature {
     }
 }
 
-/// Ticks a second from which on an edge can be missed. They stand 30 us apart, and 20 where an encoder spaces them unevenly by a
-/// third: the interrupt looks again within that. It is 62 km/h with 0.5 mm a tick, and 6 km/h with the finest that can be set.
-const CAN_BE_MISSED: u32 = 1 << 15;
-
-/// Ticks in a turn of the loop that no machine rolls, noise included: the speed is measured too late for a wheel that is flung.
-const FLUNG: u16 = 16;
+/// Ticks in a turn of the loop from which on an edge may have been missed, noise of two spikes included. A short turn takes
+/// 0.25 ms, so these come 15 us apart at most, where the interrupt looks again within 12: 120 km/h with 0.5 mm a tick, and 12
+/// with the finest that can be set.
+const CAN_BE_MISSED: u16 = 16;
 
 /// More ticks than this are not told to be in doubt: it is enough.
 const ENOUGH: u16 = 32;
@@ -95,20 +93,22 @@ impl Odometer {
         Self { counted: counted.count() as u16, jumps, surplus: Ticks::ZERO }
     }
 
-    /// Takes a reading of the count and of the jumps in it, modulo 65,536, at a speed; returns how many ticks, 32 at the most, came
-    /// by jumps that are not believed.
-    pub fn read(&mut self, counted: Position, jumps: u16, speed: TicksPerSecond) -> u8 {
+    /// Takes a reading of the count and of the jumps in it, modulo 65,536; returns how many ticks, 32 at the most, came by jumps
+    /// that are not believed.
+    #[inline(never)]
+    pub fn read(&mut self, counted: Position, jumps: u16) -> u8 {
         let counted = counted.count() as u16;
         let moved = counted.wrapping_sub(self.counted).cast_signed();
         let jumped = jumps.wrapping_sub(self.jumps).wrapping_mul(2);
         (self.counted, self.jumps) = (counted, jumps);
-        if jumped == 0 || moved.unsigned_abs() > FLUNG || speed.0.unsigned_abs() >= CAN_BE_MISSED {
+        if jumped == 0 || moved.unsigned_abs() > CAN_BE_MISSED {
             return 0;
         }
+        let jumped = jumped.min(ENOUGH) as u8;
         // No more than it moved: a wheel at rest that trembles may have taken a step back in between.
-        let added = Ticks(moved.unsigned_abs().min(jumped).into());
+        let added = Ticks((moved.unsigned_abs() as u8).min(jumped).into());
         self.surplus = if moved < 0 { self.surplus - added } else { self.surplus + added };
-        jumped.min(ENOUGH) as u8
+        jumped
     }
 
     /// The place that a count stands for.
@@ -162,38 +162,30 @@ mod tests {
         assert_eq!(decoder.step(0b11), Step::Ticks(2));
     }
 
-    const WALK: TicksPerSecond = TicksPerSecond(1061);
-
     /// The odometer's place after these readings of count and jumps, and the ticks that it does not believe.
-    fn read(readings: &[(i32, u16)], speed: TicksPerSecond) -> (i32, u8) {
+    fn read(readings: &[(i32, u16)]) -> (i32, u8) {
         let mut odometer = Odometer::new(Position::new(readings[0].0), readings[0].1);
-        let mut doubted = 0;
-        let mut place = 0;
-        for &(count, jumps) in readings {
-            doubted += odometer.read(Position::new(count), jumps, speed);
-            place = odometer.place(Position::new(count)).count();
-        }
-        (place, doubted)
+        let doubted = readings.iter().map(|&(count, jumps)| odometer.read(Position::new(count), jumps)).sum();
+        (readings.last().map_or(0, |&(count, _)| odometer.place(Position::new(count)).count()), doubted)
     }
 
     #[test]
     fn at_walking_speed_a_jump_is_not_believed_whichever_way_the_wheel_turns() {
-        assert_eq!(read(&[(100, 7), (101, 7), (106, 9), (107, 9)], WALK), (103, 4));
-        assert_eq!(read(&[(100, 7), (99, 7), (94, 9), (93, 9)], TicksPerSecond(-1061)), (97, 4));
-        assert_eq!(read(&[(0, u16::MAX), (-2, 0), (-4, 1)], TicksPerSecond(0)), (0, 4), "at rest");
-        assert_eq!(read(&[(32_767, 0), (32_770, 1), (32_772, 2)], WALK), (32_768, 4), "over the end of its lower half");
+        assert_eq!(read(&[(100, 7), (101, 7), (106, 9), (107, 9)]), (103, 4));
+        assert_eq!(read(&[(100, 7), (99, 7), (94, 9), (93, 9)]), (97, 4));
+        assert_eq!(read(&[(0, u16::MAX), (-2, 0), (-4, 1)]), (0, 4), "at rest");
+        assert_eq!(read(&[(32_767, 0), (32_770, 1), (32_772, 2)]), (32_768, 4), "over the end of its lower half");
     }
 
     #[test]
     fn where_an_edge_can_be_missed_a_jump_is_one() {
-        assert_eq!(read(&[(0, 0), (12, 1)], TicksPerSecond(1 << 15)), (12, 0));
-        assert_eq!(read(&[(0, 0), (-12, 1)], TicksPerSecond(-(1 << 15))), (-12, 0));
-        assert_eq!(read(&[(0, 0), (17, 3)], TicksPerSecond(0)), (17, 0), "flung from standstill");
+        assert_eq!(read(&[(0, 0), (17, 1)]), (17, 0));
+        assert_eq!(read(&[(0, 0), (-17, 1)]), (-17, 0));
     }
 
     #[test]
     fn a_jump_that_nothing_resolves_has_added_nothing() {
-        assert_eq!(read(&[(0, 0), (0, 1), (-1, 1)], WALK), (-1, 2));
-        assert_eq!(read(&[(0, 0), (1, 1)], WALK), (0, 2));
+        assert_eq!(read(&[(0, 0), (0, 1), (-1, 1)]), (-1, 2));
+        assert_eq!(read(&[(0, 0), (1, 1)]), (0, 2));
     }
 }
