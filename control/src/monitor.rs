@@ -11,7 +11,7 @@
 
 use crate::{
     alarm::Alarm,
-    units::{Coarse, Instant, Position, Wheel},
+    units::{Coarse, Instant, Position},
 };
 
 /// The time in which edges are counted.
@@ -27,12 +27,12 @@ const STANDS: u16 = Coarse::steps_in_ms(150);
 /// Times that the beam may break while the machine stands: leaves move in the wind, but plants do not pass.
 const BREAKS: u8 = 3;
 
-/// When the speed meter begins to take silence for slowness, and leads shrink: from here on until it is clear what the silence
-/// is, a tool that is out stays out.
-const QUIET: u16 = crate::speed::SPACING;
-
 /// The time of a progress in steps of 256 us: all that tells slow rolling from standing fits into a byte.
 type Short = u8;
+
+/// When the speed meter begins to take silence for slowness, and leads shrink: from here on until it is clear what the silence
+/// is, a tool that is out stays out.
+const QUIET: Short = (crate::speed::SPACING >> 2) as Short;
 
 /// A machine rolls steadily where a progress takes no longer than this, 15.4 ms: from 0.5 km/h on with ticks of 0.5 mm or finer.
 /// Coarser ones need four ticks in this time, and are not known to fall silent at less.
@@ -50,37 +50,21 @@ const TURN: Short = 4;
 const SILENCES: u8 = 3;
 const SILENCES_WITHIN: u16 = 5000;
 
-/// Ticks that are lost with half a pulse of a channel: where one does not come, the other channel counts a tick back and on again
-/// instead, and the wheel seems to turn round twice.
+/// What is lost is told in quarters of a progress, which are ticks where the encoder is no finer than 0.4 mm.
+const PROGRESS: u8 = 4;
+
+/// Lost with half a pulse of a channel: where one does not come, the other channel counts a tick back and on again instead, and
+/// the wheel seems to turn round twice.
 const TURNED_ROUND: u8 = 2;
 
-/// Ticks rolled that pay for one that may be lost: who loses three in a hundred goes on, and who loses more gets into debt.
-const PRICE: u16 = 32;
+/// One that may be lost is paid for by so many times the progress, 32 quarters: who loses three in a hundred goes on.
+const PAID_BY: u8 = 8;
 
-/// How far the encoder may go, on this wheel.
-#[derive(Clone, Copy, Debug)]
-pub struct Tolerance {
-    /// Ticks that are progress: a little more than two millimetres, so that it means the same for every encoder, and four at least. That is
-    /// a whole cycle of both channels, over which it does not matter that an encoder spaces its edges unevenly, and more
-    /// than a wheel makes that trembles on an edge, or one dead channel.
-    progress: u8,
-    /// The debt at which half the margin may be lost.
-    debt: u16,
-}
-
-impl Tolerance {
-    /// No tolerance.
-    pub const NONE: Self = Self { progress: 0, debt: 0 };
-
-    /// That of a machine with such a wheel and margin.
-    pub fn of(wheel: Wheel, margin_mm: u16) -> Self {
-        // Without a margin, 16 ticks.
-        let debt = (wheel.ticks(margin_mm).0 as u16 + 32) * (PRICE / 2);
-        Self { progress: ((wheel.ticks(9).0 / 4) as u8).max(4), debt }
-    }
-}
+/// More than this unpaid, 25 mm or half of the usual margin, is an alarm.
+const DEBT: u8 = 48;
 
 /// A time in shorter form, or the longest that there is.
+#[inline(never)]
 const fn shortened(time: u16) -> Short {
     if time < 1 << 10 { (time >> 2) as Short } else { Short::MAX }
 }
@@ -118,8 +102,8 @@ pub struct EncoderMonitor {
     /// Times that the beam broke since the machine stands.
     breaks: u8,
     period_since: Coarse,
-    /// Ticks that are yet to be rolled to pay for those that may be lost.
-    debt: u16,
+    /// What may be lost and has not been paid for.
+    debt: u8,
     /// Silences, and progress since the last one, modulo 137 m.
     silences: u8,
     since_silence: u16,
@@ -152,8 +136,12 @@ impl EncoderMonitor {
     }
 
     /// Takes a reading, with the ticks that came by jumps and are not believed; returns the fault that it shows.
+    ///
+    /// `progress` is a distance of some two millimetres, so that it means the same for every encoder, and four ticks at least. That
+    /// is a whole cycle of both channels, over which it does not matter that an encoder spaces its edges unevenly, and more
+    /// than a wheel makes that trembles on an edge, or one dead channel.
     #[inline(never)]
-    pub fn read(&mut self, now: Instant, position: Position, doubted: u8, tolerance: &Tolerance) -> Option<Alarm> {
+    pub fn read(&mut self, now: Instant, position: Position, doubted: u8, progress: u8) -> Option<Alarm> {
         let now = now.coarse();
         let place = position.count() as u16;
         if now.since(self.period_since) >= PERIOD {
@@ -171,18 +159,19 @@ impl EncoderMonitor {
         let short = shortened(time);
         let mut lost = doubted;
         let mut alarm = Alarm::EncoderJumps;
-        let mut is_fault = false;
-        if moved.unsigned_abs() >= tolerance.progress.into() {
+        if moved.unsigned_abs() >= progress.into() {
             let (before, gap) = (self.took_before, self.took);
             // Where the machine stood, the clock may have run round; else it may have come there as early as the turn began.
-            self.took = if self.stands { Short::MAX } else { short.saturating_sub(turn) };
+            self.took = if self.stands { Short::MAX } else { short - turn };
             self.took_before = gap;
             (self.anchor, self.progress_at) = (place, now);
             self.backwards = moved < 0;
             (self.stands, self.quiet, self.silent) = (false, false, false);
             (self.edges, self.breaks) = (0, 0);
-            self.debt = self.debt.saturating_sub(tolerance.progress.into());
             self.since_silence = self.since_silence.wrapping_add(1);
+            if self.since_silence as u8 % PAID_BY == 0 {
+                self.debt -= u8::from(self.debt > 0);
+            }
             // As fast again behind the gap as before it, the machine has not been slow in between.
             let steady = before.max(self.took);
             if steady <= STEADY && is_gap(gap, steady) {
@@ -191,18 +180,20 @@ impl EncoderMonitor {
                     // The ground is forgotten already.
                     self.silences = if self.since_silence > SILENCES_WITHIN { 1 } else { self.silences + 1 };
                     self.since_silence = 0;
-                    is_fault = self.silences >= SILENCES;
+                    if self.silences >= SILENCES {
+                        lost += DEBT + 1;
+                    }
                 } else {
-                    lost += tolerance.progress;
+                    lost += PROGRESS;
                 }
             }
         } else {
             let steady = self.took <= STEADY;
-            self.quiet = steady && time >= QUIET;
+            self.quiet = steady && short >= QUIET;
             self.silent |= steady && is_silence(short, self.took);
             self.stands |= time >= STANDS;
             if step != 0 {
-                self.edges = self.edges.saturating_add(1);
+                self.edges = self.edges.wrapping_add(1);
                 // No wheel turns back from steady rolling within a tick or two.
                 if steady && !self.silent && (step < 0) != self.backwards {
                     (self.anchor, self.progress_at) = (place, now);
@@ -215,9 +206,12 @@ impl EncoderMonitor {
                 return Some(Alarm::EncoderChannelDead);
             }
         }
-        self.debt = self.debt.saturating_add(u16::from(lost) * PRICE);
-        is_fault |= self.debt > tolerance.debt;
-        is_fault.then_some(alarm)
+        self.debt += lost;
+        if self.debt <= DEBT {
+            return None;
+        }
+        (self.debt, self.silences) = (0, 0);
+        Some(alarm)
     }
 
     /// The beam broke; returns the fault that this shows.

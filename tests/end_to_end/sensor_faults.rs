@@ -122,7 +122,11 @@ fn spikes_on_both_channels_are_not_counted_and_are_an_alarm_by_the_way_on_which_
         let trial = Trial { start: Start::Now, ..trial(plants(), steady(mm_s(speed_km_h), 3500.0)) };
         let mut run = Run::begin_altered(trial.clone(), &[], |start_cycle, changes| {
             let level_at = |pin: Pin, cycle: u64| {
-                changes.iter().rev().find(|change| change.pin == pin && change.cycle <= cycle).is_some_and(|change| change.high)
+                changes
+                    .iter()
+                    .rev()
+                    .find(|change| change.pin == pin && change.cycle <= cycle)
+                    .is_some_and(|change| change.high)
             };
             let spikes = (5..(trial.motion.duration_s() * 17.0) as u64).flat_map(|number| {
                 let cycle = start_cycle + number * CYCLES_PER_SECOND / 17;

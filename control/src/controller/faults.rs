@@ -6,9 +6,8 @@ use crate::{
     classifier::Classifier,
     event::Event,
     memory::Memory,
-    monitor::Tolerance,
     settings::{Setting, Settings},
-    units::{Interval, Ticks},
+    units::{Interval, Length, Ticks},
 };
 
 /// What the end switch may take longer than the lead: a servo frame, the contacts' bouncing, and some patience.
@@ -17,6 +16,9 @@ const END_SWITCH_GRACE_MS: u32 = 100;
 /// Free bytes of stack below which the machine does not work on: two interrupts' worth.
 const STACK_RESERVE: u16 = 48;
 
+/// What the encoder's monitor takes for progress: 1.7 to 3.3 mm with an encoder finer than 0.4 mm, and four ticks with any other.
+const PROGRESS: Length = Length(4);
+
 /// What the machine is not to go beyond, in ticks of the present wheel.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Limits {
@@ -24,18 +26,16 @@ pub(super) struct Limits {
     top_speed: i32,
     /// Zero for none.
     no_plant: Ticks,
-    encoder: Tolerance,
 }
 
 impl Limits {
-    pub(super) const NONE: Self = Self { top_speed: 0, no_plant: Ticks::ZERO, encoder: Tolerance::NONE };
+    pub(super) const NONE: Self = Self { top_speed: 0, no_plant: Ticks::ZERO };
 
     pub(super) fn of(settings: &Settings) -> Self {
         let wheel = settings.wheel();
         Self {
             top_speed: wheel.ticks(settings.get(Setting::TopSpeedMmS)).0,
             no_plant: Ticks(wheel.ticks(1000).0 * i32::from(settings.get(Setting::NoPlantM))),
-            encoder: Tolerance::of(wheel, settings.get(Setting::MarginMm)),
         }
     }
 }
@@ -46,7 +46,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     pub(super) fn fault(&mut self, doubted: u8) -> Option<Alarm> {
         let Readings { now, position, end_switch_on, stack_free, .. } = self.readings;
         let working = self.is_working();
-        let fault = self.encoder.read(now, position, doubted, &self.limits.encoder);
+        let fault = self.encoder.read(now, position, doubted, self.ground.ticks(PROGRESS).0 as u8);
         if self.encoder.is_silent() {
             // Nobody knows how far the machine has rolled since.
             self.ground.forget();
