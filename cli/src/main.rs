@@ -10,6 +10,7 @@ mod completions;
 mod course;
 mod design;
 mod evaluate;
+mod figures;
 mod flash;
 mod hex;
 mod monitor;
@@ -77,6 +78,8 @@ enum Command {
     Design(design::Arguments),
     /// Judge a field trial by what was counted and measured in its plots.
     Evaluate(evaluate::Arguments),
+    /// Write the figures of the manual anew, or say which are no longer true.
+    Figures(figures::Arguments),
     /// Print what a shell needs to complete this command's words.
     Completions(completions::Arguments),
 }
@@ -108,6 +111,7 @@ fn main() -> ExitCode {
         Command::Settings(arguments) => settings::run(&arguments),
         Command::Design(arguments) => design::run(&arguments).map(|()| Finding::Good),
         Command::Evaluate(arguments) => evaluate::run(&arguments).map(|()| Finding::Good),
+        Command::Figures(arguments) => figures::run(&arguments),
         Command::Completions(arguments) => completions::run(&arguments, Arguments::command()).map(|()| Finding::Good),
     };
     match result {

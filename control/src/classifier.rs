@@ -60,7 +60,7 @@ pub struct Full;
 /// Tells plants from weeds, and may be taught.
 pub trait Classifier {
     /// Looks what was kept over the loss of power; to be called once, before anything else.
-    fn wake_up(&mut self);
+    fn wake_up(&mut self) {}
 
     /// Classifies an object by its `k` nearest examples.
     fn classify(&self, features: &Features, k: u8) -> Vote;
