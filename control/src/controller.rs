@@ -23,6 +23,7 @@ use crate::{
     ground::{Ground, watch::Object},
     memory::Memory,
     monitor::{BeamMonitor, EncoderMonitor},
+    quadrature::Odometer,
     reset::Cause,
     saved::SavedSettings,
     servo::{self, HalfMicros},
@@ -131,6 +132,7 @@ pub struct Controller<C, M> {
     readings: Readings,
     switch: Switch,
     end_switch: Switch,
+    odometer: Odometer,
     encoder: EncoderMonitor,
     beam: BeamMonitor,
     beam_broken: bool,
@@ -179,7 +181,8 @@ impl<C: Classifier, M: Memory> Asleep<C, M> {
             readings: Readings { stack_free: 0, ..Readings::new(start, place) },
             switch: Switch::new(false),
             end_switch: Switch::new(false),
-            encoder: EncoderMonitor::new(start, place, 0),
+            odometer: Odometer::new(place, 0),
+            encoder: EncoderMonitor::NONE,
             beam: BeamMonitor::new(start),
             beam_broken: false,
             bench: Bench::Idle,
@@ -222,7 +225,8 @@ impl<C: Classifier, M: Memory> Asleep<C, M> {
         (controller.cause, controller.readings, controller.beam_broken) = (cause, readings, beam_broken);
         controller.switch = Switch::new(readings.switch_on);
         controller.end_switch = Switch::new(readings.end_switch_on);
-        controller.encoder = EncoderMonitor::new(now, position, jumps);
+        controller.odometer = Odometer::new(position, jumps);
+        controller.encoder = EncoderMonitor::new(now, position);
         controller.beam = BeamMonitor::new(now);
         controller.meter = SpeedMeter::new(position, now);
         (controller.tool_out, controller.told_at) = (true, now);
@@ -251,7 +255,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         {
             self.raise(alarm);
         }
-        if let Some(object) = self.ground.edge(position, broken) {
+        if let Some(object) = self.ground.edge(self.odometer.place(position), broken) {
             self.judge(object);
         }
     }
@@ -267,7 +271,10 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     #[inline(never)]
     pub fn step(&mut self, readings: Readings) -> Orders {
         self.readings = readings;
-        if let Some(speed) = self.meter.read(readings.now, readings.position) {
+        let doubted = self.odometer.read(readings.position, readings.jumps);
+        let position = self.odometer.place(readings.position);
+        self.readings.position = position;
+        if let Some(speed) = self.meter.read(readings.now, position) {
             self.ground.lead(&self.settings, speed);
         }
         match self.switch.read(readings.now, readings.switch_on) {
@@ -276,17 +283,17 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             Some(false) => self.enter(State::Hold),
             _ => {}
         }
-        if let Some(object) = self.ground.roll_to(readings.position) {
+        if let Some(object) = self.ground.roll_to(position) {
             self.judge(object);
         }
-        if let Some(alarm) = self.fault() {
+        if let Some(alarm) = self.fault(doubted) {
             self.raise(alarm);
         }
         let out = self.try_out().unwrap_or(!self.is_working() || self.must_be_out());
         if out != self.tool_out {
             self.tool_out = out;
             self.awaits_ground = out && self.is_working();
-            self.tell(Event::Swing { out, position: readings.position });
+            self.tell(Event::Swing { out, position });
         }
         let orders = self.orders();
         if orders.pulse != self.pulse {

@@ -6,6 +6,7 @@ use field::motion::{Motion, mm_s};
 use field::row::{Row, Thing};
 use field::signal::{CYCLES_PER_SECOND, Pin, PinChange};
 use field::trial::{Start, Trial};
+use field::verdict::Verdict;
 
 /// Where the fault begins: the tool is in the row between the second plant and the third, which the beam has just passed.
 const FAULT_MM: f64 = 1720.0;
@@ -53,7 +54,102 @@ fn an_encoder_that_falls_silent_harms_no_plant_and_is_an_alarm() {
     assert_eq!(value(&status(&mut run.uno), "for"), "encoder_doubtful");
     assert_alarm(&mut run, "encoder_silent", 21);
     for plant in run.judgement().plants {
-        assert_ne!(plant.verdict, field::verdict::Verdict::Damaged, "{plant:?}");
+        assert_ne!(plant.verdict, Verdict::Damaged, "{plant:?}");
+    }
+}
+
+/// Drops the encoder's edges while `is_lost` says so, given the time in seconds since the machine was at a place.
+fn losing_edges(row: Row, speed_km_h: f64, from_mm: f64, length_mm: f64, is_lost: impl Fn(f64) -> bool) -> Run {
+    let trial = Trial { start: Start::Now, ..trial(row, steady(mm_s(speed_km_h), length_mm)) };
+    let from_s = trial.motion.passings(from_mm).first().expect("the machine comes there").time_s;
+    Run::begin_altered(trial, &[], |start_cycle, mut changes| {
+        let from = cycle_at(start_cycle, from_s);
+        let since_s = |cycle: u64| (cycle - from) as f64 / CYCLES_PER_SECOND as f64;
+        changes.retain(|change| change.cycle < from || !is_encoder(change) || !is_lost(since_s(change.cycle)));
+        changes
+    })
+}
+
+fn damaged(run: &Run) -> usize {
+    run.judgement().count(Verdict::Damaged)
+}
+
+#[test]
+fn an_encoder_that_is_silent_for_25_ms_in_every_100_is_an_alarm_before_it_costs_a_plant() {
+    let mut run = losing_edges(plants(), 1.0, 500.0, 3500.0, |time_s| time_s % 0.1 < 0.025);
+    assert_alarm(&mut run, "encoder_silent", 21);
+    assert_eq!(damaged(&run), 0);
+}
+
+#[test]
+fn one_silence_of_200_ms_costs_no_plant_wherever_it_comes_and_is_no_alarm() {
+    for place in 0..9 {
+        let silent_mm = FAULT_MM + f64::from(place) * 500.0 / 9.0;
+        let mut run = losing_edges(plants(), 2.5, silent_mm, 3400.0, |time_s| time_s < 0.2);
+        run.roll_to(silent_mm + 60.0);
+        assert!(is_out_at_the_pin(&run.uno), "{silent_mm} mm");
+        // It speaks again behind 139 mm, and the tool does not come back over what was seen before.
+        let spoken = run.uno.cycle();
+        run.roll_to(silent_mm + 139.0 + 420.0);
+        assert!(run.commands().iter().all(|command| command.rise_cycle < spoken), "{silent_mm} mm");
+        run.roll_to_the_end();
+        assert_eq!((damaged(&run), run.events("alarm")), (0, vec![]), "{silent_mm} mm");
+    }
+}
+
+#[test]
+fn an_encoder_that_stutters_at_a_crawl_costs_one_plant_at_most() {
+    let mut run = losing_edges(plants(), 0.5, 500.0, 2600.0, |time_s| time_s % 0.05 < 0.01);
+    assert_alarm(&mut run, "encoder_silent", 21);
+    assert!(damaged(&run) <= 1);
+}
+
+#[test]
+fn an_encoder_of_which_one_edge_in_ten_does_not_come_costs_one_plant_at_most() {
+    // The pins keep their level where one is left out.
+    let lost = |time_s: f64| (time_s * CYCLES_PER_SECOND as f64) as u64 % 10 == 3;
+    let mut run = losing_edges(plants(), 2.5, 500.0, 3500.0, lost);
+    run.roll_to_the_end();
+    let alarm = run.events("alarm").pop().expect("an alarm");
+    assert!(["encoder_channel_dead", "encoder_silent"].contains(&value(&alarm, "name")), "{alarm}");
+    assert!(damaged(&run) <= 1);
+}
+
+#[test]
+fn spikes_on_both_channels_are_not_counted_and_are_an_alarm_by_the_way_on_which_they_come() {
+    // 17 a second, each for 0.1 ms.
+    for (speed_km_h, is_alarm) in [(1.0, true), (4.0, false)] {
+        let trial = Trial { start: Start::Now, ..trial(plants(), steady(mm_s(speed_km_h), 3500.0)) };
+        let mut run = Run::begin_altered(trial.clone(), &[], |start_cycle, changes| {
+            let level_at = |pin: Pin, cycle: u64| {
+                changes
+                    .iter()
+                    .rev()
+                    .find(|change| change.pin == pin && change.cycle <= cycle)
+                    .is_some_and(|change| change.high)
+            };
+            let spikes = (5..(trial.motion.duration_s() * 17.0) as u64).flat_map(|number| {
+                let cycle = start_cycle + number * CYCLES_PER_SECOND / 17;
+                let is_quiet = !changes.iter().any(|c| is_encoder(c) && (cycle..cycle + 3200).contains(&c.cycle));
+                let spike = [Pin::EncoderA, Pin::EncoderB].map(|pin| {
+                    let high = level_at(pin, cycle);
+                    [PinChange { cycle, pin, high: !high }, PinChange { cycle: cycle + 1600, pin, high }]
+                });
+                is_quiet.then_some(spike).into_iter().flatten().flatten()
+            });
+            let mut all: Vec<PinChange> = spikes.chain(changes.iter().copied()).collect();
+            all.sort_by_key(|change| change.cycle);
+            all
+        });
+        run.roll_to_the_end();
+        let alarms = run.events("alarm");
+        assert_eq!(alarms.len(), usize::from(is_alarm), "{speed_km_h} km/h: {alarms:?}");
+        assert!(alarms.iter().all(|alarm| value(alarm, "name") == "encoder_jumps"), "{alarms:?}");
+        let status = status(&mut run.uno);
+        let rolled = trial.machine.ticks(&trial.motion, trial.motion.duration_s());
+        assert!(number(&status, "jumps") > 20, "{status}");
+        assert!((number(&status, "pos") - rolled).abs() <= 2, "{status}, and {rolled} were rolled");
+        assert_eq!(damaged(&run), 0);
     }
 }
 

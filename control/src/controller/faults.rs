@@ -7,7 +7,7 @@ use crate::{
     event::Event,
     memory::Memory,
     settings::{Setting, Settings},
-    units::{Interval, Ticks},
+    units::{Interval, Length, Ticks},
 };
 
 /// What the end switch may take longer than the lead: a servo frame, the contacts' bouncing, and some patience.
@@ -15,6 +15,9 @@ const END_SWITCH_GRACE_MS: u32 = 100;
 
 /// Free bytes of stack below which the machine does not work on: two interrupts' worth.
 const STACK_RESERVE: u16 = 48;
+
+/// What the encoder's monitor takes for progress: 1.7 to 3.3 mm with an encoder finer than 0.4 mm, and four ticks with any other.
+const PROGRESS: Length = Length(4);
 
 /// What the machine is not to go beyond, in ticks of the present wheel.
 #[derive(Clone, Copy, Debug)]
@@ -38,12 +41,17 @@ impl Limits {
 }
 
 impl<C: Classifier, M: Memory> Controller<C, M> {
-    /// The fault that the readings show, if any.
+    /// The fault that the readings show, if any; so many of the encoder's ticks are `doubted`.
     #[inline(never)]
-    pub(super) fn fault(&mut self) -> Option<Alarm> {
-        let Readings { now, position, jumps, end_switch_on, stack_free, .. } = self.readings;
+    pub(super) fn fault(&mut self, doubted: u8) -> Option<Alarm> {
+        let Readings { now, position, end_switch_on, stack_free, .. } = self.readings;
         let working = self.is_working();
-        match self.encoder.read(now, position, jumps) {
+        let fault = self.encoder.read(now, position, doubted, self.ground.ticks(PROGRESS).0 as u8);
+        if self.encoder.is_silent() {
+            // Nobody knows how far the machine has rolled since.
+            self.ground.forget();
+        }
+        match fault {
             // A machine at rest may tremble.
             Some(Alarm::EncoderChannelDead) if !working => {}
             None => {}

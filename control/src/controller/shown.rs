@@ -66,6 +66,11 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         self.ground.millimetres(self.ground.unseen())
     }
 
+    /// Whether the encoder fell silent from one moment to the next, so that nobody knows how far the machine has rolled since.
+    pub fn encoder_is_silent(&self) -> bool {
+        self.encoder.is_silent()
+    }
+
     /// Whether the beam is broken.
     pub fn beam_is_broken(&self) -> bool {
         self.beam_broken

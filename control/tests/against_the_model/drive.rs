@@ -35,6 +35,8 @@ const SWITCH_DELAY_US: u64 = 60_000;
 pub struct ByWidth;
 
 impl Classifier for ByWidth {
+    fn wake_up(&mut self) {}
+
     fn classify(&self, features: &Features, _: u8) -> Vote {
         let narrow = Features::describe(0, 0, PLANT_MM).hold_mm;
         Vote { class: if features.hold_mm < narrow { Class::Weed } else { Class::Plant }, votes: 1 }
@@ -338,6 +340,9 @@ impl Drive {
         let seen = self.model.roll_to(count, merge_gap);
         let orders = self.controller.step(readings);
         self.compare(seen, state, frontier)?;
+        if self.controller.encoder_is_silent() {
+            self.model.lose_place(self.margin());
+        }
         let out = self.controller.tool_out();
         self.out_since_us = out.then(|| self.out_since_us.unwrap_or(self.time_us));
         prop_assert_eq!(orders.pulse == orders.pulse_out, out);

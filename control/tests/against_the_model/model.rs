@@ -119,6 +119,13 @@ impl Model {
         self.doubtful = self.open.is_some();
     }
 
+    /// The machine does not know how far it has rolled: all that was seen is unknown, and a margin ahead of it.
+    pub fn lose_place(&mut self, margin: i64) {
+        self.latch(self.frontier);
+        self.known_from = self.frontier + margin;
+        self.doubtful = self.open.is_some();
+    }
+
     /// Edges were lost: the beam's level is now `broken`.
     pub fn lose_edges(&mut self, broken: bool) {
         self.broken = broken;

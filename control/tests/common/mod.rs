@@ -14,6 +14,8 @@ use control::{
 pub struct ByWidth;
 
 impl Classifier for ByWidth {
+    fn wake_up(&mut self) {}
+
     fn classify(&self, features: &Features, _: u8) -> Vote {
         let class = if features.hold_mm < 160 { Class::Weed } else { Class::Plant };
         Vote { class, votes: 1 }

@@ -1,0 +1,412 @@
+//! What becomes of a row when the encoder fails in small ways: silences, spikes on both channels, edges that do not come.
+//!
+//! The machine rolls past a row of plants at a steady speed. Each edge of the encoder comes at its time, unevenly by a third as
+//! encoders give them, goes through the fault, and is decoded by the firmware's decoder; the controller turns as the firmware's
+//! loop does, with now and then a long turn. The tool follows as a servo does. A plant is hit where the tool is not fully out
+//! over its canopy.
+//!
+//! What is held: every canopy is kept, or the alarm comes before a second one is hit. The manual's page of faults has the table;
+//! `UPDATE_EXPECT=1 cargo test -p control --test encoder_faults` writes it anew.
+
+use control::{
+    alarm::Alarm,
+    classifier::Nearest,
+    controller::{Controller, Readings, State, WakeUp},
+    examples::EXAMPLES,
+    memory::Volatile,
+    quadrature::{Quadrature, Step},
+    reset::Cause,
+    servo,
+    settings::Setting,
+    units::{Instant, Interval, Position},
+};
+use expect_test::{ExpectFile, expect_file};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::fmt::{self, Write};
+use std::ops::Range;
+
+/// A wheel of 400 mm with 2400 counts.
+const TICK_MM: f64 = std::f64::consts::PI * 400.0 / 2400.0;
+
+/// The row: plants half a metre apart, with canopies of 150 mm, the first so far from where the machine starts.
+const PLANTS: usize = 8;
+const FIRST_MM: f64 = 1000.0;
+const SPACING_MM: f64 = 500.0;
+const CANOPY_MM: f64 = 150.0;
+
+const BEAM_TO_TOOL_MM: f64 = 400.0;
+const MARGIN_MM: f64 = 50.0;
+
+/// A margin that is short by less than this still counts as kept, as everywhere in this project.
+const TOLERANCE_MM: f64 = 10.0;
+
+/// The machine gains its speed with 1 m/s2.
+const ACCELERATION_MM_S2: f64 = 1000.0;
+
+/// The beam's sensor answers a millisecond late.
+const RESPONSE_S: f64 = 0.001;
+
+/// The servo: dead time, and until the tool is out.
+const DEAD_S: f64 = 0.060;
+const SWING_S: f64 = 0.180;
+
+/// How long a spike lasts: longer than the interrupt takes to answer.
+const SPIKE_S: f64 = 0.000_1;
+
+const SPEEDS_KM_H: [f64; 7] = [0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0];
+
+/// What is wrong with the encoder.
+#[derive(Clone, Copy, Debug)]
+enum Fault {
+    /// No edge comes for so long, once or time and again.
+    Silence { length_ms: u32, every_ms: Option<u32> },
+    /// Both channels change for a moment, so often a second.
+    Spikes { a_second: u32 },
+    /// So many of a thousand edges do not come: the channel stays where it is until its next edge but one.
+    LostEdges { in_1000: u32 },
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::Silence { length_ms, every_ms: None } => write!(f, "silent once for {length_ms} ms"),
+            Self::Silence { length_ms, every_ms: Some(every_ms) } => {
+                write!(f, "silent for {length_ms} ms every {} s", f64::from(every_ms) / 1000.0)
+            }
+            Self::Spikes { a_second } => write!(f, "{a_second} spikes a second on both channels"),
+            Self::LostEdges { in_1000 } => write!(f, "{} % of the edges lost", f64::from(in_1000) / 10.0),
+        }
+    }
+}
+
+/// What became of the row, the best first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Outcome {
+    /// Every canopy and every margin was kept.
+    Kept,
+    /// A margin was cut.
+    MarginCut,
+    /// An alarm came, and no plant was hit.
+    Alarm,
+    /// One plant was hit, and an alarm came.
+    OneHit,
+    /// Plants were hit without an alarm, or more than one before it.
+    Failed,
+}
+
+impl fmt::Display for Outcome {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Kept => "kept",
+            Self::MarginCut => "cut",
+            Self::Alarm => "alarm",
+            Self::OneHit => "1 hit, alarm",
+            Self::Failed => "FAILED",
+        })
+    }
+}
+
+/// A run: the fault is there from a place on.
+#[derive(Clone, Copy, Debug)]
+struct Run {
+    fault: Fault,
+    speed_km_h: f64,
+    from_mm: f64,
+    seed: u64,
+}
+
+/// What a run showed.
+#[derive(Debug)]
+struct Shown {
+    hit: usize,
+    cut: usize,
+    alarm: Option<Alarm>,
+    /// Ticks that the machine has rolled, and those that the controller believes.
+    rolled: i64,
+    counted: i64,
+}
+
+impl Shown {
+    fn outcome(&self) -> Outcome {
+        match (self.hit, self.alarm) {
+            (0, Some(_)) => Outcome::Alarm,
+            (1, Some(_)) => Outcome::OneHit,
+            (0, None) if self.cut > 0 => Outcome::MarginCut,
+            (0, None) => Outcome::Kept,
+            _ => Outcome::Failed,
+        }
+    }
+}
+
+/// The machine's way.
+#[derive(Clone, Copy)]
+struct Way {
+    speed_mm_s: f64,
+}
+
+impl Way {
+    /// When it is at a place.
+    fn time_s(self, place_mm: f64) -> f64 {
+        let gaining_mm = self.speed_mm_s.powi(2) / (2.0 * ACCELERATION_MM_S2);
+        if place_mm < gaining_mm {
+            (2.0 * place_mm / ACCELERATION_MM_S2).sqrt()
+        } else {
+            self.speed_mm_s / ACCELERATION_MM_S2 + (place_mm - gaining_mm) / self.speed_mm_s
+        }
+    }
+
+    /// Where it is at a time.
+    fn place_mm(self, time_s: f64) -> f64 {
+        let gaining_s = self.speed_mm_s / ACCELERATION_MM_S2;
+        if time_s < gaining_s {
+            ACCELERATION_MM_S2 * time_s * time_s / 2.0
+        } else {
+            self.speed_mm_s * (time_s - gaining_s / 2.0)
+        }
+    }
+}
+
+/// The encoder's wires, with the fault on them.
+struct Wires {
+    way: Way,
+    fault: Fault,
+    from_s: f64,
+    rng: ChaCha8Rng,
+    /// The number of the next edge, and its time.
+    edge: i64,
+    edge_s: f64,
+    /// Levels without spikes.
+    levels: u8,
+    spike_s: f64,
+    spiked: bool,
+    decoder: Quadrature,
+    count: i64,
+    jumps: u16,
+}
+
+/// AB in the order of forward motion.
+const FORWARD: [u8; 4] = [0b00, 0b10, 0b11, 0b01];
+
+impl Wires {
+    fn new(way: Way, run: Run) -> Self {
+        let mut wires = Self {
+            way,
+            fault: run.fault,
+            from_s: way.time_s(run.from_mm),
+            rng: ChaCha8Rng::seed_from_u64(run.seed),
+            edge: 0,
+            edge_s: 0.0,
+            levels: FORWARD[0],
+            spike_s: f64::INFINITY,
+            spiked: false,
+            decoder: Quadrature::new(FORWARD[0]),
+            count: 0,
+            jumps: 0,
+        };
+        wires.next_edge();
+        if let Fault::Spikes { a_second } = run.fault {
+            wires.spike_s = wires.from_s + wires.rng.random_range(0.0..1.0) / f64::from(a_second);
+        }
+        wires
+    }
+
+    fn next_edge(&mut self) {
+        self.edge += 1;
+        // The edges of one channel come late by a third of the distance between two.
+        let late = if self.edge % 2 == 0 { 1.0 / 3.0 } else { 0.0 };
+        self.edge_s = self.way.time_s((self.edge as f64 + late) * TICK_MM);
+    }
+
+    /// Rolls on to a time.
+    fn roll_to(&mut self, time_s: f64) {
+        while self.edge_s.min(self.spike_s) <= time_s {
+            if self.spike_s < self.edge_s {
+                self.spiked = !self.spiked;
+                self.spike_s += match self.fault {
+                    Fault::Spikes { a_second } if !self.spiked => {
+                        // Not in step with anything.
+                        (1.0 / f64::from(a_second) - SPIKE_S) * self.rng.random_range(0.5..1.5)
+                    }
+                    _ => SPIKE_S,
+                };
+            } else {
+                let from = FORWARD[(self.edge - 1).rem_euclid(4) as usize];
+                let to = FORWARD[self.edge.rem_euclid(4) as usize];
+                let channel = from ^ to;
+                if !self.is_lost(self.edge_s) {
+                    self.levels = self.levels & !channel | to & channel;
+                }
+                self.next_edge();
+            }
+            match self.decoder.step(self.levels ^ if self.spiked { 0b11 } else { 0 }) {
+                Step::Ticks(ticks) => {
+                    self.count += i64::from(ticks);
+                    self.jumps = self.jumps.wrapping_add(u16::from(ticks.abs() == 2));
+                }
+                Step::Lost => self.jumps = self.jumps.wrapping_add(1),
+            }
+        }
+    }
+
+    fn is_lost(&mut self, time_s: f64) -> bool {
+        let since_s = time_s - self.from_s;
+        match self.fault {
+            _ if since_s < 0.0 => false,
+            Fault::Silence { length_ms, every_ms } => {
+                let phase_s = every_ms.map_or(since_s, |every_ms| since_s % (f64::from(every_ms) / 1000.0));
+                phase_s < f64::from(length_ms) / 1000.0
+            }
+            Fault::Spikes { .. } => false,
+            Fault::LostEdges { in_1000 } => self.rng.random_bool(f64::from(in_1000) / 1000.0),
+        }
+    }
+}
+
+fn canopies_mm() -> impl Iterator<Item = Range<f64>> {
+    (0..PLANTS).map(|plant| {
+        let leading_mm = FIRST_MM + SPACING_MM * plant as f64;
+        leading_mm..leading_mm + CANOPY_MM
+    })
+}
+
+/// Rolls past the row, to its end or to an alarm and the swing after it.
+fn roll(run: Run) -> Shown {
+    let way = Way { speed_mm_s: run.speed_km_h / 0.0036 };
+    let mut wires = Wires::new(way, run);
+    let readings = |time_s: f64, wires: &Wires| {
+        let now = Instant::default() + Interval::from_steps((time_s * f64::from(Interval::STEPS_PER_SECOND)) as u32);
+        Readings { jumps: wires.jumps, ..Readings::new(now, Position::new(wires.count as i32)) }
+    };
+    let wake_up = WakeUp { readings: readings(0.0, &wires), beam_broken: false, cause: Cause::PowerOn };
+    let mut weeder = Controller::new(Nearest::new(&EXAMPLES[..], Volatile::new()), Volatile::new(), wake_up);
+    weeder.clear();
+    weeder.start(false).expect("nothing is wrong yet");
+    let tool_in = servo::from_us(weeder.settings().get(Setting::ServoInUs));
+
+    let mut beam = canopies_mm()
+        .flat_map(|canopy| [(canopy.start, true), (canopy.end, false)])
+        .map(|(place_mm, broken)| (way.time_s(place_mm) + RESPONSE_S, broken))
+        .peekable();
+    let canopies: Vec<Range<f64>> = canopies_mm().collect();
+    let (mut hit, mut cut) = ([false; PLANTS], [false; PLANTS]);
+    // Since when the tool was told where it is, and whether it was clear of the row then.
+    let (mut out, mut told_s, mut was_clear) = (true, f64::NEG_INFINITY, true);
+    let end_s = way.time_s(canopies[PLANTS - 1].end + BEAM_TO_TOOL_MM + MARGIN_MM);
+    let (mut time_s, mut turn, mut alarm) = (0.0, 0_u32, None);
+    while time_s < alarm.map_or(end_s, |(_, at_s): (Alarm, f64)| f64::min(at_s + 2.0 * SWING_S, end_s)) {
+        turn += 1;
+        // The loop's turns as they are while it weeds and its status is asked for.
+        time_s += match turn {
+            turn if turn % 503 == 0 => 0.003_8,
+            turn if turn % 11 == 0 => 0.000_7,
+            _ => 0.000_25,
+        };
+        while let Some((edge_s, broken)) = beam.next_if(|&(edge_s, _)| edge_s <= time_s) {
+            wires.roll_to(edge_s);
+            weeder.beam_edge(Position::new(wires.count as i32), broken);
+        }
+        wires.roll_to(time_s);
+        let orders = weeder.step(readings(time_s, &wires));
+        if let (State::Alarm(raised), None) = (weeder.state(), alarm) {
+            alarm = Some((raised, time_s));
+        }
+        let since_told_s = time_s - told_s;
+        let is_clear = if out { since_told_s >= SWING_S || was_clear } else { was_clear && since_told_s < DEAD_S };
+        if (orders.pulse != tool_in) != out {
+            (out, told_s, was_clear) = (!out, time_s, is_clear);
+        }
+        if is_clear {
+            continue;
+        }
+        let tool_mm = way.place_mm(time_s) - BEAM_TO_TOOL_MM;
+        let within = |canopy: &Range<f64>, by_mm: f64| (canopy.start - by_mm..canopy.end + by_mm).contains(&tool_mm);
+        for (plant, canopy) in canopies.iter().enumerate() {
+            hit[plant] |= within(canopy, 0.0);
+            cut[plant] |= within(canopy, MARGIN_MM - TOLERANCE_MM);
+        }
+    }
+    let count = |plants: [bool; PLANTS]| plants.iter().filter(|is| **is).count();
+    Shown {
+        hit: count(hit),
+        cut: count(cut),
+        alarm: alarm.map(|(alarm, _)| alarm),
+        rolled: wires.edge - 1,
+        counted: i64::from(weeder.readings().position.count()),
+    }
+}
+
+/// The worst that a fault does at a speed, wherever it begins between two plants.
+fn worst(fault: Fault, speed_km_h: f64) -> (Outcome, Run) {
+    let places: u32 = if matches!(fault, Fault::Silence { every_ms: None, .. }) { 25 } else { 4 };
+    (0..places)
+        .map(|place| {
+            // The tool is at work between the first plants.
+            let from_mm = 1800.0 + SPACING_MM * f64::from(place) / f64::from(places);
+            let run = Run { fault, speed_km_h, from_mm, seed: place.into() };
+            (roll(run).outcome(), run)
+        })
+        .max_by_key(|(outcome, _)| *outcome)
+        .expect("there are places")
+}
+
+fn silences() -> Vec<Fault> {
+    const LENGTHS_MS: [u32; 7] = [5, 10, 25, 50, 100, 200, 500];
+    let once = LENGTHS_MS.map(|length_ms| Fault::Silence { length_ms, every_ms: None });
+    let repeated = [50, 100, 200, 500, 1000, 2000].into_iter().flat_map(|every_ms| {
+        let lengths_ms = LENGTHS_MS.into_iter().filter(move |length_ms| 2 * length_ms <= every_ms);
+        lengths_ms.map(move |length_ms| Fault::Silence { length_ms, every_ms: Some(every_ms) })
+    });
+    once.into_iter().chain(repeated).collect()
+}
+
+fn table(faults: impl IntoIterator<Item = Fault>, failed: &mut Vec<String>) -> String {
+    let mut table = "| the encoder |".to_owned();
+    for speed_km_h in SPEEDS_KM_H {
+        write!(table, " {speed_km_h} km/h |").expect("a string takes everything");
+    }
+    table += "\n|";
+    table += &" --- |".repeat(1 + SPEEDS_KM_H.len());
+    for fault in faults {
+        write!(table, "\n| {fault} |").expect("a string takes everything");
+        for speed_km_h in SPEEDS_KM_H {
+            let (outcome, run) = worst(fault, speed_km_h);
+            write!(table, " {outcome} |").expect("a string takes everything");
+            if outcome == Outcome::Failed {
+                failed.push(format!("{run:?}: {:?}", roll(run)));
+            }
+        }
+    }
+    table + "\n"
+}
+
+/// The page with the part between `<!-- name -->` and `<!-- name end -->` replaced.
+fn with_part(page: &ExpectFile, name: &str, part: &str) -> String {
+    let (begin, end) = (format!("<!-- {name} -->\n"), format!("<!-- {name} end -->"));
+    let text = page.data();
+    let (before, rest) = text.split_once(&begin).unwrap_or_else(|| panic!("no {begin:?}"));
+    let (_, after) = rest.split_once(&end).unwrap_or_else(|| panic!("no {end:?}"));
+    [before, &begin, "\n", part, "\n", &end, after].concat()
+}
+
+#[test]
+fn whatever_ails_the_encoder_every_canopy_is_kept_or_the_alarm_comes_before_a_second_is_hit() {
+    let spikes = [1, 2, 5, 10, 17, 20, 50, 100].map(|a_second| Fault::Spikes { a_second });
+    let lost = [1, 2, 5, 10, 20, 50, 100, 200].map(|in_1000| Fault::LostEdges { in_1000 });
+    let mut failed = Vec::new();
+    let table = table(silences().into_iter().chain(spikes).chain(lost), &mut failed);
+    println!("{table}");
+    println!("{failed:#?}");
+    assert!(failed.is_empty(), "{failed:#?}");
+    let page = expect_file!["../../docs/faults.md"];
+    page.assert_eq(&with_part(&page, "encoder", &table));
+}
+
+#[test]
+fn spikes_on_both_channels_are_not_counted() {
+    for speed_km_h in [1.0, 2.5, 4.0] {
+        let run = Run { fault: Fault::Spikes { a_second: 10 }, speed_km_h, from_mm: 300.0, seed: 1 };
+        let shown = roll(run);
+        assert!((shown.rolled - shown.counted).abs() <= 4, "{run:?}: {shown:?}");
+    }
+}
