@@ -73,12 +73,14 @@
 mod classify;
 mod distance;
 mod examples;
+mod neighbour;
 mod scale;
 mod table;
 
 pub use classify::{Answer, ClassifyError, Kind, MAX_K, classify};
 pub use distance::{MAX_FEATURES, squared_distance};
 pub use examples::{Example, Examples};
+pub use neighbour::Neighbour;
 pub use scale::{Range, Scale};
 pub use table::Table;
 
