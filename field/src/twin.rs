@@ -8,7 +8,8 @@
 //! Console, EEPROM, interrupts and cycles are not in it: for those there is the virtual Uno.
 
 use crate::link::settings::name;
-use crate::machine::time_at_s;
+use crate::machine::{Machine, time_at_s};
+use crate::motion::{Course, marks};
 use crate::signal::{CYCLES_PER_SECOND, PinChange, Pulse};
 use crate::trial::{Start, Trial};
 use control::classifier::Nearest;
@@ -99,34 +100,49 @@ impl ServoLine {
 
 /// What the machine's sensors say, turn by turn: the encoder's count, and the beam's edges since the turn before.
 pub struct Sensors<'a> {
-    trial: &'a Trial,
+    machine: &'a Machine,
+    course: Course<'a>,
+    start_mm: f64,
+    tick_mm: f64,
     edges: std::iter::Peekable<std::vec::IntoIter<PinChange>>,
-    clean_ticks: i64,
+    /// The pulse in which a clean encoder is, whether dirt hides it, and the counts that it has hidden before.
+    pulse: i64,
+    is_hidden: bool,
     hidden_ticks: i64,
 }
 
 impl<'a> Sensors<'a> {
     /// Those of a trial, whose motion begins at time 0.
     pub fn new(trial: &'a Trial) -> Self {
-        let edges = trial.machine.beam_changes(&trial.row, &trial.motion, 0);
-        Self { trial, edges: edges.into_iter().peekable(), clean_ticks: 0, hidden_ticks: 0 }
+        let Trial { machine, motion, row, .. } = trial;
+        Self {
+            machine,
+            course: Course::along(motion),
+            start_mm: motion.start_mm(),
+            tick_mm: machine.tick_mm(),
+            edges: machine.beam_changes(row, motion, 0).into_iter().peekable(),
+            pulse: 0,
+            is_hidden: machine.dirt.hides(0),
+            hidden_ticks: 0,
+        }
     }
 
     /// The encoder's count at a time, no earlier than the last one asked for.
     pub fn position(&mut self, time_s: f64) -> i64 {
-        let Trial { machine, motion, .. } = self.trial;
-        let ticks = machine.ticks(motion, time_s);
-        if machine.dirt.share == 0.0 {
-            return ticks;
+        let ticks = marks(self.course.wheel_mm(time_s) - self.start_mm, self.tick_mm);
+        let pulse = self.machine.pulse(ticks);
+        if pulse != self.pulse {
+            // What is lost on the way there comes back on the way back.
+            self.hidden_ticks += if pulse > self.pulse {
+                self.machine.hidden_ticks(self.pulse..pulse)
+            } else {
+                -self.machine.hidden_ticks(pulse..self.pulse)
+            };
+            self.pulse = pulse;
+            self.is_hidden = self.machine.dirt.hides(pulse);
         }
-        // What is lost on the way there comes back on the way back.
-        self.hidden_ticks += if ticks >= self.clean_ticks {
-            machine.hidden_ticks(self.clean_ticks..ticks)
-        } else {
-            -machine.hidden_ticks(ticks..self.clean_ticks)
-        };
-        self.clean_ticks = ticks;
-        ticks - self.hidden_ticks - machine.hidden_in_pulse(ticks)
+        let in_pulse = if self.is_hidden { self.machine.hidden_in_pulse(ticks) } else { 0 };
+        ticks - self.hidden_ticks - in_pulse
     }
 
     /// The next edge of the beam before a time: when it comes, and whether the beam is broken from then on.
@@ -156,17 +172,75 @@ pub fn weed(trial: &Trial) -> Result<Weeded, Refused> {
     let orders = weeder.orders();
     let mut line = ServoLine::new(orders.pulse, orders.gap_ms);
     let turns = (trial.motion.duration_s() / TURN_S).ceil() as u64;
+    let mut take_turn = |weeder: &mut Weeder, time_s: f64, position: i64| {
+        let orders = weeder.step(Readings::new(instant(time_s), Position::new(position as i32)));
+        line.command(orders.pulse, time_s);
+        orders.pulse
+    };
+    let mut lull = Lull::default();
+    let mut left_out = None;
     for turn in 0..=turns {
         let time_s = turn as f64 * TURN_S;
         while let Some((edge_s, broken)) = sensors.next_edge(time_s) {
+            // The edge comes after the turn before it, with the clock as that turn has read it.
+            if let Some((time_s, position)) = left_out.take() {
+                take_turn(&mut weeder, time_s, position);
+            }
             let position = sensors.position(edge_s);
             weeder.beam_edge(Position::new(position as i32), broken);
+            lull.disturb();
         }
-        let position = Position::new(sensors.position(time_s) as i32);
-        let orders = weeder.step(Readings::new(instant(time_s), position));
-        line.command(orders.pulse, time_s);
+        let position = sensors.position(time_s);
+        if lull.lasts(turn, position) {
+            left_out = Some((time_s, position));
+        } else {
+            lull.turn(position, take_turn(&mut weeder, time_s, position));
+            left_out = None;
+        }
     }
     Ok(Weeded { pulses: line.into_pulses(), state: weeder.state() })
+}
+
+/// Tells which turns may be left out: those that find everything as the turn before has left it.
+///
+/// Nothing but time has gone by then, and time alone means something only to who waits for a machine that has fallen silent, not before
+/// [`SILENCE_TURNS`].
+#[derive(Debug, Default)]
+struct Lull {
+    /// What the last turn has read and commanded, unless something has happened since or it was the first to command that.
+    left: Option<i64>,
+    pulse: HalfMicros,
+    /// Where the machine last made progress, and in which turn.
+    anchor: i64,
+    progress_turn: u64,
+}
+
+/// Silence that means nothing yet: speed meter and encoder's monitor take one of 10 ms for none.
+const SILENCE_TURNS: u64 = 9;
+
+/// Counts that are no progress yet to the encoder's monitor.
+const PROGRESS_TICKS: u64 = 2;
+
+impl Lull {
+    /// Something has happened.
+    fn disturb(&mut self) {
+        self.left = None;
+    }
+
+    /// Whether this turn may be left out.
+    fn lasts(&mut self, turn: u64, position: i64) -> bool {
+        if position.abs_diff(self.anchor) > PROGRESS_TICKS {
+            (self.anchor, self.progress_turn) = (position, turn);
+        }
+        self.left == Some(position) && turn - self.progress_turn <= SILENCE_TURNS
+    }
+
+    /// A turn has been taken, and commanded this pulse.
+    fn turn(&mut self, position: i64, pulse: HalfMicros) {
+        // Whether the tool is out decides what is asked next.
+        self.left = (pulse == self.pulse).then_some(position);
+        self.pulse = pulse;
+    }
 }
 
 /// The firmware's clock when the motion has lasted for a time.
