@@ -2,9 +2,10 @@
 //!
 //! The search is most of what a classification costs, so it is written in assembly: the query stays in registers, LPM
 //! brings one feature after the other, and an example is left as soon as it is known to be too far. For that the sum
-//! does not begin at 0 but at 2^24 - 1 less the reach, so that the carry out of its 24 bits says that the example is out of
-//! reach. An example costs 9 cycles and 12 for each feature that is looked at: 21 to 69. Only those within reach go to the
-//! classifier.
+//! does not begin at 0 but at 2^24 - 1 less the farthest neighbour's distance, so that the carry out of its 24 bits says that the
+//! example is beyond it. An example costs 9 cycles and 12 for each feature that is looked at: 21 to 69. One that is near enough
+//! moves those that are farther up by a place, 27 cycles each, and takes its own: some 75 cycles with three places. Only those
+//! that find no place although they are as far as the farthest go to the classifier.
 
 use avr_progmem::wrapper::ProgMem;
 use control::{examples, features};
@@ -89,8 +90,8 @@ impl Search {
                     "4:\n",
                     "mul  {byte}, {byte}\n",
                     "add  {low}, r0\n",
-                    "adc  {upper:l}, r1\n",
-                    "adc  {upper:h}, {zero}\n",
+                    "adc  r16, r1\n",
+                    "adc  r17, {zero}\n",
                     "brcs 2b",
                 )
             };
@@ -102,19 +103,22 @@ impl Search {
         let [a, b, c, d, e] = *query;
         let farthest = nearest.first()?.key();
         // What a sum begins with: the complement of the farthest's distance.
-        let (start_low, start_upper) = (!(farthest >> 8) as u8, !(farthest >> 16) as u16);
-        let (label, low, upper): (u8, u8, u16);
+        let [_, start_low, start_middle, start_high] = (!farthest).to_le_bytes();
+        let (label, low, middle, high): (u8, u8, u8, u8);
         // SAFETY: the loop reads flash from `next` to `end` and nothing else, both of them a row's start or the table's end
         // (`keep_nearest` makes them, and each turn takes `next` one row on). Of SRAM it reads and writes the places of
-        // `nearest`, of which there is a first one: it stops at the last of them, or of the first 256. R0 is free for use, and R1 is 0 again at the end.
+        // `nearest`, of which there is a first one: it stops at the last of them, or of the first
+        // 256. R0 is free for use, and R1 is 0 again at the end.
         unsafe {
             asm!(
+                // The sum has its upper bytes in R17 and R16, what it begins with in R19 and R18: MOVW wants pairs that begin with
+                // an even register, which the compiler's own choice of a pair need not be.
                 // R1, which is 0 elsewhere, takes the products: the carry is added by a register of its own.
                 "clr  {zero}",
                 "rjmp 2f",
                 "3:",
                 "ldi  r30, {none}",
-                "mov  {upper:h}, r30",
+                "mov  r17, r30",
                 "rjmp 9f",
                 "2:",
                 "cp   {next:l}, {end:l}",
@@ -123,7 +127,7 @@ impl Search {
                 "movw r30, {next:l}",
                 "adiw {next:l}, {row}",
                 "mov  {low}, {start_low}",
-                "movw {upper:l}, {start_upper:l}",
+                "movw r16, r18",
                 feature!("a"),
                 feature!("b"),
                 feature!("c"),
@@ -131,12 +135,12 @@ impl Search {
                 feature!("e"),
                 // Within reach. The sum is all ones where the example is as far as the farthest.
                 "mov  {byte}, {low}",
-                "and  {byte}, {upper:l}",
-                "and  {byte}, {upper:h}",
+                "and  {byte}, r16",
+                "and  {byte}, r17",
                 // The distance is what the sum has grown by.
                 "sub  {low}, {start_low}",
-                "sbc  {upper:l}, {start_upper:l}",
-                "sbc  {upper:h}, {start_upper:h}",
+                "sbc  r16, r18",
+                "sbc  r17, r19",
                 "lpm  {label}, Z",
                 "movw r30, {nearest:l}",
                 "ld   {old_label}, Z",
@@ -157,8 +161,8 @@ impl Search {
                 "ldd  {third:h}, Z+7",
                 "cp   {label}, {byte}",
                 "cpc  {low}, {second}",
-                "cpc  {upper:l}, {third:l}",
-                "cpc  {upper:h}, {third:h}",
+                "cpc  r16, {third:l}",
+                "cpc  r17, {third:h}",
                 "brcc 7f",
                 "st   Z, {byte}",
                 "std  Z+1, {second}",
@@ -169,33 +173,33 @@ impl Search {
                 "7:",
                 "st   Z, {label}",
                 "std  Z+1, {low}",
-                "std  Z+2, {upper:l}",
-                "std  Z+3, {upper:h}",
+                "std  Z+2, r16",
+                "std  Z+3, r17",
                 // The reach is where the farthest is now.
                 "movw r30, {nearest:l}",
                 "ldd  {low}, Z+1",
-                "ldd  {upper:l}, Z+2",
-                "ldd  {upper:h}, Z+3",
+                "ldd  r16, Z+2",
+                "ldd  r17, Z+3",
                 "com  {low}",
-                "com  {upper:l}",
-                "com  {upper:h}",
+                "com  r16",
+                "com  r17",
                 "cp   {low}, {start_low}",
-                "cpc  {upper:l}, {start_upper:l}",
-                "cpc  {upper:h}, {start_upper:h}",
+                "cpc  r16, r18",
+                "cpc  r17, r19",
                 "mov  {start_low}, {low}",
-                "movw {start_upper:l}, {upper:l}",
+                "movw r18, r16",
                 "breq 7f",
                 "8:",
                 "rjmp 2b",
                 // It has not changed: the one that lost its place is level, unless nothing had taken that place.
                 "7:",
                 "mov  r0, {low}",
-                "or   r0, {upper:l}",
-                "or   r0, {upper:h}",
+                "or   r0, r16",
+                "or   r0, r17",
                 "breq 8b",
                 "com  {low}",
-                "com  {upper:l}",
-                "com  {upper:h}",
+                "com  r16",
+                "com  r17",
                 "mov  {label}, {old_label}",
                 "9:",
                 "clr  r1",
@@ -205,18 +209,20 @@ impl Search {
                 next = inout(reg_iw) self.next,
                 end = in(reg_pair) self.end,
                 start_low = inout(reg) start_low => _,
-                start_upper = inout(reg_pair) start_upper => _,
+                inout("r18") start_middle => _,
+                inout("r19") start_high => _,
                 a = in(reg) a,
                 b = in(reg) b,
                 c = in(reg) c,
                 d = in(reg) d,
                 e = in(reg) e,
                 zero = out(reg) _,
-                nearest = in(reg_pair) nearest.as_mut_ptr(),
+                nearest = in(reg_iw) nearest.as_mut_ptr(),
                 places = in(reg) nearest.len() as u8,
                 label = out(reg) label,
                 low = out(reg) low,
-                upper = out(reg_pair) upper,
+                out("r16") middle,
+                out("r17") high,
                 byte = out(reg) _,
                 second = out(reg) _,
                 third = out(reg_pair) _,
@@ -226,6 +232,6 @@ impl Search {
                 options(nostack),
             );
         }
-        ((upper >> 8) as u8 != NONE).then(|| Neighbour::new(u32::from(upper) << 8 | u32::from(low), label))
+        (high != NONE).then(|| Neighbour::from_key(u32::from_le_bytes([label, low, middle, high])))
     }
 }

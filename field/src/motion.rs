@@ -314,7 +314,10 @@ impl<'a> Course<'a> {
 
 /// Marks passed, net, after a distance rolled from half way between two of them: the counts of an ideal encoder.
 pub fn marks(distance_mm: f64, pitch_mm: f64) -> i64 {
-    (distance_mm / pitch_mm + 0.5).floor() as i64
+    // The floor, without a call: this is asked for in each turn of a loop.
+    let marks = distance_mm / pitch_mm + 0.5;
+    let towards_zero = marks as i64;
+    towards_zero - i64::from(towards_zero as f64 > marks)
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 //! [`weed`] does what `src/main.rs` does with the same [`control`] code and the same examples: a turn of the loop reads clock
 //! and encoder, takes the beam's edges with the position at which each came, and commands the servo. Turns come every
 //! millisecond, not as fast as a chip can; nothing else is simplified: motion, beam, encoder and servo are those that
-//! the virtual Uno is given. It is some thousand times faster than real time, for studies of many rows.
+//! the virtual Uno is given. It is some ten thousand times faster than real time, for studies of many rows.
 //!
 //! Console, EEPROM, interrupts and cycles are not in it: for those there is the virtual Uno.
 
@@ -21,16 +21,17 @@ use control::memory::Volatile;
 use control::reply;
 use control::reset::Cause;
 use control::servo::{self, Action, FRAME, HalfMicros};
-use control::units::{Instant, Position};
+use control::units::{Instant, Interval, Position};
 use thiserror::Error;
 
 type Weeder = Controller<Nearest<&'static [knn::Example<{ features::COUNT }>], Volatile>, Volatile>;
 
 /// A turn of the loop.
 const TURN_S: f64 = 0.001;
+const STEPS_A_TURN: u32 = Interval::STEPS_PER_SECOND / 1000;
 
-/// How long the machine stands before it rolls, so that the clock is not at its beginning.
-const STILL_S: f64 = 0.1;
+/// How long the machine stands before it rolls, so that the clock is not at its beginning: 0.1 s.
+const STILL_STEPS: u32 = Interval::STEPS_PER_SECOND / 10;
 
 /// Cycles in a step of Timer1, behind its prescaler of 8.
 const CYCLES_A_STEP: u64 = 8;
@@ -104,7 +105,9 @@ pub struct Sensors<'a> {
     course: Course<'a>,
     start_mm: f64,
     tick_mm: f64,
-    edges: std::iter::Peekable<std::vec::IntoIter<PinChange>>,
+    /// The beam's edges to come, and when the next one does.
+    edges: std::vec::IntoIter<PinChange>,
+    next: Option<(f64, bool)>,
     /// The pulse in which a clean encoder is, whether dirt hides it, and the counts that it has hidden before.
     pulse: i64,
     is_hidden: bool,
@@ -115,12 +118,14 @@ impl<'a> Sensors<'a> {
     /// Those of a trial, whose motion begins at time 0.
     pub fn new(trial: &'a Trial) -> Self {
         let Trial { machine, motion, row, .. } = trial;
+        let mut edges = machine.beam_changes(row, motion, 0).into_iter();
         Self {
             machine,
             course: Course::along(motion),
             start_mm: motion.start_mm(),
             tick_mm: machine.tick_mm(),
-            edges: machine.beam_changes(row, motion, 0).into_iter().peekable(),
+            next: edges.next().map(edge_of),
+            edges,
             pulse: 0,
             is_hidden: machine.dirt.hides(0),
             hidden_ticks: 0,
@@ -147,9 +152,15 @@ impl<'a> Sensors<'a> {
 
     /// The next edge of the beam before a time: when it comes, and whether the beam is broken from then on.
     pub fn next_edge(&mut self, before_s: f64) -> Option<(f64, bool)> {
-        let edge = self.edges.next_if(|edge| time_at_s(0, edge.cycle) <= before_s)?;
-        Some((time_at_s(0, edge.cycle), !edge.high))
+        let edge = self.next.filter(|&(edge_s, _)| edge_s <= before_s)?;
+        self.next = self.edges.next().map(edge_of);
+        Some(edge)
     }
+}
+
+/// When an edge of the beam comes, and whether the beam is broken from then on.
+fn edge_of(edge: PinChange) -> (f64, bool) {
+    (time_at_s(0, edge.cycle), !edge.high)
 }
 
 /// Has the decisions weed the trial's row. The motion begins at time and cycle 0.
@@ -157,9 +168,13 @@ impl<'a> Sensors<'a> {
 /// # Errors
 /// Where they refuse a setting, or to start.
 pub fn weed(trial: &Trial) -> Result<Weeded, Refused> {
+    weed_with(trial, Lull::default())
+}
+
+fn weed_with(trial: &Trial, mut lull: Lull) -> Result<Weeded, Refused> {
     let mut sensors = Sensors::new(trial);
     let broken = !trial.machine.beam_before(&trial.row, &trial.motion).high;
-    let readings = Readings::new(instant(0.0), Position::new(0));
+    let readings = Readings::new(instant(0), Position::new(0));
     let wake_up = WakeUp { readings, beam_broken: broken, cause: Cause::PowerOn };
     let classifier = Nearest::new(&EXAMPLES[..], Volatile::new());
     let mut weeder: Weeder = Controller::new(classifier, Volatile::new(), wake_up);
@@ -172,19 +187,18 @@ pub fn weed(trial: &Trial) -> Result<Weeded, Refused> {
     let orders = weeder.orders();
     let mut line = ServoLine::new(orders.pulse, orders.gap_ms);
     let turns = (trial.motion.duration_s() / TURN_S).ceil() as u64;
-    let mut take_turn = |weeder: &mut Weeder, time_s: f64, position: i64| {
-        let orders = weeder.step(Readings::new(instant(time_s), Position::new(position as i32)));
-        line.command(orders.pulse, time_s);
+    let mut take_turn = |weeder: &mut Weeder, turn: u64, position: i64| {
+        let orders = weeder.step(Readings::new(instant(turn), Position::new(position as i32)));
+        line.command(orders.pulse, turn as f64 * TURN_S);
         orders.pulse
     };
-    let mut lull = Lull::default();
     let mut left_out = None;
     for turn in 0..=turns {
         let time_s = turn as f64 * TURN_S;
         while let Some((edge_s, broken)) = sensors.next_edge(time_s) {
             // The edge comes after the turn before it, with the clock as that turn has read it.
-            if let Some((time_s, position)) = left_out.take() {
-                take_turn(&mut weeder, time_s, position);
+            if let Some((turn, position)) = left_out.take() {
+                take_turn(&mut weeder, turn, position);
             }
             let position = sensors.position(edge_s);
             weeder.beam_edge(Position::new(position as i32), broken);
@@ -192,9 +206,9 @@ pub fn weed(trial: &Trial) -> Result<Weeded, Refused> {
         }
         let position = sensors.position(time_s);
         if lull.lasts(turn, position) {
-            left_out = Some((time_s, position));
+            left_out = Some((turn, position));
         } else {
-            lull.turn(position, take_turn(&mut weeder, time_s, position));
+            lull.turn(position, take_turn(&mut weeder, turn, position));
             left_out = None;
         }
     }
@@ -207,6 +221,8 @@ pub fn weed(trial: &Trial) -> Result<Weeded, Refused> {
 /// [`SILENCE_TURNS`].
 #[derive(Debug, Default)]
 struct Lull {
+    /// Whether each turn is taken all the same.
+    is_ignored: bool,
     /// What the last turn has read and commanded, unless something has happened since or it was the first to command that.
     left: Option<i64>,
     pulse: HalfMicros,
@@ -232,7 +248,7 @@ impl Lull {
         if position.abs_diff(self.anchor) > PROGRESS_TICKS {
             (self.anchor, self.progress_turn) = (position, turn);
         }
-        self.left == Some(position) && turn - self.progress_turn <= SILENCE_TURNS
+        !self.is_ignored && self.left == Some(position) && turn - self.progress_turn <= SILENCE_TURNS
     }
 
     /// A turn has been taken, and commanded this pulse.
@@ -243,9 +259,9 @@ impl Lull {
     }
 }
 
-/// The firmware's clock when the motion has lasted for a time.
-fn instant(time_s: f64) -> Instant {
-    Instant::new(((time_s + STILL_S) * f64::from(control::units::Interval::STEPS_PER_SECOND)) as u32)
+/// The firmware's clock in a turn.
+fn instant(turn: u64) -> Instant {
+    Instant::new((turn as u32).wrapping_mul(STEPS_A_TURN).wrapping_add(STILL_STEPS))
 }
 
 /// Types a line into the decisions' console.
@@ -261,4 +277,37 @@ fn type_line(weeder: &mut Weeder, command: &str) -> Result<(), Refused> {
         return Ok(());
     }
     Err(Refused { command: command.to_owned(), answer: said.trim_end().to_owned() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::conditions::{Conditions, presets};
+    use crate::driving::drive;
+    use crate::stand::Stand;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    #[test]
+    fn turns_that_are_left_out_change_no_pulse() {
+        let presets: Vec<&str> = presets().collect();
+        for (seed, preset) in presets.repeat(4).into_iter().enumerate() {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed as u64);
+            let mut conditions = Conditions::load(preset).unwrap();
+            // Some stop again and again, and some are all but standing still.
+            conditions.set("driving.stops_per_100_m", 50.0 * (seed % 2) as f64).unwrap();
+            let stand = Stand::grow(&conditions, rng.random_range(400.0..700.0), &mut rng).unwrap();
+            let drive = drive(&conditions, &stand.span_mm, rng.random_range(0.1..3.0), &mut rng);
+            let trial = Trial {
+                row: stand.row,
+                machine: conditions.machine(rng.random()),
+                motion: drive.motion,
+                timing: conditions.timing(),
+                start: Start::Command,
+                settings: conditions.told(),
+            };
+            let every_turn = Lull { is_ignored: true, ..Lull::default() };
+            assert_eq!(weed(&trial), weed_with(&trial, every_turn), "{preset}, row {seed}");
+        }
+    }
 }
