@@ -50,11 +50,11 @@
 //!
 //! | n | fewest | mean | most |
 //! |---|---|---|---|
-//! | 8 | 1,465 | 1,784 | 2,023 |
-//! | 16 | 1,800 | 2,284 | 2,776 |
-//! | 32 | 2,503 | 3,191 | 3,875 |
-//! | 64 | 3,716 | 4,665 | 5,698 |
-//! | 128 | 5,901 | 7,119 | 8,872 |
+//! | 8 | 1,468 | 1,787 | 2,026 |
+//! | 16 | 1,803 | 2,287 | 2,779 |
+//! | 32 | 2,506 | 3,194 | 3,878 |
+//! | 64 | 3,719 | 4,668 | 5,701 |
+//! | 128 | 5,904 | 7,122 | 8,875 |
 //!
 //! That is about 800 for the call and the vote, 40 for each example, and 110 for each that was among the k nearest when
 //! it was met: about k (1 + ln(n / k)) of n in random order, and up to all of them where one example lies a little nearer than
