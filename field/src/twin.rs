@@ -187,35 +187,35 @@ fn weed_with(trial: &Trial, mut lull: Lull) -> Result<Weeded, Refused> {
     let orders = weeder.orders();
     let mut line = ServoLine::new(orders.pulse, orders.gap_ms);
     let turns = (trial.motion.duration_s() / TURN_S).ceil() as u64;
-    let mut take_turn = |weeder: &mut Weeder, turn: u64, position: i64| {
-        let orders = weeder.step(Readings::new(instant(turn), Position::new(position as i32)));
-        line.command(orders.pulse, turn as f64 * TURN_S);
-        orders.pulse
+    let decide = |weeder: &mut Weeder, turn: u64, position: i64| {
+        weeder.step(Readings::new(instant(turn), Position::new(position as i32))).pulse
     };
+    let mut pulse = orders.pulse;
     let mut left_out = None;
     for turn in 0..=turns {
         let time_s = turn as f64 * TURN_S;
         while let Some((edge_s, broken)) = sensors.next_edge(time_s) {
             // The edge comes after the turn before it, with the clock as that turn has read it.
             if let Some((turn, position)) = left_out.take() {
-                take_turn(&mut weeder, turn, position);
+                decide(&mut weeder, turn, position);
             }
             let position = sensors.position(edge_s);
             weeder.beam_edge(Position::new(position as i32), broken);
             lull.disturb();
         }
         let position = sensors.position(time_s);
-        if lull.lasts(turn, position) {
-            left_out = Some((turn, position));
-        } else {
-            lull.turn(position, take_turn(&mut weeder, turn, position));
-            left_out = None;
+        left_out = lull.lasts(turn, position).then_some((turn, position));
+        if left_out.is_none() {
+            pulse = decide(&mut weeder, turn, position);
+            lull.turn(position, pulse);
         }
+        // The line is asked in every turn: while a pulse is on it, it takes no other, and has to be asked again.
+        line.command(pulse, time_s);
     }
     Ok(Weeded { pulses: line.into_pulses(), state: weeder.state() })
 }
 
-/// Tells which turns may be left out: those that find everything as the turn before has left it.
+/// Tells in which turns the decisions may be left out: in those that find everything as the turn before has left it.
 ///
 /// Nothing but time has gone by then, and time alone means something only to who waits for a machine that has fallen silent, not before
 /// [`SILENCE_TURNS`].
@@ -289,7 +289,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     #[test]
-    fn turns_that_are_left_out_change_no_pulse() {
+    fn decisions_that_are_left_out_change_no_pulse() {
         let presets: Vec<&str> = presets().collect();
         for (seed, preset) in presets.repeat(4).into_iter().enumerate() {
             let mut rng = ChaCha8Rng::seed_from_u64(seed as u64);
