@@ -49,17 +49,31 @@ pub const COUNT: usize = table::TAUGHT.len();
 
 const _: () = assert!(COUNT <= CAPACITY, "too many examples for the flash budget");
 
-/// The table.
+/// The table, but in another order: trained ones lie beside their likes, so that a search would come ever nearer, and each of them
+/// would find a place among the nearest for a while. Each is as many places behind the one before it as [`STEP`] says.
 pub const EXAMPLES: [Example<{ features::COUNT }>; COUNT] = {
     let mut examples = [Example::new([0; features::COUNT], 0); COUNT];
     let mut index = 0;
     while index < COUNT {
-        let (features, label) = &table::TAUGHT[index];
+        let (features, label) = &table::TAUGHT[index * STEP % COUNT];
         examples[index] = Example::new(SCALE.quantise(features), *label);
         index += 1;
     }
     examples
 };
+
+/// Some five eighths of the table, and without a divisor in common with its length, so that none is left out.
+const STEP: usize = {
+    let mut step = COUNT * 5 / 8;
+    while greatest_common_divisor(step, COUNT) != 1 {
+        step += 1;
+    }
+    step
+};
+
+const fn greatest_common_divisor(one: usize, other: usize) -> usize {
+    if other == 0 { one } else { greatest_common_divisor(other, one % other) }
+}
 
 #[cfg(test)]
 mod tests {
@@ -75,6 +89,13 @@ mod tests {
         Nearest::new(EXAMPLES, Volatile::new())
             .classify(&Features::describe(speed, spacing_mm, width_mm), table::K)
             .class
+    }
+
+    #[test]
+    fn every_example_of_the_table_is_among_the_built_in_ones() {
+        for (features, label) in &table::TAUGHT {
+            assert!(EXAMPLES.contains(&Example::new(SCALE.quantise(features), *label)), "{features:?}");
+        }
     }
 
     #[test]

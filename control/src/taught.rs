@@ -10,7 +10,7 @@ use crate::{
     examples, features,
     memory::{CHECK, ERASED, Memory},
 };
-use knn::{Example, Examples};
+use knn::{Example, Examples, Neighbour};
 
 /// Examples that can be taught.
 pub const CAPACITY: u8 = 32;
@@ -177,14 +177,15 @@ impl<M: Memory> Examples<{ features::COUNT }> for FieldExamples<M> {
     }
 
     /// Reads each slot once.
-    fn visit_near(&self, query: &[u8; features::COUNT], mut reach: u32, visit: &mut impl FnMut(u32, u8) -> u32) -> u32 {
+    fn keep_nearest(
+        &self,
+        query: &[u8; features::COUNT],
+        nearest: &mut [Neighbour],
+        level: &mut impl FnMut(Neighbour),
+    ) {
         for example in (0..CAPACITY).filter_map(|slot| self.slot(slot)) {
-            let distance = knn::squared_distance(query, &example.features);
-            if distance <= reach {
-                reach = visit(distance, example.label);
-            }
+            example.neighbour_of(query).join(nearest, level);
         }
-        reach
     }
 }
 

@@ -15,8 +15,8 @@ use crate::motion::{Motion, marks};
 use crate::row::Row;
 use crate::servo::{OUT_DEGREES, Servo, Stroke};
 use crate::signal::{CYCLES_PER_SECOND, Pin, PinChange};
+use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use std::f64::consts::PI;
 use std::ops::Range;
 
@@ -54,10 +54,12 @@ pub struct Dirt {
 const PULSE_TICKS: i64 = 4;
 
 impl Dirt {
-    /// Whether pulse number `pulse` is hidden: always the same ones for the same seed.
-    fn hides(&self, pulse: i64) -> bool {
+    /// Whether pulse number `pulse` is hidden: always the same ones for the same seed. It is asked for each pulse of a row, so
+    /// its chance is a quick one.
+    pub fn hides(&self, pulse: i64) -> bool {
         self.share > 0.0
-            && ChaCha8Rng::seed_from_u64(self.seed ^ pulse.cast_unsigned()).random_bool(self.share.clamp(0.0, 1.0))
+            && Xoshiro256PlusPlus::seed_from_u64(self.seed ^ pulse.cast_unsigned())
+                .random_bool(self.share.clamp(0.0, 1.0))
     }
 }
 
@@ -95,17 +97,20 @@ impl Machine {
         marks(motion.wheel_mm(time_s) - motion.start_mm(), self.tick_mm())
     }
 
-    /// Counts of the pulses that dirt hides, whose beginnings lie between two counts of a clean encoder.
-    pub fn hidden_ticks(&self, clean_ticks: Range<i64>) -> i64 {
-        let pulses = clean_ticks.start.div_euclid(PULSE_TICKS)..clean_ticks.end.div_euclid(PULSE_TICKS);
+    /// The pulse in which a clean encoder is at a count.
+    pub fn pulse(&self, clean_ticks: i64) -> i64 {
+        clean_ticks.div_euclid(PULSE_TICKS)
+    }
+
+    /// Counts of those of the pulses that dirt hides.
+    pub fn hidden_ticks(&self, pulses: Range<i64>) -> i64 {
         pulses.filter(|&pulse| self.dirt.hides(pulse)).count() as i64 * PULSE_TICKS
     }
 
-    /// Counts that are missing so far of the pulse in which a clean encoder is: while A is hidden, B alone counts one back and
-    /// then one forward.
+    /// Counts that are missing so far of the hidden pulse in which a clean encoder is: while A is hidden, B alone counts one back
+    /// and then one forward.
     pub fn hidden_in_pulse(&self, clean_ticks: i64) -> i64 {
-        let is_hidden = self.dirt.hides(clean_ticks.div_euclid(PULSE_TICKS));
-        if is_hidden { [0, 1, 3, 4][clean_ticks.rem_euclid(PULSE_TICKS) as usize] } else { 0 }
+        [0, 1, 3, 4][clean_ticks.rem_euclid(PULSE_TICKS) as usize]
     }
 
     /// How far the tool's middle is beside the row's line at an angle.
@@ -269,15 +274,18 @@ mod tests {
         let motion = Motion::steady(0.0, 1000.0, 500.0, 1000.0).change_speed(0.0, 1000.0);
         let changes = machine.encoder_changes(&motion, START_CYCLE);
         let clean = machine.ticks(&motion, motion.duration_s());
-        let missing = machine.hidden_ticks(0..clean) + machine.hidden_in_pulse(clean);
-        assert!((60..160).contains(&missing), "{missing} of {clean}");
-        assert_eq!(decode(&changes), clean - missing);
+        let missing = |ticks: i64| {
+            let pulse = machine.pulse(ticks);
+            let in_pulse = if machine.dirt.hides(pulse) { machine.hidden_in_pulse(ticks) } else { 0 };
+            machine.hidden_ticks(0..pulse) + in_pulse
+        };
+        assert!((60..160).contains(&missing(clean)), "{} of {clean}", missing(clean));
+        assert_eq!(decode(&changes), clean - missing(clean));
         // Half way as well, wherever in a pulse that is.
         for passing in motion.mark_passings(machine.tick_mm()).iter().skip(600).take(200) {
             let so_far = changes.iter().filter(|change| change.cycle <= cycle_at(START_CYCLE, passing.time_s));
             let ticks = machine.ticks(&motion, passing.time_s + 1e-7);
-            let missing = machine.hidden_ticks(0..ticks) + machine.hidden_in_pulse(ticks);
-            assert_eq!(decode(&so_far.copied().collect::<Vec<_>>()), ticks - missing);
+            assert_eq!(decode(&so_far.copied().collect::<Vec<_>>()), ticks - missing(ticks));
         }
     }
 

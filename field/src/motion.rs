@@ -284,9 +284,40 @@ impl Motion {
     }
 }
 
+/// A motion as somebody sees it who goes along: asked for one time after the other, it need not search for the piece.
+#[derive(Clone, Debug)]
+pub struct Course<'a> {
+    motion: &'a Motion,
+    /// The piece of the last time asked for.
+    piece: usize,
+}
+
+impl<'a> Course<'a> {
+    /// A motion from its beginning on.
+    pub fn along(motion: &'a Motion) -> Self {
+        Self { motion, piece: 0 }
+    }
+
+    /// [`Motion::wheel_mm`] at a time from 0 on, no earlier than the last one asked for.
+    pub fn wheel_mm(&mut self, time_s: f64) -> f64 {
+        let Motion { start_mm, pieces, .. } = self.motion;
+        while pieces.get(self.piece).is_some_and(|piece| piece.end_s <= time_s) {
+            self.piece += 1;
+        }
+        match (pieces.get(self.piece), pieces.last()) {
+            (Some(piece), _) => piece.wheel_mm(piece.position_mm(time_s)),
+            (None, Some(last)) => last.wheel_mm(last.end_mm),
+            (None, None) => *start_mm,
+        }
+    }
+}
+
 /// Marks passed, net, after a distance rolled from half way between two of them: the counts of an ideal encoder.
 pub fn marks(distance_mm: f64, pitch_mm: f64) -> i64 {
-    (distance_mm / pitch_mm + 0.5).floor() as i64
+    // The floor, without a call: this is asked for in each turn of a loop.
+    let marks = distance_mm / pitch_mm + 0.5;
+    let towards_zero = marks as i64;
+    towards_zero - i64::from(towards_zero as f64 > marks)
 }
 
 #[cfg(test)]
@@ -334,6 +365,17 @@ mod tests {
         assert_eq!(passings.len(), 200);
         let hundredth = motion.position_mm(passings[99].time_s);
         assert!((hundredth - 995.0 * 0.95).abs() < 1e-6, "{hundredth} mm");
+    }
+
+    #[test]
+    fn who_goes_along_finds_the_wheel_where_a_search_does() {
+        let mut slip = [0.02, 0.1, 0.0].into_iter().cycle();
+        let motion = to_and_fro().with_slip(|| slip.next().unwrap_or(0.0));
+        let mut course = Course::along(&motion);
+        for step in 0..(1000.0 * motion.duration_s()) as u32 + 500 {
+            let time_s = f64::from(step) / 1000.0;
+            assert_eq!(course.wheel_mm(time_s), motion.wheel_mm(time_s), "at {time_s} s");
+        }
     }
 
     #[test]

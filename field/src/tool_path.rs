@@ -120,17 +120,33 @@ impl Tools<'_> {
         };
         self.motion.times_within_s(&(zone.start + x_mm..zone.end + x_mm)).into_iter().any(|times| {
             let looks = ((times.end - times.start) / LOOK_S).ceil() as u32;
-            // Not at the very ends, where the zone is a point.
-            (1..looks).any(|look| enters(times.start + f64::from(look) * LOOK_S))
+            // Between two turns of the servo the tool is nowhere beyond where it is at them: often that is clear of the zone.
+            self.between_turns_s(&times).any(|stretch| {
+                let [from, to] = [stretch.start, stretch.end].map(|time_s| self.covered_mm(time_s));
+                let comes_near = from.start.min(to.start) < across_mm + protected_mm
+                    && across_mm - protected_mm < from.end.max(to.end);
+                let look_at = |time_s: f64| (time_s - times.start) / LOOK_S;
+                // Not at the very ends, where the zone is a point.
+                let first = (look_at(stretch.start).floor() as u32).max(1);
+                let behind = (look_at(stretch.end).ceil() as u32 + 1).min(looks);
+                comes_near && (first..behind).any(|look| enters(times.start + f64::from(look) * LOOK_S))
+            })
         })
+    }
+
+    /// The parts of a time in which the tool's angle follows a straight line.
+    fn between_turns_s(&self, times: &Range<f64>) -> impl Iterator<Item = Range<f64>> {
+        let turns_s = self.stroke.turns_s().filter(|time_s| times.start < *time_s && *time_s < times.end);
+        let mut start_s = times.start;
+        turns_s.chain([times.end]).map(move |end_s| std::mem::replace(&mut start_s, end_s)..end_s)
     }
 
     fn remove(&self, weed: &Weed) -> bool {
         let Mechanism { sweeps_a_side, sweep_width_mm, sweep_from_mm, .. } = *self.mechanism;
         let swept_mm = sweep_from_mm..sweep_from_mm + f64::from(sweeps_a_side) * sweep_width_mm;
-        let passings = self.motion.passings(weed.along_mm + self.machine.beam_to_tool_mm);
+        let passings = || self.motion.passings(weed.along_mm + self.machine.beam_to_tool_mm);
         swept_mm.contains(&weed.across_mm.abs())
-            || passings.iter().any(|passing| self.covered_mm(passing.time_s).contains(&weed.across_mm))
+            || passings().iter().any(|passing| self.covered_mm(passing.time_s).contains(&weed.across_mm))
     }
 }
 

@@ -3,12 +3,13 @@
 //! [`weed`] does what `src/main.rs` does with the same [`control`] code and the same examples: a turn of the loop reads clock
 //! and encoder, takes the beam's edges with the position at which each came, and commands the servo. Turns come every
 //! millisecond, not as fast as a chip can; nothing else is simplified: motion, beam, encoder and servo are those that
-//! the virtual Uno is given. It is some thousand times faster than real time, for studies of many rows.
+//! the virtual Uno is given. It is some ten thousand times faster than real time, for studies of many rows.
 //!
 //! Console, EEPROM, interrupts and cycles are not in it: for those there is the virtual Uno.
 
 use crate::link::settings::name;
-use crate::machine::time_at_s;
+use crate::machine::{Machine, time_at_s};
+use crate::motion::{Course, marks};
 use crate::signal::{CYCLES_PER_SECOND, PinChange, Pulse};
 use crate::trial::{Start, Trial};
 use control::classifier::Nearest;
@@ -21,16 +22,17 @@ use control::memory::Volatile;
 use control::reply;
 use control::reset::Cause;
 use control::servo::{self, Action, FRAME, HalfMicros};
-use control::units::{Instant, Position};
+use control::units::{Instant, Interval, Position};
 use thiserror::Error;
 
 type Weeder = Controller<Nearest<&'static [knn::Example<{ features::COUNT }>], Volatile>, Volatile>;
 
 /// A turn of the loop.
 const TURN_S: f64 = 0.001;
+const STEPS_A_TURN: u32 = Interval::STEPS_PER_SECOND / 1000;
 
-/// How long the machine stands before it rolls, so that the clock is not at its beginning.
-const STILL_S: f64 = 0.1;
+/// How long the machine stands before it rolls, so that the clock is not at its beginning: 0.1 s.
+const STILL_STEPS: u32 = Interval::STEPS_PER_SECOND / 10;
 
 /// Cycles in a step of Timer1, behind its prescaler of 8.
 const CYCLES_A_STEP: u64 = 8;
@@ -100,41 +102,66 @@ impl ServoLine {
 
 /// What the machine's sensors say, turn by turn: the encoder's count, and the beam's edges since the turn before.
 pub struct Sensors<'a> {
-    trial: &'a Trial,
-    edges: std::iter::Peekable<std::vec::IntoIter<PinChange>>,
-    clean_ticks: i64,
+    machine: &'a Machine,
+    course: Course<'a>,
+    start_mm: f64,
+    tick_mm: f64,
+    /// The beam's edges to come, and when the next one does.
+    edges: std::vec::IntoIter<PinChange>,
+    next: Option<(f64, bool)>,
+    /// The pulse in which a clean encoder is, whether dirt hides it, and the counts that it has hidden before.
+    pulse: i64,
+    is_hidden: bool,
     hidden_ticks: i64,
 }
 
 impl<'a> Sensors<'a> {
     /// Those of a trial, whose motion begins at time 0.
     pub fn new(trial: &'a Trial) -> Self {
-        let edges = trial.machine.beam_changes(&trial.row, &trial.motion, 0);
-        Self { trial, edges: edges.into_iter().peekable(), clean_ticks: 0, hidden_ticks: 0 }
+        let Trial { machine, motion, row, .. } = trial;
+        let mut edges = machine.beam_changes(row, motion, 0).into_iter();
+        Self {
+            machine,
+            course: Course::along(motion),
+            start_mm: motion.start_mm(),
+            tick_mm: machine.tick_mm(),
+            next: edges.next().map(edge_of),
+            edges,
+            pulse: 0,
+            is_hidden: machine.dirt.hides(0),
+            hidden_ticks: 0,
+        }
     }
 
     /// The encoder's count at a time, no earlier than the last one asked for.
     pub fn position(&mut self, time_s: f64) -> i64 {
-        let Trial { machine, motion, .. } = self.trial;
-        let ticks = machine.ticks(motion, time_s);
-        if machine.dirt.share == 0.0 {
-            return ticks;
+        let ticks = marks(self.course.wheel_mm(time_s) - self.start_mm, self.tick_mm);
+        let pulse = self.machine.pulse(ticks);
+        if pulse != self.pulse {
+            // What is lost on the way there comes back on the way back.
+            self.hidden_ticks += if pulse > self.pulse {
+                self.machine.hidden_ticks(self.pulse..pulse)
+            } else {
+                -self.machine.hidden_ticks(pulse..self.pulse)
+            };
+            self.pulse = pulse;
+            self.is_hidden = self.machine.dirt.hides(pulse);
         }
-        // What is lost on the way there comes back on the way back.
-        self.hidden_ticks += if ticks >= self.clean_ticks {
-            machine.hidden_ticks(self.clean_ticks..ticks)
-        } else {
-            -machine.hidden_ticks(ticks..self.clean_ticks)
-        };
-        self.clean_ticks = ticks;
-        ticks - self.hidden_ticks - machine.hidden_in_pulse(ticks)
+        let in_pulse = if self.is_hidden { self.machine.hidden_in_pulse(ticks) } else { 0 };
+        ticks - self.hidden_ticks - in_pulse
     }
 
     /// The next edge of the beam before a time: when it comes, and whether the beam is broken from then on.
     pub fn next_edge(&mut self, before_s: f64) -> Option<(f64, bool)> {
-        let edge = self.edges.next_if(|edge| time_at_s(0, edge.cycle) <= before_s)?;
-        Some((time_at_s(0, edge.cycle), !edge.high))
+        let edge = self.next.filter(|&(edge_s, _)| edge_s <= before_s)?;
+        self.next = self.edges.next().map(edge_of);
+        Some(edge)
     }
+}
+
+/// When an edge of the beam comes, and whether the beam is broken from then on.
+fn edge_of(edge: PinChange) -> (f64, bool) {
+    (time_at_s(0, edge.cycle), !edge.high)
 }
 
 /// Has the decisions weed the trial's row. The motion begins at time and cycle 0.
@@ -142,9 +169,13 @@ impl<'a> Sensors<'a> {
 /// # Errors
 /// Where they refuse a setting, or to start.
 pub fn weed(trial: &Trial) -> Result<Weeded, Refused> {
+    weed_with(trial, Lull::default())
+}
+
+fn weed_with(trial: &Trial, mut lull: Lull) -> Result<Weeded, Refused> {
     let mut sensors = Sensors::new(trial);
     let broken = !trial.machine.beam_before(&trial.row, &trial.motion).high;
-    let readings = Readings::new(instant(0.0), Position::new(0));
+    let readings = Readings::new(instant(0), Position::new(0));
     let wake_up = WakeUp { readings, beam_broken: broken, cause: Cause::PowerOn };
     let classifier = Nearest::new(&EXAMPLES[..], Volatile::new());
     let mut weeder: Weeder = Controller::new(classifier, Volatile::new(), wake_up);
@@ -157,22 +188,81 @@ pub fn weed(trial: &Trial) -> Result<Weeded, Refused> {
     let orders = weeder.orders();
     let mut line = ServoLine::new(orders.pulse, orders.gap_ms);
     let turns = (trial.motion.duration_s() / TURN_S).ceil() as u64;
+    let decide = |weeder: &mut Weeder, turn: u64, position: i64| {
+        weeder.step(Readings::new(instant(turn), Position::new(position as i32))).pulse
+    };
+    let mut pulse = orders.pulse;
+    let mut left_out = None;
     for turn in 0..=turns {
         let time_s = turn as f64 * TURN_S;
         while let Some((edge_s, broken)) = sensors.next_edge(time_s) {
+            // The edge comes after the turn before it, with the clock as that turn has read it.
+            if let Some((turn, position)) = left_out.take() {
+                decide(&mut weeder, turn, position);
+            }
             let position = sensors.position(edge_s);
             weeder.beam_edge(Position::new(position as i32), broken);
+            lull.disturb();
         }
-        let position = Position::new(sensors.position(time_s) as i32);
-        let orders = weeder.step(Readings::new(instant(time_s), position));
-        line.command(orders.pulse, time_s);
+        let position = sensors.position(time_s);
+        left_out = lull.lasts(turn, position).then_some((turn, position));
+        if left_out.is_none() {
+            pulse = decide(&mut weeder, turn, position);
+            lull.turn(position, pulse);
+        }
+        // The line is asked in every turn: while a pulse is on it, it takes no other, and has to be asked again.
+        line.command(pulse, time_s);
     }
     Ok(Weeded { pulses: line.into_pulses(), state: weeder.state() })
 }
 
-/// The firmware's clock when the motion has lasted for a time.
-fn instant(time_s: f64) -> Instant {
-    Instant::new(((time_s + STILL_S) * f64::from(control::units::Interval::STEPS_PER_SECOND)) as u32)
+/// Tells in which turns the decisions may be left out: in those that find everything as the turn before has left it.
+///
+/// Nothing but time has gone by then, and time alone means something only to who waits for a machine that has fallen silent, not before
+/// [`SILENCE_TURNS`].
+#[derive(Debug, Default)]
+struct Lull {
+    /// Whether each turn is taken all the same.
+    is_ignored: bool,
+    /// What the last turn has read and commanded, unless something has happened since or it was the first to command that.
+    left: Option<i64>,
+    pulse: HalfMicros,
+    /// Where the machine last made progress, and in which turn.
+    anchor: i64,
+    progress_turn: u64,
+}
+
+/// Silence that means nothing yet: speed meter and encoder's monitor take one of 10 ms for none.
+const SILENCE_TURNS: u64 = 9;
+
+/// Counts that are no progress yet to the encoder's monitor.
+const PROGRESS_TICKS: u64 = 2;
+
+impl Lull {
+    /// Something has happened.
+    fn disturb(&mut self) {
+        self.left = None;
+    }
+
+    /// Whether this turn may be left out.
+    fn lasts(&mut self, turn: u64, position: i64) -> bool {
+        if position.abs_diff(self.anchor) > PROGRESS_TICKS {
+            (self.anchor, self.progress_turn) = (position, turn);
+        }
+        !self.is_ignored && self.left == Some(position) && turn - self.progress_turn <= SILENCE_TURNS
+    }
+
+    /// A turn has been taken, and commanded this pulse.
+    fn turn(&mut self, position: i64, pulse: HalfMicros) {
+        // Whether the tool is out decides what is asked next.
+        self.left = (pulse == self.pulse).then_some(position);
+        self.pulse = pulse;
+    }
+}
+
+/// The firmware's clock in a turn.
+fn instant(turn: u64) -> Instant {
+    Instant::new((turn as u32).wrapping_mul(STEPS_A_TURN).wrapping_add(STILL_STEPS))
 }
 
 /// Types a line into the decisions' console.
@@ -190,4 +280,37 @@ fn type_line(weeder: &mut Weeder, command: &str) -> Result<(), Refused> {
         return Ok(());
     }
     Err(Refused { command: command.to_owned(), answer: said.trim_end().to_owned() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::conditions::{Conditions, presets};
+    use crate::driving::drive;
+    use crate::stand::Stand;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    #[test]
+    fn decisions_that_are_left_out_change_no_pulse() {
+        let presets: Vec<&str> = presets().collect();
+        for (seed, preset) in presets.repeat(4).into_iter().enumerate() {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed as u64);
+            let mut conditions = Conditions::load(preset).unwrap();
+            // Some stop again and again, and some are all but standing still.
+            conditions.set("driving.stops_per_100_m", 50.0 * (seed % 2) as f64).unwrap();
+            let stand = Stand::grow(&conditions, rng.random_range(400.0..700.0), &mut rng).unwrap();
+            let drive = drive(&conditions, &stand.span_mm, rng.random_range(0.1..3.0), &mut rng);
+            let trial = Trial {
+                row: stand.row,
+                machine: conditions.machine(rng.random()),
+                motion: drive.motion,
+                timing: conditions.timing(),
+                start: Start::Command,
+                settings: conditions.told(),
+            };
+            let every_turn = Lull { is_ignored: true, ..Lull::default() };
+            assert_eq!(weed(&trial), weed_with(&trial, every_turn), "{preset}, row {seed}");
+        }
+    }
 }

@@ -1,10 +1,9 @@
 //! The search for the k nearest examples, and their vote.
 //!
-//! One pass over the examples keeps the k + 1 nearest so far, sorted. A neighbour is a key of four bytes, its distance
-//! above its label, so that comparing keys compares distances first and labels next. Where the last of them is as far as the k-th, there may be more such examples, which vote too: only then does a
-//! second pass count all that lie within this distance.
+//! One pass over the examples keeps the k nearest so far, sorted, and counts those that are as far as the k-th of them but
+//! have found no place: they vote too.
 
-use crate::{Examples, distance::DISTANCE_LIMIT};
+use crate::{Examples, Neighbour};
 
 /// The largest k.
 pub const MAX_K: u8 = 15;
@@ -97,141 +96,87 @@ pub fn classify<const FEATURES: usize, const CLASSES: usize>(
     radius: u32,
 ) -> Result<Answer<CLASSES>, ClassifyError> {
     const { assert!(CLASSES > 0 && CLASSES <= 256, "there are 1 to 256 classes") };
-    // Clearing room for all 16 takes 200 cycles more than for 4 on an ATmega328P.
+    // Clearing room for all 15 takes 200 cycles more than for 3 on an ATmega328P.
+    const FREE: Neighbour = Neighbour::FARTHEST;
     match k {
-        1..=3 => search(examples, features, &mut [Neighbour::NONE; 4][..=usize::from(k)], radius),
-        4..=MAX_K => search(examples, features, &mut [Neighbour::NONE; MAX_K as usize + 1][..=usize::from(k)], radius),
-        _ => Err(ClassifyError::KOutOfRange),
+        1..=3 => search(examples, features, [FREE, FREE, FREE].get_mut(..usize::from(k)), radius),
+        _ => search(examples, features, [FREE; MAX_K as usize].get_mut(..usize::from(k)), radius),
     }
 }
 
-/// [`classify`] with room for the k + 1 nearest, all of them [`Neighbour::NONE`] yet.
+/// [`classify`] with places for the k nearest, nothing in any of them yet.
 ///
-/// Out of line, because AVR reaches the first 63 bytes of a stack frame by far the fastest: the neighbours lie in the
-/// caller's.
+/// Out of line, because AVR reaches the first 63 bytes of a stack frame by far the fastest: the places lie in the caller's.
 #[inline(never)]
 fn search<const FEATURES: usize, const CLASSES: usize>(
     examples: &(impl Examples<FEATURES> + ?Sized),
     features: &[u8; FEATURES],
-    nearest: &mut [Neighbour],
+    nearest: Option<&mut [Neighbour]>,
     radius: u32,
 ) -> Result<Answer<CLASSES>, ClassifyError> {
-    examples.visit_near(features, DISTANCE_LIMIT - 1, &mut |distance, label| {
-        admit(nearest, Neighbour::new(distance, label)).distance()
-    });
-    let [next, neighbours @ ..] = nearest else { return Err(ClassifyError::KOutOfRange) };
-    let (Some(&last), Some(&first)) = (neighbours.first(), neighbours.last()) else {
+    let Some(nearest @ [_, ..]) = nearest else { return Err(ClassifyError::KOutOfRange) };
+    // Those that found no place although they are as far as the farthest that has one. Where a nearer one is the farthest
+    // later on, they were none after all.
+    let mut level = Level { distance: 0, votes: [0; CLASSES], unknown: false };
+    examples.keep_nearest(features, nearest, &mut |neighbour| level.count(neighbour));
+    let (Some(&last), Some(&first)) = (nearest.first(), nearest.last()) else {
         return Err(ClassifyError::KOutOfRange);
     };
-    if last == Neighbour::NONE {
+    if last == Neighbour::FARTHEST {
         return Err(if first == last { ClassifyError::NoExamples } else { ClassifyError::TooFewExamples });
     }
-    let mut ballot = Ballot { votes: [0; CLASSES], unknown: false };
-    if next.distance() == last.distance() {
-        // There are more than k within the last neighbour's distance, perhaps more than found room: all of them vote.
-        examples.visit_near(features, last.distance(), &mut |_, label| {
-            ballot.count(label);
-            last.distance()
-        });
-    } else {
-        for neighbour in neighbours.iter() {
-            ballot.count(neighbour.label());
+    if level.distance != last.distance() {
+        (level.votes, level.unknown) = ([0; CLASSES], false);
+    }
+    for neighbour in nearest.iter() {
+        level.vote(neighbour.label());
+    }
+    let Level { votes, unknown: false, .. } = level else { return Err(ClassifyError::UnknownLabel) };
+    let (mut label, mut most, mut tie) = (0, 0, false);
+    for (class, &votes) in votes.iter().enumerate() {
+        if votes > most {
+            (label, most, tie) = (class as u8, votes, false);
+        } else if votes == most {
+            tie = true;
         }
     }
-    ballot.decide(neighbours, first.distance(), radius)
+    if tie {
+        // Neighbours are sorted by distance and then by label, and the examples that found no place are behind them
+        // in the same order: the first leading class met this way is the nearest, and the smallest among equals.
+        // Where none is met, `label` is the smallest already.
+        let mut labels = nearest.iter().rev().map(|neighbour| neighbour.label());
+        label = labels.find(|&label| votes.get(usize::from(label)) == Some(&most)).unwrap_or(label);
+    }
+    let nearest = first.distance();
+    let kind = match (nearest > radius, tie) {
+        (true, _) => Kind::Stranger,
+        (false, true) => Kind::Tie,
+        (false, false) => Kind::Known,
+    };
+    Ok(Answer { label, votes, nearest, kind })
 }
 
-/// Gives an example its place among the k + 1 nearest, farthest first, and returns the k-th nearest.
-///
-/// The nearest k vote; the one before them only tells whether more examples are as far as the k-th. It has one caller:
-/// inline, it saves the 60 cycles of keeping the caller's registers.
-#[inline(always)]
-fn admit(nearest: &mut [Neighbour], candidate: Neighbour) -> Neighbour {
-    let mut rest = &mut *nearest;
-    while let [place, nearer @ ..] = rest {
-        match nearer.first() {
-            Some(&neighbour) if candidate.is_nearer(neighbour) => *place = neighbour,
-            _ => {
-                *place = candidate;
-                break;
-            }
-        }
-        rest = nearer;
-    }
-    nearest.get(1).copied().unwrap_or(candidate)
-}
-
-/// A distance of 24 bits above a label of 8, in two halves: AVR compares 16 bits faster than 32.
-#[derive(Clone, Copy, PartialEq, Eq)]
-struct Neighbour {
-    upper: u16,
-    lower: u16,
-}
-
-impl Neighbour {
-    /// Farther than every example.
-    const NONE: Self = Self::new(DISTANCE_LIMIT - 1, 0);
-
-    const fn new(distance: u32, label: u8) -> Self {
-        let key = (distance << 8) | label as u32;
-        Self { upper: (key >> 16) as u16, lower: key as u16 }
-    }
-
-    const fn distance(self) -> u32 {
-        (self.upper as u32) << 8 | (self.lower >> 8) as u32
-    }
-
-    const fn label(self) -> u8 {
-        self.lower as u8
-    }
-
-    /// Whether it comes before `other`: by distance, then by label.
-    const fn is_nearer(self, other: Self) -> bool {
-        self.upper < other.upper || (self.upper == other.upper && self.lower < other.lower)
-    }
-}
-
-/// The votes.
-struct Ballot<const CLASSES: usize> {
+/// The votes of those that are as far as the k-th nearest and found no place among them.
+struct Level<const CLASSES: usize> {
+    distance: u32,
     votes: [usize; CLASSES],
     /// Whether a voter's label is not a class.
     unknown: bool,
 }
 
-impl<const CLASSES: usize> Ballot<CLASSES> {
-    fn count(&mut self, label: u8) {
+impl<const CLASSES: usize> Level<CLASSES> {
+    fn count(&mut self, neighbour: Neighbour) {
+        if neighbour.distance() != self.distance {
+            *self = Self { distance: neighbour.distance(), votes: [0; CLASSES], unknown: false };
+        }
+        self.vote(neighbour.label());
+    }
+
+    #[inline(always)]
+    fn vote(&mut self, label: u8) {
         match self.votes.get_mut(usize::from(label)) {
             Some(votes) => *votes = votes.wrapping_add(1),
             None => self.unknown = true,
         }
-    }
-
-    /// The answer by these votes, with the neighbours farthest first.
-    #[inline(always)]
-    fn decide(self, neighbours: &[Neighbour], nearest: u32, radius: u32) -> Result<Answer<CLASSES>, ClassifyError> {
-        let Self { votes, unknown: false } = self else { return Err(ClassifyError::UnknownLabel) };
-        let mut most = 0;
-        let mut label = 0;
-        let mut tie = false;
-        for (class, &votes) in votes.iter().enumerate() {
-            if votes > most {
-                (most, label, tie) = (votes, class as u8, false);
-            } else if votes == most {
-                tie = true;
-            }
-        }
-        if tie {
-            // Neighbours are sorted by distance and then by label, and the examples that found no room are behind them
-            // in the same order: the first leading class met this way is the nearest, and the smallest among equals.
-            // Where none is met, `label` is the smallest already.
-            let mut labels = neighbours.iter().rev().map(|neighbour| neighbour.label());
-            label = labels.find(|&label| votes.get(usize::from(label)) == Some(&most)).unwrap_or(label);
-        }
-        let kind = match (nearest > radius, tie) {
-            (true, _) => Kind::Stranger,
-            (false, true) => Kind::Tie,
-            (false, false) => Kind::Known,
-        };
-        Ok(Answer { label, votes, nearest, kind })
     }
 }

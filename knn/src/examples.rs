@@ -1,11 +1,10 @@
 //! Labelled examples, and the trait by which they are searched wherever they lie.
 //!
-//! Examples may lie in flash, EEPROM or SRAM. The classifier asks a store for one thing only: the examples within a
-//! reach that shrinks as near ones are found. A store that can hand out an example has that for nothing; one with a
-//! faster way, such as an assembly loop that reads flash, overrides [`Examples::visit_near`]. A pair of stores is a
-//! store.
+//! Examples may lie in flash, EEPROM or SRAM. The classifier asks a store for one thing only: to give its examples places
+//! among the nearest found so far. A store that can hand out an example has that for nothing; one with a faster way, such as an
+//! assembly loop that reads flash, overrides [`Examples::keep_nearest`]. A pair of stores is a store.
 
-use crate::squared_distance;
+use crate::{Neighbour, squared_distance};
 
 /// A labelled example: what was measured, and what it was.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -21,6 +20,13 @@ impl<const FEATURES: usize> Example<FEATURES> {
     #[must_use]
     pub const fn new(features: [u8; FEATURES], label: u8) -> Self {
         Self { features, label }
+    }
+
+    /// How far it is from `query`, and its class.
+    #[inline]
+    #[must_use]
+    pub fn neighbour_of(&self, query: &[u8; FEATURES]) -> Neighbour {
+        Neighbour::new(squared_distance(query, &self.features), self.label)
     }
 }
 
@@ -46,21 +52,15 @@ pub trait Examples<const FEATURES: usize> {
     /// The example at `index`, or `None` from [`len`](Self::len) on.
     fn example(&self, index: usize) -> Option<Example<FEATURES>>;
 
-    /// Calls `visit` with the squared distance to `query` and the label of each example that is not farther than
-    /// `reach`, in any order. `visit` returns the reach that holds from there on, and the last one is returned.
+    /// Gives those of its examples that are near enough to `query` a place among the `nearest`: each does what
+    /// [`Neighbour::join`] does, in any order.
     ///
-    /// Distances must equal those of [`squared_distance`]. The reach never grows.
+    /// Distances must equal those of [`squared_distance`].
     #[inline]
-    fn visit_near(&self, query: &[u8; FEATURES], mut reach: u32, visit: &mut impl FnMut(u32, u8) -> u32) -> u32 {
-        for index in 0..self.len() {
-            if let Some(example) = self.example(index) {
-                let distance = squared_distance(query, &example.features);
-                if distance <= reach {
-                    reach = visit(distance, example.label);
-                }
-            }
+    fn keep_nearest(&self, query: &[u8; FEATURES], nearest: &mut [Neighbour], level: &mut impl FnMut(Neighbour)) {
+        for example in (0..self.len()).filter_map(|index| self.example(index)) {
+            example.neighbour_of(query).join(nearest, level);
         }
-        reach
     }
 
     /// Whether there are no examples.
@@ -84,14 +84,10 @@ impl<const FEATURES: usize> Examples<FEATURES> for [Example<FEATURES>] {
     }
 
     #[inline]
-    fn visit_near(&self, query: &[u8; FEATURES], mut reach: u32, visit: &mut impl FnMut(u32, u8) -> u32) -> u32 {
+    fn keep_nearest(&self, query: &[u8; FEATURES], nearest: &mut [Neighbour], level: &mut impl FnMut(Neighbour)) {
         for example in self {
-            let distance = squared_distance(query, &example.features);
-            if distance <= reach {
-                reach = visit(distance, example.label);
-            }
+            example.neighbour_of(query).join(nearest, level);
         }
-        reach
     }
 }
 
@@ -105,8 +101,8 @@ impl<const FEATURES: usize, const N: usize> Examples<FEATURES> for [Example<FEAT
     }
 
     #[inline]
-    fn visit_near(&self, query: &[u8; FEATURES], reach: u32, visit: &mut impl FnMut(u32, u8) -> u32) -> u32 {
-        self.as_slice().visit_near(query, reach, visit)
+    fn keep_nearest(&self, query: &[u8; FEATURES], nearest: &mut [Neighbour], level: &mut impl FnMut(Neighbour)) {
+        self.as_slice().keep_nearest(query, nearest, level)
     }
 }
 
@@ -120,8 +116,8 @@ impl<const FEATURES: usize, Store: Examples<FEATURES> + ?Sized> Examples<FEATURE
     }
 
     #[inline]
-    fn visit_near(&self, query: &[u8; FEATURES], reach: u32, visit: &mut impl FnMut(u32, u8) -> u32) -> u32 {
-        (**self).visit_near(query, reach, visit)
+    fn keep_nearest(&self, query: &[u8; FEATURES], nearest: &mut [Neighbour], level: &mut impl FnMut(Neighbour)) {
+        (**self).keep_nearest(query, nearest, level)
     }
 }
 
@@ -141,8 +137,8 @@ impl<const FEATURES: usize, First: Examples<FEATURES>, Second: Examples<FEATURES
     }
 
     #[inline]
-    fn visit_near(&self, query: &[u8; FEATURES], reach: u32, visit: &mut impl FnMut(u32, u8) -> u32) -> u32 {
-        let reach = self.0.visit_near(query, reach, visit);
-        self.1.visit_near(query, reach, visit)
+    fn keep_nearest(&self, query: &[u8; FEATURES], nearest: &mut [Neighbour], level: &mut impl FnMut(Neighbour)) {
+        self.0.keep_nearest(query, nearest, level);
+        self.1.keep_nearest(query, nearest, level);
     }
 }

@@ -46,20 +46,20 @@
 //! | [`classify`] | about 130 + 2 C of stack | n F multiplications of 8 x 8 bits; k steps an example within reach; k + C to vote |
 //!
 //! In cycles of an ATmega328P, for F = 5, C = 2 and k = 3, the examples in flash behind a store whose
-//! [`Examples::visit_near`] is written in assembly, compiled for size (`opt-level = "z"`), over 256 random queries:
+//! [`Examples::keep_nearest`] is written in assembly, compiled for size (`opt-level = "z"`), over 256 random queries:
 //!
 //! | n | fewest | mean | most |
 //! |---|---|---|---|
-//! | 8 | 1,741 | 2,267 | 2,646 |
-//! | 16 | 2,083 | 2,843 | 3,637 |
-//! | 32 | 2,901 | 3,908 | 4,889 |
-//! | 64 | 4,228 | 5,541 | 7,083 |
-//! | 128 | 6,667 | 8,136 | 10,432 |
+//! | 8 | 1,468 | 1,787 | 2,026 |
+//! | 16 | 1,803 | 2,287 | 2,779 |
+//! | 32 | 2,506 | 3,194 | 3,878 |
+//! | 64 | 3,719 | 4,668 | 5,701 |
+//! | 128 | 5,904 | 7,122 | 8,875 |
 //!
-//! That is about 700 for the call and the vote, 40 for each example, and 190 for each that was among the k nearest when
-//! it was met: about k (1 + ln(n / k)) of n in random order. Searched by the plain [`Examples::visit_near`], an example
-//! costs about 200 instead of 40. Where more examples than k are as far as the k-th nearest, a second pass counts them.
-//! [`Scale::quantise`] takes 1,467 cycles. `cargo bench-uno`, in the weeder's workspace, measures all of this anew in the
+//! That is about 800 for the call and the vote, 40 for each example, and 110 for each that was among the k nearest when
+//! it was met: about k (1 + ln(n / k)) of n in random order, and up to all of them where one example lies a little nearer than
+//! the one before it. Searched by the plain [`Examples::keep_nearest`], an example costs about 200 instead of 40.
+//! [`Scale::quantise`] takes 1,444 cycles. `cargo bench-uno`, in the weeder's workspace, measures all of this anew in the
 //! simulator simavr.
 //!
 //! # What it does not do
@@ -73,12 +73,14 @@
 mod classify;
 mod distance;
 mod examples;
+mod neighbour;
 mod scale;
 mod table;
 
 pub use classify::{Answer, ClassifyError, Kind, MAX_K, classify};
 pub use distance::{MAX_FEATURES, squared_distance};
 pub use examples::{Example, Examples};
+pub use neighbour::Neighbour;
 pub use scale::{Range, Scale};
 pub use table::Table;
 

@@ -1,6 +1,6 @@
 //! Examples in SRAM, in an array of fixed capacity, which can be added and removed while the machine works.
 
-use crate::{Example, Examples};
+use crate::{Example, Examples, Neighbour};
 
 /// Up to `CAPACITY` examples in SRAM: `CAPACITY * (FEATURES + 1)` bytes and a `usize`.
 ///
@@ -81,7 +81,7 @@ impl<const FEATURES: usize, const CAPACITY: usize> Examples<FEATURES> for Table<
     }
 
     #[inline]
-    fn visit_near(&self, query: &[u8; FEATURES], reach: u32, visit: &mut impl FnMut(u32, u8) -> u32) -> u32 {
-        self.as_slice().visit_near(query, reach, visit)
+    fn keep_nearest(&self, query: &[u8; FEATURES], nearest: &mut [Neighbour], level: &mut impl FnMut(Neighbour)) {
+        self.as_slice().keep_nearest(query, nearest, level);
     }
 }

@@ -228,3 +228,53 @@ fn what_cannot_be_answered_is_an_error_and_not_a_class() {
     let erased = [Example::new([1], 255)];
     assert_eq!(classify::<1, 2>(&(&one, &erased), &[1], 1, 0), Err(ClassifyError::UnknownLabel));
 }
+
+#[test]
+fn an_error_says_what_would_be_right() {
+    for (error, advice) in [
+        (ClassifyError::KOutOfRange, "choose 1 to 15"),
+        (ClassifyError::NoExamples, "add at least k"),
+        (ClassifyError::TooFewExamples, "add examples or choose a smaller k"),
+        (ClassifyError::UnknownLabel, "labels run from 0 to the number of classes less 1"),
+    ] {
+        assert!(error.to_string().ends_with(advice), "{error}");
+    }
+}
+
+#[test]
+fn level_examples_vote_whenever_they_are_met_and_only_while_they_are_level_with_the_kth() {
+    let at = |place: u8, label| Example::new([place], label);
+    // Those at 9 are level with the third until nearer ones come; a label that is none does no harm then.
+    let answer = |examples: &[Example<1>]| classify::<1, 2>(examples, &[0], 3, u32::MAX).map(|answer| answer.votes);
+    let far = [at(9, 1), at(9, 1), at(9, 7), at(9, 1)];
+    assert_eq!(answer(&far), Err(ClassifyError::UnknownLabel));
+    let near = [at(5, 0), at(5, 1), at(5, 1), at(5, 1), at(1, 0)];
+    assert_eq!(answer(&[&far[..], &near].concat()), Ok([2, 3]));
+    assert_eq!(answer(&[&near[..], &far].concat()), Ok([2, 3]));
+}
+
+#[test]
+fn every_store_counts_and_hands_out_its_examples() {
+    let examples = [[1], [2], [3]].map(|features| Example::new(features, features[0]));
+    let [first, second, third] = examples;
+    let mut table: Table<1, 4> = Table::new();
+    for example in examples {
+        assert_eq!(table.add_example(example), Ok(()));
+    }
+    fn check(store: &(impl Examples<1> + ?Sized), expected: &[Example<1>]) {
+        assert_eq!((Examples::len(store), Examples::is_empty(store)), (expected.len(), expected.is_empty()));
+        for index in 0..=expected.len() {
+            assert_eq!(store.example(index), expected.get(index).copied(), "{index}");
+        }
+        assert_eq!(store.count(2), expected.iter().filter(|example| example.label == 2).count());
+    }
+    check(&examples, &examples);
+    check(examples.as_slice(), &examples);
+    check(&&examples, &examples);
+    check(&table, &examples);
+    check(&OneByOne(&examples), &examples);
+    check(&(&table, &examples), &[first, second, third, first, second, third]);
+    check(&(&examples[..1], &examples[1..]), &examples);
+    check(&examples[..0], &[]);
+    check(&(&examples[..0], &[] as &[Example<1>]), &[]);
+}
