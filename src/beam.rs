@@ -76,7 +76,7 @@ fn is_broken(levels: u8) -> bool {
 }
 
 handler! {
-    /// The beam's level changed: 53 cycles.
+    /// The beam's level changed: 51 cycles.
     on_change = "__vector_3" {
         "push r30",
         "push r31",

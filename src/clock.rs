@@ -40,7 +40,7 @@ impl Clock {
 }
 
 handler! {
-    /// The clock's counter ran over: 29 cycles, up to 43 where the upper bytes change too, for a loop that turns.
+    /// The clock's counter ran over: 28 cycles, up to 42 where the upper bytes change too, for a loop that turns.
     on_overflow = "__vector_16" {
         "lds  r24, {left}",
         "dec  r24",
