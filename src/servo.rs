@@ -63,7 +63,7 @@ impl Servo {
 /// the command waits for that one.
 ///
 /// No interrupt may come between reading the counter and setting it. The encoder waits for that, so it is a function of its own:
-/// what it is given was worked out before. At most 25 cycles are without interrupts.
+/// what it is given was worked out before. At most 24 cycles are without interrupts.
 #[inline(never)]
 fn change(timer: &TC1, since_rise: HalfMicros, compare: u16, restart: bool) -> bool {
     interrupt::free(|_| {

@@ -16,7 +16,9 @@ const JITTERED_PER_S: f64 = 215_000.0;
 fn assert_no_count_is_lost(counts_per_s: f64, jitter: f64) {
     for direction in [Direction::Forward, Direction::Backward] {
         let turning = Turning { load: Load::Telemetry, direction, jitter };
-        for (trial, moments) in [(encoder::turn as Trial, "moments by chance"), (encoder::turn_at_worst, "worst moments")] {
+        for (trial, moments) in
+            [(encoder::turn as Trial, "moments by chance"), (encoder::turn_at_worst, "worst moments")]
+        {
             let counted = trial(&elf(), turning, counts_per_s).expect("the firmware runs");
             let share = counted.line_share * 100.0;
             println!("{direction:?} at {counts_per_s} counts/s, {moments}: {share:.0} % of the serial line");
