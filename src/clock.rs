@@ -4,6 +4,7 @@
 //! the overflows, and the loop's heartbeat down. The clock wraps after 4.77 hours, which `control` is made for.
 
 use crate::{
+    handler::handler,
     heartbeat,
     shared::{Byte, Shared},
 };
@@ -38,13 +39,38 @@ impl Clock {
     }
 }
 
-// The clock's counter ran over. At most 70 cycles, for a loop that turns.
-#[avr_device::interrupt(atmega328p)]
-fn TIMER0_OVF() {
-    heartbeat::count_down();
-    let low = OVERFLOWS_LOW.get().wrapping_add(1);
-    OVERFLOWS_LOW.set(low);
-    if low == 0 {
-        OVERFLOWS_HIGH.set(OVERFLOWS_HIGH.get().wrapping_add(1));
+handler! {
+    /// The clock's counter ran over: 28 cycles, up to 42 where the upper bytes change too, for a loop that turns.
+    on_overflow = "__vector_16" {
+        "lds  r24, {left}",
+        "dec  r24",
+        "sts  {left}, r24",
+        "breq 3f",
+        "lds  r24, {low}",
+        "inc  r24",
+        "sts  {low}, r24",
+        "breq 4f",
+        "2:",
     }
+    aside {
+        // The loop stands still. There is no way back from here, and none of what the code behind it takes for granted but
+        // a stack and a zero in r1.
+        "3:",
+        "clr  r1",
+        "jmp  {stalled}",
+        // The lowest byte is 0 again: one more in the upper two.
+        "4:",
+        "lds  r24, {high}",
+        "inc  r24",
+        "sts  {high}, r24",
+        "brne 2b",
+        "lds  r24, {high}+1",
+        "inc  r24",
+        "sts  {high}+1, r24",
+        "rjmp 2b",
+    }
+    low = sym OVERFLOWS_LOW,
+    high = sym OVERFLOWS_HIGH,
+    left = sym heartbeat::LEFT,
+    stalled = sym heartbeat::stalled,
 }

@@ -38,8 +38,13 @@ impl Examples<{ features::COUNT }> for BuiltIn {
     }
 
     #[inline]
-    fn visit_near(&self, query: &[u8; features::COUNT], reach: u32, visit: &mut impl FnMut(u32, u8) -> u32) -> u32 {
-        Self::table().visit_near(query, reach, visit)
+    fn keep_nearest(
+        &self,
+        query: &[u8; features::COUNT],
+        nearest: &mut [Neighbour],
+        level: &mut impl FnMut(Neighbour),
+    ) {
+        Self::table().keep_nearest(query, nearest, level);
     }
 }
 

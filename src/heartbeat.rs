@@ -14,13 +14,13 @@ use crate::{
 };
 use avr_device::interrupt;
 use control::{reset::mark, servo::HalfMicros};
-use core::arch::asm;
 
 /// Periods of the clock's interrupt that may pass without a beat: 200 ms. The watchdog's 250 ms come after them.
 const PERIODS: u8 = 195;
 
-/// Periods left. The first count-down goes from 0 round to 255, so the loop has 262 ms to begin.
-static LEFT: Byte = Byte::new(0);
+/// Periods left, which the clock's handler counts down. The first count-down goes from 0 round to 255, so the loop has 262 ms to
+/// begin.
+pub static LEFT: Byte = Byte::new(0);
 
 /// The pulse width that has the tool out; 0 before the first beat.
 static OUT: Shared<HalfMicros> = Shared::new(0);
@@ -32,21 +32,9 @@ pub fn beat(out: HalfMicros) {
     OUT.set(out);
 }
 
-/// Another period has passed; called by the clock's interrupt handler.
-#[inline(always)]
-pub fn count_down() {
-    let left = LEFT.get().wrapping_sub(1);
-    LEFT.set(left);
-    if left == 0 {
-        // A call would have the handler save every time what the callee may change, and so would the word that there
-        // is no return. There is none.
-        // SAFETY: `stalled` needs a stack, which the handler has, and a zero in r1; nothing behind this is ever run.
-        unsafe { asm!("clr r1", "jmp {stalled}", stalled = sym stalled) }
-    }
-}
-
-/// The loop stands still, and so does everything from here on.
-extern "C" fn stalled() -> ! {
+/// The loop stands still, and so does everything from here on: the clock's handler jumps here when it has counted
+/// [`LEFT`] down to 0, with a stack and a zero in r1.
+pub extern "C" fn stalled() -> ! {
     give_up(mark::LOOP_STALLED)
 }
 

@@ -7,7 +7,7 @@
 
 #![no_std]
 #![no_main]
-#![feature(abi_avr_interrupt, asm_experimental_arch)]
+#![feature(asm_experimental_arch)]
 #![allow(missing_docs, reason = "the interrupt attribute leaves no place for a handler's doc comment")]
 
 mod beam;
@@ -16,6 +16,7 @@ mod clock;
 mod eeprom;
 mod encoder;
 mod examples;
+mod handler;
 mod heartbeat;
 mod reset;
 mod ring;
@@ -56,6 +57,8 @@ fn main() -> ! {
 fn run(typed: &mut LineBuffer) -> ! {
     // SAFETY: the entry point is the first code to run and runs once, as this does, so nobody else holds the peripherals.
     let peripherals = unsafe { Peripherals::steal() };
+    // Before the first interrupt: their handlers use the register that told it.
+    let cause = reset::cause(&peripherals.CPU);
     let board::Pins { mut lamp, mut work_switch, mut end_switch } = board::pins(&peripherals.PORTB, &peripherals.PORTD);
     let clock = clock::Clock::new(peripherals.TC0);
     encoder::watch(&peripherals.EXINT, &peripherals.PORTD, &peripherals.CPU);
@@ -73,7 +76,6 @@ fn run(typed: &mut LineBuffer) -> ! {
         let stack_free = stack.free();
         Readings { now, position: Position::new(position), switch_on, lost, jumps, end_switch_on, stack_free }
     };
-    let cause = reset::cause(&peripherals.CPU);
     static CONSOLE: ConstStaticCell<Console> = ConstStaticCell::new(Console::new());
     let console = CONSOLE.take();
     let controller = wake_up(WakeUp { readings: read(), beam_broken: beam.is_broken(), cause });

@@ -10,7 +10,8 @@ use control::reset::{Cause, mark};
 // SAFETY: at power-up it holds any two bytes, which are a number.
 static MARK: Shared<u16> = Shared::new(mark::NONE);
 
-/// What started the machine; to be asked once, because it takes the mark away.
+/// What started the machine; to be asked once, because it takes the mark away, and with interrupts off, because their handlers use
+/// GPIOR2 for something else.
 pub fn cause(cpu: &CPU) -> Cause {
     let left = MARK.get();
     leave_mark(mark::NONE);

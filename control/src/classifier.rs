@@ -10,7 +10,7 @@ use crate::{
     memory::Memory,
     taught::{self, FieldExamples},
 };
-use knn::{Answer, Example, Examples, Kind};
+use knn::{Answer, Example, Examples, Kind, Neighbour};
 
 /// What an object is taken for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -143,8 +143,15 @@ impl<M: Memory> Examples<{ features::COUNT }> for FromField<'_, M> {
         self.examples.example(index).filter(|_| self.vote)
     }
 
-    fn visit_near(&self, query: &[u8; features::COUNT], reach: u32, visit: &mut impl FnMut(u32, u8) -> u32) -> u32 {
-        if self.vote { self.examples.visit_near(query, reach, visit) } else { reach }
+    fn keep_nearest(
+        &self,
+        query: &[u8; features::COUNT],
+        nearest: &mut [Neighbour],
+        level: &mut impl FnMut(Neighbour),
+    ) {
+        if self.vote {
+            self.examples.keep_nearest(query, nearest, level);
+        }
     }
 }
 

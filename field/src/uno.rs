@@ -55,7 +55,7 @@ use std::collections::VecDeque;
 use std::path::Path;
 
 use self::core::{Core, Stop};
-pub use self::interrupts::{HandlerCycles, InterruptStatistics};
+pub use self::interrupts::{HandlerCycles, InterruptStatistics, Place};
 pub use self::turns::Turns;
 use crate::firmware::{EEPROM_BYTES, Image, ImageError, Size, Variable};
 use crate::hex::{Bootloader, HexError};
@@ -396,10 +396,30 @@ impl Uno {
             if self.cycle() >= deadline {
                 return Err(UnoError::NotReached { symbol: symbol.to_owned(), timeout_cycles });
             }
-            // A cycle is less than any instruction has, so that each is seen.
-            self.step(self.cycle() + 1)?;
+            self.run_instruction()?;
         }
         Ok(())
+    }
+
+    /// Runs one instruction. Where an interrupt is due, that is the first one of its handler, behind the response.
+    ///
+    /// # Errors
+    ///
+    /// As [`Uno::run_until`].
+    pub fn run_instruction(&mut self) -> Result<(), UnoError> {
+        // A cycle is less than any instruction has.
+        self.step(self.cycle() + 1)
+    }
+
+    /// Where the program stands.
+    pub fn place(&self) -> Place {
+        self.core.place()
+    }
+
+    /// Gives the receiver a byte whose stop bit ends now, beside those that [`Uno::send`] has on their way. Returns whether it had
+    /// room.
+    pub fn receive(&mut self, byte: u8) -> bool {
+        self.core.receive(byte)
     }
 
     /// Runs a step, and what falls due before it.

@@ -21,6 +21,8 @@ const LOOK_CYCLES: u64 = CYCLES_PER_SECOND / 1000;
 #[derive(Default)]
 pub(super) struct Telemetry {
     unanswered: usize,
+    /// Bytes of a question that [`Telemetry::next_byte`] has given.
+    given: usize,
     line: Vec<u8>,
     bytes: u64,
 }
@@ -39,7 +41,26 @@ impl Telemetry {
         Ok(())
     }
 
-    fn take(&mut self, received: &[ReceivedByte]) {
+    /// The next byte to ask with, for who gives the firmware its bytes himself; `None` while enough questions are on their way.
+    pub(super) fn next_byte(&mut self) -> Option<u8> {
+        if self.given == 0 {
+            if self.unanswered == QUESTIONS_AHEAD {
+                return None;
+            }
+            self.unanswered += 1;
+        }
+        let byte = QUESTION[self.given];
+        self.given = (self.given + 1) % QUESTION.len();
+        Some(byte)
+    }
+
+    /// What is still to be given of a question that has begun.
+    pub(super) fn rest_of_question(&self) -> &'static [u8] {
+        if self.given == 0 { &[] } else { &QUESTION[self.given..] }
+    }
+
+    /// Looks at what has come.
+    pub(super) fn take(&mut self, received: &[ReceivedByte]) {
         for byte in received.iter().map(|received| received.byte) {
             self.bytes += 1;
             if byte != b'\n' {
@@ -61,7 +82,7 @@ impl Telemetry {
 }
 
 /// Shortest time between two edges of the beam, the response time of its sensor, and by how much more it may be.
-const EDGE_CYCLES: u64 = CYCLES_PER_SECOND / 1000;
+pub(super) const EDGE_CYCLES: u64 = CYCLES_PER_SECOND / 1000;
 const EDGE_SCATTER_CYCLES: u64 = EDGE_CYCLES / 5;
 
 /// A beam that flickers as fast as a sensor with a response of 1 ms can report, from `begin` to `end`; it ends clear.

@@ -18,7 +18,7 @@ use std::ptr::{self, NonNull};
 use simavr_ffi as simavr;
 
 use super::eeprom::{self, Eeprom};
-use super::interrupts::{InterruptRecorder, InterruptStatistics};
+use super::interrupts::{InterruptRecorder, InterruptStatistics, Place};
 use super::recorder::{Recorder, cycles_per_byte, on_interrupt, on_output, on_reset, on_timer_output, on_transmit};
 use super::timer::{self, Timer1};
 use super::turns::{TurnRecorder, Turns};
@@ -68,6 +68,9 @@ const RXEN0: u8 = 1 << 4;
 
 /// The instruction `wdr`, which feeds the watchdog.
 const WDR: u16 = 0x95A8;
+
+/// The instruction `cli`, which turns interrupts off.
+const CLI: u16 = 0x94F8;
 
 /// Cycles of a jump to itself (`rjmp`).
 const LOOP_CYCLES: u64 = 2;
@@ -241,6 +244,15 @@ impl Core {
     pub(super) fn is_in_handler(&self) -> bool {
         // SAFETY: as in `cycle`.
         unsafe { (*self.chip.as_ptr()).interrupts.running_ptr > 0 }
+    }
+
+    /// Where the program stands.
+    pub(super) fn place(&self) -> Place {
+        match self.next_instruction() {
+            _ if self.is_in_handler() => Place::InHandler,
+            CLI => Place::BeforeCriticalSection,
+            _ => Place::InMain,
+        }
     }
 
     /// Has the main program jump to where it is, for ever; handlers go on. No handler may be running.

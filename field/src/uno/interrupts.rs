@@ -25,6 +25,17 @@ impl HandlerCycles {
     }
 }
 
+/// Where the program stands between two instructions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// In an interrupt's handler.
+    InHandler,
+    /// In the main program, right before it turns interrupts off.
+    BeforeCriticalSection,
+    /// In the main program, elsewhere.
+    InMain,
+}
+
 /// What the interrupts have cost since measuring began.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct InterruptStatistics {
