@@ -75,7 +75,8 @@ fn run(typed: &mut LineBuffer) -> ! {
         Readings { now, position: Position::new(position), switch_on, lost, jumps, end_switch_on, stack_free }
     };
     let cause = reset::cause(&peripherals.CPU);
-    let (controller, console) = wake_up(peripherals.EEPROM, WakeUp { readings: read(), beam_broken: beam.is_broken(), cause });
+    let (controller, console) =
+        wake_up(peripherals.EEPROM, WakeUp { readings: read(), beam_broken: beam.is_broken(), cause });
     // The settings say which pulse has the tool out, so there is none before they are loaded.
     let mut servo = servo::Servo::new(peripherals.TC1, &peripherals.PORTB, controller.orders().pulse);
 
