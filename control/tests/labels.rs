@@ -25,6 +25,8 @@ const SPEED: u64 = 1061;
 struct Rolling {
     machine: Machine,
     count: i32,
+    /// Where the last object began.
+    leading: i32,
 }
 
 impl Rolling {
@@ -32,24 +34,28 @@ impl Rolling {
         let nearest = Nearest::new(&EXAMPLES[..], Volatile::new());
         let mut machine = Controller::new(nearest, Volatile::new(), woken_up(Cause::PowerOn));
         machine.clear();
-        Self { machine, count: 0 }
+        Self { machine, count: 0, leading: 0 }
     }
 
     /// Rolls past an object so far behind the leading edge of the one before it; returns what it is taken for.
     fn past(&mut self, spacing_mm: u16, width_mm: u16) -> Class {
         let wheel = self.machine.settings().wheel();
-        let (gap, width) = (wheel.ticks(spacing_mm - width_mm).0, wheel.ticks(width_mm).0);
-        let behind = wheel.ticks(40).0;
-        for (ticks, broken) in [(gap, true), (width, false), (behind, false)] {
-            for _ in 0..ticks {
-                self.count += 1;
-                self.machine.step(readings(self.count as u64 * 1_000_000 / SPEED, self.count));
-            }
-            if self.machine.beam_is_broken() != broken {
-                self.machine.beam_edge(Position::new(self.count), broken);
-            }
-        }
+        let leading = self.leading + wheel.ticks(spacing_mm).0;
+        let trailing = leading + wheel.ticks(width_mm).0;
+        self.roll_to(leading);
+        self.machine.beam_edge(Position::new(leading), true);
+        self.roll_to(trailing);
+        self.machine.beam_edge(Position::new(trailing), false);
+        self.roll_to(trailing + wheel.ticks(40).0);
+        self.leading = leading;
         self.machine.objects().last().expect("the object was seen").vote.class
+    }
+
+    fn roll_to(&mut self, count: i32) {
+        while self.count < count {
+            self.count += 1;
+            self.machine.step(readings(self.count as u64 * 1_000_000 / SPEED, self.count));
+        }
     }
 
     /// Types a line; returns the last line of its answer.
@@ -101,10 +107,9 @@ fn two_wrong_labels_do_not_make_weeds_of_the_plants_that_follow() {
 #[test]
 fn what_has_been_taught_does_not_make_the_built_in_examples_less_sure() {
     let mut rolling = Rolling::new();
-    for _ in 0..3 {
-        rolling.past(540, 150);
-        assert_eq!(rolling.ask("label weed force"), "ok");
-    }
+    rolling.machine.set(Setting::K, 1).expect("it may be");
+    assert_eq!(rolling.past(540, 150), Class::Plant);
+    assert_eq!(rolling.ask("label weed force"), "ok");
     assert_eq!(rolling.past(540, 150), Class::Weed, "it was insisted on");
     assert!(rolling.ask("label weed").starts_with("error: the built-in examples say plant"));
 }
