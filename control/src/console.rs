@@ -217,7 +217,7 @@ pub fn parse(line: &[u8]) -> Result<Command, Mistake> {
         Word::Calibrate | Word::Test | Word::Label => true,
         _ => second.is_empty(),
     };
-    if !fits || !rest.iter().all(is_blank) {
+    if !fits || !split_word(rest).0.is_empty() {
         return usage;
     }
     if first.is_empty() {
@@ -346,7 +346,7 @@ impl LineBuffer {
     fn end(&mut self) -> Option<Result<Command, Mistake>> {
         let said = match self.mistake.take() {
             Some(mistake) => Some(Err(mistake)),
-            None if self.characters.iter().all(is_blank) => None,
+            None if split_word(&self.characters).0.is_empty() => None,
             None => Some(parse(&self.characters)),
         };
         self.characters.clear();

@@ -55,7 +55,7 @@ impl Line {
 
     /// A number for a `#` that is never negative.
     #[inline(never)]
-    pub(crate) fn count(&mut self, number: u16) {
+    pub(crate) fn counted(&mut self, number: u16) {
         self.number(number.into());
     }
 

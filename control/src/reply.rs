@@ -245,7 +245,7 @@ impl Answer {
                 }
                 None => {
                     line.say(said::SPOILED);
-                    line.count(controller.classifier().spoiled().into());
+                    line.counted(controller.classifier().spoiled().into());
                     Self::Ok
                 }
             },

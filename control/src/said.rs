@@ -95,7 +95,7 @@ said! {
     IN_ALARM = "alarm";
     TOO_LONG = "send 80 characters at most";
     NOT_TEXT = "send letters, digits and blanks only";
-    CHARACTERS_LOST = "characters of this line were lost, send it again";
+    CHARACTERS_LOST = "characters were lost, send the line again";
     UNKNOWN_COMMAND = "no such command, help lists them all";
     UNKNOWN_SETTING = "no such setting, get lists them all";
     USAGE = "the words do not fit, the command is ";
@@ -149,7 +149,7 @@ commands! {
     Help "help [name]",
         "this list, or what a setting is";
     Status "status",
-        "state, position, speed and windows, and what was counted";
+        "where the machine is, and what was counted";
     Get "get [name]",
         "one setting, or all";
     Set "set name value",

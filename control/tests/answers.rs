@@ -13,7 +13,7 @@ use control::{
     ground::schedule::Plan,
     line::Line,
     memory::Volatile,
-    reply::{self, LINE},
+    reply::{self, Console, LINE},
     reset::Cause,
     settings::Setting,
     units::{Position, Ticks},
@@ -350,4 +350,40 @@ fn curves_are_labels_and_values_and_nothing_else() {
         reply::write_plot(&machine, plot, &mut line);
         assert_eq!(said(line), expected);
     }
+}
+
+#[test]
+fn events_and_curves_wait_until_an_answer_is_complete() {
+    let mut machine = machine();
+    machine.tell_events(true);
+    machine.set_plot(Plot::Arduino);
+    let (mut console, mut typed) = (Console::new(), LineBuffer::new());
+    let mut to_type = b"help\nnonsense\nget\nversion\n".iter();
+    let mut said = String::new();
+    for turn in 0..20_000 {
+        machine.step(readings(turn * 300, 0));
+        match turn % 200 {
+            0 => machine.start(false).expect("no alarm is latched"),
+            100 => machine.hold(),
+            _ => {}
+        }
+        if let Some(byte) = console.next_byte() {
+            said.push(char::from(byte));
+        } else if console.listens()
+            && let Some(&byte) = to_type.next()
+        {
+            if let Some(line) = typed.take(byte) {
+                console.take(line);
+            }
+        } else {
+            console.carry_on(&mut machine);
+        }
+    }
+    for line in ["help", "nonsense", "get", "version"] {
+        let answer = ask(&mut machine, line).join("\r\n") + "\r\n";
+        assert_eq!(said.matches(&answer).count(), 1, "{line} is answered once and in one piece: {said}");
+    }
+    assert_eq!(said.lines().filter(|line| *line == "ok" || line.starts_with("error: ")).count(), 4);
+    assert!(said.starts_with("weeder "), "it greets: {said}");
+    assert!(said.contains("\r\nstate is=work\r\n") && said.contains("\r\nspeed_mm_s:0,"), "{said}");
 }

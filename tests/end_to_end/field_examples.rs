@@ -89,6 +89,22 @@ fn an_object_that_was_labelled_is_known_when_it_comes_again() {
 }
 
 #[test]
+fn a_label_that_the_built_in_examples_contradict_wants_force() {
+    let mut uno = woken_up();
+    let row = Row::new(vec![Thing::plant(600.0, 150.0)]).expect("a plant is a row");
+    let motion = Motion::steady(0.0, 3000.0, 500.0, 900.0);
+    let start = uno.cycle();
+    uno.drive(Machine::default().pin_changes(&row, &motion, start));
+    run_for_ms(&mut uno, (motion.duration_s() * 1000.0) as u64 + 50);
+    assert!(answers(&mut uno)[0].contains(",plant,3,"));
+    assert_eq!(refusal(&mut uno, "label weed"), "error: the built-in examples say plant, look again, or add force");
+    assert!(answers(&mut uno)[0].ends_with(','), "it has no label yet");
+    assert!(field_examples(&mut uno).is_empty());
+    ask(&mut uno, "label weed force");
+    assert!(answers(&mut uno)[0].ends_with(",weed"));
+}
+
+#[test]
 fn what_was_taught_survives_a_loss_of_power_and_a_spoiled_one_is_dropped_and_counted() {
     let mut uno = woken_up();
     roll_past_odd_objects(&mut uno, 1);

@@ -41,7 +41,7 @@ pub(super) fn write_refusal(refusal: Refusal, setting: Option<Setting>, line: &m
         (Refusal::AlarmLatched, _) => said::ALARM_LATCHED,
         (Refusal::Contradiction(Contradiction::PulsesEqual), _) => said::PULSES_EQUAL,
         (Refusal::Contradiction(Contradiction::BeamTooNear { needed_mm }), _) => {
-            line.count(needed_mm);
+            line.counted(needed_mm);
             said::BEAM_TOO_NEAR
         }
         (Refusal::NothingToLabel, _) => said::NOTHING_TO_LABEL,
@@ -55,12 +55,12 @@ pub(super) fn write_refusal(refusal: Refusal, setting: Option<Setting>, line: &m
         (Refusal::Unfit(Unfit::TooShort), _) => said::TOO_SHORT,
         (Refusal::Unfit(Unfit::Differs { counted, nominal }), _) => {
             line.say(said::WHEEL_DIFFERS);
-            line.count(counted);
-            line.count(nominal);
+            line.counted(counted);
+            line.counted(nominal);
             said::LOOK_AGAIN
         }
         (Refusal::TestSpeed { fastest }, _) => {
-            line.count(fastest);
+            line.counted(fastest);
             said::TEST_SPEED
         }
         (Refusal::ExamplesFull, _) => said::EXAMPLES_FULL,

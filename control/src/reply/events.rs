@@ -16,7 +16,7 @@ pub fn write_event(event: &Event, line: &mut Line) {
             line.say(class_name(vote.class));
             line.say(said::OBJECT);
             line.number(leading.count());
-            line.count(vote.votes.into());
+            line.counted(vote.votes.into());
             line.number(spacing.0);
             line.number(plan.delay.0);
             line.number(plan.hold.0);
@@ -38,8 +38,8 @@ pub fn write_event(event: &Event, line: &mut Line) {
         }
         Event::Calibrated { outcome: Outcome::Measured(Leads { out_ms, in_ms }), fits } => {
             line.say(said::CALIBRATED);
-            line.count(out_ms);
-            line.count(in_ms);
+            line.counted(out_ms);
+            line.counted(in_ms);
             line.say(if fits { said::SET } else { said::NOT_SET });
         }
         Event::Calibrated { outcome: Outcome::Shown, .. } => line.say(said::CALIBRATED_BY_EYE),
@@ -48,7 +48,7 @@ pub fn write_event(event: &Event, line: &mut Line) {
             line.say(said::ALARM);
             line.say(alarm.text());
             line.say(said::CODE);
-            line.count(alarm.code().into());
+            line.counted(alarm.code().into());
             line.say(said::POS);
             line.number(position.count());
         }

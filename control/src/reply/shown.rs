@@ -34,19 +34,19 @@ pub(super) fn write_status<C: Classifier, M: Memory>(controller: &Controller<C, 
     line.say(said::PLACE);
     line.number(controller.readings().position.count());
     line.number(controller.speed_mm_s().into());
-    line.count(controller.windows().into());
+    line.counted(controller.windows().into());
     line.number(controller.unseen_mm().into());
 }
 
 pub(super) fn write_counts<C: Classifier, M: Memory>(controller: &Controller<C, M>, line: &mut Line) {
     let readings = controller.readings();
     line.say(said::COUNTS);
-    line.count(readings.lost);
-    line.count(readings.jumps);
-    line.count(controller.late());
-    line.count(controller.events_missed());
-    line.count(controller.mistakes());
-    line.count(readings.stack_free);
+    line.counted(readings.lost);
+    line.counted(readings.jumps);
+    line.counted(controller.late());
+    line.counted(controller.events_missed());
+    line.counted(controller.mistakes());
+    line.counted(readings.stack_free);
     line.say(controller.cause().text());
     if controller.sees_no_plants() {
         line.say(said::WARNING_IS);
@@ -60,8 +60,8 @@ pub fn write_plot<C: Classifier, M: Memory>(controller: &Controller<C, M>, plot:
     line.say(if plot == Plot::Teleplot { said::TELEPLOT } else { said::SERIAL_PLOTTER });
     line.number(controller.speed_mm_s().into());
     line.number(if controller.tool_out() { 45 } else { 0 });
-    line.count(controller.beam_is_broken().into());
-    line.count(controller.windows().into());
+    line.counted(controller.beam_is_broken().into());
+    line.counted(controller.windows().into());
     line.say(said::END);
 }
 
@@ -90,7 +90,7 @@ fn write_value(text: Text, setting: Setting, value: u16, line: &mut Line) {
     line.say(text);
     if !setting.is_switched() {
         line.say(said::NUMBER);
-        return line.count(value);
+        return line.counted(value);
     }
     line.say(if value == 0 { Argument::Off } else { Argument::On }.text());
 }
@@ -101,8 +101,8 @@ fn write_range(setting: Setting, line: &mut Line) {
     }
     let description = setting.description();
     line.say(said::RANGE);
-    line.count(description.least);
-    line.count(description.greatest);
+    line.counted(description.least);
+    line.counted(description.greatest);
 }
 
 /// What may be given for a setting, or for something else that has the same range.
@@ -116,10 +116,10 @@ pub(super) fn write_allowed(name: Text, setting: Setting, line: &mut Line) {
 pub(super) fn write_example(listed: &Listed, line: &mut Line) {
     line.say(if listed.from_field { said::FIELD } else { said::BUILT_IN });
     line.say(said::EXAMPLE);
-    line.count(listed.number.into());
+    line.counted(listed.number.into());
     line.say(label_name(listed.example.label));
     line.say(said::FEATURES);
-    listed.example.features.iter().for_each(|&feature| line.count(feature.into()));
+    listed.example.features.iter().for_each(|&feature| line.counted(feature.into()));
 }
 
 pub(super) fn write_object(object: &Judged, line: &mut Line) {
@@ -127,7 +127,7 @@ pub(super) fn write_object(object: &Judged, line: &mut Line) {
     object.features().values().iter().for_each(|&value| line.number(value));
     line.say(class_name(object.vote.class));
     line.say(said::VOTES);
-    line.count(object.vote.votes.into());
+    line.counted(object.vote.votes.into());
     if let Some(label) = object.label {
         line.say(label_name(label));
     }

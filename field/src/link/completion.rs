@@ -19,6 +19,7 @@ pub fn complete(line: &str) -> Vec<String> {
         ["events"] => owned(&["on", "off"]),
         ["plot"] => owned(&["on", "off", "teleplot"]),
         ["label"] => owned(&["plant", "weed"]),
+        ["label", _] => owned(&["force"]),
         ["forget"] => owned(&["all"]),
         ["servo"] => owned(&["in", "out"]),
         ["calibrate"] => owned(&["start", "servo"]),
@@ -52,6 +53,7 @@ mod tests {
         assert_eq!(complete("set end_switch "), ["set end_switch on", "set end_switch off"]);
         assert_eq!(complete("set wheel_mm "), ["set wheel_mm 400"]);
         assert_eq!(complete("label p"), ["label plant"]);
+        assert_eq!(complete("label weed "), ["label weed force"]);
         assert!(complete("").len() > 10);
     }
 

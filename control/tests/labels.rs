@@ -1,0 +1,124 @@
+//! What the operator says of the last object, against what the built-in examples say.
+
+mod common;
+
+use common::{readings, woken_up};
+use control::{
+    classifier::{Class, Nearest},
+    console::LineBuffer,
+    controller::Controller,
+    examples::EXAMPLES,
+    line::Line,
+    memory::Volatile,
+    reply,
+    reset::Cause,
+    settings::Setting,
+    units::Position,
+};
+
+type Machine = Controller<Nearest<&'static [knn::Example<5>], Volatile>, Volatile>;
+
+/// 2 km/h in ticks a second.
+const SPEED: u64 = 1061;
+
+/// A machine that rolls at 2 km/h, in hold.
+struct Rolling {
+    machine: Machine,
+    count: i32,
+    /// Where the last object began.
+    leading: i32,
+}
+
+impl Rolling {
+    fn new() -> Self {
+        let nearest = Nearest::new(&EXAMPLES[..], Volatile::new());
+        let mut machine = Controller::new(nearest, Volatile::new(), woken_up(Cause::PowerOn));
+        machine.clear();
+        Self { machine, count: 0, leading: 0 }
+    }
+
+    /// Rolls past an object so far behind the leading edge of the one before it; returns what it is taken for.
+    fn past(&mut self, spacing_mm: u16, width_mm: u16) -> Class {
+        let wheel = self.machine.settings().wheel();
+        let leading = self.leading + wheel.ticks(spacing_mm).0;
+        let trailing = leading + wheel.ticks(width_mm).0;
+        self.roll_to(leading);
+        self.machine.beam_edge(Position::new(leading), true);
+        self.roll_to(trailing);
+        self.machine.beam_edge(Position::new(trailing), false);
+        self.roll_to(trailing + wheel.ticks(40).0);
+        self.leading = leading;
+        self.machine.objects().last().expect("the object was seen").vote.class
+    }
+
+    fn roll_to(&mut self, count: i32) {
+        while self.count < count {
+            self.count += 1;
+            self.machine.step(readings(self.count as u64 * 1_000_000 / SPEED, self.count));
+        }
+    }
+
+    /// Types a line; returns the last line of its answer.
+    fn ask(&mut self, line: &str) -> String {
+        let mut typed = LineBuffer::new();
+        let said = line.bytes().chain(*b"\n").find_map(|byte| typed.take(byte)).expect("a line that says something");
+        let mut answer = reply::answer(said, &mut self.machine);
+        let mut written = Line::new();
+        while !answer.is_done() {
+            written = Line::new();
+            answer.write_line(&self.machine, &mut written);
+        }
+        written.map(char::from).collect::<String>().trim_end().to_owned()
+    }
+
+    fn label(&self) -> Option<u8> {
+        self.machine.objects().last().expect("an object").label
+    }
+}
+
+#[test]
+fn a_label_that_the_built_in_examples_contradict_is_refused_and_can_be_forced() {
+    for (width_mm, class, wrong, right) in [(150, Class::Plant, "weed", "plant"), (16, Class::Weed, "plant", "weed")] {
+        let mut rolling = Rolling::new();
+        assert_eq!(rolling.past(540, width_mm), class);
+        let refusal = format!("error: the built-in examples say {right}, look again, or add force");
+        assert_eq!(rolling.ask(&format!("label {wrong}")), refusal);
+        assert_eq!(rolling.label(), None, "it can still be labelled");
+        assert_eq!(rolling.ask(&format!("label {right}")), "ok");
+        rolling.past(540, width_mm);
+        assert_eq!(rolling.ask(&format!("label {wrong} force")), "ok");
+        assert!(rolling.label().is_some());
+    }
+}
+
+#[test]
+fn two_wrong_labels_do_not_make_weeds_of_the_plants_that_follow() {
+    for k in [1, 3] {
+        let mut rolling = Rolling::new();
+        rolling.machine.set(Setting::K, k).expect("it may be");
+        for _ in 0..2 {
+            rolling.past(540, 150);
+            assert!(rolling.ask("label weed").starts_with("error: "));
+        }
+        assert_eq!(rolling.past(540, 150), Class::Plant, "k {k}");
+    }
+}
+
+#[test]
+fn what_has_been_taught_does_not_make_the_built_in_examples_less_sure() {
+    let mut rolling = Rolling::new();
+    rolling.machine.set(Setting::K, 1).expect("it may be");
+    assert_eq!(rolling.past(540, 150), Class::Plant);
+    assert_eq!(rolling.ask("label weed force"), "ok");
+    assert_eq!(rolling.past(540, 150), Class::Weed, "it was insisted on");
+    assert!(rolling.ask("label weed").starts_with("error: the built-in examples say plant"));
+}
+
+#[test]
+fn what_the_built_in_examples_do_not_know_is_taught_at_the_first_word() {
+    for label in ["plant", "weed"] {
+        let mut rolling = Rolling::new();
+        assert_eq!(rolling.past(540, 55), Class::Unknown);
+        assert_eq!(rolling.ask(&format!("label {label}")), "ok");
+    }
+}
