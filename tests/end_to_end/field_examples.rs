@@ -39,7 +39,8 @@ fn greeted(uno: &mut Uno) {
 
 /// An EEPROM with an example in every slot.
 fn full_eeprom() -> Vec<u8> {
-    let mut store = FieldExamples::new(Volatile::new());
+    let mut store = FieldExamples::asleep(Volatile::new());
+    store.wake_up();
     for number in 0..taught::CAPACITY {
         store.add(Example::new([number, 1, 2, 3, 4], number % 2)).expect("there is room");
     }
