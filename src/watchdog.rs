@@ -17,7 +17,8 @@ const RESET_LATER: u8 = 0x0C;
 
 /// Switches the watchdog off in the start-up code, before SRAM is cleared and long before `main`.
 ///
-/// MCUSR is cleared first: while it tells of a watchdog reset, the watchdog cannot go off. GPIOR2 keeps what it told.
+/// MCUSR is cleared first: while it tells of a watchdog reset, the watchdog cannot go off. GPIOR2 keeps what it told
+/// until `reset::cause` has read it, before the first interrupt.
 #[unsafe(naked)]
 #[unsafe(no_mangle)]
 // SAFETY: .init3 is run through, not called; the code falls into the next start-up section and changes r24 alone,

@@ -108,7 +108,7 @@ impl Figures {
     /// A line per load, with the highest rate each way.
     fn rates(&self) -> Table {
         let mut table = number_table(&[
-            "highest counts/s without a lost count",
+            "highest counts/s without a lost count,\nwhatever the moments of the edges",
             "forward",
             "backward",
             "30 % jitter,\nforward",
