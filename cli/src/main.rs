@@ -1,10 +1,11 @@
 //! The `weeder` command: tries the firmware on a simulated field, and puts it on an Arduino Uno.
 //!
 //! `weeder sim` and `weeder classify` end with status 0 where no plant was damaged, or would be, and 1 where one was;
-//! commands that compare end with 1 where something differs. Whatever else goes wrong ends with status 2 and a message
+//! commands that compare end with 1 where something differs, `weeder bounds` where a bound is over its budget. Whatever else goes wrong ends with status 2 and a message
 //! that says what would be right.
 
 mod bench;
+mod bounds;
 mod classify;
 mod completions;
 mod course;
@@ -55,6 +56,8 @@ enum Command {
     /// Count the cycles and bytes of the firmware and its classifier on a virtual Uno.
     #[command(after_help = "Example: weeder bench-uno > figures.txt")]
     BenchUno,
+    /// Prove from the ELF what the firmware needs at most: stack, interrupts, and how fast the encoder may turn.
+    Bounds(bounds::Arguments),
     /// Work for a day with everything going wrong now and then, and say what happened.
     Soak(soak::Arguments),
     /// Run the paper's experiment in a simulated field, and say how the firmware and others did.
@@ -97,6 +100,7 @@ fn main() -> ExitCode {
         Command::Hex(arguments) => hex::run(&arguments).map(|()| Finding::Good),
         Command::VirtualUno(arguments) => virtual_uno::run(&arguments).map(|()| Finding::Good),
         Command::BenchUno => bench::run().map(|()| Finding::Good),
+        Command::Bounds(arguments) => bounds::run(&arguments),
         Command::Soak(arguments) => soak::run(&arguments),
         Command::Trial(arguments) => trial::run(&arguments),
         Command::Sweep(arguments) => sweep::run(&arguments).map(|()| Finding::Good),
