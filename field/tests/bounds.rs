@@ -29,7 +29,7 @@ fn try_to_prove(program: &str, input: Option<&Input>) -> Result<Bounds, BoundsEr
         .spawn()
         .unwrap_or_else(|error| panic!("avr-gcc could not be started ({error}): run ./setup.sh"));
     let mut source = gcc.stdin.take().expect("it was asked for");
-    write!(source, "{functions}{vectors}{program}\n").expect("avr-gcc reads");
+    writeln!(source, "{functions}{vectors}{program}").expect("avr-gcc reads");
     drop(source);
     assert!(gcc.wait().expect("avr-gcc ends").success(), "{program}");
     prove(elf.path(), input)
@@ -284,6 +284,7 @@ fn what_is_called_by_an_address_is_refused() {
 #[test]
 fn a_stack_that_grows_in_a_loop_is_refused() {
     assert_refused("start:\n push r2\n rjmp start", "puts more onto the stack in every turn of a loop");
+    assert_refused("start:\n rcall 1f\n1: rjmp start", "puts more onto the stack in every turn of a loop");
     assert_refused("start:\n pop r2\n rjmp start", "takes more from the stack than it has put there");
 }
 

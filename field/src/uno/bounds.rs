@@ -28,18 +28,19 @@ mod loops;
 pub use self::budget::{Budgets, BudgetsError, Held};
 use self::cycles::{Stretch, Time, Timer};
 use self::decode::Operation;
-use self::flow::{Entry, Interrupts, Kind, Node, Program, bytes};
+use self::flow::{Entry, Interrupts, Kind, Node, Program, Routine, bytes};
 use crate::firmware::{Image, ImageError};
 use crate::signal::CYCLES_PER_SECOND;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
+use std::rc::Rc;
 
 /// Cycles from the end of an instruction to the first one of the vector (data sheet, section 7.7.1).
 const RESPONSE_CYCLES: u64 = 4;
 
-/// Cycles from an edge at a pin until it asks for its interrupt, and by which it may be late for a look, at most (data sheet,
-/// sections 13.1 and 14.2.4).
+/// Cycles from an edge at a pin until it asks for its interrupt, at most, and by which it may come before a look and not be seen
+/// (data sheet, pin change interrupt timing, and reading the pin value).
 const SYNCHRONISER_CYCLES: u64 = 3;
 
 /// Bytes that an interrupt puts onto the stack: where it came in.
@@ -295,14 +296,10 @@ pub fn prove(elf: &Path, input: Option<&Input>) -> Result<Bounds, BoundsError> {
 
     let stated = loops::stated(elf)?;
     let mut timer = Timer::new(stated);
-    // A time that has to have a bound.
-    let bound = |time: Time, what: &str| match time.unbounded.first() {
-        None => Ok(time.cycles),
-        Some(&address) => Err(BoundsError::Unbounded { what: what.into(), address, function: program.name(address) }),
-    };
     let mut told = Vec::new();
     for (&vector, handler) in &handlers {
-        let longest = timer.longest(handler).map(|time| bound(time, &format!("the handler of vector {vector}")));
+        let what = format!("the handler of vector {vector}");
+        let longest = timer.longest(handler).map(|time| time.bound(&what, &program));
         told.push(Handler {
             vector,
             function: program.name_of(handler.entry),
@@ -311,61 +308,26 @@ pub fn prove(elf: &Path, input: Option<&Input>) -> Result<Bounds, BoundsError> {
         });
     }
     let mut longest_stretch = |kind| {
-        let longest = timer.longest_stretch(&main, kind).map(|time| bound(time, "a stretch without interrupts"));
+        let longest =
+            timer.longest_stretch(&main, kind).map(|time| time.bound("a stretch without interrupts", &program));
         longest.transpose().map(Option::unwrap_or_default)
     };
     let critical_section_cycles = longest_stretch(Stretch::FlagClear)?;
     let closed_cycles = longest_stretch(Stretch::Closed)?;
 
-    let edges = match input {
-        None => None,
-        Some(input) => {
-            let before = |other: &u8| input.vectors.last().is_some_and(|last| other < last);
-            if let Some(&other) = handlers.keys().find(|other| !input.vectors.contains(other) && before(other)) {
-                return Err(BoundsError::NotFirst { vector: input.vectors.last().copied().unwrap_or_default(), other });
-            }
-            let (mut to_look, mut behind) = (0, 0);
-            for &vector in &input.vectors {
-                let looks = |node: &Node| {
-                    program.instruction(node.place.address).is_ok_and(|instruction| instruction.reads(input.port))
-                };
-                let look = handlers.get(&vector).and_then(|handler| timer.around(handler, looks));
-                let (to, from) = look.ok_or(BoundsError::DoesNotLook { vector, port: input.port })?;
-                to_look = to_look.max(RESPONSE_CYCLES + bound(to, "the way to a look")?);
-                behind = behind.max(bound(from, "the way from a look")?);
-            }
-            let others = told.iter().filter(|handler| !input.vectors.contains(&handler.vector));
-            let busy = others.filter_map(|handler| handler.cycles).fold(behind, u64::max);
-            let wait_cycles = SYNCHRONISER_CYCLES + busy + closed_cycles + to_look;
-            Some(EdgeBounds {
-                wait_cycles,
-                never_lost_per_s: input.edges_between_looks * CYCLES_PER_SECOND / wait_cycles,
-            })
-        }
-    };
+    let edges = input.map(|input| watch(input, &program, &handlers, &told, &mut timer, closed_cycles)).transpose()?;
 
     let feeds = |node: &Node| {
         program.instruction(node.place.address).is_ok_and(|instruction| instruction.operation == Operation::Wdr)
     };
     let turns = program.routines().filter(|routine| routine.entry.kind != Kind::Handler);
     let turns: Vec<Time> = turns.filter_map(|routine| timer.turn(routine, feeds)).collect();
-    let turn = turns.into_iter().max_by_key(|turn| turn.cycles).map(|turn| TurnBound {
+    let turn = turns.into_iter().reduce(|longest, turn| longest.or(&turn)).map(|turn| TurnBound {
         cycles: turn.is_bound().then_some(turn.cycles),
         without_bound: turn.unbounded.iter().map(|&address| (address, program.name(address))).collect(),
     });
 
-    // A handler comes in where the main program's stack is deepest with interrupts on; with them off the main program is alone.
-    let alone = main.deepest.clone();
-    let deepest_handler = handlers.values().max_by_key(|handler| bytes(&handler.deepest));
-    let interrupted = main.deepest_interrupted.clone().zip(deepest_handler).map(|(mut frames, handler)| {
-        let mut own = handler.deepest.clone();
-        if let Some(first) = own.first_mut() {
-            first.bytes += RETURN_ADDRESS_BYTES;
-        }
-        frames.extend(own);
-        frames
-    });
-    let stack = [Some(alone), interrupted].into_iter().flatten().max_by_key(|frames| bytes(frames)).unwrap_or_default();
+    let stack = deepest(&main, handlers.values());
     Ok(Bounds {
         stack_bytes: bytes(&stack),
         stack,
@@ -377,8 +339,63 @@ pub fn prove(elf: &Path, input: Option<&Input>) -> Result<Bounds, BoundsError> {
     })
 }
 
+/// How long an edge of an input waits for a look, and how fast its edges may come. `told` are all handlers with their times.
+fn watch(
+    input: &Input,
+    program: &Program,
+    handlers: &BTreeMap<u8, Rc<Routine>>,
+    told: &[Handler],
+    timer: &mut Timer,
+    closed_cycles: u64,
+) -> Result<EdgeBounds, BoundsError> {
+    let is_before_last = |other: u8| input.vectors.last().filter(|last| other < **last).copied();
+    for &other in handlers.keys().filter(|other| !input.vectors.contains(other)) {
+        if let Some(vector) = is_before_last(other) {
+            return Err(BoundsError::NotFirst { vector, other });
+        }
+    }
+    let looks = |node: &Node| program.instruction(node.place.address).is_ok_and(|found| found.reads(input.port));
+    let (mut to_look, mut busy) = (0, 0);
+    for &vector in &input.vectors {
+        let look = handlers.get(&vector).and_then(|handler| timer.around(handler, looks));
+        let (to, behind) = look.ok_or(BoundsError::DoesNotLook { vector, port: input.port })?;
+        to_look = to_look.max(RESPONSE_CYCLES + to.bound("the way to a look", program)?);
+        busy = busy.max(behind.bound("the way from a look", program)?);
+    }
+    let others = told.iter().filter(|handler| !input.vectors.contains(&handler.vector));
+    let busy = others.filter_map(|handler| handler.cycles).fold(busy, u64::max);
+    let wait_cycles = SYNCHRONISER_CYCLES + busy + closed_cycles + to_look;
+    Ok(EdgeBounds { wait_cycles, never_lost_per_s: input.edges_between_looks * CYCLES_PER_SECOND / wait_cycles })
+}
+
+/// The deepest stack: the main program where a handler comes in, and that handler, or with interrupts off the main program alone.
+fn deepest<'a>(main: &Routine, handlers: impl Iterator<Item = &'a Rc<Routine>>) -> Vec<Frame> {
+    let handler = handlers.map(|handler| &handler.deepest).max_by_key(|frames| bytes(frames));
+    let interrupted = main.deepest_interrupted.clone().zip(handler).map(|(mut frames, handler)| {
+        frames.extend_from_slice(handler);
+        let handler = frames.len() - handler.len();
+        if let Some(first) = frames.get_mut(handler) {
+            first.bytes += RETURN_ADDRESS_BYTES;
+        }
+        frames
+    });
+    interrupted.into_iter().chain([main.deepest.clone()]).max_by_key(|frames| bytes(frames)).unwrap_or_default()
+}
+
+impl Time {
+    /// A time that has to have a bound; `what` it is the time of.
+    fn bound(&self, what: &str, program: &Program) -> Result<u64, BoundsError> {
+        match self.unbounded.first() {
+            None => Ok(self.cycles),
+            Some(&address) => {
+                Err(BoundsError::Unbounded { what: what.into(), address, function: program.name(address) })
+            }
+        }
+    }
+}
+
 /// Where the handler of a vector is entered: at the vector itself. `None` where the vector's jumps lead to the reset, as
-/// they do for a vector that is not used, or flash ends before it.
+/// they do for a vector that is not used.
 fn handler_of(program: &Program, vector: u8) -> Result<Option<u32>, BoundsError> {
     let start = u32::from(vector) * VECTOR_BYTES;
     let mut address = start;

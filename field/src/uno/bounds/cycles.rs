@@ -38,7 +38,7 @@ impl Time {
     }
 
     /// The longer of both; loops without a bound on either make the longer one unknown.
-    fn or(&self, other: &Time) -> Time {
+    pub(super) fn or(&self, other: &Time) -> Time {
         Time { cycles: self.cycles.max(other.cycles), unbounded: &self.unbounded | &other.unbounded }
     }
 }

@@ -1,7 +1,7 @@
 //! The ATmega328P's instructions: what a word of flash means, and how many cycles it takes.
 //!
 //! The table has a row for every form of every instruction, its bits written as the AVR instruction set manual writes them, and
-//! its cycles as the data sheet's summary of the instruction set gives them (section 30, a program counter of 16 bits).
+//! its cycles as the data sheet's instruction set summary gives them.
 //! It is the project's own because what would have been there is not dependable enough for a proof: the one crate that decodes AVR
 //! gives `jmp` and `call`, the two that this is about, a wrong length, and the text of avr-objdump is made for readers. A
 //! test holds the table against avr-objdump, over all 65,536 words.
@@ -200,7 +200,7 @@ impl Instruction {
 
     /// The data address that is in the instruction itself: of `in`, `out` and those for a bit of a register as of `lds` and `sts`.
     pub(super) fn data_address(&self) -> Option<u16> {
-        /// Where the registers for `in` and `out` begin in the data space (data sheet, section 7.5).
+        /// Where the registers for `in` and `out` begin in the data space (data sheet, register summary).
         const IO_START: u16 = 0x20;
 
         match self.operation {

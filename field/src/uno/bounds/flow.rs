@@ -19,7 +19,7 @@ use super::{BoundsError, Frame};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::rc::Rc;
 
-/// The last address of SRAM, where the stack pointer stands after a reset (data sheet, section 7.5.1).
+/// The last address of SRAM, where the stack pointer stands after a reset (data sheet, stack pointer).
 const SRAM_LAST: u16 = 0x08FF;
 
 /// More than there is SRAM for: a stack so deep grows without an end.
@@ -361,6 +361,9 @@ impl<'p, 'a> Follower<'p, 'a> {
         let instruction = self.program.instruction(place.address)?;
         let function = || self.program.name(place.address);
         let at = place.address;
+        if place.depth > DEEPEST {
+            return Err(BoundsError::GrowsForEver { address: at, function: function() });
+        }
         if known.upper_half.is_some() && place.interrupts == Interrupts::On {
             return Err(BoundsError::HalfAStackPointer { address: at, function: function() });
         }
@@ -466,9 +469,6 @@ impl<'p, 'a> Follower<'p, 'a> {
                     && self.entry.interrupts == Interrupts::Off
                 {
                     self.enables.get_or_insert(at);
-                }
-                if known.stack.len() > DEEPEST {
-                    return Err(BoundsError::GrowsForEver { address: at, function: function() });
                 }
                 go(instruction.next(), known, interrupts, cycles, None);
             }
@@ -602,7 +602,8 @@ fn turn(interrupts: &mut Interrupts, on: bool) {
     };
 }
 
-/// Cycles for which the core stands still behind an instruction, because of the EEPROM (data sheet, section 8.4).
+/// Cycles for which the core stands still behind an instruction, because of the EEPROM (data sheet, section 8.6.3). A write of the whole register may
+/// order either; it is taken for the longer.
 fn halt_cycles(instruction: &Instruction) -> u32 {
     match (instruction.operation, instruction.data_address()) {
         (Sbi, Some(EECR)) => match instruction.operand('b') {
