@@ -102,7 +102,7 @@ fn told(bounds: &Bounds, held: &[Held], every_loop: bool) -> String {
 /// A table whose first column is text, and whose others are numbers as far as they are.
 fn table(head: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
     let mut table = Table::new();
-    table.load_preset(presets::ASCII_MARKDOWN).set_header(head);
+    table.load_style(presets::UTF8_BORDERS_ONLY).set_header(head);
     for row in rows {
         table.add_row(row.into_iter().map(|text| {
             let is_number = text.bytes().all(|byte| byte.is_ascii_digit());

@@ -1,6 +1,6 @@
 //! What is proved of small programs in assembly, whose stack and cycles can be counted by hand.
 
-use field::uno::bounds::{Bounds, BoundsError, Input, prove};
+use field::uno::bounds::{Bounds, BoundsError, Budgets, Input, prove};
 use std::io::Write;
 use std::process::{Command, Stdio};
 
@@ -365,4 +365,28 @@ fn a_turn_of_the_loop_that_feeds_the_watchdog_has_a_bound_once_every_loop_in_it_
 fn words_that_are_no_instructions_are_refused() {
     assert_refused("start:\n .word 0xFFFF", "start comes to 0x0068, where there is no instruction");
     assert_refused("start:\n sei\n1: sleep\n rjmp 1b", "`sleep`");
+}
+
+#[test]
+fn a_bound_over_its_budget_is_told_and_so_is_a_rate_under_it() {
+    let budgets = |stack: u64, rate: u64| {
+        let file = tempfile::NamedTempFile::new().expect("there is room for a file");
+        let text = format!(
+            "stack_bytes = {stack}\nhandler_cycles = 14\ncritical_section_cycles = 0\nloops_without_bound = 0\n\
+             never_lost_per_s = {rate}\n[input]\nvectors = [1]\nport = 0x29\nedges_between_looks = 2\n"
+        );
+        std::fs::write(file.path(), text).expect("it can be written");
+        Budgets::read(file.path()).expect("it is whole")
+    };
+    // A push and an interrupt: 3 bytes of stack. Response 4, jmp 3, in 1, nop 1, reti 4: 13 cycles.
+    let program = "start:\n sei\n1: wdr\n push r2\n pop r2\n rjmp 1b\nhandler:\n in r2, 9\n nop\n reti";
+    let bounds = try_to_prove(program, Some(&INPUT())).expect("it has bounds");
+    let rate = bounds.edges.as_ref().expect("they were asked for").never_lost_per_s;
+    let over = |budgets: Budgets| -> Vec<&str> {
+        budgets.hold(&bounds).iter().filter(|held| !held.keeps).map(|held| held.name).collect()
+    };
+    assert_eq!(over(budgets(3, rate)), [""; 0]);
+    assert_eq!(over(budgets(2, rate + 1)), ["stack_bytes", "never_lost_per_s"]);
+    let error = Budgets::read("no-such.toml".as_ref()).expect_err("there is none").to_string();
+    assert!(error.starts_with("no-such.toml: "), "{error}");
 }

@@ -25,7 +25,7 @@ mod decode;
 mod flow;
 mod loops;
 
-pub use self::budget::{Budgets, BudgetsError, Held};
+pub use self::budget::{Budgets, BudgetsError, BudgetsProblem, Held};
 use self::cycles::{Stretch, Time, Timer};
 use self::decode::Operation;
 use self::flow::{Entry, Interrupts, Kind, Node, Program, Routine, bytes};

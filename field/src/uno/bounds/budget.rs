@@ -23,25 +23,25 @@ pub struct Budgets {
     pub input: Input,
 }
 
-/// Why budgets could not be read.
+/// Why a file of budgets could not be read.
 #[derive(Debug, thiserror::Error)]
-pub enum BudgetsError {
-    /// The file could not be read.
-    #[error("{} cannot be read", path.display())]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// What the system says.
-        source: io::Error,
-    },
-    /// The file is no TOML, or lacks a budget, or has one that is not known.
-    #[error("{}: {problem}", path.display())]
-    NotUnderstood {
-        /// The file.
-        path: PathBuf,
-        /// What the TOML reader says, with line and column.
-        problem: toml::de::Error,
-    },
+#[error("{}: {problem}", path.display())]
+pub struct BudgetsError {
+    /// The file.
+    pub path: PathBuf,
+    /// What is wrong with it.
+    pub problem: BudgetsProblem,
+}
+
+/// What is wrong with a file of budgets.
+#[derive(Debug, thiserror::Error)]
+pub enum BudgetsProblem {
+    /// The system does not give it.
+    #[error(transparent)]
+    File(#[from] io::Error),
+    /// It is no TOML, lacks a budget, or has one that is not known; with line and column.
+    #[error(transparent)]
+    Content(#[from] toml::de::Error),
 }
 
 /// A bound beside its budget.
@@ -63,9 +63,8 @@ impl Budgets {
     /// # Errors
     /// Where it cannot be read, or says something else than every budget.
     pub fn read(path: &Path) -> Result<Budgets, BudgetsError> {
-        let text = std::fs::read_to_string(path);
-        let text = text.map_err(|source| BudgetsError::Unreadable { path: path.into(), source })?;
-        toml::from_str(&text).map_err(|problem| BudgetsError::NotUnderstood { path: path.into(), problem })
+        let read = || Ok(toml::from_str(&std::fs::read_to_string(path)?)?);
+        read().map_err(|problem| BudgetsError { path: path.into(), problem })
     }
 
     /// Holds bounds against them.
