@@ -1,8 +1,8 @@
 //! The `weeder` command: tries the firmware on a simulated field, and puts it on an Arduino Uno.
 //!
 //! `weeder sim` and `weeder classify` end with status 0 where no plant was damaged, or would be, and 1 where one was;
-//! commands that compare end with 1 where something differs, `weeder bounds` where a bound is over its budget. Whatever else goes wrong ends with status 2 and a message
-//! that says what would be right.
+//! commands that compare end with 1 where something differs, `weeder bounds` where a bound is over its budget. Whatever else
+//! goes wrong ends with status 2 and a message that says what would be right.
 
 mod bench;
 mod bounds;
@@ -36,7 +36,7 @@ use std::process::ExitCode;
     version,
     disable_help_subcommand = true,
     after_help = "Each command's --help has examples. The status is 0 where all is well; 1 where a plant was damaged, something \
-        differs, or the machine refused a command; 2 where something else went wrong, with a message that says what would be right."
+        differs, a bound is over its budget, or the machine refused a command; 2 where something else went wrong, with a message that says what would be right."
 )]
 struct Arguments {
     #[command(subcommand)]
@@ -89,7 +89,7 @@ enum Command {
 enum Finding {
     /// No plant was damaged, nothing differs.
     Good,
-    /// A plant was damaged, or something differs.
+    /// A plant was damaged, something differs, or a bound is over its budget.
     Bad,
 }
 
