@@ -1,10 +1,11 @@
 //! The `weeder` command: tries the firmware on a simulated field, and puts it on an Arduino Uno.
 //!
 //! `weeder sim` and `weeder classify` end with status 0 where no plant was damaged, or would be, and 1 where one was;
-//! commands that compare end with 1 where something differs. Whatever else goes wrong ends with status 2 and a message
-//! that says what would be right.
+//! commands that compare end with 1 where something differs, `weeder bounds` where a bound is over its budget. Whatever else
+//! goes wrong ends with status 2 and a message that says what would be right.
 
 mod bench;
+mod bounds;
 mod classify;
 mod completions;
 mod course;
@@ -36,7 +37,7 @@ use std::process::ExitCode;
     version,
     disable_help_subcommand = true,
     after_help = "Each command's --help has examples. The status is 0 where all is well; 1 where a plant was damaged, something \
-        differs, or the machine refused a command; 2 where something else went wrong, with a message that says what would be right."
+        differs, a bound is over its budget, or the machine refused a command; 2 where something else went wrong, with a message that says what would be right."
 )]
 struct Arguments {
     #[command(subcommand)]
@@ -56,6 +57,8 @@ enum Command {
     /// Count the cycles and bytes of the firmware and its classifier on a virtual Uno.
     #[command(after_help = "Example: weeder bench-uno > figures.txt")]
     BenchUno,
+    /// Prove from the ELF what the firmware needs at most: stack, interrupts, and how fast the encoder may turn.
+    Bounds(bounds::Arguments),
     /// Work for a day with everything going wrong now and then, and say what happened.
     Soak(soak::Arguments),
     /// Run the paper's experiment in a simulated field, and say how the firmware and others did.
@@ -89,7 +92,7 @@ enum Command {
 enum Finding {
     /// No plant was damaged, nothing differs.
     Good,
-    /// A plant was damaged, or something differs.
+    /// A plant was damaged, something differs, or a bound is over its budget.
     Bad,
 }
 
@@ -100,6 +103,7 @@ fn main() -> ExitCode {
         Command::Hex(arguments) => hex::run(&arguments).map(|()| Finding::Good),
         Command::VirtualUno(arguments) => virtual_uno::run(&arguments).map(|()| Finding::Good),
         Command::BenchUno => bench::run().map(|()| Finding::Good),
+        Command::Bounds(arguments) => bounds::run(&arguments),
         Command::Soak(arguments) => soak::run(&arguments),
         Command::Trial(arguments) => trial::run(&arguments),
         Command::Sweep(arguments) => sweep::run(&arguments).map(|()| Finding::Good),

@@ -282,12 +282,17 @@ fn size(file: &ElfFile32<LittleEndian>) -> Size {
         if !sh_flags.contains(elf::SHF_ALLOC) {
             continue;
         }
-        let has_content = section.file_range().is_some_and(|(_, length)| length > 0);
+        // First values have a place in flash; what a start-up code leaves alone (.noinit) may have some in the file and none there.
+        let is_loaded = file.elf_program_headers().iter().any(|header| {
+            let (start, length) = (header.p_vaddr(LittleEndian), header.p_filesz(LittleEndian));
+            let in_flash = u64::from(header.p_paddr(LittleEndian)) < SRAM_ORIGIN;
+            in_flash && (start..start + length).contains(&(section.address() as u32))
+        });
         match section.address() {
             ..SRAM_ORIGIN => size.flash += section.size(),
             SRAM_ORIGIN..EEPROM_ORIGIN => {
                 size.sram += section.size();
-                if has_content {
+                if is_loaded {
                     size.flash += section.size();
                 }
             }

@@ -4,7 +4,8 @@
 //!   covered. [`motion`] is how the machine rolls, [`machine`] turns both into levels on the firmware's pins ([`signal`]),
 //!   and [`servo`] is what its pulses do to the tool.
 //! - **The virtual Uno**: [`firmware`] builds and reads the ELF, [`hex`] reads bootloaders and writes what avrdude takes, [`uno`] runs
-//!   it on simavr, [`console`] talks to it. [`live`] runs it in real time, at a serial port that other programs open ([`pty`]).
+//!   it on simavr and proves what it can need at most ([`uno::bounds`]), [`console`] talks to it. [`live`] runs it in real time, at
+//!   a serial port that other programs open ([`pty`]).
 //! - **Trials**: [`trial`] joins them, [`verdict`] judges what happened to each plant, [`report`] and [`picture`] show it,
 //!   and [`waveform`] writes down what was on the pins. [`replay`] plays a recording ([`capture`]) instead of a row, and
 //!   [`mod@bench`] counts cycles and bytes.

@@ -44,6 +44,7 @@
 //! - UBRR is what the clock divides; the crystal is exact.
 //! - Self-programming takes no time: a page of flash is erased or written within its instruction. Lock bits are not kept.
 
+pub mod bounds;
 mod core;
 mod eeprom;
 mod interrupts;

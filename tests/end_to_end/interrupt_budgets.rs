@@ -23,7 +23,7 @@ const CRITICAL_SECTION: u64 = 25;
 
 /// Rolls for two seconds at so many counts a second, forward and then back, with the console asked without end and a beam
 /// that flickers.
-fn roll(uno: &mut Uno, counts_per_second: u64) -> String {
+pub fn roll(uno: &mut Uno, counts_per_second: u64) -> String {
     const MILLISECONDS: u64 = 2000;
     ask(uno, "events on");
     ask(uno, "start now");

@@ -21,6 +21,7 @@ mod paper_mode;
 mod performance_servo_jitter;
 mod performance_swing_commands;
 mod power_and_memory_faults;
+mod proved_bounds;
 mod recordings;
 mod sensor_faults;
 mod serial_noise;

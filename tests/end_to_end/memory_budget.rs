@@ -1,12 +1,13 @@
 //! The memory that the firmware may take on an ATmega328P.
 
 use crate::common::{Run, ask, elf};
-use field::firmware::Size;
+use field::firmware::{Image, Size};
 use field::machine::Machine;
 use field::motion::mm_s;
 use field::planting::Planting;
 use field::trial::Trial;
 use field::verdict::Timing;
+use std::process::Command;
 
 /// The flash below the bootloader that came before the Uno's, 30 KiB.
 const FLASH_BYTES: u64 = 30 * 1024;
@@ -36,4 +37,20 @@ fn the_firmware_stays_within_its_memory_budget() {
     println!("flash {flash} of {FLASH_BYTES} bytes, static SRAM {sram} of {SRAM_BYTES} bytes");
     assert!(flash <= FLASH_BYTES, "{flash} bytes of flash");
     assert!(sram <= SRAM_BYTES, "{sram} bytes of static SRAM");
+}
+
+#[test]
+fn the_flash_that_the_tools_tell_is_what_avr_size_counts_and_what_is_flashed() {
+    let output = Command::new("avr-size").arg("-A").arg(elf()).output().expect("./setup.sh brings avr-size");
+    let sections = String::from_utf8(output.stdout).expect("it is text");
+    let bytes = |name: &str| -> u64 {
+        let mut lines = sections.lines().map(|line| line.split_whitespace());
+        let mut line = lines.find(|line| line.clone().next() == Some(name)).expect("the section is there");
+        line.nth(1).expect("it has a size").parse().expect("the size is a number")
+    };
+    let counted = bytes(".text") + bytes(".data");
+    assert_eq!(Size::read(&elf()).expect("the ELF can be read").flash, counted);
+    assert_eq!(Image::read(&elf()).expect("the ELF can be read").flash.len() as u64, counted);
+    // Its mark outlives a reset in SRAM, and has nothing in flash.
+    assert!(bytes(".noinit") > 0);
 }

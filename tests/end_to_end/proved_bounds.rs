@@ -1,0 +1,108 @@
+//! What is measured never exceeds what is proved: the deepest stack, every handler, every critical section; and no count is lost at
+//! the rate that is said to be never lost.
+//!
+//! The proofs follow the ELF (`field::uno::bounds`); the measurements run it with all that keeps it busy.
+
+use crate::common::{Run, ask, elf, run_for_ms, woken_up};
+use crate::interrupt_budgets::roll;
+use field::firmware::workspace_root;
+use field::machine::Machine;
+use field::motion::mm_s;
+use field::planting::Planting;
+use field::trial::Trial;
+use field::uno::Uno;
+use field::uno::bounds::{self, Bounds, Budgets};
+use field::verdict::Timing;
+
+/// Counts in a second beside which the loop still gets time to answer.
+const BUSY_PER_S: u64 = 150_000;
+
+/// Commands that are taken in HOLD, each with what it has done for it.
+const COMMANDS: [&str; 24] = [
+    "help",
+    "help k",
+    "status",
+    "get",
+    "get k",
+    "set k 5",
+    "set wheel_mm 410",
+    "save",
+    "revert",
+    "defaults",
+    "version",
+    "dump",
+    "label plant",
+    "label weed",
+    "examples",
+    "forget 1",
+    "forget all",
+    "plot on",
+    "plot off",
+    "calibrate start",
+    "test row 500",
+    "hold",
+    "servo 1600",
+    "servo out",
+];
+
+fn proved() -> Bounds {
+    let budgets = Budgets::read(&workspace_root().join("budgets.toml")).expect("there are budgets");
+    bounds::prove(&elf(), Some(&budgets.input)).expect("the firmware has bounds")
+}
+
+/// Holds what an Uno was measured to need against the bounds.
+#[track_caller]
+fn assert_within(bounds: &Bounds, uno: &Uno) {
+    let stack = uno.deepest_stack();
+    println!("stack: {stack} of {} bytes", bounds.stack_bytes);
+    assert!(stack <= bounds.stack_bytes, "{stack} bytes of stack");
+    let measured = uno.interrupt_statistics().expect("they were measured");
+    for (vector, handler) in &measured.handlers {
+        let proved = bounds.handlers.iter().find(|proved| proved.vector == *vector).expect("every handler is known");
+        let longest = proved.cycles.expect("it returned");
+        println!("vector {vector}: {} of {longest} cycles", handler.most);
+        assert!(handler.most <= longest, "the handler of vector {vector} took {} cycles", handler.most);
+    }
+    let section = measured.longest_critical_section;
+    println!("critical section: {section} of {} cycles", bounds.critical_section_cycles);
+    assert!(section <= bounds.critical_section_cycles, "{section} cycles without interrupts");
+}
+
+#[test]
+fn a_console_that_is_flooded_beside_a_fast_encoder_and_a_flickering_beam_stays_within_the_bounds() {
+    let bounds = proved();
+    let mut uno = woken_up();
+    uno.measure_interrupts();
+    roll(&mut uno, BUSY_PER_S);
+    assert_within(&bounds, &uno);
+    let ran: Vec<u8> = uno.interrupt_statistics().expect("they were measured").handlers.keys().copied().collect();
+    let known: Vec<u8> = bounds.handlers.iter().map(|handler| handler.vector).collect();
+    assert_eq!(ran, known, "every handler has run");
+}
+
+#[test]
+fn weeding_and_every_command_stay_within_the_bounds() {
+    let bounds = proved();
+    let row =
+        Planting { plants: 4, weeds: 2, ragged: true, ..Planting::default() }.grow(1).expect("everything has room");
+    let trial = Trial::at_speed(row, Machine::default(), Timing::default(), mm_s(2.5));
+    let mut run = Run::begin(trial, &[]);
+    run.uno.measure_interrupts();
+    run.roll_on_asking("status", 40);
+    run_for_ms(&mut run.uno, 500);
+    ask(&mut run.uno, "hold");
+    for command in COMMANDS {
+        // Some are refused as things stand, which is answered too.
+        run.uno.send(format!("{command}\n").as_bytes());
+        run_for_ms(&mut run.uno, 400);
+    }
+    assert_within(&bounds, &run.uno);
+}
+
+#[test]
+fn no_count_is_lost_at_the_rate_that_is_never_lost() {
+    let edges = proved().edges.expect("the encoder is watched");
+    println!("{} counts a second, {} cycles of wait", edges.never_lost_per_s, edges.wait_cycles);
+    // A rate whose counts go up in quarters.
+    roll(&mut woken_up(), edges.never_lost_per_s / 100 * 100);
+}
