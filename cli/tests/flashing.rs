@@ -230,7 +230,7 @@ fn without_ravedude_avrdude_does_it() {
 #[test]
 fn bootloaders_that_are_none_are_refused() {
     let virtual_uno = |file: &Path| weeder().args(["virtual-uno", "--bootloader"]).arg(file).output().unwrap();
-    assert_refused(&virtual_uno(Path::new("no-such.hex")), "no-such.hex: No such file");
+    assert_refused(&virtual_uno(Path::new("no-such.hex")), "no-such.hex cannot be read: No such file");
     let optiboot = Path::new(BOOTLOADERS).join("optiboot/optiboot_atmega328.hex");
     // Debian's is longer than its boot section.
     assert_refused(&virtual_uno(&optiboot), "it fills flash from 0x7e00 to 0x8014");
