@@ -90,8 +90,11 @@ impl Bootloader {
     /// # Errors
     /// Where it cannot be read, is not Intel HEX, or does not lie in the chip's boot section.
     pub fn read(path: &Path) -> Result<Bootloader, HexError> {
-        let text = std::fs::read_to_string(path)
-            .map_err(|source| HexError::File { path: path.into(), done: "read", source })?;
+        let text = std::fs::read_to_string(path).map_err(|source| HexError::File {
+            path: path.into(),
+            done: "read",
+            source,
+        })?;
         let pieces = pieces(&text).map_err(|reason| HexError::NotHex { path: path.into(), reason })?;
         let start = pieces.iter().map(|(address, _)| *address).min();
         let start = start.ok_or_else(|| HexError::Empty(path.into()))?;
@@ -165,8 +168,11 @@ pub fn check_room(bytes: usize, available: usize) -> Result<(), HexError> {
 /// Where `flash` is longer than the ATmega328P's.
 pub fn write(path: &Path, flash: &[u8]) -> Result<(), HexError> {
     let text = text(flash);
-    whole_file::write(path, |to| to.write_all(text.as_bytes()))
-        .map_err(|source| HexError::File { path: path.into(), done: "written", source })
+    whole_file::write(path, |to| to.write_all(text.as_bytes())).map_err(|source| HexError::File {
+        path: path.into(),
+        done: "written",
+        source,
+    })
 }
 
 /// What goes into flash from address 0 on as Intel HEX.
