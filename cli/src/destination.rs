@@ -91,8 +91,7 @@ impl FolderName {
         if !folder.exists() && ending.is_some_and(|ending| FILE_ENDINGS.contains(&ending)) {
             bail!("{} is named like a file, and a folder has to be named: several files go there", folder.display());
         }
-        let there = folder.ancestors().map(|part| if part.as_os_str().is_empty() { Path::new(".") } else { part });
-        let there = there.into_iter().find(|part| part.exists()).unwrap_or(Path::new("."));
+        let there = folder.ancestors().find(|part| part.exists()).unwrap_or(Path::new("."));
         whole_file::check(&there.join("report")).with_context(|| cannot_be_written(folder))?;
         Ok(OutFolder(folder))
     }

@@ -43,7 +43,8 @@ use std::process::ExitCode;
 #[command(
     name = "weeder",
     version,
-    after_help = "Each command's --help has examples. The status is 0 where all is well; 1 where a plant was damaged, something \
+    after_help = "Each command's --help has examples. A report goes into a folder (--out FOLDER), a single table to a file (--out \
+        FILE.csv); - is standard input wherever a file is read. The status is 0 where all is well; 1 where a plant was damaged, something \
         differs, or the machine refused a command; 2 where something else went wrong, with a message that says what would be right."
 )]
 struct Arguments {
@@ -176,6 +177,26 @@ mod tests {
             [vec![(name.clone(), command.clone())], subcommands(command, &name)].concat()
         };
         command.get_subcommands().flat_map(of_one).collect()
+    }
+
+    #[test]
+    fn every_number_s_range_is_in_its_help_and_in_what_is_said_of_a_number_below_it() {
+        let mut ranges = 0;
+        for (name, command) in subcommands(&grammar(), "weeder") {
+            for option in command.get_arguments().filter(|option| option.get_action().takes_values()) {
+                let Some(long) = option.get_long() else { continue };
+                let words = name.split(' ').map(OsString::from).chain([format!("--{long}").into(), "-1".into()]);
+                let Err(error) = parse(words.collect()) else { continue };
+                let said = error.to_string();
+                assert!(!said.contains("unexpected argument"), "{name} --{long}: {said}");
+                let Some((_, rest)) = said.split_once("number from ") else { continue };
+                let range = rest.lines().next().unwrap_or_default();
+                let help = option.get_help().map(ToString::to_string).unwrap_or_default();
+                assert!(help.contains(range), "{name} --{long}: {range} is not in {help:?}");
+                ranges += 1;
+            }
+        }
+        assert!(ranges > 20, "{ranges}");
     }
 
     #[test]

@@ -26,11 +26,11 @@ fn within<T: FromStr + PartialOrd + Display>(text: &str, range: &RangeInclusive<
 /// The same command, whose options take what begins with a minus for their value: what is wrong with it is then said by its
 /// range, and not that it is no option.
 pub fn with_negative_numbers(command: Command) -> Command {
-    let take = |option: Arg| match (option.is_positional(), option.get_value_delimiter()) {
-        (true, _) => option,
-        (false, None) => option.allow_negative_numbers(true),
+    let take = |option: Arg| match option.get_value_delimiter() {
+        _ if option.is_positional() || !option.get_action().takes_values() => option,
+        None => option.allow_negative_numbers(true),
         // Several numbers are not one.
-        (false, Some(_)) => option.allow_hyphen_values(true),
+        Some(_) => option.allow_hyphen_values(true),
     };
     command.mut_args(take).mut_subcommands(with_negative_numbers)
 }

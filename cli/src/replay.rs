@@ -47,7 +47,10 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
         }
         say!(
             "The same: {} objects, {} alarms and {} swings, which differ by {} ticks at the most",
-            replayed.objects, replayed.alarms, replayed.swings, replayed.farthest_swing
+            replayed.objects,
+            replayed.alarms,
+            replayed.swings,
+            replayed.farthest_swing
         )?;
         match &difference {
             Some(difference) => say!("But {name}, {difference}")?,

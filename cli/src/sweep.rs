@@ -10,8 +10,8 @@ use clap::{Args, ValueEnum, builder::PossibleValuesParser};
 use comfy_table::{CellAlignment, Table, presets};
 use field::conditions::{Conditions, PARAMETERS};
 use field::experiment::Controller;
-use field::sweep::{Axis, Point, Results, SPACINGS_CM, SPEEDS_KM_H, Sweep};
 use field::link::settings::{self, Setting};
+use field::sweep::{Axis, Point, Results, SPACINGS_CM, SPEEDS_KM_H, Sweep};
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
 

@@ -209,7 +209,9 @@ fn holder(terminal: &Path) -> String {
     };
     let processes = std::fs::read_dir("/proc").into_iter().flatten().flatten().map(|entry| entry.path());
     let is_process = |path: &PathBuf| {
-        path.file_name().and_then(|name| name.to_str()).is_some_and(|name| name.bytes().all(|byte| byte.is_ascii_digit()))
+        path.file_name()
+            .and_then(|name| name.to_str())
+            .is_some_and(|name| name.bytes().all(|byte| byte.is_ascii_digit()))
     };
     processes.filter(is_process).find(has_it).map_or("another process".to_owned(), |process| {
         let name = std::fs::read_to_string(process.join("comm")).unwrap_or_default();

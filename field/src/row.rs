@@ -346,7 +346,10 @@ mod tests {
             ("NaN,150,plant\n", "row.csv, line 2: position_mm is NaN"),
             ("250,150,plant\n4294967296,150,plant\n", "row.csv, line 3: position_mm is 4294967296: it has to be from"),
             ("18446744073709551616,150,plant\n", "row.csv, line 2: position_mm is 18446744073709552000: it has to be"),
-            ("-9e6,150,plant\n9e6,150,plant\n", "row.csv, line 3: the row is 18000 m long: it has to be at most 6000 m"),
+            (
+                "-9e6,150,plant\n9e6,150,plant\n",
+                "row.csv, line 3: the row is 18000 m long: it has to be at most 6000 m",
+            ),
             (
                 "750,150,plant\n250,150,plant\n700,20,weed\n",
                 "row.csv, line 2: the plant at 750 mm and the weed at 700 mm overlap",

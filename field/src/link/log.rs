@@ -114,7 +114,8 @@ impl LogWriter {
         file.set_len(whole as u64).and_then(|()| file.seek(SeekFrom::End(0))).map_err(failed)?;
         // What stands in quotes may have lines of its own, which the firmware's lines never have.
         let found = bytes[..whole].iter().filter(|&&byte| byte == b'\n').count().saturating_sub(1) as u64;
-        let mut log = Self { path: path.into(), file: csv::Writer::from_writer(file), began: Instant::now(), found, added: 0 };
+        let mut log =
+            Self { path: path.into(), file: csv::Writer::from_writer(file), began: Instant::now(), found, added: 0 };
         if whole == 0 {
             log.record(HEADER.split(','))?;
         }
