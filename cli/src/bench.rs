@@ -1,5 +1,6 @@
 //! `weeder bench-uno`: what the firmware and its classifier can take and what they cost on an Arduino Uno.
 
+use crate::output::say;
 use crate::progress::Progress;
 use anyhow::Result;
 use field::bench::table::{Figures, TURNINGS};
@@ -37,7 +38,7 @@ pub fn run() -> Result<()> {
     let lateness = swings::lateness(&elf, &swings::Rows::at_walking_speed(0..ROWS), |share| bar.show(share))?;
     bar.finish();
     for table in (Figures { classifier, firmware, rates, jitter, lateness }).tables() {
-        println!("{table}");
+        say!("{table}")?;
     }
     Ok(())
 }

@@ -1,7 +1,7 @@
 //! `weeder bounds`: what the firmware can need at most, proved from its ELF, beside what it may need.
 
 use crate::Finding;
-use crate::output::print;
+use crate::output::{print, say};
 use anyhow::Result;
 use clap::Args;
 use comfy_table::{Cell, CellAlignment, Table, presets};
@@ -48,9 +48,9 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     let held = budgets.hold(&bounds);
     let keeps = held.iter().all(|held| held.keeps);
     if arguments.json {
-        print(&format!("{:#}\n", json!({ "bounds": bounds, "budgets": held, "keeps": keeps })))?;
+        say!("{:#}", json!({ "bounds": bounds, "budgets": held, "keeps": keeps }))?;
     } else {
-        print(&told(&bounds, &held, arguments.loops))?;
+        print(format_args!("{}", told(&bounds, &held, arguments.loops)))?;
     }
     Ok(if keeps { Finding::Good } else { Finding::Bad })
 }

@@ -3,11 +3,14 @@
 //! The built-in examples, the scale and the radius are those of the firmware, and so is the code that searches them.
 
 use crate::Finding;
+use crate::numbers::whole_within;
+use crate::output::say;
+use crate::source;
 use anyhow::Result;
 use clap::Args;
 use field::row::Kind;
 use field::training::table::{self, Recorded};
-use field::training::{Confusion, Model, class_of, label_of};
+use field::training::{Confusion, MAX_K, Model, class_of, label_of};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
@@ -20,11 +23,16 @@ Examples:
   weeder classify field.csv --json | jq '.[] | select(.answer == \"unknown\")'
 The status is 1 where a plant would be taken for a weed.")]
 pub struct Arguments {
-    /// A CSV file with the columns speed_mm_s,spacing_mm,delay_mm,hold_mm,actuation_mm and, if known, label.
-    #[arg(value_name = "FILE.csv")]
+    /// A CSV file with the columns speed_mm_s,spacing_mm,delay_mm,hold_mm,actuation_mm and, if known, label;
+    /// - for standard input.
+    #[arg(value_name = "FILE.csv", value_parser = source::file)]
     file: PathBuf,
-    /// Examples that vote; as the firmware starts with where none are given.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=i64::from(field::training::MAX_K)))]
+    #[arg(
+        long,
+        value_name = "N",
+        value_parser = whole_within(1..=MAX_K),
+        help = format!("Examples that vote, 1 to {MAX_K}; as the firmware starts with where none are given")
+    )]
     k: Option<u8>,
     /// Print a JSON object for each instead of the table.
     #[arg(long)]
@@ -42,11 +50,11 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     let labelled = objects.iter().filter_map(|object| Some((object.kind?, model.class(&object.features))));
     let confusion: Confusion = labelled.collect();
     if arguments.json {
-        println!("{:#}", as_json(&model, &objects)?);
+        say!("{:#}", as_json(&model, &objects)?)?;
     } else {
-        println!("{}", model.table(&objects)?);
+        say!("{}", model.table(&objects)?)?;
         if confusion.total() > 0 {
-            println!("\n{confusion}");
+            say!("\n{confusion}")?;
         }
     }
     if confusion.plants_taken_for_weeds() == 0 { Ok(Finding::Good) } else { Ok(Finding::Bad) }

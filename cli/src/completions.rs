@@ -2,10 +2,10 @@
 //!
 //! The words are those of the arguments themselves, by clap_complete. Ports and values of settings are not among them.
 
-use anyhow::{Context, Result};
+use crate::output;
+use anyhow::Result;
 use clap::Args;
 use clap_complete::Shell;
-use std::io::{self, Write};
 
 /// What the user asks of the completions.
 #[derive(Args)]
@@ -26,5 +26,5 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments, mut command: clap::Command) -> Result<()> {
     let mut script = Vec::new();
     clap_complete::generate(arguments.shell, &mut command, "weeder", &mut script);
-    io::stdout().write_all(&script).context("the completions cannot be printed")
+    output::print(format_args!("{}", String::from_utf8_lossy(&script)))
 }

@@ -1,60 +1,53 @@
 //! Arguments that several commands share: the row, and the machine that rolls along it.
 
+use crate::numbers::{number_within, whole_within};
+use crate::source;
 use anyhow::{Result, ensure};
-use clap::{Args, builder::RangedU64ValueParser};
+use clap::Args;
 use field::machine::Machine;
 use field::planting::Planting;
 use field::row::Row;
-use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
 /// What the user asks of row and machine.
 #[derive(Args)]
 pub struct CourseArguments {
-    /// Speed in km/h.
+    /// Speed in km/h, 0.1 to 10.
     #[arg(long, default_value = "2.5", value_parser = number_within(0.1..=10.0))]
     pub speed: f64,
-    /// Mean distance from plant to plant in mm.
+    /// Mean distance from plant to plant in mm, 50 to 5000.
     #[arg(long, default_value = "500", value_parser = number_within(50.0..=5000.0))]
     spacing: f64,
-    /// Mean width of a canopy in mm.
+    /// Mean width of a canopy in mm, 10 to 340.
     #[arg(long, default_value = "150", value_parser = number_within(10.0..=340.0))]
     canopy: f64,
-    /// Number of crop plants.
-    #[arg(long, default_value = "20", value_parser = RangedU64ValueParser::<usize>::new().range(1..=1000))]
+    /// Number of crop plants, 1 to 1000.
+    #[arg(long, default_value = "20", value_parser = whole_within(1..=1000_usize))]
     plants: usize,
-    /// Number of tall weeds between them.
-    #[arg(long, default_value = "5", value_parser = RangedU64ValueParser::<usize>::new().range(0..=1000))]
-    weeds: usize,
-    /// Which of all the possible rows: the same seed gives the same row.
-    #[arg(long, default_value = "1")]
+    /// Number of tall weeds between them, 0 to 1000; where none is given, 5, or as many of these as there is room for.
+    #[arg(long, value_parser = whole_within(0..=1000_usize))]
+    weeds: Option<usize>,
+    /// Which of all the possible rows, 0 to 18446744073709551615: the same seed gives the same row.
+    #[arg(long, default_value = "1", value_parser = whole_within(0..=u64::MAX))]
     seed: u64,
-    /// Distance from the beam back to the tool in mm.
-    #[arg(long, default_value = "400", value_parser = RangedU64ValueParser::<u32>::new().range(100..=2000))]
+    /// Distance from the beam back to the tool in mm, 100 to 2000.
+    #[arg(long, default_value = "400", value_parser = whole_within(100..=2000_u32))]
     beam_to_tool: u32,
     /// Grow canopies with gaps through which the beam passes.
     #[arg(long)]
     ragged: bool,
-    /// Take the row from a CSV file with the columns position_mm,width_mm,kind instead of growing one.
-    #[arg(long, value_name = "FILE.csv", conflicts_with_all = ["spacing", "canopy", "plants", "weeds", "seed", "ragged"])]
+    /// Take the row from a CSV file with the columns position_mm,width_mm,kind instead of growing one; - for standard input.
+    #[arg(long, value_name = "FILE.csv", value_parser = source::file, conflicts_with_all = ["spacing", "canopy", "plants", "weeds", "seed", "ragged"])]
     row: Option<PathBuf>,
 }
+
+/// Tall weeds in a row for which nobody has said how many, where there is room for them.
+const WEEDS: usize = 5;
 
 /// Scatter of a grown row, as shares of the mean spacing and the mean canopy; never more than a quarter of the gap
 /// between two mean canopies each, so that the plants stay apart.
 const SPACING_SCATTER: f64 = 0.08;
 const CANOPY_SCATTER: f64 = 0.15;
-
-/// A number in a range, for the command line.
-pub fn number_within(range: RangeInclusive<f64>) -> impl Fn(&str) -> Result<f64, String> + Clone {
-    move |text| {
-        let (least, greatest) = (range.start(), range.end());
-        text.parse()
-            .ok()
-            .filter(|value| range.contains(value))
-            .ok_or_else(|| format!("it has to be a number from {least} to {greatest}"))
-    }
-}
 
 impl CourseArguments {
     /// The row, read or grown.
@@ -78,10 +71,14 @@ impl CourseArguments {
             spacing_scatter_mm: (self.spacing * SPACING_SCATTER).min(gap_mm / 4.0),
             canopy_mm: self.canopy,
             canopy_scatter_mm: (self.canopy * CANOPY_SCATTER).min(gap_mm / 4.0),
-            weeds: self.weeds,
+            weeds: self.weeds.unwrap_or(WEEDS),
             ragged: self.ragged,
         };
-        Ok(planting.grow(self.seed)?)
+        let row = match self.weeds {
+            Some(_) => planting.grow(self.seed),
+            None => planting.grow_with_room(self.seed),
+        };
+        Ok(row?)
     }
 
     /// The machine.

@@ -1,5 +1,7 @@
 //! `weeder design`: what a machine's engine, servo, shanks, chain, wheels and handle have to be like.
 
+use crate::output::{print, say};
+use crate::source;
 use anyhow::Result;
 use clap::Args;
 use mechanics::design::Design;
@@ -16,8 +18,8 @@ Examples:
   weeder design --print-machine > my.toml    a commented file to start from
   weeder design --machine my.toml --json     your machine, for a program")]
 pub struct Arguments {
-    /// The machine; what the file leaves out, or all without it, is as on the paper's machine.
-    #[arg(long, value_name = "FILE.toml")]
+    /// The machine; what the file leaves out, or all without it, is as on the paper's machine; - for standard input.
+    #[arg(long, value_name = "FILE.toml", value_parser = source::file)]
     machine: Option<PathBuf>,
     /// Show the paper's printed figures beside ours, with a verdict on each.
     #[arg(long)]
@@ -38,7 +40,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let own = arguments.machine.as_deref().map(file::read).transpose()?;
     let machine = own.unwrap_or_default();
     if arguments.print_machine {
-        print!("{}", machine.to_toml());
+        print(format_args!("{}", machine.to_toml()))?;
     } else if arguments.against_paper {
         against_paper(own.as_ref(), arguments.json)?;
     } else {
@@ -50,32 +52,28 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 fn design(machine: &Machine, json: bool) -> Result<()> {
     let figures = Design::of(machine)?.figures(machine);
     if json {
-        println!("{:#}", json!({ "inputs": machine.inputs(), "figures": figures }));
-        return Ok(());
+        return say!("{:#}", json!({ "inputs": machine.inputs(), "figures": figures }));
     }
     let (inputs, paper) = (machine.inputs(), Machine::default().inputs());
     let differing = inputs.iter().zip(&paper).filter(|(input, paper)| input.value != paper.value).count();
-    println!("{differing} of the machine's {} values differ from the paper's machine.", inputs.len());
-    println!("{}\n", report::design_table(&figures));
+    say!("{differing} of the machine's {} values differ from the paper's machine.", inputs.len())?;
+    say!("{}\n", report::design_table(&figures))?;
     let concerns = figures.iter().filter(|figure| figure.concern).count();
-    println!("{concerns} of {} figures ask for a change (!).", figures.len());
-    Ok(())
+    say!("{concerns} of {} figures ask for a change (!).", figures.len())
 }
 
 fn against_paper(own: Option<&Machine>, json: bool) -> Result<()> {
     let comparisons = paper::compare(own)?;
     if json {
-        println!("{:#}", json!({ "comparisons": comparisons }));
-        return Ok(());
+        return say!("{:#}", json!({ "comparisons": comparisons }));
     }
-    println!("{}\n", report::comparison_table(&comparisons));
+    say!("{}\n", report::comparison_table(&comparisons))?;
     let count = |verdict| comparisons.iter().filter(|comparison| comparison.verdict == verdict).count();
-    println!(
+    say!(
         "Of {} printed figures {} are right, {} follow from an error before them, and {} are wrong.",
         comparisons.len(),
         count(paper::Verdict::Right),
         count(paper::Verdict::Follows),
         count(paper::Verdict::Wrong)
-    );
-    Ok(())
+    )
 }

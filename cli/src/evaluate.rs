@@ -1,13 +1,13 @@
 //! `weeder evaluate`: judges a field trial by what was counted and measured in its plots.
 
-use crate::output;
+use crate::destination::{FolderName, OutFolder};
+use crate::output::{self, say};
+use crate::source;
 use anyhow::{Context, Result};
 use clap::Args;
 use field::evaluation::{self, Analysis, ResponseAnalysis};
 use field::page::Page;
-use field::whole_file;
 use serde_json::{Value, json};
-use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The report's name in its folder.
@@ -21,15 +21,15 @@ const REPORT: &str = "report.html";
     weeder evaluate trial.csv --json | jq .responses[0].model.terms")]
 pub struct Arguments {
     /// CSV file, a line a plot, with the columns
-    /// replication,speed_km_h,spacing_cm,weeds_before,weeds_after,plants,damaged,area_m2,time_s,width_m,power_hp.
-    #[arg(value_name = "FILE.csv")]
+    /// replication,speed_km_h,spacing_cm,weeds_before,weeds_after,plants,damaged,area_m2,time_s,width_m,power_hp; - for standard input.
+    #[arg(value_name = "FILE.csv", value_parser = source::file)]
     file: PathBuf,
     /// Print JSON for programs instead of tables.
     #[arg(long)]
     json: bool,
     /// Write report.html into this folder, which is made where there is none.
-    #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
+    #[arg(long, value_name = "FOLDER")]
+    out: Option<FolderName>,
 }
 
 /// Reads, judges and prints.
@@ -37,19 +37,23 @@ pub struct Arguments {
 /// # Errors
 /// Where the table cannot be read or has a plot that cannot be, or the report cannot be written.
 pub fn run(arguments: &Arguments) -> Result<()> {
+    let folder = arguments.out.as_ref().map(FolderName::check).transpose()?;
     let records = evaluation::read_csv(&arguments.file)?;
     let analysis = Analysis::of(records).with_context(|| arguments.file.display().to_string())?;
-    let written =
-        arguments.out.as_deref().map(|folder| write_report(&analysis, &arguments.file, folder)).transpose()?;
-    if arguments.json {
-        return output::print(&format!("{:#}\n", in_json(&analysis)));
+    let printed = match arguments.json {
+        true => say!("{:#}", in_json(&analysis)),
+        false => output::print(format_args!("{analysis}")),
+    };
+    if let Some(folder) = &folder {
+        write_report(&analysis, &arguments.file, folder)?;
+        if !arguments.json {
+            say!("\nReport      {}", folder.path().join(REPORT).display())?;
+        }
     }
-    let written = written.map(|path| format!("\nReport      {}\n", path.display()));
-    output::print(&format!("{analysis}{}", written.unwrap_or_default()))
+    printed
 }
 
-/// Writes the report, and returns where it is.
-fn write_report(analysis: &Analysis, file: &Path, folder: &Path) -> Result<PathBuf> {
+fn write_report(analysis: &Analysis, file: &Path, folder: &OutFolder) -> Result<()> {
     let name = file.file_name().unwrap_or(file.as_os_str()).display();
     let page = Page {
         title: &format!("Field trial: {name}"),
@@ -64,11 +68,7 @@ fn write_report(analysis: &Analysis, file: &Path, folder: &Path) -> Result<PathB
         row: None,
     };
     let html = page.html()?;
-    fs::create_dir_all(folder).with_context(|| format!("{} cannot be made", folder.display()))?;
-    let path = folder.join(REPORT);
-    whole_file::write(&path, |to| to.write_all(html.as_bytes()))
-        .with_context(|| format!("{} cannot be written", path.display()))?;
-    Ok(path)
+    folder.write(REPORT, |to| to.write_all(html.as_bytes()))
 }
 
 /// The whole analysis; where there is no model, `no_model` says why.

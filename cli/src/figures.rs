@@ -8,7 +8,8 @@
 //! The command is run, and what it prints becomes the block. What it prints of the time that it took, a line that begins with
 //! `Pace:`, is left out: everything else is the same on every machine.
 
-use crate::{Finding, output};
+use crate::Finding;
+use crate::output::{say, tell};
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 use field::whole_file;
@@ -58,10 +59,8 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     if differ.is_empty() {
         return Ok(Finding::Good);
     }
-    output::print(&format!(
-        "These figures are not what their commands print; `weeder figures` writes them:\n{}",
-        differ.join("\n")
-    ))?;
+    say!("These figures are not what their commands print; `weeder figures` writes them:")?;
+    say!("{}", differ.join("\n"))?;
     Ok(Finding::Bad)
 }
 
@@ -92,7 +91,7 @@ fn print(command: &str) -> Result<String> {
     let words = shlex::split(command).with_context(|| format!("unbalanced quotes in `{command}`"))?;
     let [program, arguments @ ..] = words.as_slice() else { bail!("there is no command") };
     ensure!(program == "weeder", "figures come from `weeder`, not from `{program}`");
-    eprintln!("{command}");
+    tell!("{command}");
     let weeder = env::current_exe().context("the running program cannot be found")?;
     let output = Command::new(weeder).args(arguments).stderr(Stdio::null()).output()?;
     // Status 1 is a finding, such as a plant that was damaged.

@@ -1,12 +1,14 @@
 //! `weeder flash`: builds the firmware and has avrdude put it on the Uno.
 
+use crate::output::say;
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use field::firmware::{self, Image};
 use field::{hex, link};
-use std::io;
+use std::collections::HashSet;
+use std::io::{self, Read, Write};
 use std::path::{self, Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Stdio};
 
 /// What the user asks of flashing.
 #[derive(Args)]
@@ -39,7 +41,7 @@ const OLD_BAUD: u32 = 57_600;
 const AVAILABLE_BYTES: usize = 32_256;
 const OLD_AVAILABLE_BYTES: usize = 30_720;
 
-/// Flashes, with avrdude's own messages on the terminal.
+/// Flashes, with each of avrdude's own messages once on the terminal.
 ///
 /// # Errors
 /// Where there is no Uno, it cannot be opened, or building or writing fails; each says what to do.
@@ -84,26 +86,110 @@ fn run_ravedude(elf: &Path, port: &str) -> Result<bool> {
 
 /// Has avrdude write an Intel HEX file and verify it.
 fn run_avrdude(image: &Path, port: &str, baud: u32, old_bootloader: bool) -> Result<()> {
-    println!("Writing {} to the Uno at {port}", image.display());
-    let status = Command::new("avrdude")
+    say!("Writing {} to the Uno at {port}", image.display())?;
+    let mut avrdude = Command::new("avrdude")
         // Each page is erased as it is written; a bootloader cannot erase the chip.
         .args(["-c", "arduino", "-p", "atmega328p", "-D", "-b", &baud.to_string(), "-P", port])
         .arg("-U")
         .arg(format!("flash:w:{}:i", image.display()))
-        .status()
+        .stderr(Stdio::piped())
+        .spawn()
         .context("avrdude cannot be started: ./setup.sh installs it")?;
+    if let Some(words) = avrdude.stderr.take() {
+        Messages::new(io::stderr()).pass(words);
+    }
+    let status = avrdude.wait().context("avrdude cannot be waited for")?;
     let other = if old_bootloader { "without" } else { "with" };
     ensure!(
         status.success(),
         "avrdude did not succeed: pull D0 and D1 free of other devices, press reset and try again, or try {other} \
          --old-bootloader"
     );
-    println!("Done: the Uno runs it. `weeder monitor --port {port}` talks to it.");
+    say!("Done: the Uno runs it. `weeder monitor --port {port}` talks to it.")?;
     if old_bootloader {
-        println!(
+        say!(
             "Behind this bootloader the machine does not come back by itself where its watchdog has had to stop it: the tool \
              has no signal until power is taken away and given back. Optiboot, which Arduino's IDE can burn, has no such fault."
-        );
+        )?;
     }
     Ok(())
+}
+
+/// What avrdude says of itself, each message once, however often it tries; its progress as it comes.
+struct Messages<W> {
+    to: W,
+    line: Vec<u8>,
+    /// How much of the line was passed on.
+    passed: usize,
+    /// The messages that were passed on, without their numbers.
+    said: HashSet<Vec<u8>>,
+}
+
+/// How avrdude's messages begin.
+const MESSAGE: &[u8] = b"avrdude";
+
+impl<W: Write> Messages<W> {
+    fn new(to: W) -> Self {
+        Self { to, line: Vec::new(), passed: 0, said: HashSet::new() }
+    }
+
+    /// Passes on what comes until it ends.
+    fn pass(&mut self, mut from: impl Read) {
+        let mut buffer = [0; 256];
+        while let Ok(count @ 1..) = from.read(&mut buffer) {
+            buffer[..count].iter().for_each(|&byte| self.take(byte));
+            // Nobody is left who could be told, and avrdude goes on.
+            let _ = self.to.flush();
+        }
+        self.end_line();
+    }
+
+    fn take(&mut self, byte: u8) {
+        self.line.push(byte);
+        if matches!(byte, b'\n' | b'\r') {
+            self.end_line();
+        } else if !self.may_be_message() {
+            self.pass_line();
+        }
+    }
+
+    /// Whether the line is a message as far as it has come.
+    fn may_be_message(&self) -> bool {
+        self.line.starts_with(MESSAGE) || MESSAGE.starts_with(&self.line)
+    }
+
+    fn end_line(&mut self) {
+        let words = self.line.iter().filter(|byte| !byte.is_ascii_hexdigit()).copied().collect();
+        if !self.line.starts_with(MESSAGE) || self.said.insert(words) {
+            self.pass_line();
+        }
+        self.line.clear();
+        self.passed = 0;
+    }
+
+    fn pass_line(&mut self) {
+        // As above.
+        let _ = self.to.write_all(&self.line[self.passed..]);
+        self.passed = self.line.len();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_message_that_comes_ten_times_is_said_once_and_progress_as_it_comes() {
+        let mut words = String::from("avrdude: ser_open(): no modem lines\n\n");
+        for attempt in 1..=10 {
+            words += &format!("avrdude: stk500_getsync() attempt {attempt} of 10: not in sync: resp=0x{attempt:02x}\n");
+        }
+        words += "Writing | #### | 10%\rWriting | ######## | 20%\navrdude done.  Thank you.";
+        let mut said = Vec::new();
+        Messages::new(&mut said).pass(words.as_bytes());
+        let said = String::from_utf8(said).unwrap();
+        assert_eq!(said.matches("not in sync").count(), 1, "{said}");
+        assert!(said.starts_with("avrdude: ser_open(): no modem lines\n\navrdude: stk500_getsync() attempt 1 of 10"));
+        assert!(said.ends_with("Writing | #### | 10%\rWriting | ######## | 20%\navrdude done.  Thank you."), "{said}");
+    }
 }

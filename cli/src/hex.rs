@@ -1,5 +1,7 @@
 //! `weeder hex`: the firmware as an Intel HEX file, which a computer without Rust can put on an Uno.
 
+use crate::destination::FileName;
+use crate::output::say;
 use anyhow::Result;
 use clap::Args;
 use field::firmware::{self, Image};
@@ -18,7 +20,7 @@ Any computer with avrdude, which the Arduino IDE brings along, can put the file 
 pub struct Arguments {
     /// The file to write.
     #[arg(value_name = "OUT.hex")]
-    out: PathBuf,
+    out: FileName,
     /// Write this firmware instead of building the one in this repository.
     #[arg(long, value_name = "FILE.elf")]
     elf: Option<PathBuf>,
@@ -29,12 +31,12 @@ pub struct Arguments {
 /// # Errors
 /// Where the firmware cannot be built or read, or the file not be written.
 pub fn run(arguments: &Arguments) -> Result<()> {
+    let out = arguments.out.check()?;
     let elf = match &arguments.elf {
         Some(elf) => elf.clone(),
         None => firmware::build()?,
     };
     let flash = Image::read(&elf)?.flash;
-    hex::write(&arguments.out, &flash)?;
-    println!("Written     {}, {} bytes of flash", arguments.out.display(), flash.len());
-    Ok(())
+    out.write(|to| to.write_all(hex::text(&flash).as_bytes()))?;
+    say!("Written     {}, {} bytes of flash", out.path().display(), flash.len())
 }

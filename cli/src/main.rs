@@ -4,17 +4,22 @@
 //! commands that compare end with 1 where something differs, `weeder bounds` where a bound is over its budget. Whatever else
 //! goes wrong ends with status 2 and a message that says what would be right.
 
+// A result is printed in one way, which a closed pipe or a full disk does not bring down.
+#![deny(clippy::print_stdout, clippy::print_stderr)]
+
 mod bench;
 mod bounds;
 mod classify;
 mod completions;
 mod course;
 mod design;
+mod destination;
 mod evaluate;
 mod figures;
 mod flash;
 mod hex;
 mod monitor;
+mod numbers;
 mod output;
 mod progress;
 mod record;
@@ -22,12 +27,17 @@ mod replay;
 mod settings;
 mod sim;
 mod soak;
+mod source;
 mod sweep;
 mod train;
 mod trial;
 mod virtual_uno;
 
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::builder::StyledStr;
+use clap::error::{ContextKind, ContextValue, ErrorKind};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+use std::env;
+use std::ffi::OsString;
 use std::process::ExitCode;
 
 /// Tries the intra-row weeder's firmware on a simulated field, and puts it on an Arduino Uno.
@@ -35,8 +45,8 @@ use std::process::ExitCode;
 #[command(
     name = "weeder",
     version,
-    disable_help_subcommand = true,
-    after_help = "Each command's --help has examples. The status is 0 where all is well; 1 where a plant was damaged, something \
+    after_help = "Each command's --help has examples. A report goes into a folder (--out FOLDER), a single table to a file (--out \
+        FILE.csv); - is standard input wherever a file is read. The status is 0 where all is well; 1 where a plant was damaged, something \
         differs, a bound is over its budget, or the machine refused a command; 2 where something else went wrong, with a message that says what would be right."
 )]
 struct Arguments {
@@ -96,8 +106,38 @@ enum Finding {
     Bad,
 }
 
+/// The commands with all their arguments.
+fn grammar() -> clap::Command {
+    numbers::with_negative_numbers(Arguments::command())
+}
+
+/// What these words ask for.
+fn parse(words: Vec<OsString>) -> Result<Arguments, clap::Error> {
+    let found = grammar().try_get_matches_from(&words);
+    found.and_then(|found| Arguments::from_arg_matches(&found)).map_err(|error| with_known_commands(error, &words))
+}
+
+/// The same error; one of an unknown command says which there are.
+fn with_known_commands(mut error: clap::Error, words: &[OsString]) -> clap::Error {
+    if error.kind() == ErrorKind::InvalidSubcommand {
+        let mut command = grammar();
+        let mut words = words.iter().skip(1);
+        while let Some(inner) = words.next().and_then(|word| command.find_subcommand(word)) {
+            command = inner.clone();
+        }
+        let known: Vec<&str> = command.get_subcommands().map(clap::Command::get_name).collect();
+        let tip = StyledStr::from(format!("the commands are {}", known.join(", ")));
+        error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![tip]));
+    }
+    error
+}
+
 fn main() -> ExitCode {
-    let result = match Arguments::parse().command {
+    let arguments = match parse(env::args_os().collect()) {
+        Ok(arguments) => arguments,
+        Err(error) => error.exit(),
+    };
+    let result = match arguments.command {
         Command::Sim(arguments) => sim::run(&arguments),
         Command::Flash(arguments) => flash::run(&arguments).map(|()| Finding::Good),
         Command::Hex(arguments) => hex::run(&arguments).map(|()| Finding::Good),
@@ -116,13 +156,13 @@ fn main() -> ExitCode {
         Command::Design(arguments) => design::run(&arguments).map(|()| Finding::Good),
         Command::Evaluate(arguments) => evaluate::run(&arguments).map(|()| Finding::Good),
         Command::Figures(arguments) => figures::run(&arguments),
-        Command::Completions(arguments) => completions::run(&arguments, Arguments::command()).map(|()| Finding::Good),
+        Command::Completions(arguments) => completions::run(&arguments, grammar()).map(|()| Finding::Good),
     };
     match result {
         Ok(Finding::Good) => ExitCode::SUCCESS,
         Ok(Finding::Bad) => ExitCode::from(1),
         Err(error) => {
-            eprintln!("error: {error:#}");
+            output::tell!("error: {error:#}");
             ExitCode::from(2)
         }
     }
@@ -135,7 +175,7 @@ mod tests {
 
     #[test]
     fn the_arguments_are_well_formed() {
-        Arguments::command().debug_assert();
+        grammar().debug_assert();
     }
 
     /// A command's subcommands and theirs, each with its name in full.
@@ -148,8 +188,28 @@ mod tests {
     }
 
     #[test]
+    fn every_number_s_range_is_in_its_help_and_in_what_is_said_of_a_number_below_it() {
+        let mut ranges = 0;
+        for (name, command) in subcommands(&grammar(), "weeder") {
+            for option in command.get_arguments().filter(|option| option.get_action().takes_values()) {
+                let Some(long) = option.get_long() else { continue };
+                let words = name.split(' ').map(OsString::from).chain([format!("--{long}").into(), "-1".into()]);
+                let Err(error) = parse(words.collect()) else { continue };
+                let said = error.to_string();
+                assert!(!said.contains("unexpected argument"), "{name} --{long}: {said}");
+                let Some((_, rest)) = said.split_once("number from ") else { continue };
+                let range = rest.lines().next().unwrap_or_default();
+                let help = option.get_help().map(ToString::to_string).unwrap_or_default();
+                assert!(help.contains(range), "{name} --{long}: {range} is not in {help:?}");
+                ranges += 1;
+            }
+        }
+        assert!(ranges > 20, "{ranges}");
+    }
+
+    #[test]
     fn every_command_s_help_has_examples_that_are_well_formed() {
-        for (name, command) in subcommands(&Arguments::command(), "weeder") {
+        for (name, command) in subcommands(&grammar(), "weeder") {
             let help = command.get_after_help().map(ToString::to_string).unwrap_or_default();
             let lines = help.lines().map(|line| line.trim_start().trim_start_matches("Example: "));
             // What stands behind a pipe, `&&` or some blanks is not the command's.
@@ -160,7 +220,7 @@ mod tests {
             let mut seen = 0;
             for example in examples {
                 let words = shlex::split(example).expect("its quotes are balanced");
-                if let Err(error) = Arguments::try_parse_from(words) {
+                if let Err(error) = parse(words.into_iter().map(OsString::from).collect()) {
                     panic!("{example}: {error}");
                 }
                 seen += 1;

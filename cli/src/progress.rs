@@ -1,9 +1,19 @@
 //! The bar that shows how far a simulation is.
+//!
+//! Whoever interrupts the command finds the terminal's line empty, not half a bar.
 
 use indicatif::{ProgressBar, ProgressStyle};
+use std::process;
+use std::sync::{Mutex, Once, PoisonError};
 
 /// Steps of a full bar.
 const STEPS: u64 = 1000;
+
+/// How a shell knows of a command that Ctrl-C has ended.
+const INTERRUPTED: i32 = 130;
+
+/// The bar on the terminal.
+static SHOWN: Mutex<Option<ProgressBar>> = Mutex::new(None);
 
 /// A bar on standard error; none where that is not a terminal.
 pub struct Progress(ProgressBar);
@@ -15,6 +25,10 @@ impl Progress {
         if let Ok(style) = ProgressStyle::with_template("{msg} {wide_bar:.green} {percent:>3} %, {eta} to go") {
             bar.set_style(style);
         }
+        if !bar.is_hidden() {
+            *shown() = Some(bar.clone());
+            clear_when_interrupted();
+        }
         Self(bar)
     }
 
@@ -25,6 +39,25 @@ impl Progress {
 
     /// Takes the bar away.
     pub fn finish(self) {
+        *shown() = None;
         self.0.finish_and_clear();
     }
+}
+
+fn shown() -> std::sync::MutexGuard<'static, Option<ProgressBar>> {
+    SHOWN.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Has Ctrl-C take the bar away before it ends the command.
+fn clear_when_interrupted() {
+    static CAUGHT: Once = Once::new();
+    CAUGHT.call_once(|| {
+        // Where it cannot be caught, it ends the command as it does without a bar.
+        let _ = ctrlc::set_handler(|| {
+            if let Some(bar) = shown().take() {
+                bar.finish_and_clear();
+            }
+            process::exit(INTERRUPTED);
+        });
+    });
 }

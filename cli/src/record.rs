@@ -1,5 +1,6 @@
 //! `weeder record`: what the machine does, in a file.
 
+use crate::output::tell;
 use crate::settings::Port;
 use anyhow::{Context, Result};
 use clap::Args;
@@ -36,17 +37,17 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let stop = Arc::new(AtomicBool::new(false));
     let asked_to_stop = Arc::clone(&stop);
     ctrlc::set_handler(move || asked_to_stop.store(true, Ordering::Relaxed)).context("Ctrl-C cannot be caught")?;
-    eprintln!("Recording into {}, Ctrl-C ends it", arguments.out.display());
+    tell!("Recording into {}, Ctrl-C ends it", arguments.out.display());
     while !stop.load(Ordering::Relaxed) {
         for happening in session.turn(Instant::now()) {
             log.write(&happening)?;
             match happening {
-                Happening::Connected { version, .. } => eprintln!("weeder {version} is there"),
-                Happening::Lost(why) => eprintln!("{why}"),
+                Happening::Connected { version, .. } => tell!("weeder {version} is there"),
+                Happening::Lost(why) => tell!("{why}"),
                 _ => {}
             }
         }
     }
-    eprintln!("{} lines are in {}", log.lines(), arguments.out.display());
+    tell!("{} lines were added: {} has {} now", log.added(), arguments.out.display(), log.lines());
     Ok(())
 }

@@ -1,6 +1,8 @@
 //! `weeder replay`: a log's swings, decided anew on the host.
 
 use crate::Finding;
+use crate::output::say;
+use crate::source;
 use anyhow::{Context, Result};
 use clap::Args;
 use field::link::{log, replay};
@@ -13,8 +15,8 @@ use std::path::PathBuf;
 The status is 1 where log and replay differ; the first difference is shown. A swing may differ by 12 ticks and by 25 ms of the \
 machine's way, because the log has the speed only ten times a second.\n\nExample:\n  weeder replay row.csv --json | jq .difference")]
 pub struct Arguments {
-    /// A log, as `weeder record` and `weeder monitor --log` write it.
-    #[arg(value_name = "LOG.csv")]
+    /// A log, as `weeder record` and `weeder monitor --log` write it; - for standard input.
+    #[arg(value_name = "LOG.csv", value_parser = source::file)]
     log: PathBuf,
     /// Print the result as JSON.
     #[arg(long)]
@@ -38,18 +40,21 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
             "difference": difference,
             "notes": replayed.notes,
         });
-        println!("{result:#}");
+        say!("{result:#}")?;
     } else {
         for note in &replayed.notes {
-            println!("Note: {note}");
+            say!("Note: {note}")?;
         }
-        println!(
+        say!(
             "The same: {} objects, {} alarms and {} swings, which differ by {} ticks at the most",
-            replayed.objects, replayed.alarms, replayed.swings, replayed.farthest_swing
-        );
+            replayed.objects,
+            replayed.alarms,
+            replayed.swings,
+            replayed.farthest_swing
+        )?;
         match &difference {
-            Some(difference) => println!("{name}, {difference}"),
-            None => println!("The decisions of {name} are those of this version"),
+            Some(difference) => say!("But {name}, {difference}")?,
+            None => say!("The decisions of {name} are those of this version")?,
         }
     }
     Ok(if difference.is_none() { Finding::Good } else { Finding::Bad })

@@ -1,19 +1,22 @@
 //! `weeder settings`: the machine's settings as a file that can be kept, compared, and given to the next machine.
 
 use crate::Finding;
+use crate::destination::FileName;
+use crate::output::say;
+use crate::source;
 use anyhow::{Result, ensure};
 use clap::{Args, Subcommand};
 use comfy_table::{Table, presets};
 use field::link::settings::{self, Setting, Settings, name, unit};
 use field::link::{Link, settings_file};
 use serde_json::{Map, Value, json};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// What the user asks of the settings.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     weeder settings pull machine.toml           write the machine's settings into a file\n  \
-    weeder settings push machine.toml --save    set them on a machine, and keep them there\n  \
+    weeder settings push machine.toml           set them on a machine, which keeps them for good\n  \
     weeder settings diff machine.toml           say what differs; ends with status 1 if anything does")]
 pub struct Arguments {
     #[command(subcommand)]
@@ -27,21 +30,26 @@ enum Action {
     Pull {
         /// The file.
         #[arg(value_name = "FILE.toml", required_unless_present = "json")]
-        file: Option<PathBuf>,
+        file: Option<FileName>,
         /// Print them as JSON as well.
         #[arg(long)]
         json: bool,
         #[command(flatten)]
         port: Port,
     },
-    /// Set a file's settings on the machine; nothing is sent unless all of them can be right.
-    #[command(after_help = "Example: weeder settings push machine.toml --save --port /dev/ttyACM0")]
+    /// Set a file's settings on the machine and have it keep them for good; nothing is sent unless all of them can be right.
+    #[command(after_help = "\
+Opening the port is a reset on most Unos, and so is a loss of power: what is not saved is gone then.\n\n\
+Example: weeder settings push machine.toml --port /dev/ttyACM0")]
     Push {
-        /// The file.
-        #[arg(value_name = "FILE.toml")]
+        /// The file; - for standard input.
+        #[arg(value_name = "FILE.toml", value_parser = source::file)]
         file: PathBuf,
-        /// Have the machine keep all its settings for good.
+        /// Leave out the machine's `save`: its next reset, which on most Unos is the next opening of the port, takes them back.
         #[arg(long)]
+        no_save: bool,
+        /// What is done anyway; scripts may still say so.
+        #[arg(long, hide = true, conflicts_with = "no_save")]
         save: bool,
         /// Print which were set as JSON.
         #[arg(long)]
@@ -52,8 +60,8 @@ enum Action {
     /// Say which of a file's settings the machine has otherwise; the status is 1 where there is one.
     #[command(after_help = "Example: weeder settings diff machine.toml && echo the same")]
     Diff {
-        /// The file.
-        #[arg(value_name = "FILE.toml")]
+        /// The file; - for standard input.
+        #[arg(value_name = "FILE.toml", value_parser = source::file)]
         file: PathBuf,
         /// Print the differences as JSON.
         #[arg(long)]
@@ -84,54 +92,60 @@ impl Port {
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     match &arguments.action {
         Action::Pull { file, json, port } => {
+            let file = file.as_ref().map(FileName::check).transpose()?;
             let settings = settings::read(&mut port.open()?)?;
+            let printed = if *json { say!("{:#}", as_json(&settings)) } else { Ok(()) };
             if let Some(file) = file {
-                settings_file::write(file, &settings)?;
+                settings_file::write(file.path(), &settings)?;
                 if !json {
-                    println!("The machine's settings are in {}", file.display());
+                    say!("The machine's settings are in {}", file.path().display())?;
                 }
             }
-            if *json {
-                println!("{:#}", as_json(&settings));
-            }
+            printed?;
             Ok(Finding::Good)
         }
-        Action::Push { file, save, json, port } => {
-            let wanted = settings_file::read(file)?;
-            ensure!(!wanted.is_empty(), "{} names no setting: `weeder settings pull` writes them all", file.display());
-            let changed = settings::push(&mut port.open()?, &wanted, *save)?;
+        Action::Push { file, no_save, save: _, json, port } => {
+            let (wanted, save) = (wanted(file)?, !no_save);
+            let changed = settings::push(&mut port.open()?, &wanted, save)?;
             let changed: Vec<String> = changed.into_iter().map(name).collect();
             if *json {
-                println!("{:#}", json!({ "set": changed, "saved": save }));
+                say!("{:#}", json!({ "set": changed, "saved": save }))?;
                 return Ok(Finding::Good);
             }
             match changed.as_slice() {
-                [] => println!("The machine has these settings already"),
-                changed => println!("Set: {}", changed.join(", ")),
+                [] => say!("The machine has these settings already")?,
+                changed => say!("Set: {}", changed.join(", "))?,
             }
-            println!(
-                "{}",
-                if *save { "All settings are saved" } else { "--save would have kept them over a loss of power" }
-            );
+            match save {
+                true => say!("All settings are saved")?,
+                false => say!("Not saved: the next reset takes them back, and on most Unos opening the port is one")?,
+            }
             Ok(Finding::Good)
         }
         Action::Diff { file, json, port } => {
-            let wanted = settings_file::read(file)?;
+            let wanted = wanted(file)?;
             let found = settings::read(&mut port.open()?)?;
             let differences = differences(&wanted, &found);
             if *json {
                 let rows = differences.iter().map(|&(setting, file, machine)| {
                     json!({ "setting": name(setting), "file": value(setting, file), "machine": value(setting, machine) })
                 });
-                println!("{:#}", Value::from_iter(rows));
+                say!("{:#}", Value::from_iter(rows))?;
             } else if differences.is_empty() {
-                println!("The machine has the settings of {}", file.display());
+                say!("The machine has the settings of {}", file.display())?;
             } else {
-                println!("{}", table(&differences));
+                say!("{}", table(&differences))?;
             }
             Ok(if differences.is_empty() { Finding::Good } else { Finding::Bad })
         }
     }
+}
+
+/// A file's settings, at least one.
+fn wanted(file: &Path) -> Result<Vec<(Setting, u16)>> {
+    let wanted = settings_file::read(file)?;
+    ensure!(!wanted.is_empty(), "{} names no setting: `weeder settings pull` writes them all", file.display());
+    Ok(wanted)
 }
 
 /// Settings that the machine has otherwise than the file: with the file's value and the machine's.

@@ -1,27 +1,55 @@
 //! `weeder sweep`: a result of the simulated trial against one or two of its parameters.
 
-use crate::course::number_within;
-use crate::output;
+use crate::destination::{FileName, OutFile};
+use crate::numbers::{number_within, whole_within};
+use crate::output::{print, say};
 use crate::progress::Progress;
-use anyhow::{Context, Result};
+use crate::source;
+use anyhow::Result;
 use clap::{Args, ValueEnum, builder::PossibleValuesParser};
 use comfy_table::{CellAlignment, Table, presets};
-use field::conditions::Conditions;
+use field::conditions::{Conditions, PARAMETERS};
 use field::experiment::Controller;
-use field::sweep::{Axis, Point, Results, Sweep};
-use field::whole_file;
-use std::path::{Path, PathBuf};
+use field::link::settings::{self, Setting};
+use field::sweep::{Axis, Point, Results, SPACINGS_CM, SPEEDS_KM_H, Sweep};
+use serde_json::{Map, Value, json};
+use std::fmt::Write;
 
-/// What the user asks of a sweep.
-#[derive(Args)]
-#[command(after_help = "\
+/// The examples in the help.
+const EXAMPLES: &str = "\
 Examples:
   weeder sweep --x lead_out_ms=0..300:20 --y speed=1..4:0.5
   weeder sweep --x ground.slip_percent=0..15:1 --speed 2 --result in_row_weeding
   weeder sweep --controller paper --x speed=0.5..3:0.5 --y crop.protected_mm=60..140:20
   weeder sweep --x margin_mm=0..100:10 --y machine.load_percent=0..100:25 --out margin.csv
-An axis is `speed` in km/h, `spacing` in cm, a parameter of the field as in its TOML file (table.key), or a setting of the
-firmware. `weeder sweep --x ?=0..1:1` lists them all.")]
+  weeder sweep --x k=1..9:2 --json | jq .points[].plant_damage
+An axis is `speed` in km/h, `spacing` in cm, a parameter of the field as in its TOML file, or a setting of the firmware.";
+
+/// The examples, and all that an axis can be.
+fn long_help() -> String {
+    let mut text = format!("{EXAMPLES}\n\nWhat an axis can be:\n");
+    // Writing to a String cannot fail.
+    let mut line = |name: &str, range: String, meaning: &str| {
+        let _ = writeln!(text, "  {name:<28}{range:<16}{meaning}");
+    };
+    for (name, (least, greatest), meaning) in
+        [("speed", SPEEDS_KM_H, "forward speed in km/h"), ("spacing", SPACINGS_CM, "plant spacing in cm")]
+    {
+        line(name, format!("{least} to {greatest}"), meaning);
+    }
+    for parameter in PARAMETERS {
+        line(parameter.name, format!("{} to {}", parameter.least, parameter.greatest), parameter.meaning);
+    }
+    for setting in Setting::all() {
+        let range = setting.description();
+        line(&settings::name(setting), format!("{} to {}", range.least, range.greatest), &settings::help(setting));
+    }
+    text
+}
+
+/// What the user asks of a sweep.
+#[derive(Args)]
+#[command(after_help = format!("{EXAMPLES} `weeder sweep --help` lists them all."), after_long_help = long_help())]
 pub struct Arguments {
     /// The parameter along the first axis, and its values.
     #[arg(long, value_name = "NAME=FROM..TO:STEP")]
@@ -36,20 +64,23 @@ pub struct Arguments {
     #[arg(long, value_enum, default_value = "firmware")]
     controller: ControllerName,
     /// The field's conditions: a preset, or a TOML file, as of `weeder trial`.
-    #[arg(long, value_name = "PRESET|FILE.toml", default_value = "transplanted")]
+    #[arg(long, value_name = "PRESET|FILE.toml", value_parser = source::named, default_value = "transplanted")]
     field: String,
-    /// Forward speed in km/h, where no axis has it.
-    #[arg(long, default_value = "2.5", value_parser = number_within(0.1..=8.0))]
+    /// Forward speed in km/h, 0.1 to 8, where no axis has it.
+    #[arg(long, default_value = "2.5", value_parser = number_within(SPEEDS_KM_H.0..=SPEEDS_KM_H.1))]
     speed: f64,
-    /// Plant spacing in cm, where no axis has it.
-    #[arg(long, default_value = "50", value_parser = number_within(5.0..=500.0))]
+    /// Plant spacing in cm, 5 to 500, where no axis has it.
+    #[arg(long, default_value = "50", value_parser = number_within(SPACINGS_CM.0..=SPACINGS_CM.1))]
     spacing: f64,
-    /// Which of all the possible fields.
-    #[arg(long, default_value = "1")]
+    /// Which of all the possible fields, 0 to 18446744073709551615.
+    #[arg(long, default_value = "1", value_parser = whole_within(0..=u64::MAX))]
     seed: u64,
     /// Write all results of all points to this file as well.
     #[arg(long, value_name = "FILE.csv")]
-    out: Option<PathBuf>,
+    out: Option<FileName>,
+    /// Print JSON for programs instead of a table: all results of all points.
+    #[arg(long)]
+    json: bool,
 }
 
 /// The controllers by their names.
@@ -77,6 +108,7 @@ impl From<ControllerName> for Controller {
 /// # Errors
 /// Where an axis or the field is wrong, or the file cannot be written.
 pub fn run(arguments: &Arguments) -> Result<()> {
+    let out = arguments.out.as_ref().map(FileName::check).transpose()?;
     let sweep = Sweep {
         x: arguments.x.clone(),
         y: arguments.y.clone(),
@@ -89,24 +121,55 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let bar = Progress::new("sweeping");
     let points = sweep.run(|share| bar.show(share))?;
     bar.finish();
+    let printed = match arguments.json {
+        true => say!("{:#}", in_json(&sweep, &points)),
+        false => print(format_args!("{}", in_words(arguments, &sweep, &points))),
+    };
+    if let Some(out) = &out {
+        write(out, &sweep, &points)?;
+        if !arguments.json {
+            say!("Written: {}", out.path().display())?;
+        }
+    }
+    printed
+}
+
+/// The table, and what spoils it.
+fn in_words(arguments: &Arguments, sweep: &Sweep, points: &[Point]) -> String {
     let mut text = match &sweep.y {
         Some(y) => format!(
             "{}, {} across, {} down\n{}\n",
             arguments.result,
             sweep.x.parameter,
             y.parameter,
-            grid(&sweep, y, &points, &arguments.result)
+            grid(sweep, y, points, &arguments.result)
         ),
-        None => format!("{}\n", list(&sweep, &points)),
+        None => format!("{}\n", list(sweep, points)),
     };
     if points.iter().any(|point| point.results.alarms_percent > 0.0) {
         text += "! an alarm took the tool out in some of the rows: --result alarms says in how many\n";
     }
-    if let Some(path) = &arguments.out {
-        write(path, &sweep, &points).with_context(|| format!("{} cannot be written", path.display()))?;
-        text += &format!("Written: {}\n", path.display());
-    }
-    output::print(&text)
+    text
+}
+
+/// All results of all points, by the names of the file's columns; a result that there is not is null.
+fn in_json(sweep: &Sweep, points: &[Point]) -> Value {
+    let point = |point: &Point| {
+        let values = place(point).chain(point.results.values()).map(Value::from);
+        Map::from_iter(columns(sweep).map(str::to_owned).zip(values))
+    };
+    json!({ "points": points.iter().map(point).collect::<Vec<_>>() })
+}
+
+/// The axes by their names, and then the results.
+fn columns(sweep: &Sweep) -> impl Iterator<Item = &str> {
+    let axes = [Some(&sweep.x), sweep.y.as_ref()].into_iter().flatten();
+    axes.map(|axis| axis.parameter.as_str()).chain(Results::NAMES)
+}
+
+/// A point's values on the axes.
+fn place(point: &Point) -> impl Iterator<Item = f64> {
+    [Some(point.x), point.y].into_iter().flatten()
 }
 
 /// A result for people: with a mark where alarms spoil it, and a stroke where there is none.
@@ -151,19 +214,16 @@ fn right(mut table: Table) -> Table {
     table
 }
 
-fn write(path: &Path, sweep: &Sweep, points: &[Point]) -> Result<()> {
-    whole_file::write(path, |to| {
+fn write(out: &OutFile, sweep: &Sweep, points: &[Point]) -> Result<()> {
+    out.write(|to| {
         let mut writer = csv::Writer::from_writer(to);
-        let axes = [Some(&sweep.x), sweep.y.as_ref()].into_iter().flatten().map(|axis| axis.parameter.as_str());
-        writer.write_record(axes.chain(Results::NAMES))?;
+        writer.write_record(columns(sweep))?;
         for point in points {
-            let place = [Some(point.x), point.y].into_iter().flatten();
-            let values = place.chain(point.results.values());
+            let values = place(point).chain(point.results.values());
             // A result that there is not has an empty cell.
             writer
                 .write_record(values.map(|value| if value.is_finite() { value.to_string() } else { String::new() }))?;
         }
-        writer.flush()?;
-        Ok(())
+        Ok::<(), csv::Error>(writer.flush()?)
     })
 }

@@ -1,22 +1,23 @@
 //! `weeder trial`: the paper's experiment in a simulated field, with its report.
 
 use crate::Finding;
-use crate::course::number_within;
-use crate::output;
+use crate::destination::{FolderName, OutFolder};
+use crate::numbers::{number_within, whole_within};
+use crate::output::{self, say};
 use crate::progress::Progress;
-use anyhow::{Context, Result};
-use clap::{Args, ValueEnum, builder::RangedU64ValueParser};
+use crate::source;
+use anyhow::Result;
+use clap::{Args, ValueEnum};
 use comfy_table::{CellAlignment, Table, presets};
 use field::conditions::Conditions;
 use field::evaluation::Analysis;
 use field::experiment::{self, Controller, Engine, Experiment, PlotOutcome, Total};
 use field::page::{Page, RowPicture};
+use field::sweep::{SPACINGS_CM, SPEEDS_KM_H};
 use field::tool_path::{Effect, WeedCount};
-use field::{firmware, picture, whole_file};
+use field::{firmware, picture};
 use serde_json::json;
-use std::fs;
-use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 /// What the user asks of a trial.
@@ -32,28 +33,28 @@ pub struct Arguments {
     /// What runs the firmware: its code compiled for this computer, or the ELF on the virtual Uno, some 500 times slower.
     #[arg(long, value_enum, default_value = "twin")]
     engine: EngineName,
-    /// Plots of each speed and spacing.
-    #[arg(long, default_value = "3", value_parser = RangedU64ValueParser::<u32>::new().range(1..=1000))]
+    /// Plots of each speed and spacing, 1 to 1000.
+    #[arg(long, default_value = "3", value_parser = whole_within(1..=1000_u32))]
     replications: u32,
-    /// Forward speeds in km/h.
-    #[arg(long, value_delimiter = ',', default_value = "1,1.5,2,2.5", value_parser = number_within(0.1..=8.0))]
+    /// Forward speeds in km/h, each 0.1 to 8.
+    #[arg(long, value_delimiter = ',', default_value = "1,1.5,2,2.5", value_parser = number_within(SPEEDS_KM_H.0..=SPEEDS_KM_H.1))]
     speeds: Vec<f64>,
-    /// Plant spacings in cm.
-    #[arg(long, value_delimiter = ',', default_value = "50,60", value_parser = number_within(5.0..=500.0))]
+    /// Plant spacings in cm, each 5 to 500.
+    #[arg(long, value_delimiter = ',', default_value = "50,60", value_parser = number_within(SPACINGS_CM.0..=SPACINGS_CM.1))]
     spacings: Vec<f64>,
     /// The field's conditions: a preset (transplanted, even-stand, direct-sown, weedy, soft-ground, heavy-soil, dusty), or a TOML
-    /// file that says what differs from the first of them.
-    #[arg(long, value_name = "PRESET|FILE.toml", default_value = "transplanted")]
+    /// file that says what differs from the first of them; - for standard input.
+    #[arg(long, value_name = "PRESET|FILE.toml", value_parser = source::named, default_value = "transplanted")]
     field: String,
-    /// Which of all the possible fields: the same seed gives the same one.
-    #[arg(long, default_value = "1")]
+    /// Which of all the possible fields, 0 to 18446744073709551615: the same seed gives the same one.
+    #[arg(long, default_value = "1", value_parser = whole_within(0..=u64::MAX))]
     seed: u64,
     /// Run this firmware instead of building the one in this repository.
     #[arg(long, value_name = "FILE.elf")]
     elf: Option<PathBuf>,
-    /// Write report.html, trial.csv and controllers.csv to this folder.
-    #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
+    /// Write report.html, trial.csv and controllers.csv into this folder, which is made where there is none.
+    #[arg(long, value_name = "FOLDER")]
+    out: Option<FolderName>,
     /// Print JSON for programs instead of tables.
     #[arg(long)]
     json: bool,
@@ -73,6 +74,7 @@ enum EngineName {
 /// # Errors
 /// Where the field is wrong, the firmware cannot be built or run, or a file cannot be written.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
+    let folder = arguments.out.as_ref().map(FolderName::check).transpose()?;
     let experiment = Experiment {
         speeds_km_h: ascending(&arguments.speeds),
         spacings_cm: ascending(&arguments.spacings),
@@ -94,8 +96,8 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     let totals = experiment::totals(&outcomes);
     let analysis = Analysis::of(experiment::records(&outcomes, Controller::Firmware))?;
     let summary = summary(&experiment, &totals);
-    let mut text = if arguments.json {
-        format!("{:#}\n", json!({ "summary": summary, "plots": outcomes.iter().map(in_json).collect::<Vec<_>>() }))
+    let printed = if arguments.json {
+        say!("{:#}", json!({ "summary": summary, "plots": outcomes.iter().map(in_json).collect::<Vec<_>>() }))
     } else {
         let worked_s: f64 = outcomes.iter().map(|outcome| outcome.moved_s).sum();
         let pace = format!(
@@ -103,18 +105,18 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
             worked_s / 3600.0,
             worked_s / took_s
         );
-        format!("{}\n\n{}\n{pace}\n", by_speed(&totals), summary.join("\n"))
+        say!("{}\n\n{}\n{pace}", by_speed(&totals), summary.join("\n"))
     };
     let alarms: u32 = of(&totals, Controller::Firmware).map(|total| total.alarms).sum();
     let damaged: u32 = of(&totals, Controller::Firmware).map(|total| total.effect.damaged).sum();
-    if let Some(folder) = &arguments.out {
+    if let Some(folder) = &folder {
         let findings = Findings { outcomes: &outcomes, totals, analysis, summary };
         write_report(folder, arguments, &experiment, &engine, &findings)?;
         if !arguments.json {
-            text += &format!("\nWritten: report.html, trial.csv and controllers.csv in {}\n", folder.display());
+            say!("\nWritten: report.html, trial.csv and controllers.csv in {}", folder.path().display())?;
         }
     }
-    output::print(&text)?;
+    printed?;
     Ok(if damaged == 0 && alarms == 0 { Finding::Good } else { Finding::Bad })
 }
 
@@ -226,7 +228,7 @@ fn damage(totals: &[Total], controller: Controller) -> String {
 }
 
 fn write_report(
-    folder: &Path,
+    folder: &OutFolder,
     arguments: &Arguments,
     experiment: &Experiment,
     engine: &Engine,
@@ -261,14 +263,9 @@ fn write_report(
         row: row.as_ref(),
     };
     let html = page.html()?;
-    fs::create_dir_all(folder).with_context(|| format!("the folder {} cannot be made", folder.display()))?;
-    let write = |name: &str, contents: &dyn Fn(&mut dyn Write) -> Result<()>| {
-        let path = folder.join(name);
-        whole_file::write(&path, |to| contents(to)).with_context(|| format!("{} cannot be written", path.display()))
-    };
-    write("report.html", &|to| Ok(to.write_all(html.as_bytes())?))?;
-    write("trial.csv", &|to| Ok(experiment::write_csv(findings.outcomes, &[Controller::Firmware], to)?))?;
-    write("controllers.csv", &|to| Ok(experiment::write_csv(findings.outcomes, &experiment.controllers, to)?))
+    folder.write("report.html", |to| to.write_all(html.as_bytes()))?;
+    folder.write("trial.csv", |to| experiment::write_csv(findings.outcomes, &[Controller::Firmware], to))?;
+    folder.write("controllers.csv", |to| experiment::write_csv(findings.outcomes, &experiment.controllers, to))
 }
 
 fn in_json(outcome: &PlotOutcome) -> serde_json::Value {

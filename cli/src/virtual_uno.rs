@@ -1,6 +1,7 @@
 //! `weeder virtual-uno`: an Uno without an Uno, at a pseudo terminal that any serial program opens.
 
 use crate::course::CourseArguments;
+use crate::output::{say, tell};
 use anyhow::{Context, Result};
 use clap::Args;
 use field::firmware;
@@ -92,7 +93,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         fast: arguments.fast,
         keeps_running_when_opened: arguments.no_reset,
     })?;
-    println!("{}", uno.path().display());
-    eprintln!("The virtual Uno's port stands above: open it at 115200 baud. Ctrl-C ends it.");
+    say!("{}", uno.path().display())?;
+    tell!("The virtual Uno's port stands above: open it at 115200 baud. Ctrl-C ends it.");
     Ok(uno.run(&stop)?)
 }

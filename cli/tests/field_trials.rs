@@ -88,7 +88,7 @@ fn what_is_wrong_with_a_trial_is_named_and_nothing_is_written() {
     assert_refused(&["trial", "--field", "wet"], "wet is none of the presets (transplanted, even-stand");
     assert_refused(&["trial", "--speeds", "1,fast", "--out", "r"], "it has to be a number from 0.1 to 8");
     assert_refused(&["trial", "--spacings", "1", "--out", "r"], "it has to be a number from 5 to 500");
-    assert_refused(&["trial", "--replications", "0", "--out", "r"], "0 is not in 1..=1000");
+    assert_refused(&["trial", "--replications", "0", "--out", "r"], "it has to be a whole number from 1 to 1000");
     assert_refused(&["trial", "--spacings", "10", "--field", "small.toml"], "plants 10 cm apart grow together");
     let nowhere = ["trial", "--spacings", "10", "--field", "small.toml", "--out", "r"];
     assert_refused(&nowhere, "ask for a larger spacing or narrower canopies");
@@ -137,9 +137,44 @@ fn a_sweep_shows_each_result_along_one_axis_and_one_result_along_two() {
 }
 
 #[test]
+fn the_help_of_a_sweep_lists_what_an_axis_can_be_with_its_range() {
+    let help = said(Path::new("."), &["sweep", "--help"]);
+    for line in [
+        "speed                       0.1 to 8",
+        "ground.slip_percent         -15 to 15",
+        "lead_out_ms                 0 to 500",
+    ] {
+        assert!(help.contains(line), "{line}: {help}");
+    }
+}
+
+#[test]
+fn what_is_wrong_with_a_field_is_said_in_a_line_with_what_would_be_right() {
+    for (text, wrong) in [
+        (
+            "[plot]\nrows = \"many\"\n",
+            "wrong.toml, line 2: plot.rows is \"many\", but has to be a number from 1 to 1000: rows of a plot",
+        ),
+        ("[plot]\nrows = -3\n", "wrong.toml, line 2: plot.rows is -3, but has to be a number from 1 to 1000"),
+        ("[settings]\nk = 99999\n", "wrong.toml, line 2: settings.k is 99999, but has to be a number from 1 to "),
+        ("[plot]\nrow = 3\n", "wrong.toml, line 2: unknown field `row`, expected one of `rows`"),
+        ("[plot\n", "wrong.toml, line 1: "),
+    ] {
+        let folder = folder();
+        fs::write(folder.path().join("wrong.toml"), text).unwrap();
+        let output = weeder(folder.path(), &["trial", "--field", "wrong.toml"]);
+        let message = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(message.starts_with(&format!("error: {wrong}")), "{message}");
+        assert_eq!(message.lines().count(), 1, "{message}");
+    }
+}
+
+#[test]
 fn what_is_wrong_with_a_sweep_is_named_and_nothing_is_written() {
     assert_refused(&["sweep", "--x", "lead_out_ms", "--out", "s.csv"], "NAME=FROM..TO:STEP");
     assert_refused(&["sweep", "--x", "lead=1..2:1", "--out", "s.csv"], "lead is neither a parameter of the field nor");
     assert_refused(&["sweep", "--x", "speed=1..2:0", "--out", "s.csv"], "in steps above 0");
     assert_refused(&["sweep", "--x", "k=1..3:1", "--result", "money"], "plant_damage");
+    assert_refused(&["sweep", "--x", "speed=1..2:1", "--y", "speed=2..3:1", "--out", "s.csv"], "both axes are `speed`");
+    assert_refused(&["sweep", "--x", "k=1..3:1", "--speed", "-1"], "it has to be a number from 0.1 to 8");
 }

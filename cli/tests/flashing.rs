@@ -228,9 +228,26 @@ fn without_ravedude_avrdude_does_it() {
 }
 
 #[test]
+fn the_advice_comes_after_each_of_avrdude_s_words_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let avrdude = folder.path().join("avrdude");
+    let script = "#!/bin/sh\nfor n in 1 2 3 4 5 6 7 8 9 10; do\n\
+                  echo \"avrdude: stk500_getsync() attempt $n of 10: not in sync: resp=0x0$n\" >&2\ndone\nexit 1\n";
+    fs::write(&avrdude, script).unwrap();
+    fs::set_permissions(&avrdude, fs::Permissions::from_mode(0o755)).unwrap();
+    let pty = Pty::open().unwrap();
+    let elf = elf_of(folder.path(), 100);
+    let output =
+        weeder().args(["flash", "--elf"]).arg(&elf).arg("--port").arg(pty.path()).env("PATH", folder.path()).output();
+    let output = output.unwrap();
+    assert_refused(&output, "or try with --old-bootloader");
+    assert_eq!(String::from_utf8_lossy(&output.stderr).matches("not in sync").count(), 1);
+}
+
+#[test]
 fn bootloaders_that_are_none_are_refused() {
     let virtual_uno = |file: &Path| weeder().args(["virtual-uno", "--bootloader"]).arg(file).output().unwrap();
-    assert_refused(&virtual_uno(Path::new("no-such.hex")), "no-such.hex: No such file");
+    assert_refused(&virtual_uno(Path::new("no-such.hex")), "no-such.hex cannot be read: No such file");
     let optiboot = Path::new(BOOTLOADERS).join("optiboot/optiboot_atmega328.hex");
     // Debian's is longer than its boot section.
     assert_refused(&virtual_uno(&optiboot), "it fills flash from 0x7e00 to 0x8014");

@@ -68,11 +68,60 @@ fn settings_are_pulled_changed_compared_and_pushed() {
     assert_eq!(pushed, "Set: wheel_mm\nAll settings are saved\n");
     let again = printed(&weeder(&["settings", "push", name, "--json"], uno.path(), ""), 0);
     let again: serde_json::Value = serde_json::from_str(&again).expect("it is JSON");
-    assert_eq!(again, serde_json::json!({ "set": [], "saved": false }));
+    assert_eq!(again, serde_json::json!({ "set": [], "saved": true }));
     // Each of these opened the port anew, which is a reset: what was saved is still there.
     printed(&weeder(&["settings", "diff", name], uno.path(), ""), 0);
     let json = printed(&weeder(&["settings", "pull", "--json"], uno.path(), ""), 0);
     assert!(json.contains("\"wheel_mm\": 405") && json.contains("\"end_switch\": false"), "{json}");
+}
+
+#[test]
+fn what_is_pushed_is_kept_over_a_reset_unless_it_is_not_to_be() {
+    let uno = uno();
+    let folder = tempfile::tempdir().expect("there is room for a file");
+    let file = folder.path().join("machine.toml");
+    let name = file.to_str().expect("it is text");
+    let push = |text: &str, words: &[&str]| {
+        fs::write(&file, text).expect("it can be written");
+        printed(&weeder(&[&["settings", "push", name], words].concat(), uno.path(), ""), 0)
+    };
+    printed(&weeder(&["monitor", "--plain"], uno.path(), "clear\n"), 0);
+    assert_eq!(push("wheel_mm = 405\n", &[]), "Set: wheel_mm\nAll settings are saved\n");
+    // Opening the port is a reset.
+    printed(&weeder(&["settings", "diff", name], uno.path(), ""), 0);
+    let not_saved = push("wheel_mm = 410\n", &["--no-save"]);
+    assert!(
+        not_saved.ends_with("Not saved: the next reset takes them back, and on most Unos opening the port is one\n")
+    );
+    printed(&weeder(&["settings", "diff", name], uno.path(), ""), 1);
+}
+
+#[test]
+fn an_empty_file_has_no_settings_to_compare_or_to_push() {
+    let file = tempfile::NamedTempFile::new().expect("there is room for a file");
+    for action in ["diff", "push"] {
+        let words = ["settings", action, file.path().to_str().expect("it is text")];
+        let error = printed(&weeder(&words, Path::new("/dev/no-such-port"), ""), 2);
+        assert!(error.contains("names no setting: `weeder settings pull` writes them all"), "{error}");
+    }
+}
+
+#[test]
+fn a_second_virtual_uno_leaves_the_link_of_a_living_one_alone() {
+    let folder = tempfile::tempdir().expect("there is room for a link");
+    let link = folder.path().join("uno");
+    let words = ["virtual-uno", "--stand", "--bootloader", "optiboot", "--link"];
+    let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
+    let mut first = command.args(words).arg(&link).stdout(Stdio::piped()).spawn().expect("cargo has built the command");
+    let mut line = String::new();
+    BufReader::new(first.stdout.take().expect("it is piped")).read_line(&mut line).expect("it says where it is");
+    let leads_to = fs::read_link(&link).expect("it is a link");
+    let second = Command::new(env!("CARGO_BIN_EXE_weeder")).args(words).arg(&link).output().expect("it ends");
+    let error = printed(&second, 2);
+    assert!(error.contains(&format!("which process {} (weeder) has", first.id())), "{error}");
+    assert_eq!(fs::read_link(&link).expect("it is a link"), leads_to);
+    first.kill().expect("it runs");
+    first.wait().expect("it ends");
 }
 
 #[test]
@@ -181,5 +230,23 @@ fn a_recording_survives_an_uno_that_is_unplugged_and_ends_by_ctrl_c() {
     let id = weeder.id().to_string();
     Command::new("kill").args(["-INT", &id]).status().expect("there is a kill");
     assert_eq!(weeder.wait().expect("it ends").code(), Some(0));
-    assert!(fs::read_to_string(&log).expect("it is there").ends_with('\n'));
+    let text = fs::read_to_string(&log).expect("it is there");
+    assert!(text.ends_with('\n'));
+    // Gone on with, it counts what was added and what is there.
+    let words = ["record", "--out", log.to_str().expect("it is text")];
+    let mut weeder = Command::new(env!("CARGO_BIN_EXE_weeder"))
+        .args(words)
+        .arg("--port")
+        .arg(&port)
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("cargo has built the command");
+    wait_for(",connected,", 3);
+    Command::new("kill").args(["-INT", &weeder.id().to_string()]).status().expect("there is a kill");
+    let mut told = String::new();
+    std::io::Read::read_to_string(&mut weeder.stderr.take().expect("it is piped"), &mut told).expect("it is text");
+    weeder.wait().expect("it ends");
+    let (all, before) = (fs::read_to_string(&log).expect("it is there").lines().count() - 1, text.lines().count() - 1);
+    let counted = format!("{} lines were added: {} has {all} now", all - before, log.display());
+    assert!(told.contains(&counted), "{told}");
 }

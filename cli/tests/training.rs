@@ -94,8 +94,7 @@ fn objects_without_labels_are_classified_without_a_score() {
 #[test]
 fn a_table_larger_than_the_flash_budget_is_refused_by_name() {
     let above = MOST_EXAMPLES + 1;
-    let room =
-        format!("too many examples for the flash budget: --max is {above} and there is room for {MOST_EXAMPLES}");
+    let room = format!("it has to be a whole number from 0 to {MOST_EXAMPLES}");
     assert_refused("", &["train", "--synthetic", "--max", &above.to_string()], &room);
     assert_refused("", &["train", "--synthetic", "--max", "9"], "too many examples for the flash budget");
 }
@@ -131,7 +130,7 @@ fn a_table_that_teaches_nothing_is_refused_with_file_and_line() {
 #[test]
 fn a_k_that_cannot_vote_is_refused() {
     assert_refused("", &["train", "--synthetic", "--k", "16"], "it has to be auto or a number from 1 to 15");
-    assert_refused("", &["classify", "objects.csv", "--k", "0"], "0 is not in 1..=15");
+    assert_refused("", &["classify", "objects.csv", "--k", "0"], "it has to be a whole number from 1 to 15");
 }
 
 #[test]

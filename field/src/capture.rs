@@ -6,7 +6,7 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{BufRead, BufReader};
+use std::io::{self, BufRead, BufReader, ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
 use vcd::{Command, IdCode, Parser, Scope, ScopeItem, TimescaleUnit, Value, Var};
@@ -97,6 +97,14 @@ pub enum CaptureError {
         /// Where.
         line: u64,
     },
+    /// The recording goes on for too long.
+    #[error("{path} goes on beyond {MOST_HOURS} h at line {line}: cut the recording, or look at its $timescale")]
+    TooLong {
+        /// The file.
+        path: PathBuf,
+        /// Where.
+        line: u64,
+    },
     /// The channel has no level at all.
     #[error("{path} holds no samples of channel `{name}`")]
     NoSamples {
@@ -106,6 +114,15 @@ pub enum CaptureError {
         name: String,
     },
 }
+
+/// Longest recording, in hours. Nobody waits for the firmware to play a longer one.
+const MOST_HOURS: u64 = 24;
+
+/// Most scopes within each other. An analyser makes one or two, and each takes of the reader's stack.
+const MOST_SCOPES: usize = 50;
+
+/// Longest head of a file, in which its channels are declared.
+const MOST_HEAD_BYTES: u64 = 1 << 20;
 
 /// A recording, as levels on the Uno's pins.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -135,7 +152,9 @@ impl Capture {
 
     fn parse(path: &Path, file: impl BufRead, channels: &Channels) -> Result<Capture, CaptureError> {
         let read_error = |source| CaptureError::Read { path: path.into(), source };
-        let mut parser = Parser::new(file);
+        let mut file = file;
+        let head = head(&mut file).map_err(read_error)?;
+        let mut parser = Parser::new(head.chain(file));
         let header = parser.parse_header().map_err(read_error)?;
         let timescale = header.timescale.ok_or_else(|| CaptureError::NoTimescale { path: path.into() })?;
 
@@ -175,6 +194,9 @@ impl Capture {
                     };
                     if channel.level.replace(high) != Some(high) {
                         let cycle = to_cycles(time, timescale);
+                        if cycle > MOST_HOURS * 3600 * CYCLES_PER_SECOND {
+                            return Err(CaptureError::TooLong { path: path.into(), line: parser.line() });
+                        }
                         changes.push(PinChange { cycle, pin: channel.pin, high });
                     }
                 }
@@ -191,6 +213,37 @@ impl Capture {
     pub fn starting_at(&self, cycle: u64) -> impl Iterator<Item = PinChange> {
         let first = self.changes.first().map_or(0, |change| change.cycle);
         self.changes.iter().map(move |change| PinChange { cycle: change.cycle - first + cycle, ..*change })
+    }
+}
+
+/// The file's head, up to where its channels are declared.
+fn head(file: &mut impl BufRead) -> io::Result<io::Cursor<Vec<u8>>> {
+    let wrong = |problem: String| Err(io::Error::new(ErrorKind::InvalidData, problem));
+    let (mut head, mut scopes) = (Vec::new(), 0_usize);
+    let mut rest = file.take(MOST_HEAD_BYTES);
+    loop {
+        let start = head.len();
+        if rest.read_until(b'\n', &mut head)? == 0 {
+            break;
+        }
+        let words = head[start..].split(u8::is_ascii_whitespace);
+        for word in words {
+            match word {
+                b"$scope" => scopes += 1,
+                b"$upscope" => scopes = scopes.saturating_sub(1),
+                b"$enddefinitions" => return Ok(io::Cursor::new(head)),
+                _ => {}
+            }
+            if scopes > MOST_SCOPES {
+                return wrong(format!("more than {MOST_SCOPES} scopes stand within each other"));
+            }
+        }
+    }
+    // What is shorter is for the reader to judge.
+    if rest.limit() == 0 {
+        wrong("no $enddefinitions stands in its first MiB".to_owned())
+    } else {
+        Ok(io::Cursor::new(head))
     }
 }
 
@@ -306,6 +359,17 @@ mod tests {
         assert!(error(&recording("1 us", "").replace("$timescale 1 us $end", "")).contains("no $timescale"));
         assert!(error("").contains("row.vcd could not be read"));
         assert!(error("position_mm,width_mm,kind\n").contains("row.vcd could not be read"));
+    }
+
+    #[test]
+    fn a_recording_that_would_never_end_or_is_nested_without_end_is_refused() {
+        let endless = parse(&recording("1 s", "#0 0! 0\"\n#18446744073709551615 1!"), &CHANNELS).unwrap_err();
+        assert!(endless.contains("row.vcd goes on beyond 24 h at line 9"), "{endless}");
+        let nested = "$timescale 1 us $end\n".to_owned() + &"$scope module a $end\n".repeat(100_000);
+        let error = Capture::parse(Path::new("row.vcd"), nested.as_bytes(), &CHANNELS).unwrap_err();
+        assert!(std::error::Error::source(&error).unwrap().to_string().contains("more than 50 scopes"), "{error}");
+        let error = Capture::parse(Path::new("row.vcd"), vec![b' '; 2 << 20].as_slice(), &CHANNELS).unwrap_err();
+        assert!(std::error::Error::source(&error).unwrap().to_string().contains("no $enddefinitions"), "{error}");
     }
 
     #[test]

@@ -157,12 +157,14 @@ pub enum ConditionsError {
         source: io::Error,
     },
     /// The file is no TOML, or has keys or kinds of values that are not known.
-    #[error("{}: {problem}", path.display())]
+    #[error("{}, line {line}: {problem}", path.display())]
     NotUnderstood {
         /// The file.
         path: PathBuf,
-        /// What the TOML reader says, with line and column.
-        problem: toml::de::Error,
+        /// The line, from 1.
+        line: usize,
+        /// What is wrong, and what would be right where that is known.
+        problem: String,
     },
     /// A value in a file is out of its range.
     #[error("{}, line {line}: {problem}", path.display())]
@@ -247,7 +249,11 @@ impl Conditions {
     }
 
     fn parse(path: &Path, text: &str) -> Result<Self, ConditionsError> {
-        let not_understood = |problem| ConditionsError::NotUnderstood { path: path.to_owned(), problem };
+        let not_understood = |error: toml::de::Error| ConditionsError::NotUnderstood {
+            path: path.to_owned(),
+            line: line_at(text, error.span().map_or(0, |span| span.start)),
+            problem: explain(text, &error),
+        };
         let conditions: Self = toml::from_str(text).map_err(not_understood)?;
         conditions.check().map_err(|problem| match line(text, problem.name()) {
             Some(line) => ConditionsError::AtLine { path: path.to_owned(), line, problem },
@@ -295,9 +301,9 @@ impl Conditions {
         let why = if sweeps_a_side == 0 {
             return Ok(());
         } else if from_mm < zone_mm {
-            format!("the zone round a stem reaches {zone_mm} mm from the row's line")
+            format!("the zone round a stem reaches {zone_mm:.1} mm from the row's line")
         } else if to_mm > next_mm {
-            format!("the sweeps then reach {to_mm} mm, and the next row's plants begin at {next_mm} mm")
+            format!("the sweeps then reach {to_mm:.1} mm, and the next row's plants begin at {next_mm:.1} mm")
         } else {
             return Ok(());
         };
@@ -384,7 +390,40 @@ fn line(text: &str, name: &str) -> Option<usize> {
     let (table, key) = name.split_once('.')?;
     let root = DeTable::parse(text).ok()?;
     let (key, _) = root.get_ref().get(table)?.get_ref().as_table()?.get_key_value(key)?;
-    Some(text[..key.span().start].matches('\n').count() + 1)
+    Some(line_at(text, key.span().start))
+}
+
+/// The line, from 1, in which this byte stands.
+fn line_at(text: &str, byte: usize) -> usize {
+    text.bytes().take(byte).filter(|&byte| byte == b'\n').count() + 1
+}
+
+/// What the TOML reader found wrong, in a line; where it is the value of a parameter or setting, what that has to be.
+fn explain(text: &str, error: &toml::de::Error) -> String {
+    let at = error.span().map_or(0, |span| span.start);
+    let root = DeTable::parse(text).ok();
+    let entries = root.iter().flat_map(|root| root.get_ref()).flat_map(|(table, entries)| {
+        let entries = entries.get_ref().as_table().into_iter().flatten();
+        entries.map(|(key, value)| (table.get_ref().as_ref(), key.get_ref().as_ref(), value.span()))
+    });
+    let wrong = entries.into_iter().find_map(|(table, key, value): (&str, &str, _)| {
+        let is_here = value.contains(&at);
+        let (least, greatest, meaning) = range(table, key).filter(|_| is_here)?;
+        let written = &text[value];
+        Some(format!("{table}.{key} is {written}, but has to be a number from {least} to {greatest}: {meaning}"))
+    });
+    wrong.unwrap_or_else(|| error.message().trim().replace('\n', ", "))
+}
+
+/// The range of a parameter or setting, and what it is.
+fn range(table: &str, key: &str) -> Option<(f64, f64, String)> {
+    if table == "settings" {
+        let setting = Setting::find(key.as_bytes())?;
+        let range = setting.description();
+        return Some((range.least.into(), range.greatest.into(), crate::link::settings::help(setting)));
+    }
+    let parameter = PARAMETERS.iter().find(|known| known.name.split_once('.') == Some((table, key)))?;
+    Some((parameter.least, parameter.greatest, parameter.meaning.to_owned()))
 }
 
 #[cfg(test)]

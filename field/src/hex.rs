@@ -5,6 +5,7 @@
 //! Nothing here runs one: [`crate::uno`] does.
 
 use crate::firmware::{FLASH_BYTES, Image, ImageError};
+use crate::whole_file;
 use ihex::{Reader, ReaderError, Record};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -27,10 +28,12 @@ const LINE_BYTES: usize = 16;
 #[derive(Debug, Error)]
 pub enum HexError {
     /// The file could not be read or written.
-    #[error("{path}: {source}")]
+    #[error("{path} cannot be {done}")]
     File {
         /// The file.
         path: PathBuf,
+        /// `read` or `written`.
+        done: &'static str,
         /// The operating system's answer.
         source: io::Error,
     },
@@ -87,7 +90,11 @@ impl Bootloader {
     /// # Errors
     /// Where it cannot be read, is not Intel HEX, or does not lie in the chip's boot section.
     pub fn read(path: &Path) -> Result<Bootloader, HexError> {
-        let text = std::fs::read_to_string(path).map_err(|source| HexError::File { path: path.into(), source })?;
+        let text = std::fs::read_to_string(path).map_err(|source| HexError::File {
+            path: path.into(),
+            done: "read",
+            source,
+        })?;
         let pieces = pieces(&text).map_err(|reason| HexError::NotHex { path: path.into(), reason })?;
         let start = pieces.iter().map(|(address, _)| *address).min();
         let start = start.ok_or_else(|| HexError::Empty(path.into()))?;
@@ -160,13 +167,26 @@ pub fn check_room(bytes: usize, available: usize) -> Result<(), HexError> {
 /// # Panics
 /// Where `flash` is longer than the ATmega328P's.
 pub fn write(path: &Path, flash: &[u8]) -> Result<(), HexError> {
+    let text = text(flash);
+    whole_file::write(path, |to| to.write_all(text.as_bytes())).map_err(|source| HexError::File {
+        path: path.into(),
+        done: "written",
+        source,
+    })
+}
+
+/// What goes into flash from address 0 on as Intel HEX.
+///
+/// # Panics
+/// Where `flash` is longer than the ATmega328P's.
+pub fn text(flash: &[u8]) -> String {
     assert!(flash.len() <= FLASH_BYTES, "the ATmega328P holds {FLASH_BYTES} bytes");
     let lines = flash.chunks(LINE_BYTES).zip((0..).step_by(LINE_BYTES));
     let mut records: Vec<Record> =
         lines.map(|(bytes, offset)| Record::Data { offset, value: bytes.to_vec() }).collect();
     records.push(Record::EndOfFile);
     let text = ihex::create_object_file_representation(&records).expect("short lines and one end make a file");
-    std::fs::write(path, text + "\n").map_err(|source| HexError::File { path: path.into(), source })
+    text + "\n"
 }
 
 /// The file's stretches of data, each with its address.
@@ -248,7 +268,7 @@ mod tests {
         let error = Bootloader::read(path.path()).unwrap_err().to_string();
         assert!(error.contains("is no Intel HEX file"), "{error}");
         let error = Bootloader::read(Path::new("no-such.hex")).unwrap_err().to_string();
-        assert!(error.starts_with("no-such.hex: "), "{error}");
+        assert!(error.starts_with("no-such.hex cannot be read"), "{error}");
     }
 
     #[test]

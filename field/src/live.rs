@@ -74,7 +74,7 @@ pub enum LiveError {
     #[error(transparent)]
     Pty(#[from] PtyError),
     /// The EEPROM's file cannot be read or written.
-    #[error("the EEPROM's file {path}: {source}")]
+    #[error("the EEPROM's file {path} cannot be read or written")]
     Eeprom {
         /// The file.
         path: PathBuf,

@@ -109,6 +109,15 @@ impl Planting {
         Ok(Row::new(things)?)
     }
 
+    /// As [`Planting::grow`], with as many of the weeds as there is room for.
+    ///
+    /// # Errors
+    /// Where the plants do not fit.
+    pub fn grow_with_room(&self, seed: u64) -> Result<Row, PlantingError> {
+        let fewest = Self { weeds: 0, ..*self }.grow(seed);
+        (1..=self.weeds).rev().find_map(|weeds| Self { weeds, ..*self }.grow(seed).ok()).map_or(fewest, Ok)
+    }
+
     /// Spreads the weeds over the gaps between neighbouring plants, a second one to a gap only when each has one.
     fn weeds_between(&self, plants: &[Thing], rng: &mut impl Rng) -> Result<Vec<Thing>, PlantingError> {
         let mut gaps: Vec<Range<f64>> =

@@ -29,10 +29,10 @@ const TERMINALS: &str = "/dev/pts";
 #[derive(Debug, Error)]
 pub enum PtyError {
     /// The system has none to give.
-    #[error("no pseudo terminal can be opened ({0}): is /dev/pts mounted?")]
-    Open(io::Error),
+    #[error("no pseudo terminal can be opened: is /dev/pts mounted?")]
+    Open(#[source] io::Error),
     /// It stopped working.
-    #[error("the pseudo terminal {path} has failed: {source}")]
+    #[error("the pseudo terminal {path} has failed")]
     Failed {
         /// Its path.
         path: PathBuf,
@@ -42,8 +42,21 @@ pub enum PtyError {
     /// Something else is where the link should be.
     #[error("{0} exists already and is no link to a pseudo terminal: name another --link, or remove it")]
     LinkExists(PathBuf),
+    /// The link leads to a pseudo terminal that somebody uses.
+    #[error(
+        "{} leads to {}, which {holder} has: end it, or name another --link; if it is none of your virtual Unos, remove the link",
+        path.display(), target.display()
+    )]
+    LinkInUse {
+        /// The link.
+        path: PathBuf,
+        /// Where it leads.
+        target: PathBuf,
+        /// Which process has the device's side of it.
+        holder: String,
+    },
     /// The link cannot be made.
-    #[error("{path} cannot be made a link to the pseudo terminal: {source}")]
+    #[error("{path} cannot be made a link to the pseudo terminal")]
     Link {
         /// Where the link should be.
         path: PathBuf,
@@ -99,12 +112,18 @@ impl Pty {
     }
 
     /// Makes a symbolic link to it, which is removed again at the end. A link to another pseudo terminal, which a process that was
-    /// killed has left over, is replaced.
+    /// killed has left over, is replaced, unless somebody has that terminal now.
     ///
     /// # Errors
-    /// Where something else is there, or the folder cannot be written to.
+    /// Where something else is there, somebody uses it, or the folder cannot be written to.
     pub fn link(&mut self, path: &Path) -> Result<(), PtyError> {
-        let is_left_over = std::fs::read_link(path).is_ok_and(|target| target.starts_with(TERMINALS));
+        let target = std::fs::read_link(path).ok().filter(|target| target.starts_with(TERMINALS));
+        // What was left over may lead to this very one: the system gives the numbers away again.
+        if let Some(target) = target.as_ref().filter(|&target| *target != self.path && target.exists()) {
+            let holder = holder(target);
+            return Err(PtyError::LinkInUse { path: path.into(), target: target.clone(), holder });
+        }
+        let is_left_over = target.is_some();
         let linked = match is_left_over {
             true => std::fs::remove_file(path).and_then(|()| symlink(&self.path, path)),
             false => symlink(&self.path, path),
@@ -177,6 +196,28 @@ impl Pty {
     fn failed(&self, source: io::Error) -> PtyError {
         PtyError::Failed { path: self.path.clone(), source }
     }
+}
+
+/// The process that has the device's side of a pseudo terminal, in words.
+fn holder(terminal: &Path) -> String {
+    let number = terminal.file_name().unwrap_or_default().to_string_lossy();
+    // As the system tells of each open file; processes of others keep theirs to themselves.
+    let index = format!("tty-index:\t{number}\n");
+    let has_it = |process: &PathBuf| {
+        let files = std::fs::read_dir(process.join("fdinfo")).into_iter().flatten().flatten();
+        files.into_iter().any(|file| std::fs::read_to_string(file.path()).is_ok_and(|text| text.contains(&index)))
+    };
+    let processes = std::fs::read_dir("/proc").into_iter().flatten().flatten().map(|entry| entry.path());
+    let is_process = |path: &PathBuf| {
+        path.file_name()
+            .and_then(|name| name.to_str())
+            .is_some_and(|name| name.bytes().all(|byte| byte.is_ascii_digit()))
+    };
+    processes.filter(is_process).find(has_it).map_or("another process".to_owned(), |process| {
+        let name = std::fs::read_to_string(process.join("comm")).unwrap_or_default();
+        let id = process.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        format!("process {id} ({})", name.trim())
+    })
 }
 
 impl Drop for Pty {
@@ -257,6 +298,23 @@ mod tests {
         assert!(std::fs::canonicalize(&path).unwrap().starts_with("/dev/pts"));
         drop(pty);
         assert!(!path.is_symlink());
+    }
+
+    #[test]
+    fn a_link_to_a_living_one_is_left_to_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("uno");
+        let mut first = Pty::open().unwrap();
+        first.link(&path).unwrap();
+        let error = Pty::open().unwrap().link(&path).unwrap_err().to_string();
+        let holder = format!("which process {} (", std::process::id());
+        assert!(error.contains(&holder), "{error}");
+        assert_eq!(std::fs::read_link(&path).unwrap(), first.path);
+        // What it has left over may lead to the next one itself.
+        let mut next = Pty::open().unwrap();
+        std::fs::remove_file(&path).unwrap();
+        symlink(&next.path, &path).unwrap();
+        next.link(&path).unwrap();
     }
 
     #[test]

@@ -8,7 +8,7 @@ use crate::machine::Machine;
 use crate::motion::Motion;
 use crate::row::Row;
 use crate::trial::{Outcome, Trial};
-use crate::verdict::{PlantOutcome, Verdict};
+use crate::verdict::{PlantOutcome, Verdict, WeedOutcome};
 use comfy_table::{Attribute, Cell, CellAlignment, Color, Table, presets};
 use serde::Serialize;
 use std::fmt::{Display, Write};
@@ -107,7 +107,7 @@ pub fn totals(trial: &Trial, outcome: &Outcome) -> String {
     line(
         "Row weeded",
         format!(
-            "{:.1} % of the row's {:.2} m; {:.1} % is the most this servo allows here",
+            "{:.1} % of the row's {:.2} m; with every canopy and its margin kept, this servo allows {:.1} % at most",
             judgement.weeded_share * 100.0,
             (span.end - span.start) / 1000.0,
             judgement.weedable_share * 100.0,
@@ -184,9 +184,9 @@ pub(crate) fn counted(number: impl Display, thing: &str) -> String {
     format!("{number} {thing}{plural}")
 }
 
-/// A line of the plants' CSV table.
-#[derive(Serialize)]
-struct PlantRecord {
+/// What happened to a plant, as a line of a table.
+#[derive(Debug, Serialize)]
+pub struct PlantRecord {
     position_mm: f64,
     width_mm: f64,
     clear_from_mm: Option<f64>,
@@ -199,55 +199,65 @@ struct PlantRecord {
     verdict: &'static str,
 }
 
-/// A line of the weeds' CSV table.
-#[derive(Serialize)]
-struct WeedRecord {
+/// What happened to a tall weed, as a line of a table.
+#[derive(Debug, Serialize)]
+pub struct WeedRecord {
     position_mm: f64,
     width_mm: f64,
     cut: bool,
 }
 
-/// Writes a CSV table with a line per plant. An empty field is what [`PlantOutcome`] calls `None`.
+/// A line per plant. An empty field is what [`PlantOutcome`] calls `None`.
+pub fn plants(outcome: &Outcome) -> Vec<PlantRecord> {
+    let record = |plant: &PlantOutcome| PlantRecord {
+        position_mm: plant.plant.position_mm,
+        width_mm: plant.plant.width_mm,
+        clear_from_mm: plant.clear_mm(),
+        clear_to_mm: plant.back_mm(),
+        clearance_before_mm: plant.clearance_before_mm,
+        clearance_behind_mm: plant.clearance_behind_mm,
+        out_error_ticks: plant.out_error_ticks,
+        in_error_ticks: plant.in_error_ticks,
+        swings: plant.swings,
+        verdict: match plant.verdict {
+            Verdict::Kept => "kept",
+            Verdict::MarginCut => "margin_cut",
+            Verdict::Damaged => "damaged",
+        },
+    };
+    outcome.judgement.plants.iter().map(record).collect()
+}
+
+/// A line per tall weed.
+pub fn weeds(outcome: &Outcome) -> Vec<WeedRecord> {
+    let weeds = outcome.judgement.weeds.iter();
+    let record = |weed: &WeedOutcome| WeedRecord {
+        position_mm: weed.weed.position_mm,
+        width_mm: weed.weed.width_mm,
+        cut: weed.cut,
+    };
+    weeds.map(record).collect()
+}
+
+/// Writes [`plants`] as a CSV table.
 ///
 /// # Errors
 /// Those of the writer.
 pub fn write_plants_csv(outcome: &Outcome, to: impl io::Write) -> Result<(), csv::Error> {
-    let mut writer = csv::Writer::from_writer(to);
-    for plant in &outcome.judgement.plants {
-        writer.serialize(PlantRecord {
-            position_mm: plant.plant.position_mm,
-            width_mm: plant.plant.width_mm,
-            clear_from_mm: plant.clear_mm(),
-            clear_to_mm: plant.back_mm(),
-            clearance_before_mm: plant.clearance_before_mm,
-            clearance_behind_mm: plant.clearance_behind_mm,
-            out_error_ticks: plant.out_error_ticks,
-            in_error_ticks: plant.in_error_ticks,
-            swings: plant.swings,
-            verdict: match plant.verdict {
-                Verdict::Kept => "kept",
-                Verdict::MarginCut => "margin_cut",
-                Verdict::Damaged => "damaged",
-            },
-        })?;
-    }
-    writer.flush()?;
-    Ok(())
+    write_csv(&plants(outcome), to)
 }
 
-/// Writes a CSV table with a line per tall weed.
+/// Writes [`weeds`] as a CSV table.
 ///
 /// # Errors
 /// Those of the writer.
 pub fn write_weeds_csv(outcome: &Outcome, to: impl io::Write) -> Result<(), csv::Error> {
+    write_csv(&weeds(outcome), to)
+}
+
+fn write_csv(records: &[impl Serialize], to: impl io::Write) -> Result<(), csv::Error> {
     let mut writer = csv::Writer::from_writer(to);
-    for weed in &outcome.judgement.weeds {
-        writer.serialize(WeedRecord {
-            position_mm: weed.weed.position_mm,
-            width_mm: weed.weed.width_mm,
-            cut: weed.cut,
-        })?;
-    }
+    records.iter().try_for_each(|record| writer.serialize(record))?;
     writer.flush()?;
     Ok(())
 }

@@ -23,6 +23,12 @@ pub use crate::csv_table::TableError;
 /// Widest thing that a row takes. Wider than any crop plant that is weeded between.
 pub const MAX_WIDTH_MM: f64 = 1000.0;
 
+/// Farthest from the origin that a thing stands, 10 km: farther than any row goes.
+pub const MAX_POSITION_MM: f64 = 1e7;
+
+/// Longest row, 6 km. What simulates one keeps every edge of the encoder on the way.
+pub const MAX_LENGTH_MM: f64 = 6e6;
+
 /// What a thing in the row is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -91,13 +97,20 @@ impl Thing {
     }
 
     fn check(&self) -> Result<(), Problem> {
-        if !self.position_mm.is_finite() {
+        // A position that is no number is in no range.
+        if !(-MAX_POSITION_MM..=MAX_POSITION_MM).contains(&self.position_mm) {
             return Err(Problem::Position(self.position_mm));
         }
         if !(self.width_mm > 0.0 && self.width_mm <= MAX_WIDTH_MM) {
             return Err(Problem::Width(self.width_mm));
         }
         Ok(())
+    }
+
+    /// Whether a row that begins with `first` is still one if it goes up to this.
+    fn check_length(&self, first: &Thing) -> Result<(), Problem> {
+        let length_mm = self.position_mm - first.position_mm;
+        if length_mm <= MAX_LENGTH_MM { Ok(()) } else { Err(Problem::Length(length_mm)) }
     }
 
     /// Whether it comes after `before`, and stands apart from it.
@@ -118,8 +131,8 @@ impl Thing {
 /// What is wrong with a thing or a row, and what would be right.
 #[derive(Debug, Error, PartialEq)]
 pub enum Problem {
-    /// The place is not a number.
-    #[error("position_mm is {0}: it has to be a number of millimetres along the row")]
+    /// The place is not a number, or farther off than rows go.
+    #[error("position_mm is {0}: it has to be from -{MAX_POSITION_MM} to {MAX_POSITION_MM}, millimetres along the row")]
     Position(f64),
     /// The width is none.
     #[error("width_mm is {0}: it has to be above 0 and at most {MAX_WIDTH_MM} mm")]
@@ -139,6 +152,9 @@ pub enum Problem {
         /// The earlier thing's place.
         other_mm: f64,
     },
+    /// The row is too long.
+    #[error("the row is {} m long: it has to be at most {} m", (.0 / 1000.0).ceil(), MAX_LENGTH_MM / 1000.0)]
+    Length(f64),
     /// The row is empty.
     #[error("nothing stands in the row: it has to have at least one plant or weed")]
     Empty,
@@ -176,6 +192,7 @@ impl Row {
         things.iter().try_for_each(Thing::check)?;
         things.sort_by(|a, b| a.position_mm.total_cmp(&b.position_mm));
         things.windows(2).try_for_each(|pair| pair[1].check_after(&pair[0]))?;
+        things.iter().try_for_each(|thing| thing.check_length(&things[0]))?;
         Ok(Self { things, dust_mm: Vec::new(), ground_mm: None })
     }
 
@@ -260,7 +277,8 @@ impl Row {
         lines.sort_by(|(_, a), (_, b)| a.position_mm.total_cmp(&b.position_mm));
         for pair in lines.windows(2) {
             let (line, thing) = &pair[1];
-            thing.check_after(&pair[0].1).map_err(|problem| line.error(problem.to_string()))?;
+            let checked = thing.check_after(&pair[0].1).and_then(|()| thing.check_length(&lines[0].1));
+            checked.map_err(|problem| line.error(problem.to_string()))?;
         }
         Ok(Self { things: lines.into_iter().map(|(_, thing)| thing).collect(), dust_mm: Vec::new(), ground_mm: None })
     }
@@ -326,6 +344,12 @@ mod tests {
             ("250,150,crop\n", "row.csv, line 2: kind is `crop`: it has to be plant or weed"),
             ("250,150\n", "row.csv, line 2: fields: 2, where the header has 3"),
             ("NaN,150,plant\n", "row.csv, line 2: position_mm is NaN"),
+            ("250,150,plant\n4294967296,150,plant\n", "row.csv, line 3: position_mm is 4294967296: it has to be from"),
+            ("18446744073709551616,150,plant\n", "row.csv, line 2: position_mm is 18446744073709552000: it has to be"),
+            (
+                "-9e6,150,plant\n9e6,150,plant\n",
+                "row.csv, line 3: the row is 18000 m long: it has to be at most 6000 m",
+            ),
             (
                 "750,150,plant\n250,150,plant\n700,20,weed\n",
                 "row.csv, line 2: the plant at 750 mm and the weed at 700 mm overlap",

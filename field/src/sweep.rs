@@ -11,6 +11,12 @@ use std::str::FromStr;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use thiserror::Error;
 
+/// Forward speeds that are tried, least and greatest, in km/h.
+pub const SPEEDS_KM_H: (f64, f64) = (0.1, 8.0);
+
+/// Plant spacings that are tried, least and greatest, in cm.
+pub const SPACINGS_CM: (f64, f64) = (5.0, 500.0);
+
 /// Most values of an axis.
 const MOST_VALUES: usize = 1000;
 
@@ -66,7 +72,7 @@ pub struct Results {
     pub weeding_efficiency_percent: f64,
     /// Ground of the row that was weeded, %.
     pub in_row_weeding_percent: f64,
-    /// The most of it that the servo allows, %.
+    /// The most of it that the servo allows with every canopy and its margin kept, %.
     pub in_row_bound_percent: f64,
     /// Field efficiency, % (Eq. 24).
     pub field_efficiency_percent: f64,
@@ -151,6 +157,9 @@ pub enum SweepError {
     /// An axis has a value that cannot be.
     #[error(transparent)]
     Value(#[from] WrongValue),
+    /// Both axes have the same parameter.
+    #[error("both axes are `{0}`: the second one needs a parameter of its own")]
+    Twice(String),
     /// Speed or spacing are none that a machine works at.
     #[error("{name} is {value}, but has to be {least} to {greatest} {unit}")]
     Treatment {
@@ -181,6 +190,9 @@ impl Sweep {
     /// # Errors
     /// Before anything is weeded where an axis has a value that cannot be; else the first that a plot meets.
     pub fn run(&self, progress: impl Fn(f64) + Sync) -> Result<Vec<Point>, SweepError> {
+        if let Some(y) = self.y.as_ref().filter(|y| y.parameter == self.x.parameter) {
+            return Err(SweepError::Twice(y.parameter.clone()));
+        }
         let ys: Vec<Option<f64>> =
             self.y.as_ref().map_or(vec![None], |y| y.values.iter().map(|&value| Some(value)).collect());
         let places = ys.iter().flat_map(|&y| self.x.values.iter().map(move |&x| (x, y)));
@@ -223,10 +235,10 @@ impl Sweep {
             }
         }
         let treatment = [
-            ("speed", experiment.speeds_km_h[0], 0.1, 8.0, "km/h"),
-            ("spacing", experiment.spacings_cm[0], 5.0, 500.0, "cm"),
+            ("speed", experiment.speeds_km_h[0], SPEEDS_KM_H, "km/h"),
+            ("spacing", experiment.spacings_cm[0], SPACINGS_CM, "cm"),
         ];
-        for (name, value, least, greatest, unit) in treatment {
+        for (name, value, (least, greatest), unit) in treatment {
             if !(least..=greatest).contains(&value) {
                 return Err(SweepError::Treatment { name, value, least, greatest, unit });
             }
@@ -282,6 +294,12 @@ mod tests {
         };
         assert!(damage(0.0, 4.0) > 20.0, "{points:?}");
         assert_eq!((damage(0.0, 1.0), damage(180.0, 4.0)), (0.0, 0.0), "{points:?}");
+    }
+
+    #[test]
+    fn two_axes_of_one_parameter_are_refused() {
+        let error = sweep("speed=1..2:1", Some("speed=3..4:1")).run(|_| panic!("nothing is weeded")).unwrap_err();
+        assert!(error.to_string().starts_with("both axes are `speed`"), "{error}");
     }
 
     #[test]

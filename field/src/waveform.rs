@@ -3,13 +3,13 @@
 //! One file holds every pin of the wiring table by its name ([`Pin::name`]), inputs and outputs together. The file counts in
 //! 100 ps, of which a cycle of 62.5 ns is exactly 625, so that [`crate::capture`] reads back the very cycles.
 
-use std::fs::File;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use vcd::{SimulationCommand, TimescaleUnit, Writer};
 
 use crate::signal::{CYCLES_PER_SECOND, Pin, PinChange};
+use crate::whole_file;
 
 /// The file's unit of time: 100 ps.
 const UNITS: (u32, TimescaleUnit) = (100, TimescaleUnit::PS);
@@ -33,15 +33,17 @@ pub struct WaveformError {
 ///
 /// Where the file cannot be written.
 pub fn write(path: &Path, changes: impl IntoIterator<Item = PinChange>) -> Result<(), WaveformError> {
-    let mut changes: Vec<PinChange> = changes.into_iter().collect();
-    changes.sort_by_key(|change| change.cycle);
-    File::create(path)
-        .and_then(|file| write_to(BufWriter::new(file), &changes))
-        .map_err(|source| WaveformError { path: path.into(), source })
+    whole_file::write(path, |to| write_to(to, changes)).map_err(|source| WaveformError { path: path.into(), source })
 }
 
-/// Writes changes, sorted by cycle.
-fn write_to(file: impl Write, changes: &[PinChange]) -> io::Result<()> {
+/// As [`write`], to whatever takes bytes.
+///
+/// # Errors
+///
+/// Those of the writer.
+pub fn write_to(file: impl Write, changes: impl IntoIterator<Item = PinChange>) -> io::Result<()> {
+    let mut changes: Vec<PinChange> = changes.into_iter().collect();
+    changes.sort_by_key(|change| change.cycle);
     let mut writer = Writer::new(file);
     writer.timescale(UNITS.0, UNITS.1)?;
     writer.add_module("uno")?;
@@ -88,7 +90,7 @@ mod tests {
         let mut file = Vec::new();
         let pin = Pin::Servo;
         let changes = [(8, true), (24_008, false)].map(|(cycle, high)| PinChange { cycle, pin, high });
-        write_to(&mut file, &changes).unwrap();
+        write_to(&mut file, changes).unwrap();
         let file = String::from_utf8(file).unwrap();
         assert!(file.contains("$timescale 100 ps $end"), "{file}");
         for pin in Pin::ALL {

@@ -7,8 +7,11 @@ use field::link::session::{Happening, Session};
 use field::link::{Link, LinkError, Status, UnoPort};
 use field::machine::Machine;
 use field::motion::Motion;
+use field::planting::Planting;
 use field::row::{Row, Thing};
 use field::trial;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 use std::time::{Duration, Instant};
 
 /// Plants and a tall weed.
@@ -23,14 +26,19 @@ fn row() -> Row {
     Row::new(things).expect("plants and a weed are a row")
 }
 
-/// The log of a session in which the machine rolls along the row, and was told to start by these commands.
+/// The log of a session in which the machine rolls along the row, and was told to start by these commands. The link, the settings
+/// and the start take their time.
 fn logged(row: &Row, motion: &Motion, commands: &[&str]) -> Vec<Entry> {
+    logged_from(row, motion, commands, 16_000_000)
+}
+
+/// As [`logged`], of a machine that sets off so many cycles after it was switched on, whether or not the session has begun.
+fn logged_from(row: &Row, motion: &Motion, commands: &[&str], sets_off: u64) -> Vec<Entry> {
     let machine = Machine::default();
     let ticks = machine.ticks(motion, motion.duration_s());
     let mut uno = trial::boot(&firmware::build().expect("the firmware builds"), &[machine.beam_before(row, motion)])
         .expect("the firmware wakes up");
-    // The link, the settings and the start take their time.
-    let changes = machine.pin_changes(row, motion, uno.cycle() + 16_000_000);
+    let changes = machine.pin_changes(row, motion, uno.cycle() + sets_off);
     uno.drive(changes);
     let mut uno = Some(uno);
     let open = move || match uno.take() {
@@ -113,6 +121,39 @@ fn a_row_with_changes_of_speed_and_a_stop_is_decided_the_same_on_the_host() {
         .change_speed(0.0, 500.0);
     assert_same(&logged(&row(), &motion, &["start"]), 9);
 }
+
+/// Rows by chance, at speeds of which half lie where one speed class ends and the next begins, and sessions that begin before the
+/// machine sets off, while it gains its speed, and while it rolls past plants.
+#[test]
+fn rows_by_chance_are_decided_the_same_on_the_host_whenever_the_session_begins() {
+    let mut objects = 0;
+    for seed in 0..ROWS {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let planting = Planting {
+            plants: 5,
+            spacing_mm: rng.random_range(300.0..600.0),
+            canopy_mm: rng.random_range(80.0..160.0),
+            weeds: rng.random_range(0..4),
+            ragged: rng.random(),
+            ..Planting::default()
+        };
+        let row = planting.grow_with_room(seed).expect("there is room");
+        let edge = [347.5, 486.5, 625.5][rng.random_range(0..3)] + rng.random_range(-6.0..6.0);
+        let speed_mm_s = if rng.random() { edge } else { rng.random_range(250.0..900.0) };
+        let start_mm = rng.random_range(-250.0..100.0);
+        let end_mm = row.span_mm().end + 900.0;
+        let motion = Motion::steady(start_mm, 800.0, speed_mm_s, end_mm).change_speed(0.0, 1500.0);
+        let commands: &[&str] = [&["start"][..], &["start now"], &["clear", "start now"]][rng.random_range(0..3)];
+        let log = logged_from(&row, &motion, commands, rng.random_range(0..24_000_000));
+        let replayed = replay(&log).expect("the log can be replayed");
+        assert_eq!(replayed.difference, None, "seed {seed}, {commands:?}: {replayed:#?}\n{log:#?}");
+        objects += replayed.objects;
+    }
+    assert!(objects as u64 > 3 * ROWS, "{objects}");
+}
+
+/// How many rows by chance are rolled along.
+const ROWS: u64 = 24;
 
 #[test]
 fn start_now_over_unseen_ground_is_known_from_start() {

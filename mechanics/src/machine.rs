@@ -39,9 +39,10 @@ impl Input {
 
     /// The value as it is written in a machine file.
     pub fn written(&self) -> String {
-        // Conversion into the unit leaves an error in the last digits.
-        let value = (self.value * 1e9).round() / 1e9;
-        if self.unit.is_empty() { value.to_string() } else { format!("\"{value} {}\"", self.unit) }
+        // Conversion into the unit leaves an error in the last digits. What is far out of its range has too many for a reader.
+        let rounded = (self.value * 1e9).round() / 1e9;
+        let value = if rounded.abs() < 1e9 { rounded.to_string() } else { format!("{:e}", self.value) };
+        if self.unit.is_empty() { value } else { format!("\"{value} {}\"", self.unit) }
     }
 
     /// The range in words.
@@ -76,7 +77,9 @@ pub enum MachineError {
     },
     /// The wheel's rim is thicker than the wheel has room for.
     #[error(
-        "wheel.rim_thickness is {thickness_mm} mm: it has to be less than half of wheel.diameter, {diameter_mm} mm"
+        "wheel.rim_thickness is {} mm: it has to be less than half of wheel.diameter, {} mm",
+        digits(*.thickness_mm),
+        digits(*.diameter_mm)
     )]
     ThickRim {
         /// Thickness of the rim.
@@ -86,8 +89,9 @@ pub enum MachineError {
     },
     /// No sprocket makes the wheels turn as fast as they have to.
     #[error(
-        "engine.gear_box_ratio is {ratio}: the driven sprocket would need {} teeth and can have 1 to {MOST_TEETH}; \
+        "engine.gear_box_ratio is {}: the driven sprocket would need {} teeth and can have 1 to {MOST_TEETH}; \
          at these speeds a ratio near {} makes it {USUAL_TEETH} teeth",
+        digits(*.ratio),
         digits(*.teeth),
         digits(.ratio * .teeth / f64::from(USUAL_TEETH))
     )]

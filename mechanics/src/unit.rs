@@ -200,11 +200,22 @@ impl WrittenError {
 /// Where there is no number, or the unit is missing or of another kind of quantity; it says which units there are.
 pub fn parse<Q: Written>(text: &str) -> Result<Q, WrittenError> {
     let error = || WrittenError::new::<Q>(format_args!("\"{text}\""));
-    let unit_start = text.find(|c: char| c.is_alphabetic() || "%°".contains(c)).unwrap_or(text.len());
-    let (number, name) = text.split_at(unit_start);
+    let (number, name) = text.split_at(number_end(text));
     let number: f64 = number.trim().parse().map_err(|_| error())?;
     let unit = Q::UNITS.iter().find(|unit| !unit.name.is_empty() && closed_up(unit.name) == closed_up(name));
     unit.map(|unit| unit.of(number)).ok_or_else(error)
+}
+
+/// Where the number at the beginning of a text ends: an e belongs to it where an exponent follows.
+fn number_end(text: &str) -> usize {
+    let is_of_unit = |(_, c): &(usize, char)| c.is_alphabetic() || "%°".contains(*c);
+    let mut units = text.char_indices().filter(is_of_unit);
+    let is_exponent = |rest: &str| {
+        let digits = rest.get(1..).unwrap_or_default();
+        rest.starts_with(['e', 'E']) && digits.trim_start_matches(['+', '-']).starts_with(|c: char| c.is_ascii_digit())
+    };
+    let end = units.find(|&(place, _)| !is_exponent(&text[place..]));
+    end.map_or(text.len(), |(place, _)| place)
 }
 
 fn closed_up(name: &str) -> String {
@@ -270,6 +281,13 @@ mod tests {
         assert_eq!(error.to_string(), "\"0.4 kg\" is not a length: write a number and mm, cm or m, in quotes");
         let error = parse::<Ratio>("0.9").unwrap_err();
         assert_eq!(error.to_string(), "\"0.9\" is not a share: write a number and %, in quotes");
+    }
+
+    #[test]
+    fn a_number_may_have_an_exponent() {
+        assert_relative_eq!(MM.value(parse("4e2 mm").unwrap()), 400.0, epsilon = 1e-9);
+        assert_relative_eq!(KG.value(parse::<Mass>("1e300 kg").unwrap()), 1e300, max_relative = 1e-9);
+        assert!(parse::<Length>("4e mm").is_err() && parse::<Length>("e2 mm").is_err());
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! The monitor without a screen: each line of the input is a command, each line of the output an answer or an event.
 
 use crate::Finding;
+use crate::output::tell;
 use anyhow::{Result, ensure};
 use field::link::log::LogWriter;
 use field::link::session::{Happening, Session};
@@ -62,7 +63,7 @@ fn talk(
                 Happening::Status(..) => statuses += 1,
                 Happening::Lost(why) => {
                     ensure!(was_idle && !ended, "{why}");
-                    eprintln!("{why}");
+                    tell!("{why}");
                 }
                 Happening::Told(_, line) => writeln!(output, "{line}")?,
                 Happening::Answer(line) => {

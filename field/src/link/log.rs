@@ -90,7 +90,9 @@ pub struct LogWriter {
     path: PathBuf,
     file: csv::Writer<File>,
     began: Instant,
-    lines: u64,
+    /// Lines below the header that were there, and that were added.
+    found: u64,
+    added: u64,
 }
 
 impl LogWriter {
@@ -110,7 +112,10 @@ impl LogWriter {
         // A last line that power has cut off would spoil the next.
         let whole = bytes.iter().rposition(|&byte| byte == b'\n').map_or(0, |end| end + 1);
         file.set_len(whole as u64).and_then(|()| file.seek(SeekFrom::End(0))).map_err(failed)?;
-        let mut log = Self { path: path.into(), file: csv::Writer::from_writer(file), began: Instant::now(), lines: 0 };
+        // What stands in quotes may have lines of its own, which the firmware's lines never have.
+        let found = bytes[..whole].iter().filter(|&&byte| byte == b'\n').count().saturating_sub(1) as u64;
+        let mut log =
+            Self { path: path.into(), file: csv::Writer::from_writer(file), began: Instant::now(), found, added: 0 };
         if whole == 0 {
             log.record(HEADER.split(','))?;
         }
@@ -140,14 +145,19 @@ impl LogWriter {
         }
     }
 
-    /// Lines that were written, the header left out.
+    /// Lines in the file, the header left out.
     pub fn lines(&self) -> u64 {
-        self.lines
+        self.found + self.added
+    }
+
+    /// Those of them that were written since it was opened.
+    pub fn added(&self) -> u64 {
+        self.added
     }
 
     fn line(&mut self, kind: Kind, line: &str) -> Result<(), LogError> {
         let time_ms = self.began.elapsed().as_millis().to_string();
-        self.lines += 1;
+        self.added += 1;
         self.record([time_ms.as_str(), kind.name(), line])
     }
 

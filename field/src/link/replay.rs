@@ -9,12 +9,15 @@
 //!
 //! - An object's edges are right to [`OBJECT_TICKS`]. A swing leads by the speed, and the log has that only now and then: it may
 //!   differ by [`SWING_TICKS`], and by [`SWING_MS`] of the machine's way, which at 2.5 km/h is another 17 mm.
+//! - An object's vote rests on the speed class, which the line does not tell: it is the same where one of the classes that the machine
+//!   may have been in gives it. What was seen before the log began is believed.
 //! - Where the state changed is not in the log. The swing that follows says it, and is not judged by its place.
 //! - An alarm that encoder, beam, end switch or stack gave rests on what the log does not hold. It is raised where the log has it.
 //! - Where a log begins with ground already seen, what the tool did there is not judged.
 //! - A replay ends where the bench was used (`servo`, `calibrate`, `test`) or examples were forgotten.
 
 mod compare;
+mod judge;
 mod player;
 
 use self::compare::{Bounds, Heard, compare};
@@ -167,12 +170,8 @@ impl<'a> Stretch<'a> {
     }
 
     fn replay(self, replayed: &mut Replayed) -> Result<(), ReplayError> {
-        let wheel = self.settings.wheel();
-        let beam_to_tool = self.settings.ticks(Setting::BeamToToolMm);
-        // A machine that has just started has seen nothing yet.
-        let starts_unseen = i32::from(wheel.millimetres(beam_to_tool)) <= self.first.unseen_mm.saturating_add(1);
-        let judged_from = if starts_unseen { i32::MIN } else { self.first.position.saturating_add(beam_to_tool.0) };
-        if !starts_unseen {
+        let judged_from = self.judged_from();
+        if judged_from > i32::MIN {
             replayed.notes.push(format!(
                 "the log begins with ground already seen: swings before pos={judged_from} are not judged"
             ));
@@ -209,6 +208,12 @@ impl<'a> Stretch<'a> {
                     logged.push(Heard { line: entry.number, told: *told, speed: player.speed().0, is_given });
                 }
                 Happened::Command(line) => {
+                    if let Some(at) = self.place_of_command(entry.time_ms, &last, place) {
+                        player.roll_to(at, &last.0, self.next_status(place));
+                        last.0.position = player.position();
+                        last.0.speed_mm_s = player.speed_mm_s;
+                        last.1 = entry.time_ms;
+                    }
                     if !player.command(line) {
                         replayed.notes.push(format!("line {}: not replayed from `{line}` on", entry.number));
                         break;
@@ -219,6 +224,54 @@ impl<'a> Stretch<'a> {
         let bounds = Bounds { first: self.first.position, judged_from, end: last.0.position };
         compare(&logged, &player.heard, &bounds, replayed);
         Ok(())
+    }
+
+    /// Where watching began, as far as the log tells. Where all ground up to the tool had been seen, the log does not: then it is
+    /// where the log begins, or the beginning of what stood in the beam there.
+    fn began(&self) -> i32 {
+        let first = self.first.position;
+        let beam_to_tool_mm = self.settings.get(Setting::BeamToToolMm);
+        let unseen_mm = self.first.unseen_mm.clamp(0, beam_to_tool_mm.into()) as u16;
+        if unseen_mm > 0 {
+            return first.wrapping_sub(self.settings.wheel().ticks(beam_to_tool_mm - unseen_mm).0);
+        }
+        self.in_the_beam_at_first().map_or(first, |(from, _)| from)
+    }
+
+    /// The ground of the object that was in the beam when the log began.
+    fn in_the_beam_at_first(&self) -> Option<(i32, i32)> {
+        let widest = self.settings.ticks(Setting::MaxWidthMm).0;
+        self.happened.iter().find_map(|(_, happened)| match happened {
+            Happened::Told(Told::Object { position, hold, .. }) => {
+                let before = self.first.position.wrapping_sub(*position);
+                (0..=widest).contains(&before).then_some((*position, position.wrapping_add(*hold)))
+            }
+            _ => None,
+        })
+    }
+
+    /// From where on the log tells all that the tool's swings rest on. A machine that has just started knows no window yet, and
+    /// the ground that it has seen was bare.
+    fn judged_from(&self) -> i32 {
+        if self.first.unseen_mm > 0 && self.first.windows == 0 {
+            return i32::MIN;
+        }
+        let first = self.first.position;
+        // The hold has both margins.
+        let behind = self.in_the_beam_at_first().map_or(0, |(_, to)| to.wrapping_sub(first).max(0));
+        first.saturating_add(self.settings.ticks(Setting::BeamToToolMm).0).saturating_add(behind)
+    }
+
+    /// Where the machine was when a command was typed: on its way to the next status, by the host's clock.
+    fn place_of_command(&self, time_ms: u64, last: &(Status, u64), place: usize) -> Option<i32> {
+        let (entry, next) = self.happened[place..].iter().find_map(|(entry, happened)| match happened {
+            Happened::Status(status) => Some((entry, status)),
+            _ => None,
+        })?;
+        let whole_ms = entry.time_ms.checked_sub(last.1).filter(|&time_ms| time_ms > 0)?;
+        let share = time_ms.saturating_sub(last.1).min(whole_ms) as f64 / whole_ms as f64;
+        let way = f64::from(next.position.wrapping_sub(last.0.position)) * share;
+        Some(last.0.position.wrapping_add(way as i32))
     }
 
     /// Where the state changed that a line tells of: at an alarm's own place, or that of the swing that follows.

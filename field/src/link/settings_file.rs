@@ -5,6 +5,7 @@
 //! the table, and the first thing that is wrong is said with its line and what would be right.
 
 use super::settings::{Setting, Settings, help, name, range};
+use crate::whole_file;
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 use thiserror::Error;
@@ -56,7 +57,8 @@ pub fn read(path: &Path) -> Result<Vec<(Setting, u16)>, SettingsFileError> {
 pub fn write(path: &Path, settings: &Settings) -> Result<(), SettingsFileError> {
     let old = if path.exists() { text(path)? } else { HEAD.to_owned() };
     let new = updated(path, &old, settings)?;
-    fs::write(path, new).map_err(|source| SettingsFileError::File { path: path.into(), done: "written", source })
+    let written = whole_file::write(path, |to| to.write_all(new.as_bytes()));
+    written.map_err(|source| SettingsFileError::File { path: path.into(), done: "written", source })
 }
 
 /// A setting's value as it stands in TOML and JSON: a switched one is true or false.

@@ -187,9 +187,9 @@ mod tests {
     use control::classifier::Vote;
     use control::controller::State;
     use control::event::Event;
+    use control::ground::schedule::Plan;
     use control::line::Line;
     use control::reply::write_event;
-    use control::schedule::Plan;
     use control::units::{Position, Ticks};
 
     /// The event as the firmware writes it.

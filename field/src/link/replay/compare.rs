@@ -39,15 +39,32 @@ pub(super) fn compare(logged: &[Heard], replayed: &[Heard], bounds: &Bounds, res
         Told::Swing { position, .. } => position >= bounds.judged_from,
         _ => !heard.is_given,
     };
-    // A swing at the very end may come in the one and not yet in the other.
-    let is_at_end = |heard: &Heard| {
-        matches!(heard.told, Told::Swing { position, .. }
-            if bounds.end.wrapping_sub(position).saturating_abs() <= swing_ticks(heard, heard))
+    // What is at the very end may come in the one and not yet in the other; an object is told some way behind it.
+    let is_at_end = |heard: &Heard| match heard.told {
+        Told::Swing { position, .. } => bounds.end.wrapping_sub(position).saturating_abs() <= swing_ticks(heard, heard),
+        Told::Object { position, hold, .. } => bounds.end.wrapping_sub(position.wrapping_add(hold)) <= OBJECT_TICKS,
+        _ => false,
+    };
+    // What is at the very beginning may be judged in the one and come before that in the other.
+    let is_at_beginning = |heard: &Heard| match heard.told {
+        Told::Swing { position, .. } => {
+            bounds.judged_from > i32::MIN
+                && position.wrapping_sub(bounds.judged_from).saturating_abs() <= swing_ticks(heard, heard)
+        }
+        Told::Object { position, .. } => position.wrapping_sub(bounds.first).saturating_abs() <= OBJECT_TICKS,
+        _ => false,
     };
     let mut differences = Vec::new();
     for is_kind in kinds {
-        let mut ours = replayed.iter().filter(|heard| is_kind(&heard.told)).filter(is_judged);
-        let mut theirs = logged.iter().filter(|heard| is_kind(&heard.told)).filter(is_judged);
+        let mut ours = replayed.iter().filter(|heard| is_kind(&heard.told)).filter(is_judged).peekable();
+        let mut theirs = logged.iter().filter(|heard| is_kind(&heard.told)).filter(is_judged).peekable();
+        let is_one_sided = match (theirs.peek(), ours.peek()) {
+            (Some(logged), Some(replayed)) => !agree(logged, replayed),
+            (logged, replayed) => logged.is_some() != replayed.is_some(),
+        };
+        if is_one_sided && theirs.next_if(|heard| is_at_beginning(heard)).is_none() {
+            ours.next_if(|heard| is_at_beginning(heard));
+        }
         loop {
             match (theirs.next(), ours.next()) {
                 (None, None) => break,

@@ -1,18 +1,18 @@
 //! The decisions, driven along a log: the machine's way, the beam's edges, and what was typed.
 
+use super::judge::{Judge, Seen, Witness};
 use super::{Happened, Heard, OBJECT_TICKS, Stretch};
 use crate::link::settings::{Setting, steps};
 use crate::link::{Mode, Status, Told};
 use control::alarm::Alarm;
-use control::classifier::Nearest;
+use control::classifier::Vote;
 use control::console::{self, Command};
 use control::controller::{Controller, Readings, State, WakeUp};
 use control::event::Event;
-use control::features;
 use control::memory::Volatile;
 use control::reset::Cause;
-use control::units::{Instant, Interval, Position, TicksPerSecond};
-use knn::Example;
+use control::units::{Instant, Interval, Position, Ticks, TicksPerSecond};
+use std::rc::Rc;
 
 /// Time between two steps of a machine at rest.
 const REST_MS: u32 = 5;
@@ -28,9 +28,10 @@ const FASTEST_MM_S: u16 = 3_800;
 
 /// The decisions, driven along the log.
 pub(super) struct Player<'a> {
-    controller: Controller<Nearest<&'a [Example<{ features::COUNT }>], Volatile>, Volatile>,
+    controller: Controller<Judge<'a>, Volatile>,
+    witness: Rc<Witness>,
     /// The ground over which the beam was broken.
-    canopies: Vec<(i32, i32)>,
+    canopies: Vec<Canopy>,
     broken: bool,
     now: Instant,
     position: i32,
@@ -43,27 +44,26 @@ pub(super) struct Player<'a> {
 }
 
 impl<'a> Player<'a> {
-    /// A machine as it was when the stretch began.
+    /// A machine as it was when the stretch began. It has rolled there from where watching began, as far as the log tells where
+    /// that was.
     pub(super) fn new(stretch: &'a Stretch<'a>) -> Self {
         let canopies = canopies(stretch);
-        let position = stretch.first.position;
+        // A little before, so that what stands at that place is seen in full and the log says what it was taken for.
+        let position = stretch.began().wrapping_sub(OBJECT_TICKS + 1);
         let broken = is_in(&canopies, position);
         let readings = Readings::new(Instant::new(0), Position::new(position));
         let wake_up = WakeUp { readings, beam_broken: broken, cause: Cause::Unknown };
-        let classifier = Nearest::new(stretch.examples.as_slice(), Volatile::new());
+        let witness = Rc::new(Witness::default());
+        let classifier = Judge::new(&stretch.examples, Rc::clone(&witness));
         let mut controller = Controller::new(classifier, Volatile::new(), wake_up);
         controller.clear();
         for (setting, value) in steps(controller.settings(), &stretch.settings) {
             // In an order that the firmware takes, and every value is in its range.
             let _ = controller.set(setting, value);
         }
-        if stretch.first.mode == Mode::Work {
-            let unseen = stretch.first.unseen_mm;
-            let _ = controller.start(unseen < i32::from(stretch.settings.get(Setting::BeamToToolMm)) - 1);
-        }
-        controller.tell_events(true);
-        Self {
+        let mut player = Self {
             controller,
+            witness,
             canopies,
             broken,
             now: Instant::new(0),
@@ -71,7 +71,29 @@ impl<'a> Player<'a> {
             speed_mm_s: stretch.first.speed_mm_s,
             heard: Vec::new(),
             swallows_alarm: false,
+        };
+        player.roll_in(&stretch.first);
+        if stretch.first.mode == Mode::Work {
+            let _ = player.controller.start(stretch.first.unseen_mm <= 0);
         }
+        player.controller.tell_events(true);
+        player
+    }
+
+    /// Rolls from where watching began to where the log begins, at the speed that the machine has there.
+    fn roll_in(&mut self, first: &Status) {
+        let way = first.position.wrapping_sub(self.position);
+        let top_mm_s = i32::from(self.controller.settings().get(Setting::TopSpeedMmS));
+        let speed_mm_s = if first.speed_mm_s > 0 { first.speed_mm_s } else { top_mm_s / 2 };
+        let way_mm = i64::from(self.controller.settings().wheel().millimetres(Ticks(way)));
+        let time_ms = (way_mm * 1000 / i64::from(speed_mm_s)).unsigned_abs();
+        self.roll_by(way, speed_mm_s, speed_mm_s, time_ms);
+        self.speed_mm_s = first.speed_mm_s;
+    }
+
+    /// Where the machine is.
+    pub(super) fn position(&self) -> i32 {
+        self.position
     }
 
     /// The machine's speed in ticks.
@@ -104,6 +126,9 @@ impl<'a> Player<'a> {
         if way == 0 || way.signum() != whole.signum() || way.unsigned_abs() > whole.unsigned_abs() {
             return;
         }
+        if way.unsigned_abs() > LONGEST_WAY as u32 {
+            return;
+        }
         let share = f64::from(way) / f64::from(whole);
         let speed = f64::from(from.speed_mm_s) + share * (f64::from(next.speed_mm_s) - f64::from(from.speed_mm_s));
         self.roll_by(way, from.speed_mm_s, speed.round() as i32, 0);
@@ -116,6 +141,7 @@ impl<'a> Player<'a> {
         let ways = f64::from(way);
         let mean = (from + to) / 2.0;
         let by_speed = ways / mean;
+        self.witness.speeds_mm_s.set((from_mm_s.min(to_mm_s), from_mm_s.max(to_mm_s)));
         let host_s = host_ms.max(1) as f64 / 1000.0;
         let duration_s = if by_speed > 0.0 && by_speed < 3.0 * host_s.max(0.1) { by_speed } else { host_s };
         let steps = way.unsigned_abs();
@@ -155,7 +181,11 @@ impl<'a> Player<'a> {
         let broken = is_in(&self.canopies, ground);
         if broken != self.broken {
             self.broken = broken;
+            // The edge may end the object before, which is then judged.
             self.controller.beam_edge(Position::new(self.position), broken);
+            if let Some(canopy) = self.canopies.iter().find(|canopy| canopy.is_over(ground)) {
+                self.witness.seen.set(canopy.seen);
+            }
         }
         let mut readings = Readings::new(self.now, Position::new(self.position));
         // An end switch that does as it is told.
@@ -242,27 +272,55 @@ impl<'a> Player<'a> {
     }
 }
 
+/// Ground over which the beam was broken.
+struct Canopy {
+    from: i32,
+    to: i32,
+    /// What the log tells of it, where it was judged.
+    seen: Option<Seen>,
+}
+
+impl Canopy {
+    fn is_over(&self, ground: i32) -> bool {
+        ground.wrapping_sub(self.from) >= 0 && ground.wrapping_sub(self.to) < 0
+    }
+}
+
 /// The ground over which the beam was broken, as far as the log tells.
-fn canopies(stretch: &Stretch) -> Vec<(i32, i32)> {
-    let wheel = stretch.settings.wheel();
-    let margins = wheel.ticks(2 * stretch.settings.get(Setting::MarginMm)).0;
-    let max_width = stretch.settings.ticks(Setting::MaxWidthMm).0;
-    let told = stretch.happened.iter().filter_map(|(_, happened)| match happened {
-        Happened::Told(told) => Some(told),
-        _ => None,
-    });
-    told.filter_map(|told| match told {
-        Told::Object { position, hold, .. } => Some((*position, position.wrapping_add(hold.wrapping_sub(margins)))),
-        // It is latched as soon as the object is wider than it may be.
-        Told::Alarm { alarm: Alarm::BeamBlocked, position } => {
-            Some((position.wrapping_sub(max_width + 1), position.wrapping_add(1)))
+fn canopies(stretch: &Stretch) -> Vec<Canopy> {
+    let mut settings = stretch.settings.clone();
+    let mut canopies = Vec::new();
+    for (_, happened) in &stretch.happened {
+        let wheel = settings.wheel();
+        match happened {
+            Happened::Told(Told::Object { class, position, votes, spacing, hold, .. }) => {
+                let width = hold.wrapping_sub(wheel.ticks(2 * settings.get(Setting::MarginMm)).0);
+                let seen = Seen {
+                    vote: Vote { class: *class, votes: *votes },
+                    spacing_mm: wheel.millimetres(Ticks(*spacing)),
+                    width_mm: wheel.millimetres(Ticks(width)),
+                    is_given: position.wrapping_sub(stretch.first.position) < 0,
+                };
+                canopies.push(Canopy { from: *position, to: position.wrapping_add(width), seen: Some(seen) });
+            }
+            // It is latched as soon as the object is wider than it may be.
+            Happened::Told(Told::Alarm { alarm: Alarm::BeamBlocked, position }) => {
+                let from = position.wrapping_sub(settings.ticks(Setting::MaxWidthMm).0 + 1);
+                canopies.push(Canopy { from, to: position.wrapping_add(1), seen: None });
+            }
+            Happened::Command(line) => {
+                // The holds behind it have the new margin. Refused here as there.
+                if let Ok(Command::Set(setting, value)) = console::parse(line.as_bytes()) {
+                    let _ = settings.set(setting, value);
+                }
+            }
+            _ => {}
         }
-        _ => None,
-    })
-    .collect()
+    }
+    canopies
 }
 
 /// Whether the beam is broken over this ground.
-fn is_in(canopies: &[(i32, i32)], ground: i32) -> bool {
-    canopies.iter().any(|&(from, to)| ground.wrapping_sub(from) >= 0 && ground.wrapping_sub(to) < 0)
+fn is_in(canopies: &[Canopy], ground: i32) -> bool {
+    canopies.iter().any(|canopy| canopy.is_over(ground))
 }
