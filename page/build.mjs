@@ -1,5 +1,6 @@
-// Makes what runs out of what is written: `node build.mjs tests`.
+// Makes what runs out of what is written: `node build.mjs page` makes dist/, `node build.mjs tests` makes build/tests/.
 //
+// The page is three files that a browser opens from anywhere, the disk included: the firmware is inside.
 // The firmware's HEX comes from `cargo firmware`, which has to be run first; WEEDER_HEX names another HEX file.
 
 import { execFileSync } from "node:child_process";
@@ -35,7 +36,18 @@ const common = {
 };
 
 const what = process.argv[2];
-if (what === "tests") {
+if (what === "page") {
+    rmSync("dist", { recursive: true, force: true });
+    await build({
+        ...common,
+        entryPoints: ["src/page.ts", "src/page.css", "src/index.html"],
+        outdir: "dist",
+        format: "iife",
+        loader: { ...common.loader, ".html": "copy" },
+        minify: true,
+    });
+    console.log("The page is in page/dist: open index.html.");
+} else if (what === "tests") {
     rmSync("build/tests", { recursive: true, force: true });
     const entryPoints = readdirSync("tests").filter((name) => name.endsWith(".test.ts"));
     await build({
@@ -44,10 +56,11 @@ if (what === "tests") {
         outdir: "build/tests",
         outExtension: { ".js": ".mjs" },
         platform: "node",
+        external: ["playwright-core"],
         format: "esm",
         sourcemap: "inline",
     });
 } else {
-    console.error("usage: node build.mjs tests");
+    console.error("usage: node build.mjs page|tests");
     process.exit(1);
 }

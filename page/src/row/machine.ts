@@ -10,7 +10,7 @@
 import { CYCLES_PER_SECOND, type Uno } from "../uno/uno.ts";
 import type { Motion } from "./motion.ts";
 import type { Row } from "./row.ts";
-import { OUT_DEGREES, Servo, type ServoKind } from "./servo.ts";
+import { OUT_DEGREES, SERVO, Servo, type ServoKind } from "./servo.ts";
 
 /** The Uno's pins that the machine is wired to (README, wiring). */
 export const PIN = { encoderA: 2, encoderB: 3, workSwitch: 4, endSwitch: 5, beam: 8, servo: 9, lamp: 13 } as const;
@@ -81,13 +81,7 @@ export class Machine {
     #pulseRise = 0;
 
     /** Puts the machine, from the Uno's cycle on, in front of a row, as the motion has it then. */
-    constructor(
-        uno: Uno,
-        row: Row,
-        motion: Motion,
-        dimensions: Dimensions = DIMENSIONS,
-        servo: ServoKind | undefined = undefined,
-    ) {
+    constructor(uno: Uno, row: Row, motion: Motion, dimensions: Dimensions = DIMENSIONS, servo: ServoKind = SERVO) {
         this.uno = uno;
         this.row = row;
         this.motion = motion;

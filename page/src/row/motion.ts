@@ -79,6 +79,11 @@ export class Motion {
         return speedMmS(this.#pieceAt(timeS), timeS);
     }
 
+    /** How far the machine rolls while the wheel's rim turns by a millimetre. */
+    groundMmAMm(timeS: number): number {
+        return 1 / this.#pieceAt(timeS).wheelMmAMm;
+    }
+
     /** From a time on, changes to a speed, negative for rolling back, with an acceleration above 0. */
     changeSpeed(fromS: number, toMmS: number, accelerationMmS2: number): void {
         const slowing = this.#cut(fromS);

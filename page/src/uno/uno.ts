@@ -8,14 +8,14 @@
 // does otherwise than the chip stands in docs/simulators.md.
 
 import { type EEPROMBackend, PinState } from "avr8js";
-import { Chip, EEPROM_BYTES, FLASH_BYTES, type ResetCause, SRAM_BYTES } from "./chip.ts";
+import { Chip, CYCLES_PER_SECOND, EEPROM_BYTES, FLASH_BYTES, type ResetCause, SRAM_BYTES } from "./chip.ts";
 import { readHex } from "./hex.ts";
 
 export { CYCLES_PER_SECOND, EEPROM_BYTES, type ResetCause } from "./chip.ts";
 export { HexError } from "./hex.ts";
 
 /** Cycles of a byte that a terminal sends at 115200 baud: a start bit, eight data bits and a stop bit. */
-export const SENT_BYTE_CYCLES = Math.round((10 * 16_000_000) / 115_200);
+export const SENT_BYTE_CYCLES = Math.round((10 * CYCLES_PER_SECOND) / 115_200);
 
 /** What SRAM holds at power-up. A real chip's content is random; a byte that is not zero catches who counts on it. */
 const SRAM_AT_POWER_UP = 0xc5;
