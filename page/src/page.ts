@@ -133,7 +133,7 @@ function frame(nowMs: number): void {
     passed.chipS += trial.advance(outsideS * Number(time.value), outsideS * 1000 * CHIP_SHARE);
     passed.outsideS += outsideS;
     if (passed.outsideS > PACE_S) {
-        write("pace", `${(passed.chipS / passed.outsideS).toFixed(2)} x real`);
+        write("pace", `${(passed.chipS / passed.outsideS).toFixed(2)} x`);
         passed.chipS = passed.outsideS = 0;
     }
     show();

@@ -131,7 +131,8 @@ export class Drawing {
         for (const [key, value] of Object.entries(blade)) this.#blade.setAttribute(key, String(value));
         this.#angle.setAttribute("x", String(tool.x - 70));
         this.#angle.setAttribute("y", String(tool.y - 25));
-        this.#angle.textContent = `${degrees.toFixed(0)}\u00b0`;
+        // Added to 0, a negative 0 loses its sign.
+        this.#angle.textContent = `${Math.round(degrees) + 0}\u00b0`;
     }
 
     #drawThings(things: readonly Thing[], fromMm: number, toMm: number): void {
