@@ -1,6 +1,9 @@
 #!/usr/bin/env bash
 # Installs what a fresh machine needs to build, test, simulate and flash the weeder: packages of Debian or Ubuntu, and the
 # Rust toolchain that rust-toolchain.toml pins. Safe to run again; what is there already is left alone.
+#
+#     ./setup.sh         all that cargo needs
+#     ./setup.sh page    and what the page and its tests need on top of that: Node.js 18 or later with npm, and Chromium
 set -euo pipefail
 cd "$(dirname "$0")"
 
@@ -10,6 +13,19 @@ packages=(
     gcc-avr binutils-avr avr-libc avrdude arduino-core-avr
     build-essential pkg-config clang libclang-dev libelf-dev zlib1g-dev libzstd-dev
 )
+
+case "${1-}" in
+    "") ;;
+    page)
+        # Whoever has a Node.js has it from somewhere else, mostly, and Debian's would not go beside it.
+        if ! command -v npm >/dev/null; then packages+=(nodejs npm); fi
+        if ! command -v chromium >/dev/null; then packages+=(chromium); fi
+        ;;
+    *)
+        echo "setup.sh: unknown word \`$1\`. Say nothing, or page." >&2
+        exit 1
+        ;;
+esac
 
 missing=()
 if command -v dpkg-query >/dev/null; then
@@ -48,6 +64,14 @@ if grep -q '^rust-src' <<<"$installed" && grep -q '^rustfmt' <<<"$installed" && 
 else
     echo "Rust: installing $channel"
     rustup toolchain install "$channel" --profile minimal --component rust-src --component rustfmt --component clippy
+fi
+
+if [ "${1-}" = page ]; then
+    if ! node --eval 'process.exit(process.versions.node.split(".")[0] >= 18 ? 0 : 1)'; then
+        echo "setup.sh: the page needs Node.js 18 or later, and this is $(node --version || echo none)." >&2
+        exit 1
+    fi
+    echo "Node.js: $(node --version). The page's own packages: npm ci, in page/."
 fi
 
 echo "Ready. Try: cargo sim"

@@ -36,7 +36,7 @@ speed_mm_s,spacing_mm,delay_mm,hold_mm,actuation_mm,answer,votes,label
 ";
 
 /// Programs that are not of this repository; what they do with their options is their business.
-const FOREIGN: [&str; 3] = ["avrdude", "echo", "sudo"];
+const FOREIGN: [&str; 4] = ["avrdude", "echo", "npm", "sudo"];
 
 /// Subcommands that need neither an Uno nor much time.
 const CHEAP: [&str; 7] = ["classify", "design", "evaluate", "hex", "sweep", "train", "trial"];

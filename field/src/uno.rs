@@ -43,6 +43,8 @@
 //! - The transmitter has no second buffer: it takes the next byte when the last one has left.
 //! - UBRR is what the clock divides; the crystal is exact.
 //! - Self-programming takes no time: a page of flash is erased or written within its instruction. Lock bits are not kept.
+//!
+//! The firmware is tested on avr8js as well, and what that one does otherwise stands in docs/simulators.md.
 
 pub mod bounds;
 mod core;

@@ -1,0 +1,66 @@
+// Makes what runs out of what is written: `node build.mjs page` makes dist/, `node build.mjs tests` makes build/tests/.
+//
+// The page is three files that a browser opens from anywhere, the disk included: the firmware is inside.
+// The firmware's HEX comes from `cargo firmware`, which has to be run first; WEEDER_HEX names another HEX file.
+
+import { execFileSync } from "node:child_process";
+import { existsSync, mkdirSync, readdirSync, rmSync } from "node:fs";
+import { join, resolve } from "node:path";
+import { fileURLToPath } from "node:url";
+import { build } from "esbuild";
+
+const here = fileURLToPath(new URL(".", import.meta.url));
+process.chdir(here);
+
+/** The firmware as a HEX file. */
+function firmware() {
+    if (process.env.WEEDER_HEX) return process.env.WEEDER_HEX;
+    const elf = join(process.env.CARGO_TARGET_DIR ?? "../target", "avr-none/firmware/weeder-firmware.elf");
+    if (!existsSync(elf)) {
+        console.error(`${elf} is not there: run \`cargo firmware\` first, or name a HEX file in WEEDER_HEX`);
+        process.exit(1);
+    }
+    mkdirSync("build", { recursive: true });
+    execFileSync("avr-objcopy", ["-O", "ihex", "-j", ".text", "-j", ".data", elf, "build/weeder.hex"]);
+    return "build/weeder.hex";
+}
+
+/** @type {import("esbuild").BuildOptions} */
+const common = {
+    bundle: true,
+    target: "es2022",
+    // avr8js as modules also for node: its other form looks each function up anew at every call, and takes twice the time.
+    mainFields: ["module", "main"],
+    alias: { "weeder.hex": resolve(firmware()) },
+    loader: { ".hex": "text" },
+};
+
+const what = process.argv[2];
+if (what === "page") {
+    rmSync("dist", { recursive: true, force: true });
+    await build({
+        ...common,
+        entryPoints: ["src/page.ts", "src/page.css", "src/index.html"],
+        outdir: "dist",
+        format: "iife",
+        loader: { ...common.loader, ".html": "copy" },
+        minify: true,
+    });
+    console.log("The page is in page/dist: open index.html.");
+} else if (what === "tests") {
+    rmSync("build/tests", { recursive: true, force: true });
+    const entryPoints = readdirSync("tests").filter((name) => name.endsWith(".test.ts"));
+    await build({
+        ...common,
+        entryPoints: entryPoints.map((name) => join("tests", name)),
+        outdir: "build/tests",
+        outExtension: { ".js": ".mjs" },
+        platform: "node",
+        external: ["playwright-core"],
+        format: "esm",
+        sourcemap: "inline",
+    });
+} else {
+    console.error("usage: node build.mjs page|tests");
+    process.exit(1);
+}

@@ -1,0 +1,140 @@
+// An ATmega328P from power-up or a reset to the next one, on avr8js.
+//
+// avr8js resets neither its peripherals nor its registers, so a reset here makes a new chip, which takes over what
+// outlives a reset: flash, EEPROM, SRAM and the clock. The peripherals are avr8js's own, as they come. What is set right
+// in this file is the core's time with interrupts; docs/simulators.md has the whole list.
+
+import {
+    AVRClock,
+    AVREEPROM,
+    AVRIOPort,
+    AVRTimer,
+    AVRUSART,
+    AVRWatchdog,
+    avrInstruction,
+    CPU,
+    clockConfig,
+    type EEPROMBackend,
+    eepromConfig,
+    portBConfig,
+    portCConfig,
+    portDConfig,
+    timer0Config,
+    timer1Config,
+    timer2Config,
+    usart0Config,
+    watchdogConfig,
+} from "avr8js";
+
+/** Cycles of the Uno's clock in a second. */
+export const CYCLES_PER_SECOND = 16_000_000;
+
+/** Bytes of the chip's memories. */
+export const FLASH_BYTES = 32 * 1024;
+export const SRAM_BYTES = 2048;
+export const EEPROM_BYTES = 1024;
+
+/** Why a chip starts, as the bit of MCUSR that says so (data sheet, 11.9.1). */
+export const RESET_CAUSES = { "power-on": 1, external: 2, "brown-out": 4, watchdog: 8 } as const;
+export type ResetCause = keyof typeof RESET_CAUSES;
+
+/** MCUSR's and UCSR0A's addresses in the data space (data sheet, register summary). */
+const MCUSR = 0x54;
+const UCSR0A = 0xc0;
+/** UCSR0A: a byte has been received and not read yet. */
+const RXC0 = 0x80;
+
+/** Where SRAM begins in the data space. */
+const SRAM_START = 0x100;
+
+/** Half of the time that a byte takes to be written to the EEPROM: 3.4 ms in all (data sheet, table 8-1). */
+const EEPROM_HALF_CYCLES = (CYCLES_PER_SECOND * 3.4e-3) / 2;
+
+/** Cycles that entering an interrupt takes more than avr8js counts: 4 (data sheet, 7.7.1) less 2. */
+const INTERRUPT_ENTRY_CYCLES = 2;
+
+/** Instructions behind which one more is carried out before an interrupt is entered (data sheet, 7.7). */
+const RETI = 0x9518;
+const SEI = 0x9478;
+
+/** What a chip starts with. */
+export interface Start {
+    program: Uint16Array;
+    sram: Uint8Array;
+    eeprom: EEPROMBackend;
+    cause: ResetCause;
+    cycle: number;
+}
+
+/** A running chip. */
+export class Chip {
+    readonly ports: { readonly B: AVRIOPort; readonly C: AVRIOPort; readonly D: AVRIOPort };
+    readonly usart: AVRUSART;
+    /** Whether the watchdog has run out: the chip stands still and waits for its successor. */
+    watchdogRanOut = false;
+    readonly #cpu: CPU;
+    #until = 0;
+
+    constructor({ program, sram, eeprom, cause, cycle }: Start) {
+        const cpu = new CPU(program, SRAM_BYTES);
+        this.#cpu = cpu;
+        cpu.cycles = cycle;
+        cpu.data.set(sram, SRAM_START);
+        cpu.data[MCUSR] = RESET_CAUSES[cause];
+        this.ports = {
+            B: new AVRIOPort(cpu, portBConfig),
+            C: new AVRIOPort(cpu, portCConfig),
+            D: new AVRIOPort(cpu, portDConfig),
+        };
+        for (const config of [timer0Config, timer1Config, timer2Config]) new AVRTimer(cpu, config);
+        this.usart = new AVRUSART(cpu, usart0Config, CYCLES_PER_SECOND);
+        new AVREEPROM(cpu, eeprom, {
+            ...eepromConfig,
+            eraseCycles: EEPROM_HALF_CYCLES,
+            writeCycles: EEPROM_HALF_CYCLES,
+        });
+        new AVRWatchdog(cpu, watchdogConfig, new AVRClock(cpu, CYCLES_PER_SECOND, clockConfig));
+        // From here on only the watchdog asks for it.
+        cpu.reset = () => {
+            this.watchdogRanOut = true;
+            this.#until = 0;
+        };
+    }
+
+    get cycle(): number {
+        return this.#cpu.cycles;
+    }
+
+    /** What SRAM holds now. */
+    get sram(): Uint8Array {
+        return this.#cpu.data.slice(SRAM_START);
+    }
+
+    /** Runs to the end of the instruction in which `cycle` comes, or until the watchdog runs out. */
+    run(cycle: number): void {
+        const cpu = this.#cpu;
+        const program = cpu.progMem;
+        this.#until = cycle;
+        while (cpu.cycles < this.#until) {
+            const instruction = program[cpu.pc];
+            avrInstruction(cpu);
+            if (instruction === RETI || instruction === SEI) avrInstruction(cpu);
+            const next = cpu.pc;
+            cpu.tick();
+            if (cpu.pc !== next) cpu.cycles += INTERRUPT_ENTRY_CYCLES;
+        }
+    }
+
+    /** Has something happen in so many cycles, unless a reset comes before. */
+    after(cycles: number, happen: () => void): void {
+        this.#cpu.addClockEvent(happen, cycles);
+    }
+
+    /**
+     * Whether a byte that comes now is sure to be kept. avr8js has no buffer behind the byte that waits, and forgets that one
+     * when the firmware writes UCSR0B, as handlers do: it should come where its own handler follows at once.
+     */
+    get takesByte(): boolean {
+        return this.#cpu.interruptsEnabled && !((this.#cpu.data[UCSR0A] ?? 0) & RXC0);
+    }
+}

@@ -1,0 +1,96 @@
+// What the tests share: an Uno that has woken up, and a patient operator at its console.
+
+import hex from "weeder.hex";
+import { CYCLES_PER_SECOND, Uno } from "../src/uno/uno.ts";
+
+/** Longest time that an answer may take, and that the firmware may take to its first line. */
+const TIMEOUT_MS = 1000;
+
+const CYCLES_PER_MS = CYCLES_PER_SECOND / 1000;
+
+/** The line that ends an answer. */
+const END_OF_ANSWER = /^(ok|error: .*)\r\n/m;
+
+/** A level on each input: encoder low, beam clear, switches open. */
+const AT_REST: [number, boolean][] = [
+    [2, false],
+    [3, false],
+    [4, true],
+    [5, true],
+    [8, true],
+];
+
+export class Operator {
+    readonly uno: Uno;
+    /** All that the firmware has sent and nobody has taken. */
+    #heard = "";
+
+    constructor(uno: Uno) {
+        this.uno = uno;
+        uno.onByte = (byte) => {
+            this.#heard += String.fromCharCode(byte);
+        };
+    }
+
+    /** What was sent since this was last asked. */
+    take(): string {
+        const heard = this.#heard;
+        this.#heard = "";
+        return heard;
+    }
+
+    run(ms: number): void {
+        this.uno.runUntil(this.uno.cycle + ms * CYCLES_PER_MS);
+    }
+
+    /** Lets the firmware run until what it has sent matches, and takes that. */
+    waitFor(pattern: RegExp): string {
+        for (let waited = 0; !pattern.test(this.#heard); waited++) {
+            if (waited === TIMEOUT_MS)
+                throw new Error(`the firmware sent ${JSON.stringify(this.#heard)}, not ${pattern}`);
+            this.run(1);
+        }
+        return this.take();
+    }
+
+    /** Types a line and gives back all lines of its answer, the last of which is `ok` or begins with `error:`. */
+    exchange(line: string): string[] {
+        this.take();
+        this.uno.send(`${line}\n`);
+        const heard = this.waitFor(END_OF_ANSWER);
+        const end = heard.search(END_OF_ANSWER) + (heard.match(END_OF_ANSWER)?.[0].length ?? 0);
+        // What happens meanwhile may be told right behind the answer.
+        this.#heard = heard.slice(end);
+        return heard.slice(0, end).trimEnd().split("\r\n");
+    }
+
+    /** Types a command that is to be carried out, and gives back the lines of its answer, the `ok` left out. */
+    ask(command: string): string[] {
+        const answer = this.exchange(command);
+        const last = answer.pop();
+        if (last !== "ok") throw new Error(`the firmware answers ${command} by ${last}`);
+        return answer;
+    }
+
+    /** The figures of `status`, by name. */
+    status(): Record<string, string> {
+        const words = this.ask("status")
+            .join(" ")
+            .matchAll(/(\S+)=(\S+)/g);
+        return Object.fromEntries([...words].map(([, key, value]) => [key, value]));
+    }
+}
+
+/** An Uno with its inputs at rest whose firmware has said its first line. */
+export function poweredUp(eeprom?: Uint8Array): { operator: Operator; greeting: string } {
+    const operator = new Operator(new Uno(hex, eeprom));
+    for (const [pin, high] of AT_REST) operator.uno.set(pin, high);
+    return { operator, greeting: operator.waitFor(/\n/) };
+}
+
+/** As `poweredUp`, and told that its settings are right although none are saved. */
+export function wokenUp(): Operator {
+    const { operator } = poweredUp();
+    operator.ask("clear");
+    return operator;
+}
