@@ -10,7 +10,7 @@ use control::{
     alarm::Alarm,
     classifier::{Class, Classifier, Full, Listed, Nearest, Vote},
     console::LineBuffer,
-    controller::{Controller, Judged, Orders, Readings, Reason, State, WakeUp},
+    controller::{Controller, Orders, Readings, Reason, State, WakeUp},
     examples::EXAMPLES,
     features::Features,
     reply::{self, Answer, LINE},
@@ -21,7 +21,7 @@ use control::{
 };
 use knn::Example;
 use proptest::prelude::*;
-use std::{collections::VecDeque, convert::Infallible};
+use std::{cell::Cell, collections::VecDeque, convert::Infallible, rc::Rc};
 
 /// What a test asserts is what its caller reports.
 pub type Checked = Result<(), TestCaseError>;
@@ -47,33 +47,40 @@ const SWITCH_DELAY_US: u64 = 60_000;
 const PATIENCE: u32 = 20_000;
 
 /// Takes for a weed what is narrow, and for a plant what is not, but keeps examples as the firmware does.
-#[derive(Clone, Debug)]
-struct ByWidth(Nearest<&'static [Example<5>], Half>);
+struct ByWidth {
+    nearest: Nearest<&'static [Example<5>], Half>,
+    /// The width of what was last taken for a weed, in millimetres.
+    weed: Rc<Cell<Option<i16>>>,
+}
 
 impl Classifier for ByWidth {
     fn classify(&self, features: &Features, _: u8) -> Vote {
-        let class = if features.hold_mm < PLANT_MM + MARGINS_MM { Class::Weed } else { Class::Plant };
-        Vote { class, votes: 1 }
+        let width_mm = features.hold_mm - MARGINS_MM;
+        if width_mm >= PLANT_MM {
+            return Vote { class: Class::Plant, votes: 1 };
+        }
+        self.weed.set(Some(width_mm));
+        Vote { class: Class::Weed, votes: 1 }
     }
 
     fn teach(&mut self, features: &Features, label: u8) -> Result<(), Full> {
-        self.0.teach(features, label)
+        self.nearest.teach(features, label)
     }
 
     fn forget(&mut self, number: u8) -> bool {
-        self.0.forget(number)
+        self.nearest.forget(number)
     }
 
     fn listed(&self, place: u8) -> Option<(Listed, u8)> {
-        self.0.listed(place)
+        self.nearest.listed(place)
     }
 
     fn spoiled(&self) -> u8 {
-        self.0.spoiled()
+        self.nearest.spoiled()
     }
 
     fn carry_on(&mut self) -> bool {
-        self.0.carry_on()
+        self.nearest.carry_on()
     }
 }
 
@@ -187,6 +194,8 @@ impl Extremes {
 pub struct Drive {
     machine: Weeder,
     console: Console,
+    /// What it has just taken for a weed.
+    weed: Rc<Cell<Option<i16>>>,
     eeprom: Eeprom,
     /// What is kept for sure, and what is being written.
     saved: Option<Settings>,
@@ -195,7 +204,9 @@ pub struct Drive {
     model: Model,
     beginning: Beginning,
     row: Vec<bool>,
-    row_is_bare: bool,
+    /// From which tick of it on it is bare; the farthest that the beam has come to.
+    bare_from: i64,
+    farthest: i64,
     time_us: u64,
     /// Where the machine really is, in ticks, and the encoder's count without wrapping.
     ground: f64,
@@ -210,7 +221,6 @@ pub struct Drive {
     /// The canopy for which the tool last left the row in that time.
     left_for: Option<Run>,
     broken: bool,
-    objects: Vec<Judged>,
     /// Whether something is tried on the bench, so that the tool may be in the row.
     is_tried: bool,
     encoder_is_silent: bool,
@@ -225,9 +235,10 @@ pub struct Drive {
     pub steps: u64,
 }
 
-fn wake(eeprom: &Eeprom, wake_up: WakeUp) -> Weeder {
+fn wake(eeprom: &Eeprom, weed: &Rc<Cell<Option<i16>>>, wake_up: WakeUp) -> Weeder {
     let [for_settings, for_examples] = eeprom.halves();
-    Controller::new(ByWidth(Nearest::new(&EXAMPLES[..], for_examples)), for_settings, wake_up)
+    let classifier = ByWidth { nearest: Nearest::new(&EXAMPLES[..], for_examples), weed: Rc::clone(weed) };
+    Controller::new(classifier, for_settings, wake_up)
 }
 
 impl Drive {
@@ -235,10 +246,12 @@ impl Drive {
     pub fn new(walk: &Walk) -> Result<Self, TestCaseError> {
         let (beginning, row, eeprom) = (walk.beginning.clone(), walk.levels(), Eeprom::new());
         let readings = Readings::new(Instant::new(beginning.steps), Position::new(beginning.count));
+        let weed = Rc::default();
         let wake_up = WakeUp { readings, beam_broken: row[0], cause: Cause::PowerOn };
         let mut drive = Self {
-            machine: wake(&eeprom, wake_up),
+            machine: wake(&eeprom, &weed, wake_up),
             console: Console::new(),
+            weed,
             eeprom,
             saved: None,
             saving: None,
@@ -248,7 +261,8 @@ impl Drive {
             broken: row[0],
             beginning,
             row,
-            row_is_bare: false,
+            bare_from: i64::MAX,
+            farthest: 0,
             time_us: 0,
             ground: 0.0,
             speed: 0.0,
@@ -256,7 +270,6 @@ impl Drive {
             speeds: Extremes(VecDeque::new()),
             calm_since_us: 0,
             left_for: None,
-            objects: Vec::new(),
             is_tried: false,
             encoder_is_silent: false,
             edges_get_lost: false,
@@ -336,28 +349,34 @@ impl Drive {
         }
     }
 
-    /// Every fault is mended; the operator clears the alarm and starts, and drives on over bare ground until the tool is in.
+    /// Every fault is mended, and the row is at its end; the operator clears the alarm, starts, and drives on until the tool is
+    /// in. On the way back through the row there may be more alarms.
     pub fn come_back_to_work(&mut self) -> Checked {
-        (self.tool_is_stuck, self.switch_on, self.row_is_bare) = (false, false, true);
+        (self.tool_is_stuck, self.switch_on, self.bare_from) = (false, false, self.farthest);
         self.stop();
         self.turns((1_500_000 / self.beginning.turn_us) as u32)?;
-        self.say("clear")?;
         if self.ticks(Setting::BeamToToolMm) > 4000 {
+            self.say("clear")?;
             self.say("defaults")?;
         }
-        self.say("start")?;
-        prop_assert_eq!(self.machine.state(), State::Work);
         let metre = f64::from(self.machine.settings().wheel().ticks(1000).0);
         // Over what was seen, and forgotten, and on until ground that is known comes to the tool.
-        let ticks = (self.model.frontier() - self.count) as f64
-            + 2.0 * self.ticks(Setting::BeamToToolMm) as f64
-            + self.ticks(Setting::MarginMm) as f64;
-        let end = self.ground + ticks.max(0.0) + metre;
+        let end = self.farthest.max(self.ground as i64)
+            + 2 * self.ticks(Setting::BeamToToolMm)
+            + self.ticks(Setting::MarginMm)
+            + metre as i64;
         self.target = 0.5 * self.ticks(Setting::TopSpeedMmS) as f64;
         while self.machine.tool_out() {
+            if self.machine.state() != State::Work {
+                self.say("clear")?;
+                self.say("start")?;
+                prop_assert_eq!(self.machine.state(), State::Work);
+            }
             self.turn()?;
-            prop_assert_eq!(self.machine.state(), State::Work, "on bare ground");
-            prop_assert!(self.ground < end, "the tool does not come back to work: {:?}", self.machine.reason());
+            let there = self.ground as i64;
+            let is_bare = there > self.bare_from + 1;
+            prop_assert!(!is_bare || !is_alarm(self.machine.state()), "{:?} on bare ground", self.machine.state());
+            prop_assert!(there < end, "the tool does not come back to work: {:?}", self.machine.reason());
         }
         Ok(())
     }
@@ -447,7 +466,8 @@ impl Drive {
     }
 
     fn beam_at(&mut self, ground: i64) -> Checked {
-        let broken = !self.row_is_bare && self.row[ground.rem_euclid(self.row.len() as i64) as usize];
+        self.farthest = self.farthest.max(ground);
+        let broken = ground <= self.bare_from && self.row[ground.rem_euclid(self.row.len() as i64) as usize];
         if broken == self.broken { Ok(()) } else { self.edge(broken) }
     }
 
@@ -456,7 +476,7 @@ impl Drive {
         self.broken = broken;
         if !self.edges_get_lost {
             self.machine.beam_edge(Position::new(self.count as i32), broken);
-            self.compare_objects()?;
+            self.check_weed()?;
         }
         self.model.edge(self.count, broken, self.blur());
         Ok(())
@@ -501,7 +521,7 @@ impl Drive {
         self.model.roll_to(count, self.blur());
         let orders = self.machine.step(readings);
         let (state, out) = (self.machine.state(), self.machine.tool_out());
-        self.compare_objects()?;
+        self.check_weed()?;
         self.is_tried &= state == before;
         self.check_orders(orders)?;
         self.out_since_us = (orders.pulse == orders.pulse_out).then(|| self.out_since_us.unwrap_or(self.time_us));
@@ -597,23 +617,14 @@ impl Drive {
         Ok(())
     }
 
-    /// What the machine has taken for a weed since it was last asked was one, as the model saw it.
-    fn compare_objects(&mut self) -> Checked {
-        let objects = self.machine.objects();
-        if objects == self.objects {
-            return Ok(());
-        }
-        self.objects = objects.to_vec();
-        if let Some(object) = self.objects.last()
-            && object.vote.class == Class::Weed
-        {
-            let wheel = self.machine.settings().wheel();
-            // A millimetre, and what lies between it and the next.
-            let millimetre = i64::from(wheel.ticks(1).0) + 1;
-            let width = i64::from(wheel.ticks((object.features().hold_mm - MARGINS_MM) as u16).0);
-            let told = self.model.weed(self.count, width, millimetre);
-            prop_assert!(told.is_ok() || self.model.is_shifted, "{}", told.unwrap_err());
-        }
+    /// What the machine has just taken for a weed was one, as the model saw it.
+    fn check_weed(&mut self) -> Checked {
+        let Some(width_mm) = self.weed.take() else { return Ok(()) };
+        let wheel = self.machine.settings().wheel();
+        // A millimetre, and what lies between it and the next.
+        let millimetre = i64::from(wheel.ticks(1).0) + 1;
+        let told = self.model.weed(self.count, wheel.ticks(width_mm as u16).0.into(), millimetre);
+        prop_assert!(told.is_ok() || self.model.is_shifted, "{}", told.unwrap_err());
         Ok(())
     }
 
@@ -639,7 +650,6 @@ impl Drive {
             if self.grain() != grain {
                 self.model.begin_anew(self.unwrapped(self.machine.readings().position));
             }
-            self.objects = self.machine.objects().to_vec();
         }
         self.console.write(&mut self.machine)?;
         if is_end(&self.console.written.0) {
@@ -673,7 +683,7 @@ impl Drive {
         let is_answered = self.console.is_done();
         let maybe = self.examples();
         self.console = Console::new();
-        self.machine = wake(&self.eeprom, WakeUp { readings: self.readings(), beam_broken: self.broken, cause });
+        self.machine = wake(&self.eeprom, &self.weed, WakeUp { readings: self.readings(), beam_broken: self.broken, cause });
         let is_lost = self.machine.state() == State::Alarm(Alarm::SettingsLost);
         prop_assert!(is_lost || self.machine.state() == State::Hold, "woken up in {:?}", self.machine.state());
         let found = (!is_lost).then(|| self.machine.settings().clone());
@@ -693,7 +703,6 @@ impl Drive {
         self.taught = examples;
         self.model = Model::new(self.count, self.broken);
         self.speeds = Extremes(VecDeque::new());
-        self.objects.clear();
         (self.saving, self.is_tried, self.tool_was_stuck) = (None, false, self.tool_is_stuck);
         self.out_since_us = Some(self.time_us);
         self.disturb();

@@ -89,6 +89,7 @@ impl Model {
         self.begin = self.begin.min(place);
         (self.frontier, self.is_growing) = (place, false);
         self.runs.retain(|run| run.leading < place);
+        self.runs.iter_mut().for_each(|run| run.trailing = run.trailing.min(place - 1));
         self.merge_gaps.truncate(0);
     }
 
