@@ -82,8 +82,10 @@ impl Ground {
             self.begin_here();
         }
         let complete = self.watch.roll_to(self.beam - self.leads.response, self.geometry.merge_gap);
-        self.schedule.leave(self.tool() - memory);
+        // Counted from the frontier, as the beam is never more than the memory behind it: counted from the tool, it could be
+        // farther from what is known than a place can tell.
         let farthest = self.watch.frontier() - memory;
+        self.schedule.leave(farthest - self.geometry.beam_to_tool);
         if farthest.is_ahead_of(self.last_plant) {
             self.last_plant = farthest;
         }

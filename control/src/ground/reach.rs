@@ -5,7 +5,7 @@ use crate::{
     units::{Grain, Length, Ticks, TicksPerSecond},
 };
 
-/// How far behind the tool ground is remembered, in metres. Ahead of it are 4 m at most: twice the longest X. Together with
+/// How far the machine may be rolled back with the ground still remembered, in metres. Together with twice the longest X and
 /// the widest canopy that is less than the 13 m that a [`Length`] holds.
 const MEMORY_M: i16 = 8;
 
@@ -22,7 +22,7 @@ pub struct Geometry {
     pub max_width: Length,
     /// Clear ground behind which a canopy is over.
     pub merge_gap: Length,
-    /// How far behind the tool ground is remembered.
+    /// How far the machine may be rolled back with the ground still remembered.
     pub memory: Length,
 }
 

@@ -176,7 +176,9 @@ impl Extremes {
     fn take(&mut self, now_us: u64, value: f64) {
         let share = now_us / Self::SHARE_US;
         match self.0.back_mut() {
-            Some((last, least, greatest)) if *last == share => (*least, *greatest) = (least.min(value), greatest.max(value)),
+            Some((last, least, greatest)) if *last == share => {
+                (*least, *greatest) = (least.min(value), greatest.max(value))
+            }
             _ => self.0.push_back((share, value, value)),
         }
         while self.0.front().is_some_and(|&(first, ..)| first + MEMORY_OF_SPEED_US / Self::SHARE_US < share) {
@@ -233,6 +235,8 @@ pub struct Drive {
     tool_was_stuck: bool,
     out_since_us: Option<u64>,
     pub steps: u64,
+    /// Swings out at a steady speed, each for a window of its own.
+    pub steady_swings: u32,
 }
 
 fn wake(eeprom: &Eeprom, weed: &Rc<Cell<Option<i16>>>, wake_up: WakeUp) -> Weeder {
@@ -280,6 +284,7 @@ impl Drive {
             tool_was_stuck: false,
             out_since_us: Some(0),
             steps: 0,
+            steady_swings: 0,
         };
         drive.say("clear")?;
         Ok(drive)
@@ -379,6 +384,14 @@ impl Drive {
             prop_assert!(there < end, "the tool does not come back to work: {:?}", self.machine.reason());
         }
         Ok(())
+    }
+
+    pub fn state(&self) -> State {
+        self.machine.state()
+    }
+
+    pub fn tool_out(&self) -> bool {
+        self.machine.tool_out()
     }
 
     fn ticks(&self, setting: Setting) -> i64 {
@@ -608,12 +621,14 @@ impl Drive {
             return Ok(());
         }
         // A window is left, and over, by the lead before its end, the less as the measured speed wavers.
-        let lead_in_s = f64::from(self.machine.settings().get(Setting::LeadInMs)) / 1000.0;
-        let ahead = tool + (0.8 * self.speed * lead_in_s) as i64;
+        let settings = self.machine.settings();
+        let lead_in_ms = settings.get(Setting::LeadInMs).min(settings.get(Setting::LeadOutMs));
+        let ahead = tool + (0.8 * self.speed * f64::from(lead_in_ms) / 1000.0) as i64;
         let window = self.model.next_window(ahead, self.speed > 0.0, self.ticks(Setting::MarginMm));
         let again = window.is_some() && window.map(|run| run.leading) == self.left_for.map(|run| run.leading);
         prop_assert!(!again, "at {tool} the tool leaves again for {window:?}, at {:.0} ticks/s", self.speed);
         self.left_for = window;
+        self.steady_swings += 1;
         Ok(())
     }
 
@@ -642,7 +657,8 @@ impl Drive {
             if words == ["start", "now"] && after == State::Work {
                 let read = self.unwrapped(self.machine.readings().position);
                 let tool = read - self.ticks(Setting::BeamToToolMm);
-                let unseen = f64::from(unseen_mm + 1) * f64::from(self.machine.settings().wheel().ticks(1000).0) / 1000.0;
+                let unseen =
+                    f64::from(unseen_mm + 1) * f64::from(self.machine.settings().wheel().ticks(1000).0) / 1000.0;
                 if unseen_mm > 0 {
                     self.model.trust(tool - self.ticks(Setting::MarginMm), tool + unseen as i64);
                 }
@@ -683,7 +699,8 @@ impl Drive {
         let is_answered = self.console.is_done();
         let maybe = self.examples();
         self.console = Console::new();
-        self.machine = wake(&self.eeprom, &self.weed, WakeUp { readings: self.readings(), beam_broken: self.broken, cause });
+        self.machine =
+            wake(&self.eeprom, &self.weed, WakeUp { readings: self.readings(), beam_broken: self.broken, cause });
         let is_lost = self.machine.state() == State::Alarm(Alarm::SettingsLost);
         prop_assert!(is_lost || self.machine.state() == State::Hold, "woken up in {:?}", self.machine.state());
         let found = (!is_lost).then(|| self.machine.settings().clone());
@@ -718,4 +735,3 @@ fn is_alarm(state: State) -> bool {
 fn is_end(line: &str) -> bool {
     line.trim_end() == "ok" || line.starts_with("error: ")
 }
-

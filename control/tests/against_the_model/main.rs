@@ -23,6 +23,7 @@ mod drive;
 mod eeprom;
 mod model;
 mod walk;
+mod what_fell;
 
 use drive::{Checked, Drive};
 use proptest::{

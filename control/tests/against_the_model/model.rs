@@ -63,10 +63,6 @@ impl Model {
         model
     }
 
-    pub fn frontier(&self) -> i64 {
-        self.frontier
-    }
-
     /// The settings as of now, with the beam at a place: clear ground that belongs to a canopy, and a metre. Rolled back by more
     /// than eight of them, the beam sees anew what it comes to; give or take five centimetres.
     pub fn follow(&mut self, place: i64, merge_gap: i64, metre: i64) {
@@ -156,11 +152,13 @@ impl Model {
         let shown = nearest(last).to_vec();
         for first in (0..last).rev() {
             let (leading, trailing) = (self.runs[first].leading, self.runs[last - 1].trailing);
-            let tolerance = tolerance + self.slack + 2 * self.runs[first..last].iter().map(|run| run.blur).max().unwrap_or(0);
+            let tolerance =
+                tolerance + self.slack + 2 * self.runs[first..last].iter().map(|run| run.blur).max().unwrap_or(0);
             let set: Vec<i64> = self.merge_gaps_since(leading).collect();
             let (shortest, longest) = (set.iter().min().unwrap_or(&0), set.iter().max().unwrap_or(&0));
             let before = first.checked_sub(1).map(|before| leading - self.runs[before].trailing);
-            let is_whole = before.is_none_or(|gap| gap >= shortest - tolerance) && place - trailing >= shortest - tolerance;
+            let is_whole =
+                before.is_none_or(|gap| gap >= shortest - tolerance) && place - trailing >= shortest - tolerance;
             if is_whole && (trailing - leading).abs_diff(width) <= tolerance as u64 {
                 self.runs[first..last].iter_mut().for_each(|run| run.is_free = true);
                 return Ok(());
@@ -215,7 +213,13 @@ impl Model {
     /// The window that a tool rolling on from a place comes to next: its canopy's first and last place.
     pub fn next_window(&self, place: i64, forward: bool, margin: i64) -> Option<Run> {
         if forward {
-            self.runs.iter().rev().take_while(|run| run.trailing + margin >= place).filter(|run| !run.is_free).last().copied()
+            self.runs
+                .iter()
+                .rev()
+                .take_while(|run| run.trailing + margin >= place)
+                .filter(|run| !run.is_free)
+                .last()
+                .copied()
         } else {
             self.runs.iter().take_while(|run| run.leading - margin <= place).filter(|run| !run.is_free).last().copied()
         }

@@ -135,11 +135,46 @@ impl fmt::Debug for Walk {
 /// Every command with every argument, and lines that are none.
 fn line() -> BoxedStrategy<String> {
     let fixed = [
-        "status", "help", "help margin_mm", "get", "get lead_out_ms", "save", "revert", "defaults", "calibrate start",
-        "calibrate 1000", "calibrate 1000 force", "calibrate servo", "servo in", "servo out", "servo 1750",
-        "servo 9999", "test row", "start", "start now", "hold", "clear", "events on", "events off", "plot on",
-        "plot teleplot", "plot off", "label plant", "label weed", "examples", "forget all", "dump", "version", "hepl",
-        "set k", "set wheel 400", "  clear\t", "start now please", "", "\u{1b}[A", "set k 3\nhold\r\nstart\n\nget k",
+        "status",
+        "help",
+        "help margin_mm",
+        "get",
+        "get lead_out_ms",
+        "save",
+        "revert",
+        "defaults",
+        "calibrate start",
+        "calibrate 1000",
+        "calibrate 1000 force",
+        "calibrate servo",
+        "servo in",
+        "servo out",
+        "servo 1750",
+        "servo 9999",
+        "test row",
+        "start",
+        "start now",
+        "hold",
+        "clear",
+        "events on",
+        "events off",
+        "plot on",
+        "plot teleplot",
+        "plot off",
+        "label plant",
+        "label weed",
+        "examples",
+        "forget all",
+        "dump",
+        "version",
+        "hepl",
+        "set k",
+        "set wheel 400",
+        "  clear\t",
+        "start now please",
+        "",
+        "\u{1b}[A",
+        "set k 3\nhold\r\nstart\n\nget k",
     ];
     prop_oneof![
         8 => prop::sample::select(fixed.map(str::to_owned).to_vec()),
@@ -174,9 +209,23 @@ fn setting() -> BoxedStrategy<String> {
         1 => (Just("k"), 1_u32..=15),
     ];
     let names = [
-        "ticks_per_rev", "wheel_mm", "ticks_per_m", "beam_to_tool_mm", "margin_mm", "lead_out_ms", "lead_in_ms",
-        "servo_in_us", "servo_out_us", "servo_gap_ms", "k", "max_width_mm", "merge_gap_ticks", "beam_response_ms",
-        "top_speed_mm_s", "no_plant_m", "end_switch",
+        "ticks_per_rev",
+        "wheel_mm",
+        "ticks_per_m",
+        "beam_to_tool_mm",
+        "margin_mm",
+        "lead_out_ms",
+        "lead_in_ms",
+        "servo_in_us",
+        "servo_out_us",
+        "servo_gap_ms",
+        "k",
+        "max_width_mm",
+        "merge_gap_ticks",
+        "beam_response_ms",
+        "top_speed_mm_s",
+        "no_plant_m",
+        "end_switch",
     ];
     let any = (prop::sample::select(names.to_vec()), prop_oneof![0_u32..=600, 0_u32..=70_000]);
     prop_oneof![9 => usual, 1 => any].prop_map(|(name, value)| format!("set {name} {value}")).boxed()
@@ -197,7 +246,8 @@ fn happenings() -> BoxedStrategy<Vec<Happening>> {
     let forward = || roll(prop_oneof![8 => 100..800, 1 => 5..100, 2 => 800..1500], 20..700);
     let back = || roll(prop_oneof![6 => -600..-50, 1 => -50..-5, 1 => -1500..-600], 20..600);
     let cause = prop::sample::select(vec![Cause::PowerOn, Cause::BrownOut, Cause::LoopStalled]);
-    let kept = prop::sample::select(vec!["save", "label weed", "label plant", "forget all", "forget 0", "hold", "status"]);
+    let kept =
+        prop::sample::select(vec!["save", "label weed", "label plant", "forget all", "forget 0", "hold", "status"]);
     let fault = || {
         prop_oneof![
             2 => (1_u32..30).prop_map(|times| Dust { times }),
@@ -276,9 +326,12 @@ pub fn wild() -> BoxedStrategy<Walk> {
 pub fn calm() -> BoxedStrategy<Walk> {
     let rolls = prop_oneof![5 => roll(60..1400, 500..5000), 1 => roll(-800..-60, 100..3000)];
     let happenings = (prop::collection::vec(setting(), 0..5), prop::collection::vec(rolls, 1..8));
-    walks(happenings.prop_map(|(settings, rolls)| {
-        let settings = settings.into_iter().map(Happening::Type);
-        settings.chain([typed("start")]).chain(rolls).collect::<Vec<_>>()
-    })
-    .boxed())
+    walks(
+        happenings
+            .prop_map(|(settings, rolls)| {
+                let settings = settings.into_iter().map(Happening::Type);
+                settings.chain([typed("start")]).chain(rolls).collect::<Vec<_>>()
+            })
+            .boxed(),
+    )
 }
