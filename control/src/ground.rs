@@ -113,10 +113,12 @@ impl Ground {
         self.forget();
     }
 
-    /// Takes the operator's word that no plant stands under the tool and ahead of it where the beam has not been.
+    /// Takes the operator's word that no plant stands under the tool and ahead of it where nothing is known, if the tool is there.
     pub fn trust(&mut self) {
-        // A margin behind the tool as well, so that it does not stand on the border of what is known.
-        self.schedule.trust_from(self.tool() - self.geometry.margin);
+        if self.is_unseen() {
+            // A margin behind the tool as well, so that it does not stand on the border of what is known.
+            self.schedule.trust_from(self.tool() - self.geometry.margin);
+        }
     }
 
     /// Remembers an object as a plant.

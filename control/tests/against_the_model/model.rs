@@ -138,6 +138,10 @@ impl Model {
         for run in self.runs.iter_mut().filter(|run| run.trailing < from) {
             run.margin_to = run.margin_to.min(from - 1);
         }
+        // What the beam is still to come to there counts as little.
+        if to > self.frontier {
+            (self.frontier, self.is_growing) = (to, false);
+        }
     }
 
     /// With the beam at a place, the machine has taken an object for a weed of so many ticks, give or take `tolerance`.
