@@ -84,7 +84,7 @@ fn the_margin_behind_a_canopy_is_kept_over_an_alarm() {
     for behind_mm in -10..60 {
         let lines = format!(
             "set top_speed_mm_s 600\nstart\nroll {} mm at 556 mm/s\nroll 10 mm at 694 mm/s\nstand for 800 ms\nclear\nstart\nroll 900 mm at 400 mm/s",
-            860 + behind_mm
+            950 + behind_mm
         );
         go(&walk(&PLANTS, &lines));
     }
