@@ -718,7 +718,8 @@ impl Drive {
         }
         self.taught = examples;
         self.model = Model::new(self.count, self.broken);
-        self.speeds = Extremes(VecDeque::new());
+        // It takes itself for standing until it has measured.
+        self.speeds = Extremes(VecDeque::from([(self.time_us / Extremes::SHARE_US, 0.0, 0.0)]));
         (self.saving, self.is_tried, self.tool_was_stuck) = (None, false, self.tool_is_stuck);
         self.out_since_us = Some(self.time_us);
         self.disturb();
