@@ -93,8 +93,10 @@ impl Ground {
             self.begin_here();
         }
         let complete = self.watch.roll_to(self.beam - self.leads.response, self.geometry.merge_gap);
-        self.schedule.leave(self.tool() - memory);
+        // Counted from the frontier, as the beam is never more than the memory behind it: counted from the tool, it could be
+        // farther from what is known than a place can tell.
         let farthest = self.watch.frontier() - memory;
+        self.schedule.leave(farthest - self.geometry.beam_to_tool);
         if farthest.is_ahead_of(self.last_plant) {
             self.last_plant = farthest;
         }
@@ -122,10 +124,12 @@ impl Ground {
         self.forget();
     }
 
-    /// Takes the operator's word that no plant stands under the tool and ahead of it where the beam has not been.
+    /// Takes the operator's word that no plant stands under the tool and ahead of it where nothing is known, if the tool is there.
     pub fn trust(&mut self) {
-        // A margin behind the tool as well, so that it does not stand on the border of what is known.
-        self.schedule.trust_from(self.tool() - self.geometry.margin);
+        if self.is_unseen() {
+            // A margin behind the tool as well, so that it does not stand on the border of what is known.
+            self.schedule.trust_from(self.tool() - self.geometry.margin);
+        }
     }
 
     /// Remembers an object as a plant.

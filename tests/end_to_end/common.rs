@@ -221,6 +221,12 @@ impl Run {
         self.uno.run_until(cycle_at(self.start_cycle, passing.time_s)).expect("the firmware runs");
     }
 
+    /// Rolls on until so many seconds after the motion began.
+    #[track_caller]
+    pub fn roll_for(&mut self, time_s: f64) {
+        self.uno.run_until(cycle_at(self.start_cycle, time_s)).expect("the firmware runs");
+    }
+
     /// Types a line every so many milliseconds of the way, to the motion's end.
     #[track_caller]
     pub fn roll_on_asking(&mut self, line: &str, every_ms: u64) {

@@ -71,6 +71,8 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         if self.settings.get(Setting::EndSwitch) != 0
             && !matches!(self.bench, Bench::ByHand(_) | Bench::Swings(_))
             && self.end_switch.is_on() != self.tool_out
+            // What was done by hand has ended just now, and the tool is yet to be told.
+            && self.orders().pulse == self.pulse
             && now - self.told_at > swing
         {
             return Some(Alarm::ToolStuck);

@@ -5,7 +5,7 @@ use crate::{
     units::{Grain, Length, Ticks, TicksPerSecond, Wheel},
 };
 
-/// How far behind the tool ground is remembered, in metres. Ahead of it are 4 m at most: twice the longest X. Together with
+/// How far the machine may be rolled back with the ground still remembered, in metres. Together with twice the longest X and
 /// the widest canopy that is less than the 13 m that a [`Length`] holds.
 const MEMORY_M: i16 = 8;
 
@@ -24,7 +24,7 @@ pub struct Geometry {
     pub max_width: Length,
     /// Clear ground behind which a canopy is over.
     pub merge_gap: Length,
-    /// How far behind the tool ground is remembered.
+    /// How far the machine may be rolled back with the ground still remembered.
     pub memory: Length,
 }
 
@@ -90,22 +90,24 @@ impl Leads {
     /// The stretch of ground, from the tool on, that has to be open for the tool to be in the row when a decision made now
     /// shows: where it begins and where it ends, in the direction of rolling.
     ///
-    /// What keeps a tool in the row is a part of what lets it in, so at a steady speed it goes out once for a window and comes
-    /// in once behind it.
+    /// What keeps a tool in the row is a part of what lets it in, and less by a fifth at both ends. So at a steady speed it goes
+    /// out once for a window and comes in once behind it, although the measured speed wavers.
     pub fn stretch(&self, tool_out: bool) -> (Length, Length) {
         let Self { out, back, .. } = *self;
-        let one = Length(if out < Length::ZERO { -1 } else { 1 });
-        if tool_out {
-            // Coming back pays only if the tool can stay for as long as its stroke takes, the difference of the leads.
-            // That also keeps it out for the window that it left for, should the speed falter. The tick on either side
-            // is for an encoder that trembles on an edge.
-            return (back - one, out + (out - back) + one);
-        }
-        // A window once left stays left while the measured speed wavers by less than a quarter. What lies farther than the
-        // lead out is not asked for yet.
         let wavering = back + Length(back.0 / 4);
         let is_farther = if out < Length::ZERO { wavering < out } else { wavering > out };
-        (if is_farther { out } else { wavering }, out)
+        // What lies farther than the lead out is not asked for yet.
+        let near = if is_farther { out } else { wavering };
+        if !tool_out {
+            return (near, out);
+        }
+        // Coming back pays only if the tool can stay for as long as its stroke takes, the difference of the leads. That also
+        // keeps it out for the window that it left for, should the speed falter. The tick on either side is for an encoder
+        // that trembles on an edge.
+        let one = Length(if out < Length::ZERO { -1 } else { 1 });
+        let (stroke, quarter) = (out - back, Length(out.0 / 4));
+        let is_longer = if out < Length::ZERO { stroke < quarter } else { stroke > quarter };
+        (near - Length(near.0 / 5) - one, out + if is_longer { stroke } else { quarter } + one)
     }
 }
 

@@ -59,11 +59,9 @@ impl Schedule {
         self.behind == Behind::Left && self.known_from.is_ahead_of(place)
     }
 
-    /// Declares the ground from `place` on known although the beam has not seen all of it.
+    /// Declares the ground from `place` on known, which lies behind what the beam has seen.
     pub fn trust_from(&mut self, place: Place) {
-        if self.known_from.is_ahead_of(place) {
-            (self.known_from, self.behind) = (place, Behind::Unseen);
-        }
+        (self.known_from, self.behind) = (place, Behind::Unseen);
     }
 
     /// Forgets everything, as none of it is to be relied on: from `place` on, the ground is seen anew.

@@ -1,167 +1,231 @@
-//! What the machine may know of the ground, in the plainest form: whole numbers that never wrap, and a memory that never
-//! forgets.
+//! What the beam has shown of the ground, in the plainest form: whole numbers that never wrap, and a memory that never forgets.
 //!
-//! An alarm empties the machine's schedule, again and again while its fault lasts. How often, the model does not follow: of what
-//! the beam sees meanwhile it takes nothing for sure, neither that it is known nor that it is not.
+//! The ground is counted in the encoder's ticks. For each of them that the beam has come to, the model knows whether the
+//! beam was broken there when it first came, and two things only open such ground to the tool again: that it was taken for a
+//! weed while it was whole, and the operator's word. `start now` is that word. It counts for the ground of which `status` says
+//! that the machine does not know it, never seen or seen and forgotten, and for no other. An alarm opens nothing.
+//!
+//! Where the encoder's count goes wrong, the row is shifted under it by what was lost or made up: the model then still holds
+//! what the beam has shown at each count, which is all that the machine can know.
 
-use control::schedule::CAPACITY;
-
-/// An object of the row.
+/// Ground over which the beam was broken without a break.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Seen {
+pub struct Run {
     /// The first place at which the beam was broken.
     pub leading: i64,
     /// The last.
     pub trailing: i64,
-    /// Whether its beginning was not seen.
-    pub cut: bool,
+    /// How far off the machine may have it: by what its sensor's answer takes, as it is set.
+    blur: i64,
+    /// How far its margin goes at the most: the operator's word ends it.
+    margin_to: i64,
+    /// Whether the tool may work here: it was taken for a weed, or the operator has said so.
+    is_free: bool,
 }
 
-/// The ground as the beam has seen it.
+/// The ground as the beam has shown it.
 #[derive(Debug)]
 pub struct Model {
+    /// All behind this place is unknown.
+    known_from: i64,
+    /// The first place that was looked at.
+    begin: i64,
     /// The farthest place that the beam has come to.
     frontier: i64,
-    /// Whether the beam is broken.
+    /// Whether the beam is broken where it is, and whether the last run goes on at the frontier.
     broken: bool,
-    /// The object that has not come to its end.
-    open: Option<Seen>,
-    /// Whether the machine may know more, or less, of that object: it was there during an alarm.
-    doubtful: bool,
-    /// All behind the first is unknown for sure; ahead of the second, all is known.
-    unknown_up_to: i64,
-    known_from: i64,
-    /// The canopies that the machine has to know, and those that it may know.
-    canopies: Vec<Seen>,
-    perhaps: Vec<Seen>,
+    is_growing: bool,
+    /// In the order in which they lie.
+    runs: Vec<Run>,
+    /// Gaps that belong to a canopy, each with the frontier from which on it was set.
+    merge_gaps: Vec<(i64, i64)>,
+    /// What every place may be off by: the steps in which the machine remembers the ground, and the turn of the loop.
+    slack: i64,
+    /// Whether the encoder's count has gone wrong.
+    pub is_shifted: bool,
 }
 
 impl Model {
     /// Nothing is known but the beam's level.
     pub fn new(place: i64, broken: bool) -> Self {
-        Self {
+        let mut model = Self {
+            known_from: place,
+            begin: place,
             frontier: place,
             broken,
-            open: broken.then_some(Seen { leading: place, trailing: place, cut: true }),
-            doubtful: false,
-            unknown_up_to: place,
-            known_from: place,
-            canopies: Vec::new(),
-            perhaps: Vec::new(),
+            is_growing: false,
+            runs: Vec::new(),
+            merge_gaps: Vec::new(),
+            slack: 0,
+            is_shifted: false,
+        };
+        model.touch(0);
+        model
+    }
+
+    /// The settings as of now, with the beam at a place: clear ground that belongs to a canopy, and a metre. Rolled back by more
+    /// than eight of them, the beam sees anew what it comes to; give or take five centimetres.
+    pub fn follow(&mut self, place: i64, merge_gap: i64, metre: i64) {
+        if self.frontier - place > 8 * metre - metre / 20 {
+            self.known_from = self.known_from.min(place);
+        }
+        if self.frontier - place > 8 * metre + metre / 20 {
+            self.begin_anew(place);
+        }
+        let grain = 1 + metre / 2400;
+        self.slack = self.slack.max(2 + 2 * grain);
+        if self.merge_gaps.last().is_none_or(|&(_, gap)| gap != merge_gap) {
+            self.merge_gaps.push((self.frontier, merge_gap));
         }
     }
 
-    pub fn frontier(&self) -> i64 {
-        self.frontier
+    /// What lies ahead of a place is seen anew.
+    pub fn begin_anew(&mut self, place: i64) {
+        self.known_from = self.known_from.min(place);
+        self.begin = self.begin.min(place);
+        (self.frontier, self.is_growing) = (place, false);
+        self.runs.retain(|run| run.leading < place);
+        self.runs.iter_mut().for_each(|run| run.trailing = run.trailing.min(place - 1));
+        self.merge_gaps.truncate(0);
     }
 
-    pub fn is_doubtful(&self) -> bool {
-        self.doubtful
-    }
-
-    /// The beam has come to a place; the object that is complete now.
-    pub fn roll_to(&mut self, place: i64, merge_gap: i64) -> Option<Seen> {
-        if place <= self.frontier {
-            return None;
-        }
-        for place in [self.frontier, place] {
+    /// The beam has come to a place, which the machine may have by `blur` elsewhere.
+    pub fn roll_to(&mut self, place: i64, blur: i64) {
+        if place > self.frontier {
+            self.touch(blur);
             self.frontier = place;
-            self.touch();
+            self.touch(blur);
         }
-        let complete = self.open.filter(|open| !self.broken && place - open.trailing >= merge_gap)?;
-        self.open = None;
-        Some(complete)
     }
 
     /// The beam breaks or clears at a place.
-    pub fn edge(&mut self, place: i64, broken: bool, merge_gap: i64) -> Option<Seen> {
-        let complete = self.roll_to(place, merge_gap);
+    pub fn edge(&mut self, place: i64, broken: bool, blur: i64) {
+        self.roll_to(place, blur);
         self.broken = broken;
         if place == self.frontier {
-            self.touch();
-        }
-        complete
-    }
-
-    /// Something is in the beam at the farthest place, or nothing is.
-    fn touch(&mut self) {
-        if self.broken {
-            let first = Seen { leading: self.frontier, trailing: self.frontier, cut: false };
-            self.open.get_or_insert(first).trailing = self.frontier;
+            self.touch(blur);
         }
     }
 
-    /// The doubt about an object ends with it.
-    pub fn settle(&mut self) {
-        self.doubtful = false;
+    /// Something is in the beam at the frontier, or nothing is.
+    fn touch(&mut self, blur: i64) {
+        if !self.broken {
+            self.is_growing = false;
+            return;
+        }
+        let (here, goes_on) = (self.frontier, self.is_growing);
+        match self.runs.last_mut() {
+            Some(run) if !run.is_free && (goes_on || run.trailing == here) => {
+                run.trailing = here;
+                run.blur = run.blur.max(blur);
+            }
+            _ => self.runs.push(Run { leading: here, trailing: here, blur, margin_to: i64::MAX, is_free: false }),
+        }
+        self.is_growing = true;
     }
 
-    /// An object is a plant, for all that the machine can tell.
-    pub fn keep(&mut self, canopy: Seen) {
-        self.canopies.push(canopy);
+    /// The operator says that the tool may work from one place up to another, of which the machine knows nothing.
+    pub fn trust(&mut self, from: i64, to: i64) {
+        self.known_from = self.known_from.min(from);
+        let parts = |run: &Run| {
+            let part = |leading: i64, trailing: i64, is_free| {
+                let (leading, trailing) = (leading.max(run.leading), trailing.min(run.trailing));
+                (leading <= trailing).then_some(Run { leading, trailing, is_free, ..*run })
+            };
+            [part(i64::MIN, from - 1, run.is_free), part(from, to, true), part(to + 1, i64::MAX, run.is_free)]
+        };
+        self.runs = self.runs.iter().flat_map(parts).flatten().collect();
+        for run in self.runs.iter_mut().filter(|run| run.trailing < from) {
+            run.margin_to = run.margin_to.min(from - 1);
+        }
+        // What the beam is still to come to there counts as little.
+        if to > self.frontier {
+            (self.frontier, self.is_growing) = (to, false);
+        }
     }
 
-    /// The machine went into an alarm, when the beam had come to `frontier`.
-    pub fn latch(&mut self, frontier: i64) {
-        self.unknown_up_to = frontier;
-        self.perhaps.append(&mut self.canopies);
+    /// With the beam at a place, the machine has taken an object for a weed of so many ticks, give or take `tolerance`.
+    ///
+    /// # Errors
+    /// What the beam has shown, where no whole object of this width has come to its end here.
+    pub fn weed(&mut self, place: i64, width: i64, tolerance: i64) -> Result<(), String> {
+        let last = self.runs.partition_point(|run| run.trailing <= place);
+        let nearest = |last: usize| &self.runs[last.saturating_sub(4)..last];
+        // What still goes on at the frontier is not over.
+        let last = if self.is_growing && last == self.runs.len() { last.saturating_sub(1) } else { last };
+        let shown = nearest(last).to_vec();
+        for first in (0..last).rev() {
+            let (leading, trailing) = (self.runs[first].leading, self.runs[last - 1].trailing);
+            let tolerance =
+                tolerance + self.slack + 2 * self.runs[first..last].iter().map(|run| run.blur).max().unwrap_or(0);
+            let set: Vec<i64> = self.merge_gaps_since(leading).collect();
+            let (shortest, longest) = (set.iter().min().unwrap_or(&0), set.iter().max().unwrap_or(&0));
+            let before = first.checked_sub(1).map(|before| leading - self.runs[before].trailing);
+            let is_whole =
+                before.is_none_or(|gap| gap >= shortest - tolerance) && place - trailing >= shortest - tolerance;
+            if is_whole && (trailing - leading).abs_diff(width) <= tolerance as u64 {
+                self.runs[first..last].iter_mut().for_each(|run| run.is_free = true);
+                return Ok(());
+            }
+            if before.is_none_or(|gap| gap > longest + tolerance) {
+                break;
+            }
+        }
+        if self.runs[..last].is_empty() && place - width < self.begin {
+            return Ok(());
+        }
+        Err(format!("a weed of {width} ticks was told at {place}, where the beam has shown {shown:?}"))
     }
 
-    /// The machine may have seen this.
-    pub fn perhaps(&mut self, seen: impl IntoIterator<Item = Seen>) {
-        self.perhaps.extend(seen);
+    /// The gaps that were set while the beam came from a place on.
+    fn merge_gaps_since(&self, place: i64) -> impl Iterator<Item = i64> {
+        let first = self.merge_gaps.partition_point(|&(from, _)| from <= place).saturating_sub(1);
+        self.merge_gaps[first..].iter().map(|&(_, gap)| gap)
     }
 
-    /// The machine is in an alarm, and may have seen this.
-    pub fn alarmed(&mut self, seen: impl Iterator<Item = Seen>) {
-        self.perhaps(seen);
-        self.known_from = self.frontier;
-        self.doubtful = self.open.is_some();
+    /// Whether the tool is behind all that the beam has seen, with `near` the first place that it asks for.
+    pub fn is_unseen(&self, near: i64) -> bool {
+        near + self.slack < self.known_from
     }
 
-    /// The machine does not know how far it has rolled: all that was seen is unknown, and a margin ahead of it.
-    pub fn lose_place(&mut self, margin: i64) {
-        self.latch(self.frontier);
-        self.known_from = self.frontier + margin;
-        self.doubtful = self.open.is_some();
+    /// A canopy that the tool has to keep off, with its margin, somewhere from `near` to `far`.
+    pub fn canopy_between(&self, near: i64, far: i64, margin: i64) -> Option<Run> {
+        let first = self.runs.partition_point(|run| run.trailing + margin < near);
+        let mut near_by = self.runs[first..].iter().take_while(|run| run.leading - margin <= far);
+        near_by.find(|run| self.bounds(run, margin).is_some_and(|(from, to)| from <= far && to >= near)).copied()
     }
 
-    /// Edges were lost: the beam's level is now `broken`.
-    pub fn lose_edges(&mut self, broken: bool) {
-        self.broken = broken;
-        let cut = Seen { leading: self.frontier, trailing: self.frontier, cut: true };
-        self.open = broken.then_some(cut);
+    /// As [`canopy_between`](Self::canopy_between), where all of the ground is closed by canopies and their margins.
+    pub fn canopies_all_over(&self, mut near: i64, far: i64, margin: i64) -> Option<Run> {
+        loop {
+            let run = self.canopy_between(near, near, margin)?;
+            let (_, to) = self.bounds(&run, margin)?;
+            if to >= far {
+                return Some(run);
+            }
+            near = to + 1;
+        }
     }
 
-    /// The operator says that the ground from a place on is without plants, whatever was forgotten.
-    pub fn trust_from(&mut self, place: i64) {
-        self.unknown_up_to = self.unknown_up_to.min(place);
-        self.known_from = self.known_from.min(place);
+    /// The ground around a run that is closed for sure; none where the tool may work, or the machine may have seen nothing.
+    fn bounds(&self, run: &Run, margin: i64) -> Option<(i64, i64)> {
+        let slack = self.slack + 2 * run.blur;
+        let is_canopy = !run.is_free && run.trailing - run.leading > slack;
+        is_canopy.then_some((run.leading - margin + slack, (run.trailing + margin - slack).min(run.margin_to)))
     }
 
-    /// Whether the machine has to keep its tool off some of the ground from `near` to `far`.
-    pub fn is_closed(&self, near: i64, far: i64, margin: i64) -> bool {
-        let open = self.open.filter(|_| !self.doubtful);
-        near < self.unknown_up_to
-            || far > self.frontier
-            || open.is_some_and(|open| far >= open.leading - margin)
-            || self.canopies.iter().any(|canopy| touches(canopy, near, far, margin))
+    /// The window that a tool rolling on from a place comes to next: its canopy's first and last place.
+    pub fn next_window(&self, place: i64, forward: bool, margin: i64) -> Option<Run> {
+        if forward {
+            self.runs
+                .iter()
+                .rev()
+                .take_while(|run| run.trailing + margin >= place)
+                .filter(|run| !run.is_free)
+                .last()
+                .copied()
+        } else {
+            self.runs.iter().take_while(|run| run.leading - margin <= place).filter(|run| !run.is_free).last().copied()
+        }
     }
-
-    /// Whether anything gives the machine a reason to keep its tool off some of the ground from `near` to `far`.
-    pub fn may_be_closed(&self, near: i64, far: i64, margin: i64) -> bool {
-        near < self.known_from
-            || self.may_have_forgotten()
-            || self.open.is_some_and(|open| far >= open.leading - margin)
-            || self.canopies.iter().chain(&self.perhaps).any(|canopy| touches(canopy, near, far, margin))
-    }
-
-    /// Whether the machine may have had to forget, for want of room or after a long way.
-    fn may_have_forgotten(&self) -> bool {
-        self.canopies.len() + self.perhaps.len() >= CAPACITY || self.frontier - self.known_from > 1 << 19
-    }
-}
-
-fn touches(canopy: &Seen, near: i64, far: i64, margin: i64) -> bool {
-    canopy.leading - margin <= far && canopy.trailing + margin >= near
 }

@@ -1,0 +1,85 @@
+//! An EEPROM that takes its time for a byte, and outlives the machine.
+
+use control::memory::{ERASED, Memory, SIZE};
+use std::{cell::RefCell, rc::Rc};
+
+/// How often the machine has to ask before a byte is written: once a turn, for some milliseconds.
+const PATIENCE: u8 = 3;
+
+#[derive(Clone, Debug)]
+struct Chip {
+    bytes: [u8; 2 * SIZE],
+    /// The byte that is being written, with its address, and the questions that it still takes.
+    under_way: Option<(usize, u8)>,
+    patience: u8,
+}
+
+impl Chip {
+    fn finish(&mut self) {
+        if let Some((address, byte)) = self.under_way.take() {
+            self.bytes[address] = byte;
+        }
+    }
+}
+
+/// The chip.
+#[derive(Clone, Debug)]
+pub struct Eeprom(Rc<RefCell<Chip>>);
+
+/// Half of the chip.
+#[derive(Clone, Debug)]
+pub struct Half {
+    chip: Rc<RefCell<Chip>>,
+    begin: usize,
+}
+
+impl Eeprom {
+    /// An erased one.
+    pub fn new() -> Self {
+        Self(Rc::new(RefCell::new(Chip { bytes: [ERASED; 2 * SIZE], under_way: None, patience: 0 })))
+    }
+
+    /// Both halves.
+    pub fn halves(&self) -> [Half; 2] {
+        [0, SIZE].map(|begin| Half { chip: Rc::clone(&self.0), begin })
+    }
+
+    /// The machine is reset: a byte under way is written to its end.
+    pub fn reset(&mut self) {
+        self.0.borrow_mut().finish();
+    }
+
+    /// The power goes away: a byte under way becomes this one.
+    pub fn lose_power(&mut self, becomes: u8) {
+        let mut chip = self.0.borrow_mut();
+        if let Some((_, byte)) = &mut chip.under_way {
+            *byte = becomes;
+        }
+        chip.finish();
+    }
+}
+
+impl Memory for Half {
+    fn read(&self, address: u16) -> u8 {
+        // Reading waits for what is being written.
+        let mut chip = self.chip.borrow_mut();
+        chip.finish();
+        chip.bytes[self.begin + usize::from(address)]
+    }
+
+    fn is_ready(&self) -> bool {
+        let mut chip = self.chip.borrow_mut();
+        chip.patience = chip.patience.saturating_sub(1);
+        if chip.patience == 0 {
+            chip.finish();
+        }
+        chip.under_way.is_none()
+    }
+
+    fn write(&mut self, address: u16, byte: u8) {
+        let mut chip = self.chip.borrow_mut();
+        assert!(chip.under_way.is_none(), "a byte is written over another that is under way");
+        chip.under_way = Some((self.begin + usize::from(address), byte));
+        chip.patience = PATIENCE;
+    }
+}

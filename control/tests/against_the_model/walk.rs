@@ -1,0 +1,337 @@
+//! Walks: a machine, a row, and what happens to the machine on it, one thing after the other, as a person would say it.
+
+use control::reset::Cause;
+use proptest::prelude::*;
+use std::fmt;
+
+/// Ticks of the ground wheel in a millimetre, whatever the machine is told of it.
+pub const TICKS_A_MM: f64 = 1.909_86;
+
+/// Where and when a walk begins, and how the machine is.
+#[derive(Clone, Debug)]
+pub struct Beginning {
+    /// What the counters of way and time show.
+    pub count: i32,
+    pub steps: u32,
+    pub turn_us: u64,
+    /// Whether each reading is from before the edges that come with it.
+    pub reads_first: bool,
+    /// How fast the machine gains and loses speed.
+    pub mm_s2: i32,
+}
+
+/// Something that happens.
+#[derive(Clone, Debug)]
+pub enum Happening {
+    /// A line is typed, and answered while the machine rolls on.
+    Type(String),
+    /// The machine rolls so far, back where that is negative, and goes on at this speed.
+    Roll {
+        mm: i32,
+        mm_s: i32,
+    },
+    Stand {
+        ms: u32,
+    },
+    /// The wheel trembles on an edge.
+    Tremble {
+        times: u32,
+    },
+    Switch {
+        on: bool,
+    },
+    /// Leaves, or light between them, come and go in the beam at one place.
+    Dust {
+        times: u32,
+    },
+    /// The next edges of the beam get lost.
+    LoseEdges {
+        turns: u32,
+    },
+    /// The encoder says nothing, while the machine rolls on.
+    Silence {
+        ms: u32,
+    },
+    /// Both channels of the encoder change at once.
+    Spike {
+        ticks: i32,
+        times: u32,
+    },
+    Reset(Cause),
+    /// A line is typed, and after so many turns of the loop the power goes away; a byte that is being written becomes anything.
+    CutPower {
+        line: &'static str,
+        turns: u32,
+        byte: u8,
+    },
+    LowerStack {
+        turns: u32,
+    },
+    /// The end switch no longer follows the tool, or does again.
+    StickTool {
+        stuck: bool,
+    },
+}
+
+impl fmt::Display for Happening {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Type(line) => write!(f, "type `{}`", line.escape_debug()),
+            Self::Roll { mm, mm_s } if *mm_s < 0 => write!(f, "roll back {} mm at {} mm/s", -mm, -mm_s),
+            Self::Roll { mm, mm_s } => write!(f, "roll {mm} mm at {mm_s} mm/s"),
+            Self::Stand { ms } => write!(f, "stand for {ms} ms"),
+            Self::Tremble { times } => write!(f, "stop, and tremble by a tick {times} times"),
+            Self::Switch { on } => write!(f, "throw the work switch {}", if *on { "on" } else { "off" }),
+            Self::Dust { times } => write!(f, "have the beam change twice, {times} times, at one place"),
+            Self::LoseEdges { turns } => write!(f, "lose the beam's edges for {turns} turns of the loop"),
+            Self::Silence { ms } => write!(f, "silence the encoder for {ms} ms"),
+            Self::Spike { ticks, times } => write!(f, "spoil the count by {ticks} ticks, {times} times a turn apart"),
+            Self::Reset(cause) => write!(f, "reset, by {cause:?}"),
+            Self::CutPower { line, turns, byte } => {
+                write!(f, "type `{line}`, and cut the power {turns} turns later; a byte under way becomes {byte:#04x}")
+            }
+            Self::LowerStack { turns } => write!(f, "leave 40 bytes of stack for {turns} turns"),
+            Self::StickTool { stuck: true } => write!(f, "have the end switch stick"),
+            Self::StickTool { stuck: false } => write!(f, "have the end switch follow the tool again"),
+        }
+    }
+}
+
+/// A walk.
+#[derive(Clone)]
+pub struct Walk {
+    pub beginning: Beginning,
+    /// Clear ground and ground with something on it, in turn, in millimetres; behind the last it begins again.
+    pub row: Vec<(u32, u32)>,
+    pub happenings: Vec<Happening>,
+}
+
+impl Walk {
+    /// For each tick of the row whether something stands there.
+    pub fn levels(&self) -> Vec<bool> {
+        let ticks = |mm: u32| (f64::from(mm) * TICKS_A_MM) as usize;
+        let levels =
+            |&(gap, thing)| std::iter::repeat_n(false, ticks(gap)).chain(std::iter::repeat_n(true, ticks(thing)));
+        self.row.iter().flat_map(levels).collect()
+    }
+}
+
+/// What a person types and rolls.
+impl fmt::Debug for Walk {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { beginning, row, happenings } = self;
+        writeln!(f, "{beginning:?}")?;
+        write!(f, "the beam is at 0 mm; in the row stand things from")?;
+        let mut place = 0;
+        for (gap, thing) in row {
+            write!(f, " {} to {},", place + gap, place + gap + thing)?;
+            place += gap + thing;
+        }
+        writeln!(f, " and again every {place} mm")?;
+        happenings.iter().try_for_each(|happening| writeln!(f, "    {happening}"))
+    }
+}
+
+/// Every command with every argument, and lines that are none.
+fn line() -> BoxedStrategy<String> {
+    let fixed = [
+        "status",
+        "help",
+        "help margin_mm",
+        "get",
+        "get lead_out_ms",
+        "save",
+        "revert",
+        "defaults",
+        "calibrate start",
+        "calibrate 1000",
+        "calibrate 1000 force",
+        "calibrate servo",
+        "servo in",
+        "servo out",
+        "servo 1750",
+        "servo 9999",
+        "test row",
+        "start",
+        "start now",
+        "hold",
+        "clear",
+        "events on",
+        "events off",
+        "plot on",
+        "plot teleplot",
+        "plot off",
+        "label plant",
+        "label weed",
+        "examples",
+        "forget all",
+        "dump",
+        "version",
+        "hepl",
+        "set k",
+        "set wheel 400",
+        "  clear\t",
+        "start now please",
+        "",
+        "\u{1b}[A",
+        "set k 3\nhold\r\nstart\n\nget k",
+    ];
+    prop_oneof![
+        8 => prop::sample::select(fixed.map(str::to_owned).to_vec()),
+        1 => (1000_u32..5000, any::<bool>())
+            .prop_map(|(mm, force)| format!("calibrate {mm}{}", if force { " force" } else { "" })),
+        1 => (90_u32..1500).prop_map(|mm_s| format!("test row {mm_s}")),
+        1 => (400_u32..2600).prop_map(|us| format!("servo {us}")),
+        1 => (0_u32..40).prop_map(|number| format!("forget {number}")),
+        1 => "[ -~]{0,90}",
+    ]
+    .boxed()
+}
+
+/// Settings of machines that may be built, and now and then of others.
+fn setting() -> BoxedStrategy<String> {
+    let usual = prop_oneof![
+        4 => (Just("lead_out_ms"), 0_u32..=500),
+        4 => (Just("lead_in_ms"), 0_u32..=500),
+        3 => (Just("top_speed_mm_s"), 300_u32..=1600),
+        2 => (Just("margin_mm"), 0_u32..=200),
+        2 => (Just("beam_to_tool_mm"), 100_u32..=900),
+        2 => (Just("merge_gap_ticks"), 0_u32..=300),
+        2 => (Just("max_width_mm"), 200_u32..=1500),
+        1 => (Just("ticks_per_m"), 1500_u32..=2500),
+        1 => (Just("wheel_mm"), 300_u32..=600),
+        1 => (Just("end_switch"), 0_u32..=1),
+        1 => (Just("beam_response_ms"), 0_u32..=5),
+        1 => (Just("servo_gap_ms"), 0_u32..=15),
+        1 => (Just("no_plant_m"), 0_u32..=3),
+        1 => (Just("servo_out_us"), 500_u32..=2500),
+        1 => (Just("servo_in_us"), 500_u32..=2500),
+        1 => (Just("k"), 1_u32..=15),
+    ];
+    let names = [
+        "ticks_per_rev",
+        "wheel_mm",
+        "ticks_per_m",
+        "beam_to_tool_mm",
+        "margin_mm",
+        "lead_out_ms",
+        "lead_in_ms",
+        "servo_in_us",
+        "servo_out_us",
+        "servo_gap_ms",
+        "k",
+        "max_width_mm",
+        "merge_gap_ticks",
+        "beam_response_ms",
+        "top_speed_mm_s",
+        "no_plant_m",
+        "end_switch",
+    ];
+    let any = (prop::sample::select(names.to_vec()), prop_oneof![0_u32..=600, 0_u32..=70_000]);
+    prop_oneof![9 => usual, 1 => any].prop_map(|(name, value)| format!("set {name} {value}")).boxed()
+}
+
+/// Rolls for a time at a speed.
+fn roll(mm_s: impl Strategy<Value = i32> + 'static, ms: std::ops::Range<i32>) -> BoxedStrategy<Happening> {
+    (mm_s, ms).prop_map(|(mm_s, ms)| Happening::Roll { mm: mm_s * ms / 1000 + mm_s.signum(), mm_s }).boxed()
+}
+
+fn typed(line: &str) -> Happening {
+    Happening::Type(line.to_owned())
+}
+
+/// Some things that happen one after the other.
+fn happenings() -> BoxedStrategy<Vec<Happening>> {
+    use Happening::*;
+    let forward = || roll(prop_oneof![8 => 100..800, 1 => 5..100, 2 => 800..1500], 20..700);
+    let back = || roll(prop_oneof![6 => -600..-50, 1 => -50..-5, 1 => -1500..-600], 20..600);
+    let cause = prop::sample::select(vec![Cause::PowerOn, Cause::BrownOut, Cause::LoopStalled]);
+    let kept =
+        prop::sample::select(vec!["save", "label weed", "label plant", "forget all", "forget 0", "hold", "status"]);
+    let fault = || {
+        prop_oneof![
+            2 => (1_u32..30).prop_map(|times| Dust { times }),
+            2 => (1_u32..4).prop_map(|turns| LoseEdges { turns }),
+            1 => roll(1500..2500, 50..300),
+            1 => (5_u32..300).prop_map(|ms| Silence { ms }),
+            1 => (prop_oneof![Just(-2), Just(2)], 1_u32..30).prop_map(|(ticks, times)| Spike { ticks, times }),
+            1 => (1_u32..20).prop_map(|turns| LowerStack { turns }),
+            1 => any::<bool>().prop_map(|stuck| StickTool { stuck }),
+        ]
+    };
+    let to_work = || prop_oneof![6 => Just("start"), 1 => Just("start now")];
+    let one = prop_oneof![
+        12 => forward(),
+        5 => back(),
+        2 => (1_u32..600).prop_map(|ms| Stand { ms }),
+        1 => (1_u32..100).prop_map(|times| Tremble { times }),
+        5 => line().prop_map(Type),
+        4 => setting().prop_map(Type),
+        2 => any::<bool>().prop_map(|on| Switch { on }),
+        3 => fault(),
+        1 => cause.prop_map(Reset),
+        1 => (kept, 0_u32..600, any::<u8>()).prop_map(|(line, turns, byte)| CutPower { line, turns, byte }),
+    ];
+    // A row or the servo's swings come to their end, and something is typed in that very turn or near it.
+    let bench = prop_oneof![
+        (900_u32..1400).prop_map(|mm_s| (format!("test row {mm_s}"), 3500 * 1000 / mm_s)),
+        Just(("calibrate servo".to_owned(), 9000)),
+    ];
+    let bench = (bench, 0_u32..20, line())
+        .prop_map(|((bench, ms), off, line)| vec![typed("hold"), Type(bench), Stand { ms: ms + off - 15 }, Type(line)]);
+    prop_oneof![
+        24 => one.prop_map(|happening| vec![happening]),
+        6 => (to_work(), forward()).prop_map(|(start, roll)| vec![typed("clear"), typed(start), roll]),
+        // A fault in the midst of whatever there is, and on from where it was.
+        6 => (fault(), back(), to_work(), forward()).prop_map(|(fault, back, start, forward)| {
+            vec![fault, back, typed("clear"), typed(start), forward]
+        }),
+        // Far and fast, beyond what the machine remembers.
+        1 => (prop_oneof![-11_000..-2000, 2000..12_000], to_work()).prop_map(|(mm, start)| {
+            vec![typed("hold"), Roll { mm, mm_s: 6000 * mm.signum() }, Stand { ms: 1 }, typed("clear"), typed(start)]
+        }),
+        1 => bench,
+    ]
+    .boxed()
+}
+
+/// Clear ground and things in turn: plants, weeds, leaves with light between them.
+fn row() -> BoxedStrategy<Vec<(u32, u32)>> {
+    let gap = prop_oneof![2 => 1_u32..40, 5 => 40_u32..900];
+    let thing = prop_oneof![2 => 2_u32..40, 5 => 60_u32..300, 1 => 300_u32..500];
+    prop::collection::vec((gap, thing), 1..12).boxed()
+}
+
+/// Anywhere, or where a counter is about to run over its end.
+fn beginning() -> BoxedStrategy<Beginning> {
+    let count = prop_oneof![Just(0), i32::MAX - 20_000..=i32::MAX, i32::MIN..i32::MIN + 5_000, any::<i32>()];
+    let steps = prop_oneof![Just(0), u32::MAX - 2_000_000..=u32::MAX, any::<u32>()];
+    (count, steps, 300_u64..2000, any::<bool>(), 300..6000)
+        .prop_map(|(count, steps, turn_us, reads_first, mm_s2)| Beginning { count, steps, turn_us, reads_first, mm_s2 })
+        .boxed()
+}
+
+fn walks(happenings: BoxedStrategy<Vec<Happening>>) -> BoxedStrategy<Walk> {
+    (beginning(), row(), happenings)
+        .prop_map(|(beginning, row, happenings)| Walk { beginning, row, happenings })
+        .boxed()
+}
+
+/// Walks on which anything happens.
+pub fn wild() -> BoxedStrategy<Walk> {
+    walks(prop::collection::vec(happenings(), 1..30).prop_map(|some| some.into_iter().flatten().collect()).boxed())
+}
+
+/// Walks of a machine that was set up by somebody, works, and is rolled steadily, forward and back.
+pub fn calm() -> BoxedStrategy<Walk> {
+    let rolls = prop_oneof![5 => roll(60..1400, 500..5000), 1 => roll(-800..-60, 100..3000)];
+    let happenings = (prop::collection::vec(setting(), 0..5), prop::collection::vec(rolls, 1..8));
+    walks(
+        happenings
+            .prop_map(|(settings, rolls)| {
+                let settings = settings.into_iter().map(Happening::Type);
+                settings.chain([typed("start")]).chain(rolls).collect::<Vec<_>>()
+            })
+            .boxed(),
+    )
+}

@@ -1,0 +1,189 @@
+//! What once fell, by name: the very lines and rolls that showed it, and their like on both sides, held against the model.
+
+use crate::{
+    drive::Drive,
+    walk::{Beginning, Happening, Walk},
+};
+use control::{alarm::Alarm, controller::State};
+use proptest::test_runner::TestCaseError;
+
+/// Two plants, and bare ground behind them.
+const PLANTS: [(u32, u32); 3] = [(300, 150), (350, 150), (9000, 0)];
+
+/// Plants to the end of the world.
+const ROW: [(u32, u32); 1] = [(450, 150)];
+
+/// Faster than 600 mm/s, so that there is an alarm, and to a stop.
+const TOO_FAST: &str = "roll 60 mm at 694 mm/s\nstand for 800 ms";
+
+/// What a line says: `roll 450 mm at 556 mm/s`, `roll back ...`, `stand for 100 ms`, or what is typed.
+fn happening(line: &str) -> Happening {
+    let numbers: Vec<i32> = line.split(' ').filter_map(|word| word.parse().ok()).collect();
+    match (line.split(' ').next(), &numbers[..]) {
+        (Some("roll"), &[mm, mm_s]) if line.starts_with("roll back") => Happening::Roll { mm: -mm, mm_s: -mm_s },
+        (Some("roll"), &[mm, mm_s]) => Happening::Roll { mm, mm_s },
+        (Some("stand"), &[ms]) => Happening::Stand { ms: ms as u32 },
+        _ => Happening::Type(line.to_owned()),
+    }
+}
+
+/// A machine that gains and loses speed as a person pushes it, on a row.
+fn walk(row: &[(u32, u32)], lines: &str) -> Walk {
+    let beginning = Beginning { count: 0, steps: 0, turn_us: 1000, reads_first: true, mm_s2: 3000 };
+    let happenings = lines.lines().map(str::trim).filter(|line| !line.is_empty()).map(happening).collect();
+    Walk { beginning, row: row.to_vec(), happenings }
+}
+
+/// Goes the walk, checked after each step; returns the machine.
+#[track_caller]
+fn go(walk: &Walk) -> Drive {
+    let gone = Drive::new(walk).and_then(|mut drive| {
+        walk.happenings.iter().try_for_each(|happening| drive.happen(happening))?;
+        Ok(drive)
+    });
+    gone.unwrap_or_else(|failure: TestCaseError| panic!("{failure}\n{walk:?}"))
+}
+
+#[test]
+fn the_rest_of_a_half_seen_plant_is_no_weed_after_an_alarm() {
+    for seen_mm in (1..150).step_by(7).chain([132]) {
+        for back_mm in [0, 20, 100, 200, 600] {
+            let back = if back_mm > 0 { format!("roll back {back_mm} mm at 150 mm/s") } else { String::new() };
+            let drive = go(&walk(
+                &PLANTS,
+                &format!(
+                    "set top_speed_mm_s 600
+                     start
+                     roll {} mm at 556 mm/s
+                     {back}
+                     roll back 100 mm at 694 mm/s
+                     stand for 800 ms
+                     clear
+                     start
+                     roll 1400 mm at 556 mm/s",
+                    800 + seen_mm
+                ),
+            ));
+            assert_eq!((drive.state(), drive.tool_out()), (State::Work, false), "the machine works on");
+        }
+    }
+}
+
+#[test]
+fn an_alarm_in_a_gap_between_leaves_makes_no_weed_of_the_next_leaf() {
+    // Leaves of 40 mm with light of 15 mm between them: each of them alone is as narrow as a weed.
+    let ragged = [(800, 40), (15, 40), (15, 40), (9000, 0)];
+    for seen_mm in 1..=180 {
+        let lines = format!(
+            "set top_speed_mm_s 600\nstart\nroll {} mm at 556 mm/s\n{TOO_FAST}\nclear\nstart\nroll 900 mm at 556 mm/s",
+            740 + seen_mm
+        );
+        go(&walk(&ragged, &lines));
+    }
+}
+
+#[test]
+fn the_margin_behind_a_canopy_is_kept_over_an_alarm() {
+    for behind_mm in -60..60 {
+        let lines = format!(
+            "set top_speed_mm_s 600\nstart\nroll {} mm at 556 mm/s\n{TOO_FAST}\nclear\nstart\nroll 900 mm at 400 mm/s",
+            950 + behind_mm
+        );
+        go(&walk(&PLANTS, &lines));
+    }
+}
+
+#[test]
+fn what_is_typed_in_the_turn_in_which_a_row_ends_leaves_the_real_plants_alone() {
+    for line in ["servo in", "servo out", "calibrate servo", "test row 1400", "start", "start now", "hold", "status"] {
+        for ms in 2480..2520 {
+            let lines = format!("test row 1400\nstand for {ms} ms\n{line}\nhold\nstart\nroll 2500 mm at 700 mm/s");
+            let drive = go(&walk(&ROW, &lines));
+            assert_eq!(drive.state(), State::Work);
+        }
+    }
+}
+
+#[test]
+fn what_was_saved_is_kept_although_the_servos_swings_end_while_it_is_written() {
+    for ms in (8800..9020).step_by(4) {
+        for turns in [3, 100, 400] {
+            let lines = format!("set end_switch on\nset k 5\nstand for 100 ms\ncalibrate servo\nstand for {ms} ms");
+            let mut walk = walk(&ROW, &lines);
+            walk.happenings.push(Happening::CutPower { line: "save", turns, byte: 0 });
+            go(&walk);
+        }
+        // Answered with `ok`, and the power goes at once.
+        let lines = format!("set end_switch on\nset k 5\nstand for 100 ms\ncalibrate servo\nstand for {ms} ms\nsave");
+        let mut walk = walk(&ROW, &lines);
+        walk.happenings.push(Happening::CutPower { line: "status", turns: 0, byte: 0 });
+        go(&walk);
+    }
+}
+
+#[test]
+fn leads_near_each_other_give_one_swing_each_way_a_window_at_every_speed() {
+    let leads_ms = [0, 40, 100, 150, 180, 220, 300, 500];
+    let mut swings = 0;
+    for mm_s in (100..=1400).step_by(20) {
+        for (lead_out_ms, lead_in_ms) in leads_ms.iter().flat_map(|out| leads_ms.map(|back| (out, back))) {
+            // What the tool's distance does not allow at the top speed is refused, and the lead stays as it was.
+            let lines = format!(
+                "set beam_to_tool_mm 1200
+                 set lead_out_ms {lead_out_ms}
+                 set lead_in_ms {lead_in_ms}
+                 start
+                 roll {} mm at {mm_s} mm/s",
+                mm_s * 2 + 2500
+            );
+            swings += go(&walk(&[(450, 150), (700, 150), (60, 90)], &lines)).steady_swings;
+        }
+    }
+    assert!(swings > 10_000, "{swings} swings were looked at");
+}
+
+#[test]
+fn a_tool_moved_by_hand_is_not_stuck_when_the_machine_takes_it_out_again() {
+    for moved in ["servo in", "servo 1750", "test row 500", "calibrate servo"] {
+        for ms in [1, 50, 150, 400, 1000, 3000] {
+            for back in ["servo out", "hold", "start", "start now", "servo in\nservo out"] {
+                let lines = format!(
+                    "set end_switch on\nstand for 2000 ms\n{moved}\nstand for {ms} ms\n{back}\nstand for 1500 ms"
+                );
+                let drive = go(&walk(&ROW, &lines));
+                assert!(!matches!(drive.state(), State::Alarm(Alarm::ToolStuck)), "{lines}");
+            }
+            let lines = format!("set end_switch on\nstand for 2000 ms\n{moved}\nstand for {ms} ms");
+            let mut walk = walk(&ROW, &lines);
+            for on in [true, false] {
+                walk.happenings.extend([Happening::Switch { on }, Happening::Stand { ms: 1500 }]);
+            }
+            assert_eq!(go(&walk).state(), State::Hold);
+        }
+    }
+}
+
+#[test]
+fn a_row_is_played_to_its_end_at_every_speed_that_is_accepted() {
+    for mm_s in (100..1300).step_by(50).chain(1300..=1400) {
+        let ms = 3500 * 1000 / mm_s;
+        let played = |ms| go(&walk(&ROW, &format!("test row {mm_s}\nstand for {ms} ms")));
+        assert!(!played(ms - 20).tool_out(), "{mm_s} mm/s");
+        let after = played(ms + 20);
+        assert_eq!((after.state(), after.tool_out()), (State::Hold, true), "{mm_s} mm/s");
+    }
+}
+
+#[test]
+fn ground_that_was_forgotten_stays_closed_however_far_the_machine_is_rolled_back() {
+    for back_mm in (500..12_000).step_by(500) {
+        for beam_to_tool_mm in [100, 400, 2000] {
+            let lines = format!(
+                "set top_speed_mm_s 300\nset lead_out_ms 100\nset beam_to_tool_mm {beam_to_tool_mm}
+                 roll 12000 mm at 2000 mm/s\nstart\nroll 100 mm at 2000 mm/s\nhold
+                 roll back {back_mm} mm at 2000 mm/s\nstand for 1000 ms\nclear\nstart\nroll 1000 mm at 200 mm/s"
+            );
+            go(&walk(&ROW, &lines));
+        }
+    }
+}

@@ -1,0 +1,45 @@
+//! What is answered with `ok` is kept, although the settings change while their image is on its way into the EEPROM: the servo's
+//! swings end, and set the leads.
+
+use crate::common::{ask, run_for_ms, woken_up};
+use field::servo::Servo;
+use field::signal::Pin;
+use field::uno::Uno;
+
+/// The end switch follows the servo's commands by this.
+const FOLLOWS_MS: u64 = 90;
+
+/// Runs for a time, with an end switch that follows the servo.
+fn follow(uno: &mut Uno, duration_ms: u64) {
+    let mut told = Vec::from([true; FOLLOWS_MS as usize]);
+    for now in 0..duration_ms {
+        let place = (now % FOLLOWS_MS) as usize;
+        uno.set(Pin::EndSwitch, !told[place]);
+        let pulses = uno.servo_pulses();
+        told[place] = Servo::default().commands(&pulses[pulses.len().saturating_sub(2)..])[0].is_out();
+        run_for_ms(uno, 1);
+    }
+}
+
+#[test]
+fn settings_that_were_saved_are_whole_although_the_servos_swings_end_meanwhile() {
+    for save_at_ms in [8850, 8900, 8950, 8980, 9000] {
+        let mut uno = woken_up();
+        uno.set(Pin::EndSwitch, false);
+        run_for_ms(&mut uno, 50);
+        for line in ["set end_switch on", "set k 5", "events on", "calibrate servo"] {
+            ask(&mut uno, line);
+        }
+        follow(&mut uno, save_at_ms);
+        uno.received();
+        uno.send(b"save\n");
+        follow(&mut uno, 400);
+        let answer = uno.received();
+        assert!(answer.lines().any(|line| line == "ok"), "{answer}");
+        assert!(answer.contains("calibrated "), "the swings ended while it was written: {answer}");
+        uno.power_cycle();
+        let greeting = uno.run_until_serial("commands\r\n", 16_000_000).expect("the firmware wakes up");
+        assert!(greeting.contains("state hold"), "{save_at_ms} ms: {greeting}");
+        assert_eq!(ask(&mut uno, "get k"), ["k=5 from 1 to 15, default 3"], "{save_at_ms} ms");
+    }
+}
