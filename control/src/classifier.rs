@@ -60,7 +60,7 @@ pub struct Full;
 /// Tells plants from weeds, and may be taught.
 pub trait Classifier {
     /// Looks what was kept over the loss of power; to be called once, before anything else.
-    fn wake_up(&mut self) {}
+    fn wake_up(&mut self);
 
     /// Classifies an object by its `k` nearest examples.
     fn classify(&self, features: &Features, k: u8) -> Vote;
@@ -156,6 +156,10 @@ impl<M: Memory> Examples<{ features::COUNT }> for FromField<'_, M> {
 }
 
 impl<B: Examples<{ features::COUNT }>, M: Memory> Classifier for Nearest<B, M> {
+    fn wake_up(&mut self) {
+        self.field.wake_up();
+    }
+
     fn classify(&self, features: &Features, k: u8) -> Vote {
         self.vote(features, k, true)
     }

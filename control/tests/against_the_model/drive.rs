@@ -13,6 +13,7 @@ use control::{
     controller::{Controller, Orders, Readings, Reason, State, WakeUp},
     examples::EXAMPLES,
     features::Features,
+    line::Line,
     reply::{self, Answer, LINE},
     reset::Cause,
     servo,
@@ -54,6 +55,10 @@ struct ByWidth {
 }
 
 impl Classifier for ByWidth {
+    fn wake_up(&mut self) {
+        self.nearest.wake_up();
+    }
+
     fn classify(&self, features: &Features, _: u8) -> Vote {
         let width_mm = features.hold_mm - MARGINS_MM;
         if width_mm >= PLANT_MM {
@@ -86,19 +91,6 @@ impl Classifier for ByWidth {
 
 type Weeder = Controller<ByWidth, Half>;
 
-/// What comes out of the serial line.
-#[derive(Default)]
-struct Written(String);
-
-impl ufmt::uWrite for Written {
-    type Error = Infallible;
-
-    fn write_str(&mut self, text: &str) -> Result<(), Infallible> {
-        self.0.push_str(text);
-        Ok(())
-    }
-}
-
 /// The console, as the firmware's main loop has it: a line is carried out once the one before it has been answered.
 struct Console {
     line: LineBuffer,
@@ -108,7 +100,7 @@ struct Console {
     lines: VecDeque<String>,
     /// The line that is being answered.
     current: String,
-    written: Written,
+    written: String,
 }
 
 impl Console {
@@ -119,7 +111,7 @@ impl Console {
             typed: VecDeque::new(),
             lines: VecDeque::new(),
             current: String::new(),
-            written: Written::default(),
+            written: String::new(),
         }
     }
 
@@ -145,19 +137,17 @@ impl Console {
 
     /// Writes what there is room for.
     fn write(&mut self, machine: &mut Weeder) -> Checked {
-        self.written.0.clear();
-        let Ok(()) = if !machine.carry_on() {
-            Ok(())
+        let mut line = Line::new();
+        if !machine.carry_on() {
         } else if !self.answer.is_done() {
-            self.answer.write_line(machine, &mut self.written)
+            self.answer.write_line(machine, &mut line);
         } else if let Some(event) = machine.next_event() {
-            reply::write_event(&event, &mut self.written)
+            reply::write_event(&event, &mut line);
         } else if let Some(plot) = machine.next_plot() {
-            reply::write_plot(machine, plot, &mut self.written)
-        } else {
-            Ok(())
-        };
-        prop_assert!(self.written.0.len() <= LINE, "{:?} is too long a line", self.written.0);
+            reply::write_plot(machine, plot, &mut line);
+        }
+        self.written = line.map(char::from).collect();
+        prop_assert!(self.written.len() <= LINE, "{:?} is too long a line", self.written);
         Ok(())
     }
 
@@ -241,7 +231,7 @@ pub struct Drive {
 
 fn wake(eeprom: &Eeprom, weed: &Rc<Cell<Option<i16>>>, wake_up: WakeUp) -> Weeder {
     let [for_settings, for_examples] = eeprom.halves();
-    let classifier = ByWidth { nearest: Nearest::new(&EXAMPLES[..], for_examples), weed: Rc::clone(weed) };
+    let classifier = ByWidth { nearest: Nearest::asleep(&EXAMPLES[..], for_examples), weed: Rc::clone(weed) };
     Controller::new(classifier, for_settings, wake_up)
 }
 
@@ -408,7 +398,7 @@ impl Drive {
                 return Ok(());
             }
             self.turn()?;
-            ends += self.console.written.0.lines().filter(|line| is_end(line)).count();
+            ends += self.console.written.lines().filter(|line| is_end(line)).count();
         }
         prop_assert!(false, "{text:?} is not answered");
         Ok(())
@@ -667,9 +657,9 @@ impl Drive {
             }
         }
         self.console.write(&mut self.machine)?;
-        if is_end(&self.console.written.0) {
+        if is_end(&self.console.written) {
             if let Some(saving) = self.saving.take()
-                && self.console.written.0.starts_with("ok")
+                && self.console.written.starts_with("ok")
             {
                 self.saved = Some(saving);
             }
