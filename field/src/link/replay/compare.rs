@@ -56,7 +56,11 @@ pub(super) fn compare(logged: &[Heard], replayed: &[Heard], bounds: &Bounds, res
             bounds.judged_from > i32::MIN
                 && position.wrapping_sub(bounds.judged_from).saturating_abs() <= swing_ticks(heard, heard)
         }
-        Told::Object { position, .. } => position.wrapping_sub(bounds.first).saturating_abs() <= OBJECT_TICKS,
+        // Told by both it is, and only by one of them as judged.
+        Told::Object { position, .. } => {
+            let is_told = |told: &[Heard]| told.iter().any(|other| agree(heard, other));
+            position.wrapping_sub(bounds.first).saturating_abs() <= OBJECT_TICKS && is_told(logged) && is_told(replayed)
+        }
         _ => false,
     };
     let mut differences = Vec::new();
