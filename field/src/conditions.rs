@@ -471,8 +471,11 @@ mod tests {
                 "field.toml, line 2: settings.lead_out_ms is 900, but has to be 0 to 500",
             ),
             ("[settings]\nlead = 9\n", "field.toml, line 2: settings.lead is neither a parameter of the field"),
-            ("[ground]\nslip = 4\n", "field.toml: TOML parse error at line 2, column 1"),
-            ("[ground]\nslip_percent = \"much\"\n", "field.toml: TOML parse error at line 2, column 16"),
+            ("[ground]\nslip = 4\n", "field.toml, line 2: unknown field `slip`, expected `slip_percent`"),
+            (
+                "[ground]\nslip_percent = \"much\"\n",
+                "field.toml, line 2: ground.slip_percent is \"much\", but has to be a number from -15 to 15: mean slip",
+            ),
             ("[ground]\nslip_percent = nan\n", "field.toml, line 2: ground.slip_percent is NaN"),
         ] {
             let said = parse(text).unwrap_err();

@@ -3,6 +3,9 @@
 use super::{Difference, OBJECT_TICKS, Replayed, SWING_MS, SWING_TICKS};
 use crate::link::{Class, Told};
 
+/// Farther than any object's hold goes, 5 m at the default wheel.
+const FAR_TICKS: i32 = 10_000;
+
 /// Something that was told.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Heard {
@@ -42,7 +45,9 @@ pub(super) fn compare(logged: &[Heard], replayed: &[Heard], bounds: &Bounds, res
     // What is at the very end may come in the one and not yet in the other; an object is told some way behind it.
     let is_at_end = |heard: &Heard| match heard.told {
         Told::Swing { position, .. } => bounds.end.wrapping_sub(position).saturating_abs() <= swing_ticks(heard, heard),
-        Told::Object { position, hold, .. } => bounds.end.wrapping_sub(position.wrapping_add(hold)) <= OBJECT_TICKS,
+        Told::Object { position, hold, .. } => {
+            (-FAR_TICKS..=OBJECT_TICKS).contains(&bounds.end.wrapping_sub(position.wrapping_add(hold)))
+        }
         _ => false,
     };
     // What is at the very beginning may be judged in the one and come before that in the other.
@@ -51,7 +56,11 @@ pub(super) fn compare(logged: &[Heard], replayed: &[Heard], bounds: &Bounds, res
             bounds.judged_from > i32::MIN
                 && position.wrapping_sub(bounds.judged_from).saturating_abs() <= swing_ticks(heard, heard)
         }
-        Told::Object { position, .. } => position.wrapping_sub(bounds.first).saturating_abs() <= OBJECT_TICKS,
+        // Told by both it is, and only by one of them as judged.
+        Told::Object { position, .. } => {
+            let is_told = |told: &[Heard]| told.iter().any(|other| agree(heard, other));
+            position.wrapping_sub(bounds.first).saturating_abs() <= OBJECT_TICKS && is_told(logged) && is_told(replayed)
+        }
         _ => false,
     };
     let mut differences = Vec::new();

@@ -20,6 +20,9 @@ const REST_MS: u32 = 5;
 /// Longest rest that is replayed: nothing that it changes takes longer.
 const LONGEST_REST_MS: u64 = 2_000;
 
+/// The speed at which a machine comes to a stop without surprise.
+const SLOWLY_MM_S: i32 = 20;
+
 /// Longest way between two lines of a log. A machine at 10 km/h rolls it in some minutes.
 const LONGEST_WAY: i32 = 1_000_000;
 
@@ -49,7 +52,9 @@ impl<'a> Player<'a> {
     pub(super) fn new(stretch: &'a Stretch<'a>) -> Self {
         let canopies = canopies(stretch);
         // A little before, so that what stands at that place is seen in full and the log says what it was taken for.
-        let position = stretch.began().wrapping_sub(OBJECT_TICKS + 1);
+        let began = stretch.began();
+        let has_rolled = began != stretch.first.position;
+        let position = if has_rolled { began.wrapping_sub(OBJECT_TICKS + 1) } else { began };
         let broken = is_in(&canopies, position);
         let readings = Readings::new(Instant::new(0), Position::new(position));
         let wake_up = WakeUp { readings, beam_broken: broken, cause: Cause::Unknown };
@@ -80,11 +85,11 @@ impl<'a> Player<'a> {
         player
     }
 
-    /// Rolls from where watching began to where the log begins, at the speed that the machine has there.
+    /// Rolls from where watching began to where the log begins, at the speed that the machine has there; so slowly where it stands
+    /// there that an encoder which falls silent then is no wonder.
     fn roll_in(&mut self, first: &Status) {
         let way = first.position.wrapping_sub(self.position);
-        let top_mm_s = i32::from(self.controller.settings().get(Setting::TopSpeedMmS));
-        let speed_mm_s = if first.speed_mm_s > 0 { first.speed_mm_s } else { top_mm_s / 2 };
+        let speed_mm_s = if first.speed_mm_s > 0 { first.speed_mm_s } else { SLOWLY_MM_S };
         let way_mm = i64::from(self.controller.settings().wheel().millimetres(Ticks(way)));
         let time_ms = (way_mm * 1000 / i64::from(speed_mm_s)).unsigned_abs();
         self.roll_by(way, speed_mm_s, speed_mm_s, time_ms);
