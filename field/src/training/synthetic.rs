@@ -157,6 +157,8 @@ struct Recorder<'a> {
 }
 
 impl Classifier for &Recorder<'_> {
+    fn wake_up(&mut self) {}
+
     fn classify(&self, features: &Features, _k: u8) -> Vote {
         let mut seen = self.seen.borrow_mut();
         // More objects than things are found out at the end.

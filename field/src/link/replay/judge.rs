@@ -68,6 +68,8 @@ impl<'a> Judge<'a> {
 }
 
 impl Classifier for Judge<'_> {
+    fn wake_up(&mut self) {}
+
     fn classify(&self, features: &Features, k: u8) -> Vote {
         let Some(seen) = self.witness.seen.get() else { return self.nearest.classify(features, k) };
         let describe = |class| Features::describe(class, seen.spacing_mm, seen.width_mm);
