@@ -69,8 +69,9 @@ impl Model {
         if self.frontier - place > 8 * metre - metre / 20 {
             self.known_from = self.known_from.min(place);
         }
-        if self.frontier - place > 8 * metre + metre / 20 {
-            self.begin_anew(place);
+        // The machine has done so by now, at eight metres as near as its turns let it.
+        if self.frontier - place > 8 * metre + metre / 64 {
+            self.begin_anew(self.frontier - 8 * metre);
         }
         let grain = 1 + metre / 2400;
         self.slack = self.slack.max(2 + 2 * grain);
