@@ -87,7 +87,7 @@ impl Model {
         (self.frontier, self.is_growing) = (place, false);
         self.runs.retain(|run| run.leading < place);
         self.runs.iter_mut().for_each(|run| run.trailing = run.trailing.min(place - 1));
-        self.merge_gaps.truncate(0);
+        self.merge_gaps.clear();
     }
 
     /// The beam has come to a place, which the machine may have by `blur` elsewhere.
