@@ -93,21 +93,18 @@ impl Leads {
     /// What keeps a tool in the row is a part of what lets it in, and less by a fifth at both ends. So at a steady speed it goes
     /// out once for a window and comes in once behind it, although the measured speed wavers.
     pub fn stretch(&self, tool_out: bool) -> (Length, Length) {
-        let Self { out, back, .. } = *self;
-        let wavering = back + Length(back.0 / 4);
-        let is_farther = if out < Length::ZERO { wavering < out } else { wavering > out };
+        let (out, back) = (self.out.0.unsigned_abs(), self.back.0.unsigned_abs());
         // What lies farther than the lead out is not asked for yet.
-        let near = if is_farther { out } else { wavering };
-        if !tool_out {
-            return (near, out);
+        let near = (back + back / 4).min(out);
+        let (mut near, mut far) = (near.cast_signed(), out.cast_signed());
+        if tool_out {
+            // Coming back pays only if the tool can stay for as long as its stroke takes, the difference of the leads. That also
+            // keeps it out for the window that it left for, should the speed falter. The tick on either side is for an encoder
+            // that trembles on an edge.
+            near -= near / 5 + 1;
+            far += (out - back).max(out / 4).cast_signed() + 1;
         }
-        // Coming back pays only if the tool can stay for as long as its stroke takes, the difference of the leads. That also
-        // keeps it out for the window that it left for, should the speed falter. The tick on either side is for an encoder
-        // that trembles on an edge.
-        let one = Length(if out < Length::ZERO { -1 } else { 1 });
-        let (stroke, quarter) = (out - back, Length(out.0 / 4));
-        let is_longer = if out < Length::ZERO { stroke < quarter } else { stroke > quarter };
-        (near - Length(near.0 / 5) - one, out + if is_longer { stroke } else { quarter } + one)
+        if self.out < Length::ZERO { (Length(-near), Length(-far)) } else { (Length(near), Length(far)) }
     }
 }
 

@@ -117,7 +117,7 @@ impl Console {
 
     /// Puts a line onto the wire, or several.
     fn put(&mut self, text: &str) {
-        self.typed.extend(text.bytes().chain([b'\n']));
+        self.typed.extend(text.bytes().chain(*b"\n"));
         self.lines.extend(text.split(['\r', '\n']).map(str::trim).filter(|line| !line.is_empty()).map(str::to_owned));
     }
 

@@ -69,8 +69,9 @@ impl Model {
         if self.frontier - place > 8 * metre - metre / 20 {
             self.known_from = self.known_from.min(place);
         }
-        if self.frontier - place > 8 * metre + metre / 20 {
-            self.begin_anew(place);
+        // The machine has done so by now, at eight metres as near as its turns let it.
+        if self.frontier - place > 8 * metre + metre / 64 {
+            self.begin_anew(self.frontier - 8 * metre);
         }
         let grain = 1 + metre / 2400;
         self.slack = self.slack.max(2 + 2 * grain);
@@ -86,7 +87,7 @@ impl Model {
         (self.frontier, self.is_growing) = (place, false);
         self.runs.retain(|run| run.leading < place);
         self.runs.iter_mut().for_each(|run| run.trailing = run.trailing.min(place - 1));
-        self.merge_gaps.truncate(0);
+        self.merge_gaps.clear();
     }
 
     /// The beam has come to a place, which the machine may have by `blur` elsewhere.
