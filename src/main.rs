@@ -44,7 +44,7 @@ type Weeder = Controller<Nearest<examples::BuiltIn, eeprom::Upper>, eeprom::Lowe
 type WeederAsleep = Asleep<Nearest<examples::BuiltIn, eeprom::Upper>, eeprom::Lower>;
 
 /// Bytes that a turn of the loop reads or writes at most: twice what the line carries meanwhile.
-const CONSOLE_BYTES: u8 = 8;
+const CONSOLE_BYTES: u8 = 16;
 
 #[avr_device::entry]
 fn main() -> ! {
@@ -98,8 +98,10 @@ fn run(typed: &mut LineBuffer) -> ! {
         servo.command(orders.pulse, orders.gap_ms);
         let Ok(()) = lamp.set_state(controller.lamp_is_lit().into());
 
-        // A turn has little time for the console: some bytes, or one thing that takes longer than a byte does.
-        for _ in 0..CONSOLE_BYTES {
+        // A turn has little time for the console: some bytes, or one thing that takes longer than a byte does. One in which an object
+        // was judged has none.
+        let bytes = if controller.take_judged() { 0 } else { CONSOLE_BYTES };
+        for _ in 0..bytes {
             if serial.room() > 0
                 && let Some(byte) = console.next_byte()
             {

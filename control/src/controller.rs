@@ -125,6 +125,8 @@ impl Judged {
 pub struct Controller<C, M> {
     classifier: C,
     settings: Settings,
+    /// Whether what follows from them is yet to be worked out.
+    settings_changed: bool,
     saved: SavedSettings<M>,
     ground: Ground,
     limits: Limits,
@@ -148,6 +150,8 @@ pub struct Controller<C, M> {
     awaits_ground: bool,
     /// Times that it came sooner than the tool could be out.
     late: u16,
+    /// Whether an object was judged since this was last asked.
+    has_judged: bool,
     /// Lines that were not understood, or came with a hole in them.
     mistakes: u16,
     /// Where the last object ended, or work began, and whether the operator was warned since.
@@ -176,6 +180,7 @@ impl<C: Classifier, M: Memory> Asleep<C, M> {
             ground: Ground::NONE,
             limits: Limits::NONE,
             settings: Settings::NONE,
+            settings_changed: false,
             saved: SavedSettings::new(memory),
             cause: Cause::PowerOn,
             readings: Readings { stack_free: 0, ..Readings::new(start, place) },
@@ -194,6 +199,7 @@ impl<C: Classifier, M: Memory> Asleep<C, M> {
             told_at: start,
             awaits_ground: false,
             late: 0,
+            has_judged: false,
             mistakes: 0,
             last_seen: place,
             warned: false,
@@ -274,6 +280,9 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         let doubted = self.odometer.read(readings.position, readings.jumps);
         let position = self.odometer.place(readings.position);
         self.readings.position = position;
+        if self.settings_changed {
+            self.follow_settings();
+        }
         if let Some(speed) = self.meter.read(readings.now, position) {
             self.ground.lead(&self.settings, speed);
         }
@@ -321,6 +330,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// Classifies a complete object and remembers it unless it is a weed.
     fn judge(&mut self, object: Object) {
+        self.has_judged = true;
         let position = self.readings.position;
         (self.last_seen, self.warned) = (position, false);
         let spacing = self.ground.spacing(&object);

@@ -42,8 +42,12 @@ const QUIET: Short = (crate::speed::SPACING >> 2) as Short;
 /// them, x - 1 or more being left, `sqrt(x) - sqrt(x - 1)` is at most so many times `sqrt(x + 1) - sqrt(x)`.
 const STEADY: Short = 59;
 
-/// What a turn of the loop at either end may add to a time, 1 ms.
+/// What a turn of the loop at either end may add to a time: 1 ms, or the turn and a step where it is longer.
 const TURN: Short = 4;
+
+const fn grace(turn: Short) -> Short {
+    if turn < TURN { TURN } else { turn.saturating_add(1) }
+}
 
 /// Silences in steady rolling that are an alarm, where none is farther behind the other than so many times the progress, 10 m. A
 /// sound encoder has none; one may be a wheel that a stone caught. Each costs the ground from beam to tool.
@@ -70,13 +74,13 @@ const fn shortened(time: u16) -> Short {
 }
 
 /// Whether progress that takes `time` is more than unsteady beside one that takes `steady`.
-const fn is_gap(time: Short, steady: Short) -> bool {
-    time > steady + steady / 4 + TURN
+const fn is_gap(time: Short, steady: Short, turn: Short) -> bool {
+    time > (steady + steady / 4).saturating_add(grace(turn))
 }
 
 /// Whether no machine can have braked so hard that progress takes `time` behind one that took `steady`.
-const fn is_silence(time: Short, steady: Short) -> bool {
-    time > 2 * steady + steady / 2 + 2 * TURN
+const fn is_silence(time: Short, steady: Short, turn: Short) -> bool {
+    time > (2 * steady + steady / 2).saturating_add(grace(turn).saturating_mul(2))
 }
 
 /// Watches the encoder.
@@ -174,9 +178,9 @@ impl EncoderMonitor {
             }
             // As fast again behind the gap as before it, the machine has not been slow in between.
             let steady = before.max(self.took);
-            if steady <= STEADY && is_gap(gap, steady) {
+            if steady <= STEADY && is_gap(gap, steady, turn) {
                 alarm = Alarm::EncoderSilent;
-                if is_silence(gap, steady) {
+                if is_silence(gap, steady, turn) {
                     // The ground is forgotten already.
                     self.silences = if self.since_silence > SILENCES_WITHIN { 1 } else { self.silences + 1 };
                     self.since_silence = 0;
@@ -190,7 +194,7 @@ impl EncoderMonitor {
         } else {
             let steady = self.took <= STEADY;
             self.quiet = steady && short >= QUIET;
-            self.silent |= steady && is_silence(short, self.took);
+            self.silent |= steady && is_silence(short, self.took, turn);
             self.stands |= time >= STANDS;
             if step != 0 {
                 self.edges = self.edges.wrapping_add(1);

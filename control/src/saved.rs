@@ -30,8 +30,8 @@ const _: () = assert!(COPY <= STRIDE as usize && COPY <= u8::MAX as usize);
 #[derive(Clone, Debug)]
 pub struct SavedSettings<M> {
     memory: M,
-    /// The newest copy, 0 or 1, and its sequence number.
-    newest: u8,
+    /// The older copy, 0 or 1, which the next save overwrites, and the sequence number of the newer.
+    older: u8,
     sequence: u8,
     /// What was to be saved when that was asked for, whatever is set meanwhile.
     image: [u8; COPY],
@@ -44,7 +44,7 @@ pub struct SavedSettings<M> {
 impl<M: Memory> SavedSettings<M> {
     /// The settings in a memory, which are yet to be loaded.
     pub const fn new(memory: M) -> Self {
-        Self { memory, newest: 0, sequence: 0, image: [0; COPY], left: 0, exists: false }
+        Self { memory, older: 0, sequence: 0, image: [0; COPY], left: 0, exists: false }
     }
 
     /// Loads the newest copy that is whole; `None` where neither is.
@@ -57,7 +57,7 @@ impl<M: Memory> SavedSettings<M> {
             let copy = newer ^ turn;
             if let Some(settings) = self.read(copy) {
                 self.exists = true;
-                (self.newest, self.sequence) = (copy, self.memory.read(address(copy) + SEQUENCE));
+                (self.older, self.sequence) = (copy ^ 1, self.memory.read(address(copy) + SEQUENCE));
                 return Some(settings);
             }
         }
@@ -67,7 +67,7 @@ impl<M: Memory> SavedSettings<M> {
     /// Begins to save the settings as they are now; [`carry_on`](Self::carry_on) finishes it.
     pub fn save(&mut self, settings: &Settings) {
         self.exists = true;
-        self.newest ^= 1;
+        self.older ^= 1;
         self.sequence = self.sequence.wrapping_add(1);
         self.image = image(settings, self.sequence);
         self.left = COPY as u8;
@@ -81,7 +81,7 @@ impl<M: Memory> SavedSettings<M> {
         }
         while self.left > 0 {
             let place = COPY as u8 - self.left;
-            let (address, byte) = (address(self.newest) + u16::from(place), self.image[usize::from(place)]);
+            let (address, byte) = (self.newest() + u16::from(place), self.image[usize::from(place)]);
             self.left -= 1;
             // What is right already is left alone: an EEPROM wears out.
             if self.memory.read(address) != byte {
@@ -94,9 +94,12 @@ impl<M: Memory> SavedSettings<M> {
 
     /// The value of a setting that is saved, if any is; not while a save is under way.
     pub fn value(&self, setting: Setting) -> Option<u16> {
-        let place = address(self.newest) + HEADER as u16 + 2 * setting as u16;
-        let byte = |place| self.memory.read(place);
-        self.exists.then(|| u16::from_le_bytes([byte(place), byte(place + 1)]))
+        self.exists.then(|| self.value_at(self.newest(), setting))
+    }
+
+    /// The settings that are saved, if any are: of a copy that was whole when it was loaded, or was written since.
+    pub fn settings(&self) -> Option<Settings> {
+        if self.exists { self.values(self.newest()) } else { None }
     }
 
     /// The memory, to be looked at or put into another machine.
@@ -104,14 +107,31 @@ impl<M: Memory> SavedSettings<M> {
         self.memory
     }
 
+    /// Where the newest copy begins.
+    fn newest(&self) -> u16 {
+        address(self.older ^ 1)
+    }
+
+    /// A value of the copy that begins at an address.
+    fn value_at(&self, copy: u16, setting: Setting) -> u16 {
+        let place = copy + HEADER as u16 + 2 * setting as u16;
+        u16::from_le_bytes([self.memory.read(place), self.memory.read(place + 1)])
+    }
+
+    /// The values of the copy that begins at an address; `None` where one is out of its range.
+    #[inline(never)]
+    fn values(&self, copy: u16) -> Option<Settings> {
+        let mut settings = Settings::NONE;
+        for setting in Setting::all() {
+            settings.set(setting, self.value_at(copy, setting)).ok()?;
+        }
+        Some(settings)
+    }
+
     /// A copy; `None` unless it is whole.
     fn read(&self, copy: u8) -> Option<Settings> {
         let byte = |place| self.memory.read(address(copy) + place);
-        let mut settings = Settings::new();
-        for (setting, place) in Setting::all().zip(0..) {
-            let place = HEADER as u16 + 2 * place;
-            settings.set(setting, u16::from_le_bytes([byte(place), byte(place + 1)])).ok()?;
-        }
+        let settings = self.values(address(copy))?;
         let is_whole = (0..).zip(image(&settings, byte(SEQUENCE))).all(|(place, right)| byte(place) == right);
         is_whole.then_some(settings)
     }
@@ -195,7 +215,7 @@ mod tests {
     #[test]
     fn a_spoiled_copy_gives_way_to_the_other() {
         let memory = save(save(Volatile::new(), &with_k(5)), &with_k(7));
-        for (copy, left) in [(1, 7), (0, 5)] {
+        for (copy, left) in [(0, 7), (1, 5)] {
             for place in 0..COPY {
                 for bit in 0..8 {
                     let mut spoiled = memory.clone();

@@ -58,6 +58,7 @@ impl<M: Memory> FieldExamples<M> {
     /// Looks through the memory for the examples that it holds.
     #[inline(never)]
     pub fn wake_up(&mut self) {
+        self.spoiled = 0;
         for number in 0..CAPACITY {
             let bytes = self.read(number);
             if bytes == encode(example_in(bytes)) {

@@ -295,7 +295,7 @@ impl Wheel {
     }
 
     /// A distance in ticks, rounded to the nearest: `mm * ticks_per_rev / (pi * diameter)`, the paper's Eq. 1 and 2, or by
-    /// what was measured. Right to a tick up to 4.095 m.
+    /// what was measured. Right to a tick up to 4 m.
     #[inline(never)]
     pub const fn ticks(self, millimetres: u16) -> Ticks {
         Ticks((((millimetres as u32) << 20) + self.tick / 2).wrapping_div(self.tick) as i32)

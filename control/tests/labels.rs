@@ -1,5 +1,6 @@
 //! What the operator says of the last object, against what the built-in examples say.
 
+#[allow(dead_code, reason = "each test takes what it needs")]
 mod common;
 
 use common::{readings, woken_up};

@@ -104,7 +104,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             return Err(Refusal::Contradiction(contradiction));
         }
         self.settings = settings;
-        self.follow_settings();
+        self.settings_changed = true;
         Ok(())
     }
 
@@ -117,7 +117,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             return Err(Refusal::NotInHold);
         }
         self.settings = Settings::new();
-        self.follow_settings();
+        self.settings_changed = true;
         Ok(())
     }
 
@@ -129,13 +129,16 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         if self.is_working() {
             return Err(Refusal::NotInHold);
         }
-        self.settings = self.saved.load().ok_or(Refusal::NothingSaved)?;
-        self.follow_settings();
+        self.settings = self.saved.settings().ok_or(Refusal::NothingSaved)?;
+        self.settings_changed = true;
         Ok(())
     }
 
-    /// Works out what follows from the settings.
+    /// Works out what follows from the settings. That takes half a millisecond, so the turn in which they are set leaves it to
+    /// the next one.
+    #[inline(never)]
     pub(super) fn follow_settings(&mut self) {
+        self.settings_changed = false;
         self.limits = Limits::of(&self.settings);
         self.ground.follow(&self.settings, self.readings.position, self.meter.speed());
     }
