@@ -1,4 +1,4 @@
-//! The manual holds: what README and docs/ tell to type is typed here, and their links lead somewhere.
+//! The manual holds: what README, the pages beside it and docs/ tell to type is typed here, and their links lead somewhere.
 //!
 //! In a block marked `sh`, every command of this repository is known, with its options, and those that need neither an
 //! Uno nor a minute are run. In a block marked `console`, every line behind `>` is typed into the virtual Uno and answered
@@ -47,11 +47,11 @@ struct Page {
     text: String,
 }
 
-/// The README and every page of docs/.
+/// The README, the two pages beside it, and every page of docs/.
 fn pages() -> Vec<Page> {
     let docs = fs::read_dir(Path::new(ROOT).join("docs")).expect("there is a manual");
     let mut paths: Vec<PathBuf> = docs.map(|entry| entry.expect("it can be listed").path()).collect();
-    paths.push(Path::new(ROOT).join("README.md"));
+    paths.extend(["README.md", "CONTRIBUTING.md", "CHANGELOG.md"].map(|page| Path::new(ROOT).join(page)));
     paths.retain(|path| path.extension().is_some_and(|extension| extension == "md"));
     paths.sort();
     let read = |path: PathBuf| Page { text: fs::read_to_string(&path).expect("a page is text"), path };
