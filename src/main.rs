@@ -44,7 +44,7 @@ type Weeder = Controller<Nearest<examples::BuiltIn, eeprom::Upper>, eeprom::Lowe
 type WeederAsleep = Asleep<Nearest<examples::BuiltIn, eeprom::Upper>, eeprom::Lower>;
 
 /// Bytes that a turn of the loop reads or writes at most: twice what the line carries meanwhile.
-const CONSOLE_BYTES: u8 = 16;
+const CONSOLE_BYTES: u8 = 8;
 
 #[avr_device::entry]
 fn main() -> ! {

@@ -277,7 +277,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     #[inline(never)]
     pub fn step(&mut self, readings: Readings) -> Orders {
         self.readings = readings;
-        let doubted = self.odometer.read(readings.position, readings.jumps);
+        let doubted = self.odometer.read(readings.position, readings.jumps, self.believes_jumps());
         let position = self.odometer.place(readings.position);
         self.readings.position = position;
         if self.settings_changed {
@@ -301,7 +301,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         let out = self.try_out().unwrap_or(!self.is_working() || self.must_be_out());
         if out != self.tool_out {
             self.tool_out = out;
-            self.awaits_ground = out && self.is_working();
+            self.awaits_ground = out && self.is_working() && !self.encoder.is_doubtful();
             self.tell(Event::Swing { out, position });
         }
         let orders = self.orders();

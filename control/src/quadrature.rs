@@ -68,9 +68,8 @@ impl Quadrature {
     }
 }
 
-/// Ticks in a turn of the loop from which on an edge may have been missed, noise of two spikes included. A short turn takes
-/// 0.25 ms, so these come 15 us apart at most, where the interrupt looks again within 12: 120 km/h with 0.5 mm a tick, and 12
-/// with the finest that can be set.
+/// More ticks than this in a turn of the loop, noise of two spikes included, and an edge may have been missed. A turn takes 0.2 ms
+/// at the least: so many ticks then come 12 us apart, where the interrupt looks again within 8.
 const CAN_BE_MISSED: u16 = 16;
 
 /// More ticks than this are not told to be in doubt: it is enough.
@@ -94,14 +93,15 @@ impl Odometer {
     }
 
     /// Takes a reading of the count and of the jumps in it, modulo 65,536; returns how many ticks, 32 at the most, came by jumps
-    /// that are not believed.
+    /// that are not believed. None is doubted of a wheel that
+    /// `is_fast`.
     #[inline(never)]
-    pub fn read(&mut self, counted: Position, jumps: u16) -> u8 {
+    pub fn read(&mut self, counted: Position, jumps: u16, is_fast: bool) -> u8 {
         let counted = counted.count() as u16;
         let moved = counted.wrapping_sub(self.counted).cast_signed();
         let jumped = jumps.wrapping_sub(self.jumps).wrapping_mul(2);
         (self.counted, self.jumps) = (counted, jumps);
-        if jumped == 0 || moved.unsigned_abs() > CAN_BE_MISSED {
+        if jumped == 0 || is_fast || moved.unsigned_abs() > CAN_BE_MISSED {
             return 0;
         }
         let jumped = jumped.min(ENOUGH) as u8;
@@ -165,7 +165,7 @@ mod tests {
     /// The odometer's place after these readings of count and jumps, and the ticks that it does not believe.
     fn read(readings: &[(i32, u16)]) -> (i32, u8) {
         let mut odometer = Odometer::new(Position::new(readings[0].0), readings[0].1);
-        let doubted = readings.iter().map(|&(count, jumps)| odometer.read(Position::new(count), jumps)).sum();
+        let doubted = readings.iter().map(|&(count, jumps)| odometer.read(Position::new(count), jumps, false)).sum();
         (readings.last().map_or(0, |&(count, _)| odometer.place(Position::new(count)).count()), doubted)
     }
 

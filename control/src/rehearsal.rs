@@ -21,28 +21,30 @@ const CANOPY_MM: i16 = 150;
 pub struct Rehearsal {
     begin: Instant,
     speed_mm_s: u16,
+    /// In millimetres, which stand for ticks here.
+    leads: Leads,
+    margin_mm: i16,
 }
 
 impl Rehearsal {
-    /// The tool begins to roll, half a metre before the first plant, at a speed in mm/s.
-    pub const fn new(begin: Instant, speed_mm_s: u16) -> Self {
-        Self { begin, speed_mm_s }
+    /// The tool begins to roll, half a metre before the first plant, at a speed in mm/s and with the margin and the leads of the
+    /// settings.
+    pub fn new(begin: Instant, speed_mm_s: u16, settings: &Settings) -> Self {
+        let leads = Leads::at(TicksPerSecond(speed_mm_s.into()), settings, Grain::TICK);
+        Self { begin, speed_mm_s, leads, margin_mm: settings.get(Setting::MarginMm) as i16 }
     }
 
     /// Whether the tool has to be out now, if it was told to be out or not before; `None` when it has passed the last plant.
     /// To be asked often enough to see the end: within a minute and a half.
-    pub fn tool_out(&self, now: Instant, was_out: bool, settings: &Settings) -> Option<bool> {
+    pub fn tool_out(&self, now: Instant, was_out: bool) -> Option<bool> {
         let milliseconds = (now - self.begin).steps() / (Interval::STEPS_PER_SECOND / 1000);
         let tool_mm = (milliseconds * u32::from(self.speed_mm_s) / 1000) as u16;
         let last_mm = SPACING_MM * (PLANTS + 1);
         if tool_mm > last_mm as u16 {
             return None;
         }
-        // A millimetre stands for a tick here.
-        let leads = Leads::at(TicksPerSecond(self.speed_mm_s.into()), settings, Grain::TICK);
-        let (Length(from_mm), Length(to_mm)) = leads.stretch(was_out);
-        let margin_mm = settings.get(Setting::MarginMm) as i16;
-        let (from_mm, to_mm) = (tool_mm as i16 + from_mm - margin_mm, tool_mm as i16 + to_mm + margin_mm);
+        let (Length(from_mm), Length(to_mm)) = self.leads.stretch(was_out);
+        let (from_mm, to_mm) = (tool_mm as i16 + from_mm - self.margin_mm, tool_mm as i16 + to_mm + self.margin_mm);
         Some((1..=PLANTS).any(|plant| {
             let leading_mm = SPACING_MM * plant;
             leading_mm <= to_mm && leading_mm + CANOPY_MM >= from_mm
@@ -59,11 +61,11 @@ mod tests {
     /// The swings of a rehearsal at a speed, as the place of each in millimetres and whether it is one out.
     fn swings(speed_mm_s: u16, settings: &Settings) -> Vec<(u32, bool)> {
         let begin = Instant::new(u32::MAX - 300_000);
-        let row = Rehearsal::new(begin, speed_mm_s);
+        let row = Rehearsal::new(begin, speed_mm_s, settings);
         let (mut out, mut swings) = (true, Vec::new());
         for milliseconds in 0.. {
             let now = begin + Interval::from_ms(milliseconds);
-            let Some(told) = row.tool_out(now, out, settings) else { break };
+            let Some(told) = row.tool_out(now, out) else { break };
             if told != out {
                 out = told;
                 swings.push((milliseconds * u32::from(speed_mm_s) / 1000, out));

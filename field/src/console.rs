@@ -43,6 +43,9 @@ pub enum ConsoleError {
     },
 }
 
+/// A part of the time that a character takes on the line, which is 1390 cycles.
+const CHARACTER_CYCLES: u64 = 500;
+
 /// Types a command and returns the lines of its answer, the `ok` left out.
 ///
 /// The Uno's clock runs until the answer is complete. What the firmware had sent before is dropped.
@@ -55,9 +58,15 @@ pub fn ask(uno: &mut Uno, command: &str) -> Result<Vec<String>, ConsoleError> {
     let (mut lines, mut answer) = (LineReader::new(), Vec::new());
     for _ in 0..TIMEOUT_MS {
         uno.run_for_ms(1)?;
-        lines.take(uno.received().as_bytes());
+        let mut received = uno.received();
+        lines.take(received.as_bytes());
         while let Some(line) = lines.next_line() {
             if line == "ok" {
+                // The end of its line belongs to it, and what comes behind that is somebody else's.
+                while received.ends_with('\r') {
+                    uno.run_until(uno.cycle() + CHARACTER_CYCLES)?;
+                    received += &uno.received();
+                }
                 return Ok(answer);
             }
             if line.starts_with("error:") {

@@ -85,9 +85,10 @@ fn a_row_without_sensors_swings_the_servo_for_each_plant() {
     let before = uno.servo_pulses().len();
     ask(&mut uno, "test row 400");
     run_for_ms(&mut uno, 12_000);
-    let lines: Vec<String> = uno.received().lines().map(str::to_owned).collect();
-    let told = |name: &str| lines.iter().filter(|line| line.split_whitespace().next() == Some(name)).count();
-    assert_eq!((told("swing"), told("state"), told("alarm")), (14, 0, 0), "{lines:#?}");
+    let told = uno.received();
+    // The beginning of the first line may have come with the answer.
+    assert!(told.lines().skip(1).all(|line| line.starts_with("swing ")), "{told}");
+    assert_eq!(told.lines().count(), 14, "{told}");
     let commands = Servo::default().commands(&uno.servo_pulses()[before..]);
     // Out at first, into the row, and out and in for each plant; out for good at the end.
     assert_eq!(commands.len(), 1 + 1 + 2 * 6 + 1, "{commands:?}");

@@ -238,7 +238,7 @@ fn a_speed_that_jumps_before_a_window_has_its_late_command_counted_and_told() {
     run.roll_to(jump_mm);
     assert!(!is_out_at_the_pin(&run.uno));
     run.roll_to_the_end();
-    assert_eq!(run.events("warning"), ["warning name=late_command"]);
+    assert_eq!(run.events("warning"), ["warning name=late_command"], "{:#?}", run.lines());
     let said = status(&mut run.uno);
     assert_eq!((value(&said, "state"), number(&said, "late")), ("work", 1), "{said}");
     let command = run.first_command_after(run.cycles().start);

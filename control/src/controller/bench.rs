@@ -106,7 +106,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         if !(Setting::TopSpeedMmS.description().least..=fastest).contains(&speed_mm_s) {
             return Err(Refusal::TestSpeed { fastest });
         }
-        self.bench = Bench::Row(Rehearsal::new(self.readings.now, speed_mm_s));
+        self.bench = Bench::Row(Rehearsal::new(self.readings.now, speed_mm_s, &self.settings));
         Ok(())
     }
 
@@ -122,7 +122,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
                     None
                 }
             },
-            Bench::Row(row) => row.tool_out(now, self.tool_out, &self.settings),
+            Bench::Row(row) => row.tool_out(now, self.tool_out),
         };
         if out.is_none() {
             self.bench = Bench::Idle;

@@ -13,6 +13,9 @@ use crate::{
     units::{Coarse, Ticks},
 };
 
+/// A wheel whose edges come less than 50 us apart, in ticks a second: faster than any weeder with an encoder of 0.2 mm or more.
+const FAST: i32 = 20_000;
+
 /// Time between two points of a plotter's curves.
 const PLOT_PERIOD: u16 = Coarse::steps_in_ms(50);
 
@@ -69,6 +72,11 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// Whether the encoder fell silent from one moment to the next, so that nobody knows how far the machine has rolled since.
     pub fn encoder_is_silent(&self) -> bool {
         self.encoder.is_silent()
+    }
+
+    /// Whether the wheel turns so fast that an edge may be missed, and both channels may have changed at once.
+    pub fn believes_jumps(&self) -> bool {
+        self.meter.speed().0.abs() > FAST
     }
 
     /// Whether the beam is broken.

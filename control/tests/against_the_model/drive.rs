@@ -531,7 +531,7 @@ impl Drive {
     fn step(&mut self, readings: Readings) -> Checked {
         self.steps += 1;
         let (before, was_out) = (self.machine.state(), self.machine.tool_out());
-        self.odometer.read(readings.position, readings.jumps);
+        self.odometer.read(readings.position, readings.jumps, self.machine.believes_jumps());
         let count = self.unwrapped(self.odometer.place(readings.position));
         self.model.roll_to(count, self.blur());
         let orders = self.machine.step(readings);
