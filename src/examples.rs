@@ -23,7 +23,8 @@ avr_progmem::progmem! {
 pub struct BuiltIn;
 
 impl BuiltIn {
-    fn table() -> InFlash {
+    /// Where they lie.
+    pub fn table() -> InFlash {
         InFlash(BUILT_IN.as_slice())
     }
 }

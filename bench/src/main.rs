@@ -17,7 +17,7 @@ use control::{
     features::{self, Features, SPEED_CLASSES_MM_S},
 };
 use core::{arch::asm, hint::black_box};
-use examples::{InFlash, Row, built_in, rows};
+use examples::{BuiltIn, InFlash, Row, rows};
 use knn::{Answer, ClassifyError, Example, Examples, classify};
 use knn_bench::{CLASSES, K, QUERIES, Random, Task};
 
@@ -60,7 +60,7 @@ fn main() -> ! {
             }
             Task::ClassifyObjects => {
                 for object in objects() {
-                    let _ = black_box(measured_search(&built_in(), &scale().quantise(&object.values())));
+                    let _ = black_box(measured_search(&BuiltIn::table(), &scale().quantise(&object.values())));
                 }
             }
         }
@@ -77,7 +77,8 @@ fn main() -> ! {
             Task::ClassifyObjects => {
                 for object in objects() {
                     let query = scale().quantise(&object.values());
-                    different += u16::from(search(&built_in(), &query) != plain_search(&built_in(), &query));
+                    different +=
+                        u16::from(search(&BuiltIn::table(), &query) != plain_search(&BuiltIn::table(), &query));
                 }
             }
         }

@@ -337,11 +337,11 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         let speed_class_mm_s = features::speed_class(self.speed_mm_s());
         let (spacing_mm, width_mm) =
             (self.ground.millimetres(spacing), self.ground.millimetres(self.ground.ticks(object.width())));
-        let features = Features::describe(speed_class_mm_s, spacing_mm, width_mm);
         // What is left of an object whose beginning was not seen may be as narrow as a weed.
         let vote = if object.cut {
             Vote { class: Class::Unknown, votes: 0 }
         } else {
+            let features = Features::describe(speed_class_mm_s, spacing_mm, width_mm);
             self.classifier.classify(&features, self.settings.get(Setting::K) as u8)
         };
         if self.objects.is_full() {

@@ -173,7 +173,7 @@ impl EncoderMonitor {
             (self.stands, self.quiet, self.silent) = (false, false, false);
             (self.edges, self.breaks) = (0, 0);
             self.since_silence = self.since_silence.wrapping_add(1);
-            if self.since_silence as u8 % PAID_BY == 0 {
+            if (self.since_silence as u8).is_multiple_of(PAID_BY) {
                 self.debt -= u8::from(self.debt > 0);
             }
             // As fast again behind the gap as before it, the machine has not been slow in between.

@@ -273,6 +273,8 @@ impl TicksPerSecond {
 pub struct Wheel {
     /// A tick in 2^-20 mm: 52,429 with 20,000 ticks a metre, 26 million with 40.
     tick: u32,
+    /// Ticks from which on 16 bits do not hold the millimetres: worked out once, as a division takes long.
+    too_far: u32,
 }
 
 impl Wheel {
@@ -281,17 +283,21 @@ impl Wheel {
     const PI_DENOMINATOR: u32 = 113;
 
     /// A wheel that is yet to be measured, and that measures nothing.
-    pub const NONE: Self = Self { tick: 0 };
+    pub const NONE: Self = Self { tick: 0, too_far: 0 };
 
     /// A wheel by its encoder's counts a turn, 100 to 10,000, and its diameter, 200 to 800 mm.
     pub const fn of_diameter(ticks_per_rev: u16, diameter_mm: u16) -> Self {
-        let circumference = ((Self::PI_NUMERATOR * diameter_mm as u32) << 12) / Self::PI_DENOMINATOR << 8;
-        Self { tick: circumference / ticks_per_rev as u32 }
+        let circumference = (((Self::PI_NUMERATOR * diameter_mm as u32) << 12) / Self::PI_DENOMINATOR) << 8;
+        Self::of_tick(circumference / ticks_per_rev as u32)
     }
 
     /// A wheel by its counts a metre, as measured, 1 to 20,000.
     pub const fn measured(ticks_per_m: u16) -> Self {
-        Self { tick: (1000 << 20) / ticks_per_m as u32 }
+        Self::of_tick((1000 << 20) / ticks_per_m as u32)
+    }
+
+    const fn of_tick(tick: u32) -> Self {
+        Self { tick, too_far: ((i16::MAX as u32) << 16) / (tick >> 4) }
     }
 
     /// A distance in ticks, rounded to the nearest: `mm * ticks_per_rev / (pi * diameter)`, the paper's Eq. 1 and 2, or by
@@ -304,11 +310,10 @@ impl Wheel {
     /// A distance in millimetres, rounded toward zero and limited to what 16 bits hold; right to 1 mm and 0.02 %.
     #[inline(never)]
     pub const fn millimetres(self, distance: Ticks) -> i16 {
-        let tick = self.tick >> 4;
-        // The limit keeps the product in 32 bits.
-        let limit = ((i16::MAX as u32) << 16) / tick;
         let magnitude = distance.0.unsigned_abs();
-        let millimetres = if magnitude >= limit { i16::MAX } else { ((magnitude * tick) >> 16) as i16 };
+        // What is not too far keeps the product in 32 bits.
+        let millimetres =
+            if magnitude >= self.too_far { i16::MAX } else { ((magnitude * (self.tick >> 4)) >> 16) as i16 };
         if distance.0 < 0 { -millimetres } else { millimetres }
     }
 }

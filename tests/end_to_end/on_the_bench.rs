@@ -90,8 +90,8 @@ fn a_row_without_sensors_swings_the_servo_for_each_plant() {
     assert!(told.lines().skip(1).all(|line| line.starts_with("swing ")), "{told}");
     assert_eq!(told.lines().count(), 14, "{told}");
     let commands = Servo::default().commands(&uno.servo_pulses()[before..]);
-    // Out at first, into the row, and out and in for each plant; out for good at the end.
-    assert_eq!(commands.len(), 1 + 1 + 2 * 6 + 1, "{commands:?}");
+    // Into the row, and out and in for each plant; out for good at the end.
+    assert_eq!(commands.len(), 1 + 2 * 6 + 1, "{commands:?}");
     let said = status(&mut uno);
     assert_eq!((value(&said, "state"), value(&said, "pos")), ("hold", "0"), "{said}");
     assert!(refusal(&mut uno, "test row 2000").contains("from 100 to 1400"));

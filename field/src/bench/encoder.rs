@@ -148,6 +148,10 @@ const WORST_CYCLES: u64 = (SHORTEST_S * CYCLES_PER_SECOND as f64) as u64;
 /// Edges that come one after the other once the first has met its moment, at the least and at the most.
 const RUN: std::ops::RangeInclusive<u32> = 3..=12;
 
+/// Edges of the run-up, and the cycles between two of them: a tenth of a second at 40,000 a second.
+const RUN_UP: u32 = 4000;
+const RUN_UP_CYCLES: u64 = CYCLES_PER_SECOND / 40_000;
+
 /// Critical sections of the loop that pass between two of which one is made worse, at most: some turns of the loop.
 const SECTIONS_PASSED: u32 = 40;
 
@@ -166,8 +170,15 @@ pub fn turn_at_worst(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<
     let mut world = World::new(turning.load, begin);
     // A first edge at leisure: which way it goes resolves a jump.
     uno.set(nth_edge(turning.direction, 0).pin, nth_edge(turning.direction, 0).high);
-    let mut number = 1;
     uno.run_for_ms(1)?;
+    // No wheel is fast from one moment to the next: the firmware would take its jumps for noise until it knows how fast.
+    let run_up = uno.cycle();
+    uno.drive((1..=RUN_UP).map(|number| PinChange {
+        cycle: run_up + u64::from(number) * RUN_UP_CYCLES,
+        ..nth_edge(turning.direction, number)
+    }));
+    uno.run_until(run_up + u64::from(RUN_UP + 1) * RUN_UP_CYCLES)?;
+    let mut number = RUN_UP + 1;
     while uno.cycle() < end {
         let moment = world.worst_moment(&mut uno, rng.random_range(0..SECTIONS_PASSED))?;
         // The first edge comes late, the second in time and the third early, and so on.
@@ -263,7 +274,7 @@ fn nth_edge(direction: Direction, number: u32) -> PinChange {
         Direction::Forward => (Pin::EncoderA, Pin::EncoderB),
         Direction::Backward => (Pin::EncoderB, Pin::EncoderA),
     };
-    let pin = if number % 2 == 0 { first } else { second };
+    let pin = if number.is_multiple_of(2) { first } else { second };
     PinChange { cycle: 0, pin, high: number % 4 < 2 }
 }
 
