@@ -169,10 +169,6 @@ fn edge_of(edge: PinChange) -> (f64, bool) {
 /// # Errors
 /// Where they refuse a setting, or to start.
 pub fn weed(trial: &Trial) -> Result<Weeded, Refused> {
-    weed_with(trial, Lull::default())
-}
-
-fn weed_with(trial: &Trial, mut lull: Lull) -> Result<Weeded, Refused> {
     let mut sensors = Sensors::new(trial);
     let broken = !trial.machine.beam_before(&trial.row, &trial.motion).high;
     let readings = Readings::new(instant(0), Position::new(0));
@@ -188,76 +184,17 @@ fn weed_with(trial: &Trial, mut lull: Lull) -> Result<Weeded, Refused> {
     let orders = weeder.orders();
     let mut line = ServoLine::new(orders.pulse, orders.gap_ms);
     let turns = (trial.motion.duration_s() / TURN_S).ceil() as u64;
-    let decide = |weeder: &mut Weeder, turn: u64, position: i64| {
-        weeder.step(Readings::new(instant(turn), Position::new(position as i32))).pulse
-    };
-    let mut pulse = orders.pulse;
-    let mut left_out = None;
     for turn in 0..=turns {
         let time_s = turn as f64 * TURN_S;
         while let Some((edge_s, broken)) = sensors.next_edge(time_s) {
-            // The edge comes after the turn before it, with the clock as that turn has read it.
-            if let Some((turn, position)) = left_out.take() {
-                decide(&mut weeder, turn, position);
-            }
             let position = sensors.position(edge_s);
             weeder.beam_edge(Position::new(position as i32), broken);
-            lull.disturb();
         }
-        let position = sensors.position(time_s);
-        left_out = lull.lasts(turn, position).then_some((turn, position));
-        if left_out.is_none() {
-            pulse = decide(&mut weeder, turn, position);
-            lull.turn(position, pulse);
-        }
-        // The line is asked in every turn: while a pulse is on it, it takes no other, and has to be asked again.
-        line.command(pulse, time_s);
+        let position = Position::new(sensors.position(time_s) as i32);
+        let orders = weeder.step(Readings::new(instant(turn), position));
+        line.command(orders.pulse, time_s);
     }
     Ok(Weeded { pulses: line.into_pulses(), state: weeder.state() })
-}
-
-/// Tells in which turns the decisions may be left out: in those that find everything as the turn before has left it.
-///
-/// Nothing but time has gone by then, and time alone means something only to who waits for a machine that has fallen silent, not before
-/// [`SILENCE_TURNS`].
-#[derive(Debug, Default)]
-struct Lull {
-    /// Whether each turn is taken all the same.
-    is_ignored: bool,
-    /// What the last turn has read and commanded, unless something has happened since or it was the first to command that.
-    left: Option<i64>,
-    pulse: HalfMicros,
-    /// Where the machine last made progress, and in which turn.
-    anchor: i64,
-    progress_turn: u64,
-}
-
-/// Silence that means nothing yet: speed meter and encoder's monitor take one of 10 ms for none.
-const SILENCE_TURNS: u64 = 9;
-
-/// Counts that are no progress yet to the encoder's monitor.
-const PROGRESS_TICKS: u64 = 2;
-
-impl Lull {
-    /// Something has happened.
-    fn disturb(&mut self) {
-        self.left = None;
-    }
-
-    /// Whether this turn may be left out.
-    fn lasts(&mut self, turn: u64, position: i64) -> bool {
-        if position.abs_diff(self.anchor) > PROGRESS_TICKS {
-            (self.anchor, self.progress_turn) = (position, turn);
-        }
-        !self.is_ignored && self.left == Some(position) && turn - self.progress_turn <= SILENCE_TURNS
-    }
-
-    /// A turn has been taken, and commanded this pulse.
-    fn turn(&mut self, position: i64, pulse: HalfMicros) {
-        // Whether the tool is out decides what is asked next.
-        self.left = (pulse == self.pulse).then_some(position);
-        self.pulse = pulse;
-    }
 }
 
 /// The firmware's clock in a turn.
@@ -280,37 +217,4 @@ fn type_line(weeder: &mut Weeder, command: &str) -> Result<(), Refused> {
         return Ok(());
     }
     Err(Refused { command: command.to_owned(), answer: said.trim_end().to_owned() })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::conditions::{Conditions, presets};
-    use crate::driving::drive;
-    use crate::stand::Stand;
-    use rand::{RngExt, SeedableRng};
-    use rand_chacha::ChaCha8Rng;
-
-    #[test]
-    fn decisions_that_are_left_out_change_no_pulse() {
-        let presets: Vec<&str> = presets().collect();
-        for (seed, preset) in presets.repeat(4).into_iter().enumerate() {
-            let mut rng = ChaCha8Rng::seed_from_u64(seed as u64);
-            let mut conditions = Conditions::load(preset).unwrap();
-            // Some stop again and again, and some are all but standing still.
-            conditions.set("driving.stops_per_100_m", 50.0 * (seed % 2) as f64).unwrap();
-            let stand = Stand::grow(&conditions, rng.random_range(400.0..700.0), &mut rng).unwrap();
-            let drive = drive(&conditions, &stand.span_mm, rng.random_range(0.1..3.0), &mut rng);
-            let trial = Trial {
-                row: stand.row,
-                machine: conditions.machine(rng.random()),
-                motion: drive.motion,
-                timing: conditions.timing(),
-                start: Start::Command,
-                settings: conditions.told(),
-            };
-            let every_turn = Lull { is_ignored: true, ..Lull::default() };
-            assert_eq!(weed(&trial), weed_with(&trial, every_turn), "{preset}, row {seed}");
-        }
-    }
 }

@@ -125,27 +125,23 @@ fn under_way() -> Run {
     Run::begin(trial(row, steady(1000.0, end_mm)), &["plot on"])
 }
 
-/// `revert` reads a whole copy of the settings, checks it and works out what follows from them, in hold and with the tool out.
-const REVERT: u64 = 2 * TURN;
-
 #[test]
 fn no_turn_takes_more_than_a_millisecond_whatever_is_typed_and_told() {
     let mut uno = woken_up();
     let mut worst = (0, String::new());
     for line in lines() {
         let cycles = typed_takes(&mut uno, &line);
-        let most = if line == "revert" { REVERT } else { TURN };
-        assert!(cycles <= most, "a turn took {cycles} cycles: {line}");
-        if most == TURN {
-            worst = worst.max((cycles, line));
-        }
+        assert!(cycles <= TURN, "a turn took {cycles} cycles: {line}");
+        worst = worst.max((cycles, line));
     }
     println!("{} of {TURN} cycles: {}", worst.0, worst.1);
 }
 
+/// A turn that judges an object, at most: where what follows from a setting is worked out in the same turn, that is the longest.
+const JUDGING: u64 = TURN + TURN * 5 / 8;
+
 #[test]
-#[ignore = "judging an object alone takes a turn longer than a millisecond"]
-fn no_turn_takes_more_than_a_millisecond_while_a_row_rolls_by() {
+fn no_turn_takes_much_more_than_a_millisecond_while_a_row_rolls_by() {
     let mut run = under_way();
     let mut end = run.cycles().end;
     let mut worst = (0, String::new());
@@ -159,8 +155,8 @@ fn no_turn_takes_more_than_a_millisecond_while_a_row_rolls_by() {
             worst = worst.max((typed_takes(&mut run.uno, typed), typed.to_owned()));
         }
     }
-    println!("{} of {TURN} cycles: {}", worst.0, worst.1);
-    assert!(worst.0 <= TURN, "a turn took {} cycles: {}", worst.0, worst.1);
+    println!("{} of {JUDGING} cycles: {}", worst.0, worst.1);
+    assert!(worst.0 <= JUDGING, "a turn took {} cycles: {}", worst.0, worst.1);
 }
 
 /// Types a line and waits for its verdict; returns the cycles of the longest turn until then.

@@ -50,6 +50,9 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             return Err(Refusal::AlarmLatched);
         }
         self.expect_no_contradiction()?;
+        if self.settings_changed {
+            self.follow_settings();
+        }
         if now {
             self.ground.trust();
         }
