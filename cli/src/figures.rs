@@ -6,7 +6,7 @@
 //!     ```text
 //!
 //! The command is run, and what it prints becomes the block. What it prints of the time that it took, a line that begins with
-//! `Pace:`, is left out: everything else is the same on every machine.
+//! `Pace`, is left out: everything else is the same on every machine.
 
 use crate::Finding;
 use crate::output::{say, tell};
@@ -97,7 +97,7 @@ fn print(command: &str) -> Result<String> {
     // Status 1 is a finding, such as a plant that was damaged.
     ensure!(matches!(output.status.code(), Some(0 | 1)), "`{command}` fails: run it to see why");
     let printed = String::from_utf8(output.stdout).with_context(|| format!("`{command}` prints no text"))?;
-    let lines = printed.lines().map(str::trim_end).filter(|line| !line.starts_with("Pace:"));
+    let lines = printed.lines().map(str::trim_end).filter(|line| !line.starts_with("Pace"));
     let lines: Vec<&str> = lines.collect();
     let text = lines.join("\n");
     Ok(format!("{}\n", text.trim_matches('\n')))

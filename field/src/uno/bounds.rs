@@ -280,7 +280,10 @@ impl Bounds {
 /// Where the ELF cannot be read, or its program cannot be followed.
 pub fn prove(elf: &Path, input: Option<&Input>) -> Result<Bounds, BoundsError> {
     let image = Image::read(elf)?;
-    let names = image.functions.iter().map(|(name, address)| (*address, without_types(name))).collect();
+    // Of two names for one place, always the same.
+    let mut functions: Vec<_> = image.functions.iter().collect();
+    functions.sort_by_key(|&(name, _)| std::cmp::Reverse(name));
+    let names = functions.into_iter().map(|(name, address)| (*address, without_types(name))).collect();
     let mut program = Program::new(&image.flash, &names);
     let main = program.follow(Entry { address: 0, interrupts: Interrupts::Off, kind: Kind::Reset })?;
     let mut handlers = BTreeMap::new();
