@@ -1,6 +1,6 @@
 //! The EEPROM, in two halves: one for the settings, one for the examples taught in the field.
 //!
-//! A byte takes 3.4 ms to write (data sheet, 8.4.2), and nothing here waits for it, but who reads meanwhile: nothing can be
+//! A byte takes 3.4 ms to write (data sheet, 8.4.2). Whoever writes does not wait for it; whoever reads does, as nothing can be
 //! read while a byte is written. What the bytes mean is not known here.
 
 use avr_device::{
