@@ -1,9 +1,8 @@
 //! What the operator says of the last object, against what the built-in examples say.
 
-#[allow(dead_code, reason = "each test takes what it needs")]
-mod common;
+#[path = "common/readings.rs"]
+mod readings;
 
-use common::{readings, woken_up};
 use control::{
     classifier::{Class, Nearest},
     console::LineBuffer,
@@ -16,6 +15,7 @@ use control::{
     settings::Setting,
     units::Position,
 };
+use readings::{readings, woken_up};
 
 type Machine = Controller<Nearest<&'static [knn::Example<5>], Volatile>, Volatile>;
 

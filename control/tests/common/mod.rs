@@ -1,12 +1,15 @@
 //! What the tests of the decisions share: readings, and a classifier that knows the truth.
 
+mod readings;
+
+pub use readings::{readings, woken_up};
+
 use control::{
     classifier::{Class, Classifier, Full, Listed, Vote},
-    controller::{Controller, Readings, WakeUp},
+    controller::Controller,
     features::Features,
     memory::Volatile,
     reset::Cause,
-    units::{Instant, Interval, Position},
 };
 
 /// Takes for a weed what is narrower than 60 mm.
@@ -51,14 +54,3 @@ pub fn machine() -> Machine {
 
 /// A machine as the tests have it.
 pub type Machine = Controller<ByWidth, Volatile>;
-
-/// Waking up at rest, with nothing in the beam.
-pub fn woken_up(cause: Cause) -> WakeUp {
-    WakeUp { readings: readings(0, 0), beam_broken: false, cause }
-}
-
-/// Readings of a machine at `count`, `microseconds` after the first moment.
-pub fn readings(microseconds: u64, count: i32) -> Readings {
-    let now = Instant::default() + Interval::from_steps((microseconds / 4) as u32);
-    Readings::new(now, Position::new(count))
-}
