@@ -116,10 +116,10 @@ handler! {
     /// The handler of INT0 and INT1: 51 to 53 cycles, up to 71 where all four bytes change, and up to 16 more for a jump.
     ///
     /// It looks in the 12th. An edge that comes as another handler begins waits for it, for an instruction of the loop, for
-    /// a critical section if that instruction opens one, for the instruction behind it, and for these 12 cycles: at most
-    /// 51 + 1 + 25 + 4 + 12 = 93. That is two counts at 344,000 a second, or at 240,000 where edges come early and late by
-    /// 30 % of the time between two. Edges that keep coming as fast as that leave the loop no time; so its need of time
-    /// bounds the rate, and not the wait.
+    /// a critical section if that instruction opens one, for the instruction behind it, and for these 12 cycles.
+    /// `weeder bounds` proves the longest wait, and with it the rate at which two counts never go by between two looks.
+    /// Edges that keep coming as fast as that leave the loop no time; so its need of time bounds the rate, and not
+    /// the wait.
     on_change = "__vector_1" {
         ".globl __vector_2",
         ".set __vector_2, __vector_1",

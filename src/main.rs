@@ -43,7 +43,7 @@ use ufmt::uWrite;
 type Weeder = Controller<Nearest<examples::BuiltIn, eeprom::Upper>, eeprom::Lower>;
 type WeederAsleep = Asleep<Nearest<examples::BuiltIn, eeprom::Upper>, eeprom::Lower>;
 
-/// Bytes that a turn of the loop reads or writes at most: twice what the line carries meanwhile.
+/// Bytes that a turn of the loop reads or writes at most: more than the line carries meanwhile.
 const CONSOLE_BYTES: u8 = 8;
 
 #[avr_device::entry]

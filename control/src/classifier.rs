@@ -65,10 +65,8 @@ pub trait Classifier {
     /// Classifies an object by its `k` nearest examples.
     fn classify(&self, features: &Features, k: u8) -> Vote;
 
-    /// What the built-in examples alone take an object for. Where there are none, nothing is known.
-    fn built_in_class(&self, _features: &Features) -> Class {
-        Class::Unknown
-    }
+    /// What the built-in examples alone take an object for; [`Class::Unknown`] where there are none.
+    fn built_in_class(&self, features: &Features) -> Class;
 
     /// Adds an object as an example of the class `label`, to be kept over a loss of power.
     ///

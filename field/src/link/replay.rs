@@ -128,7 +128,9 @@ enum Happened<'a> {
 /// A log from one start of the link to its end.
 struct Stretch<'a> {
     settings: Settings,
+    /// All examples, the built-in ones first, and how many those are.
     examples: Vec<Example<{ features::COUNT }>>,
+    built_in: usize,
     first: Status,
     happened: Vec<(&'a Entry, Happened<'a>)>,
 }
@@ -137,7 +139,7 @@ impl<'a> Stretch<'a> {
     /// Reads one; none where the machine said nothing.
     fn read(entries: &'a [Entry]) -> Result<Option<Self>, ReplayError> {
         let mut settings = Settings::new();
-        let mut examples = Vec::new();
+        let (mut examples, mut built_in) = (Vec::new(), 0);
         let mut happened = Vec::new();
         for entry in entries {
             let wrong = |problem: &str| {
@@ -149,7 +151,10 @@ impl<'a> Stretch<'a> {
                     let (setting, value) = shown(&entry.text).ok_or_else(|| wrong("no setting of this version"))?;
                     settings.set(setting, value).map_err(|_| wrong("out of range"))?;
                 }
-                Kind::Example => examples.extend(example(&entry.text).map_err(|()| wrong("no example"))?),
+                Kind::Example => {
+                    examples.extend(example(&entry.text).map_err(|()| wrong("no example"))?);
+                    built_in += usize::from(entry.text.starts_with("built_in "));
+                }
                 Kind::Status => {
                     let status = Status::parse(&entry.text).ok_or_else(|| wrong("no status"))?;
                     happened.push((entry, Happened::Status(status)));
@@ -166,7 +171,7 @@ impl<'a> Stretch<'a> {
             Happened::Status(status) => Some(status.clone()),
             _ => None,
         });
-        Ok(first.map(|first| Self { settings, examples, first, happened }))
+        Ok(first.map(|first| Self { settings, examples, built_in, first, happened }))
     }
 
     fn replay(self, replayed: &mut Replayed) -> Result<(), ReplayError> {

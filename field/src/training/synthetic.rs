@@ -173,6 +173,10 @@ impl Classifier for &Recorder<'_> {
 
     // It knows the truth already: there is nothing to teach it, and nothing to forget.
 
+    fn built_in_class(&self, _: &Features) -> Class {
+        Class::Unknown
+    }
+
     fn teach(&mut self, _features: &Features, _label: u8) -> Result<(), Full> {
         Err(Full)
     }

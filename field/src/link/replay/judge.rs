@@ -5,7 +5,7 @@
 //! between two speed classes it may have been in either. So an object is judged in every speed class that the machine may have
 //! been in, and the log's vote stands where one of them gives it.
 
-use control::classifier::{Classifier, Full, Listed, Nearest, Vote};
+use control::classifier::{Class, Classifier, Full, Listed, Nearest, Vote};
 use control::features::{self, Features};
 use control::memory::Volatile;
 use knn::Example;
@@ -54,6 +54,8 @@ impl Witness {
 
 /// The firmware's classifier, asked with what the log tells.
 pub(super) struct Judge<'a> {
+    /// The built-in examples alone, which a label may not contradict.
+    built_in: Nearest<&'a [Example<{ features::COUNT }>], Volatile>,
     nearest: Nearest<&'a [Example<{ features::COUNT }>], Volatile>,
     witness: Rc<Witness>,
     /// The last objects: as the replay describes them, and as the machine did.
@@ -61,9 +63,17 @@ pub(super) struct Judge<'a> {
 }
 
 impl<'a> Judge<'a> {
-    /// A classifier with a log's examples.
-    pub(super) fn new(examples: &'a [Example<{ features::COUNT }>], witness: Rc<Witness>) -> Self {
-        Self { nearest: Nearest::new(examples, Volatile::new()), witness, described: RefCell::default() }
+    /// A classifier with a log's examples, of which so many are built in: the first.
+    pub(super) fn new(examples: &'a [Example<{ features::COUNT }>], built_in: usize, witness: Rc<Witness>) -> Self {
+        let nearest = |examples| Nearest::new(examples, Volatile::new());
+        let (built_in, all) = (nearest(&examples[..built_in]), nearest(examples));
+        Self { built_in, nearest: all, witness, described: RefCell::default() }
+    }
+
+    /// What the machine took for the features of an object that the replay describes like this.
+    fn by_machine(&self, features: &Features) -> Features {
+        let described = self.described.borrow();
+        described.iter().find(|(by_replay, _)| by_replay == features).map_or(*features, |&(_, by_machine)| by_machine)
     }
 }
 
@@ -82,11 +92,12 @@ impl Classifier for Judge<'_> {
         if seen.is_given { seen.vote } else { self.nearest.classify(&by_machine, k) }
     }
 
+    fn built_in_class(&self, features: &Features) -> Class {
+        self.built_in.built_in_class(&self.by_machine(features))
+    }
+
     fn teach(&mut self, features: &Features, label: u8) -> Result<(), Full> {
-        let described = self.described.borrow();
-        let by_machine =
-            described.iter().find(|(by_replay, _)| by_replay == features).map_or(features, |(_, other)| other);
-        self.nearest.teach(by_machine, label)
+        self.nearest.teach(&self.by_machine(features), label)
     }
 
     fn forget(&mut self, number: u8) -> bool {
@@ -103,5 +114,22 @@ impl Classifier for Judge<'_> {
 
     fn carry_on(&mut self) -> bool {
         self.nearest.carry_on()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use control::classifier::label;
+    use control::examples::EXAMPLES;
+
+    #[test]
+    fn a_label_is_refused_by_the_built_in_examples_alone() {
+        let plant = Features::describe(556, 500, 150);
+        let taught = Example::new(control::examples::scale().quantise(&plant.values()), label::WEED);
+        let examples = [&EXAMPLES[..], &[taught; 5]].concat();
+        let judge = Judge::new(&examples, EXAMPLES.len(), Rc::new(Witness::default()));
+        assert_eq!(judge.classify(&plant, 3).class, Class::Weed, "the field has taught it so");
+        assert_eq!(judge.built_in_class(&plant), Class::Plant);
     }
 }

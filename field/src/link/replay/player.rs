@@ -59,7 +59,7 @@ impl<'a> Player<'a> {
         let readings = Readings::new(Instant::new(0), Position::new(position));
         let wake_up = WakeUp { readings, beam_broken: broken, cause: Cause::Unknown };
         let witness = Rc::new(Witness::default());
-        let classifier = Judge::new(&stretch.examples, Rc::clone(&witness));
+        let classifier = Judge::new(&stretch.examples, stretch.built_in, Rc::clone(&witness));
         let mut controller = Controller::new(classifier, Volatile::new(), wake_up);
         controller.clear();
         for (setting, value) in steps(controller.settings(), &stretch.settings) {
