@@ -118,6 +118,14 @@ impl Text {
     }
 }
 
+/// Off the chip, where there is room for `core::fmt`.
+#[cfg(not(target_arch = "avr"))]
+impl core::fmt::Display for Text {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        self.bytes().try_for_each(|byte| core::fmt::Write::write_char(f, char::from(byte)))
+    }
+}
+
 /// The characters of a text that are still to be unpacked.
 #[derive(Clone, Debug)]
 pub struct Characters {

@@ -6,9 +6,10 @@ use crate::common::{
 use field::machine::Machine;
 use field::motion::mm_s;
 use field::row::{Row, Thing};
-use field::signal::{CYCLES_PER_SECOND, Pin, PinChange};
 use field::trial::{Start, Trial};
-use field::uno::Uno;
+use field::wiring;
+use signal::{CYCLES_PER_SECOND, PinChange};
+use uno::Uno;
 
 /// A flash and the dark behind it, within a digit.
 const FLASH_CYCLES: u64 = CYCLES_PER_SECOND * 524 / 1000;
@@ -50,7 +51,7 @@ fn blinked_codes(uno: &mut Uno) -> Vec<Vec<usize>> {
     let flashes: Vec<u64> = uno
         .changes()
         .iter()
-        .filter(|change| change.pin == Pin::Led && change.high && change.cycle > begin)
+        .filter(|change| change.pin == wiring::LED && change.high && change.cycle > begin)
         .map(|change| change.cycle)
         .collect();
     let parted_by = |cycles: u64| move |one: &u64, next: &u64| next - one < cycles - FLASH_CYCLES / 4;
@@ -103,7 +104,7 @@ fn a_beam_that_flickers_faster_than_it_can_be_followed_is_an_alarm() {
     run.roll_to(600.0);
     assert!(!is_out_at_the_pin(&run.uno));
     let begin = run.uno.cycle();
-    run.uno.drive((0..400).map(|edge| PinChange { cycle: begin + edge * 160, pin: Pin::Beam, high: edge % 2 == 1 }));
+    run.uno.drive((0..400).map(|edge| PinChange { cycle: begin + edge * 160, pin: wiring::BEAM, high: edge % 2 == 1 }));
     run.roll_to_the_end();
     assert_alarm(&mut run, "beam_edges_lost", 13);
     assert_blinks(&mut run.uno, [1, 3]);

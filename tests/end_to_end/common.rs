@@ -2,18 +2,20 @@
 //!
 //! A [`Run`] is a trial that can be looked at and talked to on the way. Nothing in here judges: that is for the tests.
 
-use field::console::{self, ConsoleError};
-use field::firmware;
 use field::machine::{Machine, cycle_at};
 use field::motion::Motion;
 use field::row::{Row, Thing};
 use field::servo::Command;
-use field::signal::{Pin, PinChange};
-use field::trial::{self, Outcome, Start, Trial};
-use field::uno::Uno;
+use field::trial::{Start, Trial};
 use field::verdict::{Judgement, PlantOutcome, Timing, Verdict, judge};
+use field::wiring;
+use signal::PinChange;
 use std::ops::Range;
 use std::path::PathBuf;
+use trial::Outcome;
+use trial::console::{self, ConsoleError};
+use trial::firmware;
+use uno::Uno;
 
 /// Greatest distance between a swing's command at the pin and its ideal place.
 pub const SWING_TOLERANCE_TICKS: f64 = 12.0;
@@ -76,7 +78,7 @@ pub fn run_for_ms(uno: &mut Uno, time_ms: u64) {
 /// Throws the work switch and waits until it has stopped bouncing.
 #[track_caller]
 pub fn throw_switch(uno: &mut Uno, work: bool) {
-    uno.set(Pin::WorkSwitch, !work);
+    uno.set(wiring::WORK_SWITCH, !work);
     run_for_ms(uno, 50);
 }
 
@@ -111,7 +113,7 @@ pub fn trial(row: Row, motion: Motion) -> Trial {
 /// Runs a trial to its end.
 #[track_caller]
 pub fn outcome(trial: &Trial) -> Outcome {
-    trial.run(&elf(), |_| {}).expect("the firmware runs")
+    trial::run(trial, &elf(), |_| {}).expect("the firmware runs")
 }
 
 /// Every plant was kept, the margin less its tolerance on both sides included.
@@ -196,7 +198,7 @@ impl Run {
         commands: &[&str],
         alter: impl FnOnce(u64, Vec<PinChange>) -> Vec<PinChange>,
     ) -> Self {
-        trial.set_up(&mut uno).expect("the firmware takes the trial's settings");
+        trial::set_up(&trial, &mut uno).expect("the firmware takes the trial's settings");
         ask(&mut uno, "events on");
         for command in commands {
             ask(&mut uno, command);
@@ -204,7 +206,7 @@ impl Run {
         match trial.start {
             Start::Command => uno.send(b"start\n"),
             Start::Now => uno.send(b"start now\n"),
-            Start::Switch => uno.set(Pin::WorkSwitch, false),
+            Start::Switch => uno.set(wiring::WORK_SWITCH, false),
         }
         run_for_ms(&mut uno, 100);
         uno.received();
@@ -301,7 +303,7 @@ pub fn encoder_steps(steps: impl IntoIterator<Item = (u64, i32)>) -> Vec<PinChan
             let (a, _) = FORWARD[phase.rem_euclid(4) as usize];
             phase += step;
             let (new_a, new_b) = FORWARD[phase.rem_euclid(4) as usize];
-            let (pin, high) = if a == new_a { (Pin::EncoderB, new_b) } else { (Pin::EncoderA, new_a) };
+            let (pin, high) = if a == new_a { (wiring::ENCODER_B, new_b) } else { (wiring::ENCODER_A, new_a) };
             PinChange { cycle, pin, high }
         })
         .collect()

@@ -3,7 +3,8 @@
 use crate::common::{exchange, refusal, run_for_ms, status, value, woken_up};
 use control::console::Word;
 use control::settings::Setting;
-use field::uno::Uno;
+use field::wiring;
+use uno::Uno;
 
 /// The lines of an answer that are its end.
 fn ends(lines: &[String]) -> usize {
@@ -45,7 +46,7 @@ fn every_command_is_answered_by_its_lines_and_one_ok() {
 
 #[test]
 fn the_firmware_names_itself_and_its_state_when_it_wakes_up() {
-    let mut uno = Uno::boot(&crate::common::elf()).expect("the firmware can be run");
+    let mut uno = Uno::boot(&crate::common::elf()).expect("the firmware can be run").wired(&wiring::WIRES);
     run_for_ms(&mut uno, 300);
     let greeting = uno.received();
     assert!(

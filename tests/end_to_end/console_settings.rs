@@ -2,7 +2,7 @@
 
 use crate::common::{ask, refusal, run_for_ms, woken_up};
 use control::settings::{Description, Setting};
-use field::uno::Uno;
+use uno::Uno;
 
 /// Every setting with its name.
 fn settings() -> impl Iterator<Item = (Setting, String)> {

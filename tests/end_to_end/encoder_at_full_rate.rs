@@ -1,10 +1,11 @@
 //! The encoder at its full rate, a hundred times walking speed, with the rest of the firmware busy.
 
 use crate::common::{ask, elf, encoder_steps, number, run_for_ms, status, woken_up};
-use field::bench::BenchError;
-use field::bench::encoder::{self, Counted, Direction, JITTER, Load, Turning};
-use field::signal::{CYCLES_PER_SECOND, Pin, PinChange};
+use field::wiring;
+use signal::{CYCLES_PER_SECOND, PinChange};
 use std::path::Path;
+use trial::bench::BenchError;
+use trial::bench::encoder::{self, Counted, Direction, JITTER, Load, Turning};
 
 /// Counts in a second that the firmware follows while its status streams at 115200 baud and the beam flickers, whatever the
 /// moments at which the edges come: evenly, and early and late by 30 % of the time between two.
@@ -53,7 +54,7 @@ fn no_count_is_lost_when_a_fast_wheel_turns_back() {
     uno.drive(encoder_steps((0..).map(|number| begin + number * STEP_CYCLES).zip(steps)));
     uno.drive((0..1500).map(|edge| PinChange {
         cycle: begin + edge * (CYCLES_PER_SECOND / 600) + edge % 7 * 111,
-        pin: Pin::Beam,
+        pin: wiring::BEAM,
         high: edge % 2 == 1,
     }));
     let mut answers = 0;

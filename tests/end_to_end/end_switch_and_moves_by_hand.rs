@@ -1,8 +1,8 @@
 //! A tool that was moved by hand is not taken for stuck when the machine moves it back: it has its time again.
 
 use crate::common::{ask, run_for_ms, status, throw_switch, value, woken_up};
-use field::signal::Pin;
-use field::uno::Uno;
+use field::wiring;
+use uno::Uno;
 
 /// The tool follows a command by this.
 const FOLLOWS_MS: u64 = 120;
@@ -11,7 +11,7 @@ const FOLLOWS_MS: u64 = 120;
 fn moved(uno: &mut Uno, line: &str, out: bool) {
     ask(uno, line);
     run_for_ms(uno, FOLLOWS_MS);
-    uno.set(Pin::EndSwitch, !out);
+    uno.set(wiring::END_SWITCH, !out);
     run_for_ms(uno, 600);
 }
 
@@ -19,14 +19,14 @@ fn moved(uno: &mut Uno, line: &str, out: bool) {
 fn a_tool_that_follows_every_move_by_hand_is_not_stuck() {
     for back in ["servo out", "hold", "start", "the switch"] {
         let mut uno = woken_up();
-        uno.set(Pin::EndSwitch, false);
+        uno.set(wiring::END_SWITCH, false);
         run_for_ms(&mut uno, 100);
         ask(&mut uno, "set end_switch on");
         moved(&mut uno, "servo in", false);
         if back == "the switch" {
             throw_switch(&mut uno, true);
             run_for_ms(&mut uno, FOLLOWS_MS - 50);
-            uno.set(Pin::EndSwitch, false);
+            uno.set(wiring::END_SWITCH, false);
             run_for_ms(&mut uno, 600);
         } else {
             moved(&mut uno, back, true);

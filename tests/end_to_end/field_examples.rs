@@ -6,9 +6,10 @@ use control::taught::{self, FieldExamples};
 use field::machine::Machine;
 use field::motion::Motion;
 use field::row::{Row, Thing};
-use field::signal::CYCLES_PER_SECOND;
-use field::uno::Uno;
+use field::wiring;
 use knn::Example;
+use signal::CYCLES_PER_SECOND;
+use uno::Uno;
 
 /// Where the firmware keeps the slots in EEPROM.
 const SLOTS_BEGIN: usize = SIZE;
@@ -28,7 +29,7 @@ fn roll_past_odd_objects(uno: &mut Uno, count: usize) {
 
 /// An Uno that wakes up with this in its EEPROM.
 fn waking_up_with(eeprom: &[u8]) -> Uno {
-    let mut uno = Uno::boot_with_eeprom(&elf(), eeprom).expect("the firmware wakes up");
+    let mut uno = Uno::boot_with_eeprom(&elf(), eeprom).expect("the firmware wakes up").wired(&wiring::WIRES);
     greeted(&mut uno);
     uno
 }

@@ -1,8 +1,8 @@
 //! The paper's experiment with the real firmware on the virtual Uno.
 
 use field::conditions::Conditions;
-use field::experiment::{Controller, Engine, Experiment};
-use field::firmware;
+use study::experiment::{Controller, Engine, Experiment};
+use trial::firmware;
 
 /// In-row weeding may fall short of what the servo allows by this share of the ground.
 const SHORT_OF_BOUND: f64 = 0.05;

@@ -2,17 +2,18 @@
 
 use crate::common::{elf, number};
 use control::settings::{Setting, Settings};
-use field::link::settings::{self, SettingsError};
-use field::link::{Link, LinkError, Mode, Status, Told, UnoPort};
 use field::machine::Machine;
 use field::motion::Motion;
 use field::row::{Row, Thing};
-use field::trial;
-use field::uno::Uno;
+use field::wiring;
+use link::settings::{self, SettingsError};
+use link::{Link, LinkError, Mode, Status, Told};
+use trial::UnoPort;
+use uno::Uno;
 
 /// A link to a firmware that has just woken up.
 fn link() -> Link {
-    let uno = Uno::boot(&elf()).expect("the firmware is an image");
+    let uno = Uno::boot(&elf()).expect("the firmware is an image").wired(&wiring::WIRES);
     Link::over(UnoPort::new(uno), true).expect("the firmware answers")
 }
 

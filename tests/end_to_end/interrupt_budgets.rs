@@ -5,8 +5,9 @@
 //! and return included.
 
 use crate::common::{ask, encoder_steps, number, run_for_ms, status, woken_up};
-use field::signal::{CYCLES_PER_SECOND, Pin, PinChange};
-use field::uno::{InterruptStatistics, Uno};
+use field::wiring;
+use signal::{CYCLES_PER_SECOND, PinChange};
+use uno::{InterruptStatistics, Uno};
 
 /// Vector, name and budget in cycles; the encoder's two last.
 const BUDGETS: [(u8, &str, u64); 6] = [
@@ -34,7 +35,7 @@ pub fn roll(uno: &mut Uno, counts_per_second: u64) -> String {
     uno.drive(encoder_steps((0..).map(|number| begin + number * CYCLES_PER_SECOND / counts_per_second).zip(steps)));
     uno.drive((0..MILLISECONDS).map(|edge| PinChange {
         cycle: begin + edge * (CYCLES_PER_SECOND / 1000) + edge % 7 * 111,
-        pin: Pin::Beam,
+        pin: wiring::BEAM,
         high: edge % 2 == 1,
     }));
     let mut received = String::new();

@@ -2,9 +2,10 @@
 
 use crate::common::{Run, bare_ground, is_out_at_the_pin, run_for_ms, status, steady, trial, value};
 use field::motion::mm_s;
-use field::signal::{CYCLES_PER_SECOND, Pin};
 use field::trial::{Start, Trial};
-use field::uno::SENT_BYTE_CYCLES;
+use field::wiring;
+use signal::CYCLES_PER_SECOND;
+use uno::SENT_BYTE_CYCLES;
 
 /// A running pulse, the gap behind it, and turns of the loop.
 const AT_ONCE_MS: f64 = 6.0;
@@ -44,7 +45,7 @@ fn hold_puts_the_tool_out_at_once() {
 #[test]
 fn the_switch_puts_the_tool_out_at_once() {
     let mut run = weeding(Start::Switch);
-    run.uno.set(Pin::WorkSwitch, true);
+    run.uno.set(wiring::WORK_SWITCH, true);
     let thrown = run.uno.cycle();
     let time_ms = time_to_swing_out_ms(&mut run, thrown);
     assert!((BOUNCING_MS..=BOUNCING_MS + AT_ONCE_MS).contains(&time_ms), "{time_ms} ms");

@@ -1,13 +1,13 @@
 //! The memory that the firmware may take on an ATmega328P.
 
 use crate::common::{Run, ask, elf};
-use field::firmware::{Image, Size};
 use field::machine::Machine;
 use field::motion::mm_s;
 use field::planting::Planting;
 use field::trial::Trial;
 use field::verdict::Timing;
 use std::process::Command;
+use uno::elf::{Image, Size};
 
 /// The flash below the bootloader that came before the Uno's, 30 KiB.
 const FLASH_BYTES: u64 = 30 * 1024;

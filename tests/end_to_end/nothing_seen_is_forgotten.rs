@@ -4,8 +4,8 @@
 use crate::common::{Run, ask, assert_all_kept, run_for_ms, trial, woken_up};
 use field::motion::{Motion, mm_s};
 use field::row::{Row, Thing};
-use field::signal::CYCLES_PER_SECOND;
 use field::verdict::{Judgement, Verdict};
+use signal::CYCLES_PER_SECOND;
 
 /// Above this the machine is too fast.
 const TOP_SPEED: &str = "set top_speed_mm_s 600";

@@ -4,8 +4,8 @@ use crate::common::{ask, exchange, refusal, run_for_ms, status, value, woken_up}
 use field::machine::Machine;
 use field::motion::{Motion, mm_s};
 use field::servo::Servo;
-use field::signal::Pin;
-use field::uno::Uno;
+use field::wiring;
+use uno::Uno;
 
 /// The last servo pulse's width.
 fn pulse_us(uno: &Uno) -> f64 {
@@ -54,7 +54,7 @@ fn swing(uno: &mut Uno, duration_ms: u64, out_ms: u64, in_ms: u64) {
             (told_out, told_at) = (out, now);
         }
         if now - told_at == if told_out { out_ms } else { in_ms } {
-            uno.set(Pin::EndSwitch, !told_out);
+            uno.set(wiring::END_SWITCH, !told_out);
         }
         run_for_ms(uno, 1);
     }
@@ -63,7 +63,7 @@ fn swing(uno: &mut Uno, duration_ms: u64, out_ms: u64, in_ms: u64) {
 #[test]
 fn the_end_switch_times_the_servo() {
     let mut uno = woken_up();
-    uno.set(Pin::EndSwitch, false);
+    uno.set(wiring::END_SWITCH, false);
     run_for_ms(&mut uno, 50);
     ask(&mut uno, "set end_switch on");
     ask(&mut uno, "calibrate servo");

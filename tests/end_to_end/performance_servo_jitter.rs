@@ -1,7 +1,7 @@
 //! The servo's pulses while everything else is busy: each is as long as the last, to the cycle.
 
 use crate::common::elf;
-use field::bench::servo::{Jitter, PULSES, jitter};
+use trial::bench::servo::{Jitter, PULSES, jitter};
 
 #[test]
 fn five_hundred_pulses_are_the_same_while_the_encoder_turns_and_the_status_streams() {

@@ -2,8 +2,8 @@
 //! as it was made for.
 
 use crate::common::elf;
-use field::bench::swings::{Lateness, Rows, lateness};
 use field::machine::Machine;
+use trial::bench::swings::{Lateness, Rows, lateness};
 
 /// Greatest and mean distance of a command from its ideal place at 2.5 km/h, in ticks.
 const WORST_TICKS: f64 = 9.0;

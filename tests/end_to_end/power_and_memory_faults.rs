@@ -10,9 +10,11 @@ use control::saved::{COPY, SavedSettings};
 use control::settings::{Setting, Settings};
 use field::motion::mm_s;
 use field::row::{Row, Thing};
-use field::signal::{CYCLES_PER_SECOND, Pin};
-use field::trial::{Start, Trial, power_up};
-use field::uno::Uno;
+use field::trial::{Start, Trial};
+use field::wiring;
+use signal::CYCLES_PER_SECOND;
+use trial::power_up;
+use uno::Uno;
 
 /// Longest time from a reset to the greeting.
 const GREETING_CYCLES: u64 = CYCLES_PER_SECOND / 2;
@@ -126,7 +128,7 @@ fn with(values: &[(Setting, u16)]) -> Settings {
 
 /// What wakes up with this in its EEPROM: the greeting, and the Uno.
 fn waking_up_with(eeprom: &[u8]) -> (String, Uno) {
-    let mut uno = Uno::boot_with_eeprom(&elf(), eeprom).expect("the firmware wakes up");
+    let mut uno = Uno::boot_with_eeprom(&elf(), eeprom).expect("the firmware wakes up").wired(&wiring::WIRES);
     let greeting = uno.run_until_serial("commands\r\n", GREETING_CYCLES).expect("the firmware greets");
     (greeting, uno)
 }
@@ -248,7 +250,7 @@ fn the_saved_pulse_has_the_tool_out_from_the_first_one_on() {
 
 #[test]
 fn nothing_happens_where_position_and_time_wrap() {
-    let mut uno = Uno::boot(&elf()).expect("the firmware can be run");
+    let mut uno = Uno::boot(&elf()).expect("the firmware can be run").wired(&wiring::WIRES);
     uno.run_until_symbol("main", GREETING_CYCLES).expect("the program starts");
     // Both run over their end one and a half metres into the row, in the middle of a window.
     let count = (i32::MAX - 2_500).to_le_bytes();
@@ -284,7 +286,7 @@ fn a_work_switch_left_on_over_a_reset_starts_nothing() {
     run.uno.brown_out();
     greeting_with_the_tool_out_since(&mut run.uno, cycle);
     assert_eq!(value(&status(&mut run.uno), "state"), "hold");
-    run.uno.set(Pin::WorkSwitch, true);
+    run.uno.set(wiring::WORK_SWITCH, true);
     run_for_ms(&mut run.uno, 100);
     assert_eq!(value(&status(&mut run.uno), "state"), "hold");
 }

@@ -1,18 +1,20 @@
 //! What is measured never exceeds what is proved: the deepest stack, every handler, every critical section; and no count is lost at
 //! the rate that is said to be never lost.
 //!
-//! The proofs follow the ELF (`field::uno::bounds`); the measurements run it with all that keeps it busy.
+//! The proofs follow the ELF (`uno::bounds`); the measurements run it with all that keeps it busy.
 
 use crate::common::{Run, ask, elf, run_for_ms, woken_up};
 use crate::interrupt_budgets::roll;
-use field::firmware::workspace_root;
 use field::machine::Machine;
 use field::motion::mm_s;
 use field::planting::Planting;
 use field::trial::Trial;
-use field::uno::Uno;
-use field::uno::bounds::{self, Bounds, Budgets};
 use field::verdict::Timing;
+use std::process::Command;
+use trial::firmware::workspace_root;
+use uno::Uno;
+use uno::bounds::{self, Bounds, Budgets};
+use uno::elf::Image;
 
 /// Counts in a second beside which the loop still gets time to answer.
 const BUSY_PER_S: u64 = 150_000;
@@ -105,4 +107,30 @@ fn no_count_is_lost_at_the_rate_that_is_never_lost() {
     println!("{} counts a second, {} cycles of wait", edges.never_lost_per_s, edges.wait_cycles);
     // A rate whose counts go up in quarters.
     roll(&mut woken_up(), edges.never_lost_per_s / 100 * 100);
+}
+
+#[test]
+fn the_firmware_s_code_is_what_avr_objdump_takes_it_for() {
+    let elf = elf();
+    let flash = Image::read(&elf).expect("it is an ELF").flash;
+    let output =
+        Command::new("avr-objdump").args(["-d", "-z"]).arg(&elf).output().expect("./setup.sh brings avr-objdump");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let text = String::from_utf8(output.stdout).expect("it is text");
+    let line = |line: &str| {
+        let mut columns = line.split('\t');
+        let address = u32::from_str_radix(columns.next()?.trim().strip_suffix(':')?, 16).ok()?;
+        let length = columns.next()?.split_whitespace().count() as u32;
+        Some((address, length, columns.next()?.trim().to_owned()))
+    };
+    let listed: Vec<_> = text.lines().filter_map(line).collect();
+    assert!(listed.len() > 10_000, "{} instructions", listed.len());
+    for (address, length, name) in listed {
+        // Tables stand among the code.
+        if let Some(found) = bounds::instruction_at(&flash, address) {
+            assert_eq!(found, (length, name), "{address:#06x}");
+        } else {
+            assert_eq!(name, ".word", "{address:#06x}");
+        }
+    }
 }

@@ -1,19 +1,20 @@
 //! Recordings of an encoder, made here and played to the firmware: it counts them to the step.
 
 use crate::common::{elf, encoder_steps};
-use field::capture::{Capture, Channels};
-use field::replay::{Counted, replay};
-use field::waveform;
+use field::wiring;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::path::Path;
+use trial::replay::{Counted, replay};
+use uno::capture::Capture;
+use uno::waveform;
 
 /// Writes the steps as a waveform file, has the firmware count it, and compares with the sum of the steps.
 #[track_caller]
 fn assert_counts(name: &str, steps: &[(u64, i32)]) {
     let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name).with_extension("vcd");
-    waveform::write(&path, encoder_steps(steps.iter().copied())).expect("the recording is written");
-    let channels = Channels { a: "encoder_a", b: "encoder_b", beam: None };
+    waveform::write(&path, &wiring::WIRES, encoder_steps(steps.iter().copied())).expect("the recording is written");
+    let channels = [(wiring::ENCODER_A, "encoder_a"), (wiring::ENCODER_B, "encoder_b")];
     let capture = Capture::read(&path, &channels).expect("the recording is read");
     let replay = replay(&capture, &elf(), |_| {}).expect("the firmware runs");
 

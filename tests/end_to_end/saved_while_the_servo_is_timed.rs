@@ -3,8 +3,8 @@
 
 use crate::common::{ask, run_for_ms, woken_up};
 use field::servo::Servo;
-use field::signal::Pin;
-use field::uno::Uno;
+use field::wiring;
+use uno::Uno;
 
 /// The end switch follows the servo's commands by this.
 const FOLLOWS_MS: u64 = 90;
@@ -14,7 +14,7 @@ fn follow(uno: &mut Uno, duration_ms: u64) {
     let mut told = Vec::from([true; FOLLOWS_MS as usize]);
     for now in 0..duration_ms {
         let place = (now % FOLLOWS_MS) as usize;
-        uno.set(Pin::EndSwitch, !told[place]);
+        uno.set(wiring::END_SWITCH, !told[place]);
         let pulses = uno.servo_pulses();
         told[place] = Servo::default().commands(&pulses[pulses.len().saturating_sub(2)..])[0].is_out();
         run_for_ms(uno, 1);
@@ -26,7 +26,7 @@ fn settings_that_were_saved_are_whole_although_the_servos_swings_end_meanwhile()
     let mut meanwhile = 0;
     for save_at_ms in [8850, 8900, 8950, 8980, 9000] {
         let mut uno = woken_up();
-        uno.set(Pin::EndSwitch, false);
+        uno.set(wiring::END_SWITCH, false);
         run_for_ms(&mut uno, 50);
         for line in ["set end_switch on", "set k 5", "events on", "calibrate servo"] {
             ask(&mut uno, line);

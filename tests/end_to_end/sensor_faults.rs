@@ -4,9 +4,10 @@ use crate::common::{Run, ask, bare_ground, is_out_at_the_pin, number, run_for_ms
 use field::machine::cycle_at;
 use field::motion::{Motion, mm_s};
 use field::row::{Row, Thing};
-use field::signal::{CYCLES_PER_SECOND, Pin, PinChange};
 use field::trial::{Start, Trial};
 use field::verdict::Verdict;
+use field::wiring;
+use signal::{CYCLES_PER_SECOND, Pin, PinChange};
 
 /// Where the fault begins: the tool is in the row between the second plant and the third, which the beam has just passed.
 const FAULT_MM: f64 = 1720.0;
@@ -37,7 +38,7 @@ fn assert_alarm(run: &mut Run, name: &str, code: i64) {
 }
 
 fn is_encoder(change: &PinChange) -> bool {
-    matches!(change.pin, Pin::EncoderA | Pin::EncoderB)
+    matches!(change.pin, wiring::ENCODER_A | wiring::ENCODER_B)
 }
 
 #[test]
@@ -131,7 +132,7 @@ fn spikes_on_both_channels_are_not_counted_and_are_an_alarm_by_the_way_on_which_
             let spikes = (5..(trial.motion.duration_s() * 17.0) as u64).flat_map(|number| {
                 let cycle = start_cycle + number * CYCLES_PER_SECOND / 17;
                 let is_quiet = !changes.iter().any(|c| is_encoder(c) && (cycle..cycle + 3200).contains(&c.cycle));
-                let spike = [Pin::EncoderA, Pin::EncoderB].map(|pin| {
+                let spike = [wiring::ENCODER_A, wiring::ENCODER_B].map(|pin| {
                     let high = level_at(pin, cycle);
                     [PinChange { cycle, pin, high: !high }, PinChange { cycle: cycle + 1600, pin, high }]
                 });
@@ -155,7 +156,7 @@ fn spikes_on_both_channels_are_not_counted_and_are_an_alarm_by_the_way_on_which_
 
 #[test]
 fn an_encoder_with_one_dead_channel_is_an_alarm() {
-    for dead in [Pin::EncoderA, Pin::EncoderB] {
+    for dead in [wiring::ENCODER_A, wiring::ENCODER_B] {
         let mut run = with_fault(bare_ground(), 2400.0, |fault, mut changes| {
             changes.retain(|change| change.cycle < fault || change.pin != dead);
             changes
@@ -174,7 +175,7 @@ fn an_encoder_whose_channels_change_at_once_is_an_alarm() {
         // Both wires pick up the same noise: 40 times in 0.2 s.
         let noise = (0..80_u64).flat_map(|edge| {
             let cycle = fault + edge * CYCLES_PER_SECOND / 400;
-            [Pin::EncoderA, Pin::EncoderB].map(|pin| PinChange { cycle, pin, high: edge % 2 == 0 })
+            [wiring::ENCODER_A, wiring::ENCODER_B].map(|pin| PinChange { cycle, pin, high: edge % 2 == 0 })
         });
         changes.retain(|change| change.cycle < fault || !is_encoder(change));
         changes.extend(noise);
@@ -200,7 +201,7 @@ fn a_beam_that_flickers_in_dust_is_an_alarm() {
         // 600 edges a second, each of which can be followed.
         changes.extend((0..300_u64).map(|edge| PinChange {
             cycle: fault + edge * CYCLES_PER_SECOND / 600,
-            pin: Pin::Beam,
+            pin: wiring::BEAM,
             high: edge % 2 == 1,
         }));
         changes
@@ -268,17 +269,17 @@ fn rolling_back_to_forgotten_ground_is_an_alarm() {
 fn an_end_switch_that_does_not_follow_is_an_alarm() {
     // In HOLD the tool is out: the switch should be closed.
     let mut run = Run::begin(trial(bare_ground(), steady(mm_s(1.0), 100.0)), &["hold"]);
-    run.uno.set(Pin::EndSwitch, false);
+    run.uno.set(wiring::END_SWITCH, false);
     run_for_ms(&mut run.uno, 50);
     ask(&mut run.uno, "set end_switch on");
     run_for_ms(&mut run.uno, 500);
     assert_eq!(run.events("alarm"), [""; 0]);
-    run.uno.set(Pin::EndSwitch, true);
+    run.uno.set(wiring::END_SWITCH, true);
     run_for_ms(&mut run.uno, 10);
-    run.uno.set(Pin::EndSwitch, false);
+    run.uno.set(wiring::END_SWITCH, false);
     run_for_ms(&mut run.uno, 500);
     assert_eq!(run.events("alarm"), [""; 0], "contacts bounce");
-    run.uno.set(Pin::EndSwitch, true);
+    run.uno.set(wiring::END_SWITCH, true);
     run_for_ms(&mut run.uno, 100);
     assert_alarm(&mut run, "tool_stuck", 41);
 }

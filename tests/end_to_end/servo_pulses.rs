@@ -3,8 +3,8 @@
 use crate::common::{Run, ask, run_for_ms, steady, trial, woken_up};
 use field::motion::mm_s;
 use field::row::{Row, Thing};
-use field::signal::{CYCLES_PER_SECOND, Pulse};
-use field::uno::Uno;
+use signal::{CYCLES_PER_SECOND, Pulse};
+use uno::Uno;
 
 fn microseconds(cycles: u64) -> f64 {
     cycles as f64 * 1e6 / CYCLES_PER_SECOND as f64

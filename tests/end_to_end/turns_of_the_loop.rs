@@ -7,10 +7,10 @@
 use crate::common::{Run, run_for_ms, steady, trial, woken_up};
 use control::console::{LINE_LENGTH, Word};
 use control::settings::Setting;
-use field::link::settings::name;
 use field::planting::Planting;
-use field::signal::CYCLES_PER_SECOND;
-use field::uno::Uno;
+use link::settings::name;
+use signal::CYCLES_PER_SECOND;
+use uno::Uno;
 
 /// A turn's cycles at most: 1 ms.
 const TURN: u64 = CYCLES_PER_SECOND / 1000;

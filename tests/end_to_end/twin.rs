@@ -7,11 +7,12 @@ use field::conditions::{Conditions, presets};
 use field::driving::drive;
 use field::stand::Stand;
 use field::trial::{Start, Trial};
-use field::{firmware, twin};
+use field::twin;
 use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
+use trial::firmware;
 
 /// A servo's frame: what a swing may differ by.
 const FRAME_S: f64 = 0.020;
@@ -20,7 +21,7 @@ const FRAME_S: f64 = 0.020;
 fn random_row(seed: u64) -> Trial {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let presets: Vec<&str> = presets().collect();
-    let mut conditions = Conditions::load(presets.choose(&mut rng).unwrap()).unwrap();
+    let mut conditions = Conditions::preset(presets.choose(&mut rng).unwrap()).unwrap().unwrap();
     conditions.set("plot.row_m", 3.0).unwrap();
     conditions.set("driving.stops_per_100_m", 0.0).unwrap();
     let stand = Stand::grow(&conditions, rng.random_range(400.0..700.0), &mut rng).unwrap();
@@ -43,7 +44,7 @@ fn the_native_twin_swings_as_the_firmware_does_on_fifty_random_rows() {
         .map(|seed| {
             let trial = random_row(seed);
             let servo = trial.machine.servo;
-            let on_the_uno = trial.run(&elf, |_| ()).unwrap();
+            let on_the_uno = trial::run(&trial, &elf, |_| ()).unwrap();
             let by_the_twin = twin::weed(&trial).unwrap();
             let real = servo.commands(&on_the_uno.pulses);
             let native = servo.commands(&by_the_twin.pulses);

@@ -7,9 +7,11 @@ use crate::common::{
 use field::machine::Machine;
 use field::motion::mm_s;
 use field::row::{Row, Thing};
-use field::signal::{CYCLES_PER_SECOND, Pin, PinChange};
-use field::trial::{Start, boot};
-use field::uno::Uno;
+use field::trial::Start;
+use field::wiring;
+use signal::{CYCLES_PER_SECOND, PinChange};
+use trial::boot;
+use uno::Uno;
 
 /// Time in which the servo shows a decision: a frame and the loop's turn.
 const FRAME_MS: u64 = 25;
@@ -30,7 +32,7 @@ fn roll(uno: &mut Uno, length_mm: f64) {
 
 #[test]
 fn a_switch_that_is_on_at_power_up_starts_nothing_until_it_has_been_off() {
-    let mut uno = boot(&elf(), &[PinChange { cycle: 0, pin: Pin::WorkSwitch, high: false }]).expect("it wakes up");
+    let mut uno = boot(&elf(), &[PinChange { cycle: 0, pin: wiring::WORK_SWITCH, high: false }]).expect("it wakes up");
     run_for_ms(&mut uno, 200);
     assert_in_hold_with_tool_out(&mut uno);
     // Farther than from the beam to the tool, so that the tool could go into the row.

@@ -1,0 +1,77 @@
+//! `weeder classify`: what the firmware's classifier says of recorded objects.
+//!
+//! The built-in examples, the scale and the radius are those of the firmware, and so is the code that searches them.
+
+use crate::Finding;
+use crate::numbers::whole_within;
+use crate::output::say;
+use crate::source;
+use anyhow::Result;
+use clap::Args;
+use field::row::Kind;
+use serde_json::{Value, json};
+use std::path::PathBuf;
+use study::training::table::{self, Recorded};
+use study::training::{Confusion, MAX_K, Model, class_of, label_of};
+
+/// What the user asks to be classified.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  weeder classify field.csv          what `dump` has printed, labelled or not
+  weeder classify field.csv --k 5    with five votes
+  weeder classify field.csv --json | jq '.[] | select(.answer == \"unknown\")'
+The status is 1 where a plant would be taken for a weed.")]
+pub struct Arguments {
+    /// A CSV file with the columns speed_mm_s,spacing_mm,delay_mm,hold_mm,actuation_mm and, if known, label;
+    /// - for standard input.
+    #[arg(value_name = "FILE.csv", value_parser = source::file)]
+    file: PathBuf,
+    #[arg(
+        long,
+        value_name = "N",
+        value_parser = whole_within(1..=MAX_K),
+        help = format!("Examples that vote, 1 to {MAX_K}; as the firmware starts with where none are given")
+    )]
+    k: Option<u8>,
+    /// Print a JSON object for each instead of the table.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Classifies, and prints a line an object and, where there are labels, who was taken for whom.
+///
+/// # Errors
+/// Where the file or its contents are wrong.
+pub fn run(arguments: &Arguments) -> Result<Finding> {
+    let objects = table::read(&arguments.file)?;
+    let mut model = Model::built_in();
+    model.k = arguments.k.unwrap_or(model.k);
+    let labelled = objects.iter().filter_map(|object| Some((object.kind?, model.class(&object.features))));
+    let confusion: Confusion = labelled.collect();
+    if arguments.json {
+        say!("{:#}", as_json(&model, &objects)?)?;
+    } else {
+        say!("{}", model.table(&objects)?)?;
+        if confusion.total() > 0 {
+            say!("\n{confusion}")?;
+        }
+    }
+    if confusion.plants_taken_for_weeds() == 0 { Ok(Finding::Good) } else { Ok(Finding::Bad) }
+}
+
+/// What each object is taken for, and what speaks for it.
+fn as_json(model: &Model, objects: &[Recorded]) -> Result<Value> {
+    let row = |object: &Recorded| {
+        let answer = model.answer(&object.features)?;
+        let votes = |kind| answer.votes[usize::from(label_of(kind))];
+        Ok(json!({
+            "answer": format!("{:?}", class_of(&answer)).to_lowercase(),
+            "votes_plant": votes(Kind::Plant),
+            "votes_weed": votes(Kind::Weed),
+            "nearest_squared": answer.nearest,
+            "label": object.kind.map(|kind| kind.to_string()),
+        }))
+    };
+    objects.iter().map(row).collect()
+}

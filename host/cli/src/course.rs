@@ -1,0 +1,89 @@
+//! Arguments that several commands share: the row, and the machine that rolls along it.
+
+use crate::numbers::{number_within, whole_within};
+use crate::source;
+use anyhow::{Result, ensure};
+use clap::Args;
+use field::machine::Machine;
+use field::planting::Planting;
+use field::row::Row;
+use files::csv_table;
+use std::path::PathBuf;
+
+/// What the user asks of row and machine.
+#[derive(Args)]
+pub struct CourseArguments {
+    /// Speed in km/h, 0.1 to 10.
+    #[arg(long, default_value = "2.5", value_parser = number_within(0.1..=10.0))]
+    pub speed: f64,
+    /// Mean distance from plant to plant in mm, 50 to 5000.
+    #[arg(long, default_value = "500", value_parser = number_within(50.0..=5000.0))]
+    spacing: f64,
+    /// Mean width of a canopy in mm, 10 to 340.
+    #[arg(long, default_value = "150", value_parser = number_within(10.0..=340.0))]
+    canopy: f64,
+    /// Number of crop plants, 1 to 1000.
+    #[arg(long, default_value = "20", value_parser = whole_within(1..=1000_usize))]
+    plants: usize,
+    /// Number of tall weeds between them, 0 to 1000; where none is given, 5, or as many of these as there is room for.
+    #[arg(long, value_parser = whole_within(0..=1000_usize))]
+    weeds: Option<usize>,
+    /// Which of all the possible rows, 0 to 18446744073709551615: the same seed gives the same row.
+    #[arg(long, default_value = "1", value_parser = whole_within(0..=u64::MAX))]
+    seed: u64,
+    /// Distance from the beam back to the tool in mm, 100 to 2000.
+    #[arg(long, default_value = "400", value_parser = whole_within(100..=2000_u32))]
+    beam_to_tool: u32,
+    /// Grow canopies with gaps through which the beam passes.
+    #[arg(long)]
+    ragged: bool,
+    /// Take the row from a CSV file with the columns position_mm,width_mm,kind instead of growing one; - for standard input.
+    #[arg(long, value_name = "FILE.csv", value_parser = source::file, conflicts_with_all = ["spacing", "canopy", "plants", "weeds", "seed", "ragged"])]
+    row: Option<PathBuf>,
+}
+
+/// Tall weeds in a row for which nobody has said how many, where there is room for them.
+const WEEDS: usize = 5;
+
+/// Scatter of a grown row, as shares of the mean spacing and the mean canopy; never more than a quarter of the gap
+/// between two mean canopies each, so that the plants stay apart.
+const SPACING_SCATTER: f64 = 0.08;
+const CANOPY_SCATTER: f64 = 0.15;
+
+impl CourseArguments {
+    /// The row, read or grown.
+    ///
+    /// # Errors
+    /// Where the file is wrong, or the numbers make no row.
+    pub fn row(&self) -> Result<Row> {
+        if let Some(path) = &self.row {
+            return Ok(Row::parse_csv(path, csv_table::bytes(path)?)?);
+        }
+        let gap_mm = self.spacing - self.canopy;
+        ensure!(
+            gap_mm > 0.0,
+            "a spacing of {} mm leaves nothing between canopies of {} mm: --spacing has to exceed --canopy",
+            self.spacing,
+            self.canopy
+        );
+        let planting = Planting {
+            plants: self.plants,
+            spacing_mm: self.spacing,
+            spacing_scatter_mm: (self.spacing * SPACING_SCATTER).min(gap_mm / 4.0),
+            canopy_mm: self.canopy,
+            canopy_scatter_mm: (self.canopy * CANOPY_SCATTER).min(gap_mm / 4.0),
+            weeds: self.weeds.unwrap_or(WEEDS),
+            ragged: self.ragged,
+        };
+        let row = match self.weeds {
+            Some(_) => planting.grow(self.seed),
+            None => planting.grow_with_room(self.seed),
+        };
+        Ok(row?)
+    }
+
+    /// The machine.
+    pub fn machine(&self) -> Machine {
+        Machine { beam_to_tool_mm: f64::from(self.beam_to_tool), ..Machine::default() }
+    }
+}

@@ -1,0 +1,123 @@
+//! Where a command writes its files: one way for all, checked before any work is done.
+//!
+//! The rule for `--out`: a report, which is a page or several files, goes into a folder (`FOLDER`), which is made where there is
+//! none; a single table goes to a file (`FILE.csv`). An argument can only be written to once it has been checked, and a command
+//! checks before it works. What is wrong all the same after the work, such as a disk that has filled up, is told after the
+//! result has been printed.
+
+use anyhow::{Context, Result, bail, ensure};
+use files::whole_file;
+use std::ffi::OsString;
+use std::fs;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+/// How files end that commands write: a folder is hardly meant to.
+const FILE_ENDINGS: [&str; 8] = ["csv", "hex", "html", "json", "rs", "svg", "toml", "vcd"];
+
+/// A file's name, as it was typed.
+#[derive(Clone, Debug)]
+pub struct FileName(PathBuf);
+
+/// A folder's name, as it was typed.
+#[derive(Clone, Debug)]
+pub struct FolderName(PathBuf);
+
+impl From<OsString> for FileName {
+    fn from(name: OsString) -> Self {
+        Self(name.into())
+    }
+}
+
+impl From<OsString> for FolderName {
+    fn from(name: OsString) -> Self {
+        Self(name.into())
+    }
+}
+
+/// A file that could be written when it was checked.
+#[derive(Debug)]
+pub struct OutFile<'a>(&'a Path);
+
+/// A folder in which files could be written when it was checked. It may not be there yet.
+#[derive(Debug)]
+pub struct OutFolder<'a>(&'a Path);
+
+impl FileName {
+    /// Whether it could be written.
+    ///
+    /// # Errors
+    /// Where it could not, and why.
+    pub fn check(&self) -> Result<OutFile<'_>> {
+        ensure!(!self.0.is_dir(), "{} is a folder, and a file has to be named", self.0.display());
+        whole_file::check(&self.0).with_context(|| cannot_be_written(&self.0))?;
+        Ok(OutFile(&self.0))
+    }
+
+    /// The name.
+    pub fn path(&self) -> &Path {
+        &self.0
+    }
+}
+
+impl OutFile<'_> {
+    /// Writes it whole, or leaves what was there.
+    ///
+    /// # Errors
+    /// Where it cannot be written.
+    pub fn write<E>(&self, contents: impl FnOnce(&mut dyn Write) -> Result<(), E>) -> Result<()>
+    where
+        E: From<io::Error>,
+        Result<(), E>: Context<(), E>,
+    {
+        whole_file::write(self.0, contents).with_context(|| cannot_be_written(self.0))
+    }
+
+    /// The name.
+    pub fn path(&self) -> &Path {
+        self.0
+    }
+}
+
+impl FolderName {
+    /// Whether files could be written there.
+    ///
+    /// # Errors
+    /// Where they could not, and why.
+    pub fn check(&self) -> Result<OutFolder<'_>> {
+        let folder = &self.0;
+        ensure!(!folder.exists() || folder.is_dir(), "{} is a file, and a folder has to be named", folder.display());
+        let ending = folder.extension().and_then(|ending| ending.to_str());
+        if !folder.exists() && ending.is_some_and(|ending| FILE_ENDINGS.contains(&ending)) {
+            bail!("{} is named like a file, and a folder has to be named: several files go there", folder.display());
+        }
+        let there = folder.ancestors().find(|part| part.exists()).unwrap_or(Path::new("."));
+        whole_file::check(&there.join("report")).with_context(|| cannot_be_written(folder))?;
+        Ok(OutFolder(folder))
+    }
+}
+
+impl OutFolder<'_> {
+    /// Writes a file there whole, or leaves what was there; makes the folder where there is none.
+    ///
+    /// # Errors
+    /// Where folder or file cannot be written.
+    pub fn write<E>(&self, name: &str, contents: impl FnOnce(&mut dyn Write) -> Result<(), E>) -> Result<()>
+    where
+        E: From<io::Error>,
+        Result<(), E>: Context<(), E>,
+    {
+        fs::create_dir_all(self.0).with_context(|| format!("the folder {} cannot be made", self.0.display()))?;
+        let path = self.0.join(name);
+        whole_file::write(&path, contents).with_context(|| cannot_be_written(&path))
+    }
+
+    /// The name.
+    pub fn path(&self) -> &Path {
+        self.0
+    }
+}
+
+fn cannot_be_written(path: &Path) -> String {
+    format!("{} cannot be written", path.display())
+}

@@ -1,0 +1,99 @@
+//! `weeder evaluate`: judges a field trial by what was counted and measured in its plots.
+
+use crate::destination::{FolderName, OutFolder};
+use crate::output::{self, say};
+use crate::source;
+use anyhow::{Context, Result};
+use clap::Args;
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+use study::evaluation::{self, Analysis, ResponseAnalysis};
+use study::page::Page;
+
+/// The report's name in its folder.
+const REPORT: &str = "report.html";
+
+/// What the user asks of a trial.
+#[derive(Args)]
+#[command(after_help = "Examples:\n  \
+    weeder evaluate trial.csv                   say how the machine did, and what that depends on\n  \
+    weeder evaluate trial.csv --out report      write report/report.html with plots as well\n  \
+    weeder evaluate trial.csv --json | jq .responses[0].model.terms")]
+pub struct Arguments {
+    /// CSV file, a line a plot, with the columns
+    /// replication,speed_km_h,spacing_cm,weeds_before,weeds_after,plants,damaged,area_m2,time_s,width_m,power_hp; - for standard input.
+    #[arg(value_name = "FILE.csv", value_parser = source::file)]
+    file: PathBuf,
+    /// Print JSON for programs instead of tables.
+    #[arg(long)]
+    json: bool,
+    /// Write report.html into this folder, which is made where there is none.
+    #[arg(long, value_name = "FOLDER")]
+    out: Option<FolderName>,
+}
+
+/// Reads, judges and prints.
+///
+/// # Errors
+/// Where the table cannot be read or has a plot that cannot be, or the report cannot be written.
+pub fn run(arguments: &Arguments) -> Result<()> {
+    let folder = arguments.out.as_ref().map(FolderName::check).transpose()?;
+    let records = evaluation::read_csv(&arguments.file)?;
+    let analysis = Analysis::of(records).with_context(|| arguments.file.display().to_string())?;
+    let printed = match arguments.json {
+        true => say!("{:#}", in_json(&analysis)),
+        false => output::print(format_args!("{analysis}")),
+    };
+    if let Some(folder) = &folder {
+        write_report(&analysis, &arguments.file, folder)?;
+        if !arguments.json {
+            say!("\nReport      {}", folder.path().join(REPORT).display())?;
+        }
+    }
+    printed
+}
+
+fn write_report(analysis: &Analysis, file: &Path, folder: &OutFolder) -> Result<()> {
+    let name = file.file_name().unwrap_or(file.as_os_str()).display();
+    let page = Page {
+        title: &format!("Field trial: {name}"),
+        summary: analysis.findings(),
+        command: &output::command_line()?,
+        parameters: &[
+            ("plots from".to_owned(), name.to_string()),
+            ("weeder's version".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
+        ],
+        analysis,
+        comparison: None,
+        row: None,
+    };
+    let html = page.html()?;
+    folder.write(REPORT, |to| to.write_all(html.as_bytes()))
+}
+
+/// The whole analysis; where there is no model, `no_model` says why.
+fn in_json(analysis: &Analysis) -> Value {
+    let plots = analysis.records.iter().zip(&analysis.performances);
+    let plots: Vec<Value> = plots.map(|(record, result)| json!({ "record": record, "performance": result })).collect();
+    let responses: Vec<Value> = analysis.responses.iter().map(response_in_json).collect();
+    json!({
+        "findings": analysis.findings(),
+        "plots": plots,
+        "treatments": analysis.treatments(),
+        "responses": responses,
+    })
+}
+
+fn response_in_json(analysis: &ResponseAnalysis) -> Value {
+    let ResponseAnalysis { response, range, model, variance, published } = analysis;
+    json!({
+        "response": response,
+        "unit": response.unit(),
+        "range": range,
+        "model": model.as_ref().ok(),
+        "no_model": model.as_ref().err().map(ToString::to_string),
+        "variance": variance.as_ref().ok(),
+        "no_variance": variance.as_ref().err().map(ToString::to_string),
+        "published": published,
+    })
+}

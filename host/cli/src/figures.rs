@@ -1,0 +1,142 @@
+//! `weeder figures`: the figures that stand in the manual, each from the command that stands above it.
+//!
+//! A figure is a fenced block right behind a comment that names its command:
+//!
+//!     <!-- figures: weeder trial --speeds 1,2 -->
+//!     ```text
+//!
+//! The command is run, and what it prints becomes the block. What it prints of the time that it took, a line that begins with
+//! `Pace`, is left out: everything else is the same on every machine.
+
+use crate::Finding;
+use crate::output::{say, tell};
+use anyhow::{Context, Result, bail, ensure};
+use clap::Args;
+use files::whole_file;
+use std::env;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+/// Which figures are to be written.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  weeder figures                      write the figures of the manual anew
+  weeder figures --check              say which of them are no longer true
+The status is 1 where --check finds one.")]
+pub struct Arguments {
+    /// The pages with figures.
+    #[arg(default_values = ["docs/figures.md", "README.md"], value_name = "PAGE.md")]
+    pages: Vec<PathBuf>,
+    /// Write nothing, but say which figures are not what their commands print.
+    #[arg(long)]
+    check: bool,
+}
+
+/// What stands in front of a figure's command.
+const MARK: &str = "<!-- figures: ";
+
+/// Writes the figures, or compares them.
+///
+/// # Errors
+/// Where a page cannot be read or written, has a figure without a block, or a command fails.
+pub fn run(arguments: &Arguments) -> Result<Finding> {
+    let mut differ = Vec::new();
+    for path in &arguments.pages {
+        let page = fs::read_to_string(path).with_context(|| format!("{} cannot be read", path.display()))?;
+        let anew = renew(&page, path)?;
+        if anew == page {
+            continue;
+        }
+        if arguments.check {
+            differ.push(format!("{}\n{}", path.display(), difference(&page, &anew)));
+        } else {
+            whole_file::write(path, |to| Ok::<_, anyhow::Error>(to.write_all(anew.as_bytes())?))
+                .with_context(|| format!("{} cannot be written", path.display()))?;
+        }
+    }
+    if differ.is_empty() {
+        return Ok(Finding::Good);
+    }
+    say!("These figures are not what their commands print; `weeder figures` writes them:")?;
+    say!("{}", differ.join("\n"))?;
+    Ok(Finding::Bad)
+}
+
+/// The page with the figures that its commands print now.
+fn renew(page: &str, path: &Path) -> Result<String> {
+    let (mut anew, mut lines) = (String::new(), page.lines().enumerate());
+    while let Some((_, line)) = lines.next() {
+        anew += &format!("{line}\n");
+        let Some(command) = line.strip_prefix(MARK).and_then(|rest| rest.strip_suffix(" -->")) else { continue };
+        let place = |number: usize| format!("{}:{}", path.display(), number + 1);
+        let Some((number, fence)) = lines.next() else {
+            bail!("{}: no figure stands behind its command", path.display())
+        };
+        ensure!(
+            fence == "```text",
+            "{}: a block ```text has to stand right behind the figure's command",
+            place(number)
+        );
+        ensure!(lines.by_ref().any(|(_, line)| line == "```"), "{}: the figure's block has no end", place(number));
+        let figure = print(command).with_context(|| place(number))?;
+        anew += &format!("{fence}\n{figure}```\n");
+    }
+    Ok(anew)
+}
+
+/// What a command prints, without what depends on the machine that it runs on.
+fn print(command: &str) -> Result<String> {
+    let words = shlex::split(command).with_context(|| format!("unbalanced quotes in `{command}`"))?;
+    let [program, arguments @ ..] = words.as_slice() else { bail!("there is no command") };
+    ensure!(program == "weeder", "figures come from `weeder`, not from `{program}`");
+    tell!("{command}");
+    let weeder = env::current_exe().context("the running program cannot be found")?;
+    let output = Command::new(weeder).args(arguments).stderr(Stdio::null()).output()?;
+    // Status 1 is a finding, such as a plant that was damaged.
+    ensure!(matches!(output.status.code(), Some(0 | 1)), "`{command}` fails: run it to see why");
+    let printed = String::from_utf8(output.stdout).with_context(|| format!("`{command}` prints no text"))?;
+    let lines = printed.lines().map(str::trim_end).filter(|line| !line.starts_with("Pace"));
+    let lines: Vec<&str> = lines.collect();
+    let text = lines.join("\n");
+    Ok(format!("{}\n", text.trim_matches('\n')))
+}
+
+/// The lines that differ, those of the page first.
+fn difference(page: &str, anew: &str) -> String {
+    let (page, anew): (Vec<&str>, Vec<&str>) = (page.lines().collect(), anew.lines().collect());
+    let only = |sign: char, these: &[&str], others: &[&str]| -> String {
+        these.iter().filter(|line| !others.contains(line)).map(|line| format!("{sign} {line}\n")).collect()
+    };
+    only('-', &page, &anew) + &only('+', &anew, &page)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_page_without_figures_stays_as_it_is() {
+        let page = "# A page\n\n```text\nno figure\n```\n";
+        assert_eq!(renew(page, Path::new("page.md")).expect("nothing is to be run"), page);
+    }
+
+    #[test]
+    fn a_figure_without_its_block_is_told_with_its_line() {
+        for (page, complaint) in [
+            ("<!-- figures: weeder hex -->\nno block\n", "page.md:2: a block ```text has to stand"),
+            ("\n<!-- figures: weeder hex -->\n```text\n", "page.md:3: the figure's block has no end"),
+            ("<!-- figures: weeder hex -->\n", "page.md: no figure stands behind"),
+            ("<!-- figures: rm it -->\n```text\n```\n", "page.md:2"),
+        ] {
+            let error = renew(page, Path::new("page.md")).expect_err("it is wrong");
+            assert!(error.to_string().starts_with(complaint), "{error:#}");
+        }
+    }
+
+    #[test]
+    fn what_differs_is_told_line_by_line() {
+        assert_eq!(difference("same\nold\n", "same\nnew\nmore\n"), "- old\n+ new\n+ more\n");
+    }
+}

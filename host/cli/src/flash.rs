@@ -1,0 +1,195 @@
+//! `weeder flash`: builds the firmware and has avrdude put it on the Uno.
+
+use crate::output::say;
+use anyhow::{Context, Result, ensure};
+use clap::Args;
+use std::collections::HashSet;
+use std::io::{self, Read, Write};
+use std::path::{self, Path, PathBuf};
+use std::process::{Command, Stdio};
+use uno::elf::{self, Image};
+use uno::hex;
+
+/// What the user asks of flashing.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  weeder flash                         the only Uno at a USB port
+  weeder flash --port /dev/ttyACM0     this one
+  weeder flash --old-bootloader        a board that does not answer at 115200 baud")]
+pub struct Arguments {
+    /// The Uno's serial port, such as /dev/ttyACM0 or COM3; found by itself where there is only one Uno.
+    #[arg(long)]
+    port: Option<String>,
+    /// Speak to the bootloader that came before optiboot, at 57600 baud: the one of the Duemilanove, and of many copies of the
+    /// Nano.
+    #[arg(long)]
+    old_bootloader: bool,
+    /// Have ravedude do it where that is installed, as Ravedude.toml says, unless the bootloader is the old one.
+    #[arg(long)]
+    ravedude: bool,
+    /// Flash this firmware instead of building the one in this repository.
+    #[arg(long, value_name = "FILE.elf")]
+    elf: Option<PathBuf>,
+}
+
+/// Baud rates of the bootloader, Optiboot's and its predecessor's.
+const BAUD: u32 = 115_200;
+const OLD_BAUD: u32 = 57_600;
+
+/// Flash that each leaves to the firmware, in bytes: they take the last 512 and the last 2048 of 32 KiB.
+const AVAILABLE_BYTES: usize = 32_256;
+const OLD_AVAILABLE_BYTES: usize = 30_720;
+
+/// Flashes, with each of avrdude's own messages once on the terminal.
+///
+/// # Errors
+/// Where there is no Uno, it cannot be opened, or building or writing fails; each says what to do.
+pub fn run(arguments: &Arguments) -> Result<()> {
+    let (baud, available) =
+        if arguments.old_bootloader { (OLD_BAUD, OLD_AVAILABLE_BYTES) } else { (BAUD, AVAILABLE_BYTES) };
+    let port = match &arguments.port {
+        Some(port) => port.clone(),
+        None => link::find_uno()?,
+    };
+    // For an error that says more than avrdude's, and before anything is built.
+    link::try_port(&port)?;
+    let elf = match &arguments.elf {
+        Some(elf) => elf.clone(),
+        None => firmware::build()?,
+    };
+    let flash = Image::read(&elf)?.flash;
+    hex::check_room(flash.len(), available)?;
+    if arguments.ravedude && !arguments.old_bootloader && run_ravedude(&elf, &port)? {
+        return Ok(());
+    }
+    let image = elf.with_extension("hex");
+    hex::write(&image, &flash)?;
+    run_avrdude(&image, &port, baud, arguments.old_bootloader)
+}
+
+/// Has ravedude flash an ELF. Returns whether it is installed.
+fn run_ravedude(elf: &Path, port: &str) -> Result<bool> {
+    let elf = path::absolute(elf).with_context(|| format!("{} has no absolute path", elf.display()))?;
+    // Its settings lie in the workspace.
+    let mut command = Command::new("ravedude");
+    command.arg(elf).env("RAVEDUDE_PORT", port).current_dir(firmware::workspace_root());
+    match command.status() {
+        Ok(status) => {
+            ensure!(status.success(), "ravedude did not succeed: `weeder flash` does without it");
+            Ok(true)
+        }
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(false),
+        Err(error) => Err(error).context("ravedude cannot be started"),
+    }
+}
+
+/// Has avrdude write an Intel HEX file and verify it.
+fn run_avrdude(image: &Path, port: &str, baud: u32, old_bootloader: bool) -> Result<()> {
+    say!("Writing {} to the Uno at {port}", image.display())?;
+    let mut avrdude = Command::new("avrdude")
+        // Each page is erased as it is written; a bootloader cannot erase the chip.
+        .args(["-c", "arduino", "-p", "atmega328p", "-D", "-b", &baud.to_string(), "-P", port])
+        .arg("-U")
+        .arg(format!("flash:w:{}:i", image.display()))
+        .stderr(Stdio::piped())
+        .spawn()
+        .context("avrdude cannot be started: ./setup.sh installs it")?;
+    if let Some(words) = avrdude.stderr.take() {
+        Messages::new(io::stderr()).pass(words);
+    }
+    let status = avrdude.wait().context("avrdude cannot be waited for")?;
+    let other = if old_bootloader { "without" } else { "with" };
+    ensure!(
+        status.success(),
+        "avrdude did not succeed: pull D0 and D1 free of other devices, press reset and try again, or try {other} \
+         --old-bootloader"
+    );
+    say!("Done: the Uno runs it. `weeder monitor --port {port}` talks to it.")?;
+    if old_bootloader {
+        say!(
+            "Behind this bootloader the machine does not come back by itself where its watchdog has had to stop it: the tool \
+             has no signal until power is taken away and given back. Optiboot, which Arduino's IDE can burn, has no such fault."
+        )?;
+    }
+    Ok(())
+}
+
+/// What avrdude says of itself, each message once, however often it tries; its progress as it comes.
+struct Messages<W> {
+    to: W,
+    line: Vec<u8>,
+    /// How much of the line was passed on.
+    passed: usize,
+    /// The messages that were passed on, without their numbers.
+    said: HashSet<Vec<u8>>,
+}
+
+/// How avrdude's messages begin.
+const MESSAGE: &[u8] = b"avrdude";
+
+impl<W: Write> Messages<W> {
+    fn new(to: W) -> Self {
+        Self { to, line: Vec::new(), passed: 0, said: HashSet::new() }
+    }
+
+    /// Passes on what comes until it ends.
+    fn pass(&mut self, mut from: impl Read) {
+        let mut buffer = [0; 256];
+        while let Ok(count @ 1..) = from.read(&mut buffer) {
+            buffer[..count].iter().for_each(|&byte| self.take(byte));
+            // Nobody is left who could be told, and avrdude goes on.
+            let _ = self.to.flush();
+        }
+        self.end_line();
+    }
+
+    fn take(&mut self, byte: u8) {
+        self.line.push(byte);
+        if matches!(byte, b'\n' | b'\r') {
+            self.end_line();
+        } else if !self.may_be_message() {
+            self.pass_line();
+        }
+    }
+
+    /// Whether the line is a message as far as it has come.
+    fn may_be_message(&self) -> bool {
+        self.line.starts_with(MESSAGE) || MESSAGE.starts_with(&self.line)
+    }
+
+    fn end_line(&mut self) {
+        let words = self.line.iter().filter(|byte| !byte.is_ascii_hexdigit()).copied().collect();
+        if !self.line.starts_with(MESSAGE) || self.said.insert(words) {
+            self.pass_line();
+        }
+        self.line.clear();
+        self.passed = 0;
+    }
+
+    fn pass_line(&mut self) {
+        // As above.
+        let _ = self.to.write_all(&self.line[self.passed..]);
+        self.passed = self.line.len();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_message_that_comes_ten_times_is_said_once_and_progress_as_it_comes() {
+        let mut words = String::from("avrdude: ser_open(): no modem lines\n\n");
+        for attempt in 1..=10 {
+            words += &format!("avrdude: stk500_getsync() attempt {attempt} of 10: not in sync: resp=0x{attempt:02x}\n");
+        }
+        words += "Writing | #### | 10%\rWriting | ######## | 20%\navrdude done.  Thank you.";
+        let mut said = Vec::new();
+        Messages::new(&mut said).pass(words.as_bytes());
+        let said = String::from_utf8(said).unwrap();
+        assert_eq!(said.matches("not in sync").count(), 1, "{said}");
+        assert!(said.starts_with("avrdude: ser_open(): no modem lines\n\navrdude: stk500_getsync() attempt 1 of 10"));
+        assert!(said.ends_with("Writing | #### | 10%\rWriting | ######## | 20%\navrdude done.  Thank you."), "{said}");
+    }
+}

@@ -1,0 +1,176 @@
+//! The line in which commands are typed: editing, history, completion.
+
+use link::COMMAND_LENGTH;
+use link::completion::{common, complete};
+use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyEventKind};
+
+/// Lines remembered.
+const HISTORY: usize = 100;
+
+/// A line that is being typed. All its characters are printable ASCII, a byte each.
+#[derive(Clone, Debug, Default)]
+pub struct CommandLine {
+    text: String,
+    cursor: usize,
+    history: Vec<String>,
+    /// Which line of the history is shown, from the newest; none for a new one.
+    browsed: Option<usize>,
+    candidates: Vec<String>,
+}
+
+impl CommandLine {
+    /// The characters typed.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// How many characters stand before the cursor.
+    pub fn cursor(&self) -> usize {
+        self.cursor
+    }
+
+    /// What the line may become, after Tab.
+    pub fn candidates(&self) -> &[String] {
+        &self.candidates
+    }
+
+    /// Takes a key; returns the line when it is entered.
+    pub fn key(&mut self, key: KeyEvent) -> Option<String> {
+        if key.kind == KeyEventKind::Release {
+            return None;
+        }
+        self.candidates.clear();
+        match key.code {
+            KeyCode::Char(character @ ' '..='~') if self.text.len() < COMMAND_LENGTH => {
+                self.text.insert(self.cursor, character);
+                self.cursor += 1;
+            }
+            KeyCode::Backspace if self.cursor > 0 => {
+                self.cursor -= 1;
+                self.text.remove(self.cursor);
+            }
+            KeyCode::Delete if self.cursor < self.text.len() => {
+                self.text.remove(self.cursor);
+            }
+            KeyCode::Left => self.cursor = self.cursor.saturating_sub(1),
+            KeyCode::Right => self.cursor = self.text.len().min(self.cursor + 1),
+            KeyCode::Home => self.cursor = 0,
+            KeyCode::End => self.cursor = self.text.len(),
+            KeyCode::Up => self.browse(self.browsed.map_or(0, |place| place + 1)),
+            KeyCode::Down => match self.browsed {
+                Some(place) if place > 0 => self.browse(place - 1),
+                _ => self.show(None, String::new()),
+            },
+            KeyCode::Tab => self.complete(),
+            KeyCode::Enter => return self.enter(),
+            _ => {}
+        }
+        None
+    }
+
+    fn browse(&mut self, place: usize) {
+        if let Some(line) = self.history.iter().rev().nth(place) {
+            self.show(Some(place), line.clone());
+        }
+    }
+
+    fn show(&mut self, browsed: Option<usize>, text: String) {
+        (self.browsed, self.cursor, self.text) = (browsed, text.len(), text);
+    }
+
+    /// Completes what stands before the cursor, as far as there is one way to go on.
+    fn complete(&mut self) {
+        let (before, behind) = self.text.split_at(self.cursor);
+        let candidates = complete(before);
+        let completed = match candidates.as_slice() {
+            [] => return,
+            [only] => format!("{only} "),
+            several => common(several).to_owned(),
+        };
+        if completed.len() + behind.len() <= COMMAND_LENGTH && completed.len() >= before.len() {
+            let text = format!("{completed}{behind}");
+            (self.cursor, self.text) = (completed.len(), text);
+        }
+        if candidates.len() > 1 {
+            self.candidates = candidates;
+        }
+    }
+
+    fn enter(&mut self) -> Option<String> {
+        let line = self.text.trim().to_owned();
+        self.show(None, String::new());
+        if line.is_empty() {
+            return None;
+        }
+        if self.history.last() != Some(&line) {
+            self.history.push(line.clone());
+        }
+        let excess = self.history.len().saturating_sub(HISTORY);
+        self.history.drain(..excess);
+        Some(line)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn typed(line: &mut CommandLine, text: &str) {
+        for character in text.chars() {
+            line.key(KeyCode::Char(character).into());
+        }
+    }
+
+    #[test]
+    fn a_line_is_edited_at_the_cursor_and_entered() {
+        let mut line = CommandLine::default();
+        typed(&mut line, " hole");
+        line.key(KeyCode::Backspace.into());
+        typed(&mut line, "d!");
+        line.key(KeyCode::Left.into());
+        line.key(KeyCode::Delete.into());
+        assert_eq!((line.text(), line.cursor()), (" hold", 5));
+        assert_eq!(line.key(KeyCode::Enter.into()).as_deref(), Some("hold"));
+        assert_eq!(line.key(KeyCode::Enter.into()), None, "the line is empty again");
+    }
+
+    #[test]
+    fn up_and_down_go_through_what_was_entered() {
+        let mut line = CommandLine::default();
+        for text in ["status", "get k", "get k"] {
+            typed(&mut line, text);
+            line.key(KeyCode::Enter.into());
+        }
+        let mut shown = |code: KeyCode| {
+            line.key(code.into());
+            line.text().to_owned()
+        };
+        assert_eq!([shown(KeyCode::Up), shown(KeyCode::Up), shown(KeyCode::Up)], ["get k", "status", "status"]);
+        assert_eq!([shown(KeyCode::Down), shown(KeyCode::Down), shown(KeyCode::Down)], ["get k", "", ""]);
+    }
+
+    #[test]
+    fn tab_completes_as_far_as_there_is_one_way_and_shows_the_ways_from_there() {
+        let mut line = CommandLine::default();
+        typed(&mut line, "set lea");
+        line.key(KeyCode::Tab.into());
+        assert_eq!(line.text(), "set lead_");
+        assert_eq!(line.candidates(), ["set lead_out_ms", "set lead_in_ms"]);
+        typed(&mut line, "o");
+        assert!(line.candidates().is_empty());
+        line.key(KeyCode::Tab.into());
+        assert_eq!((line.text(), line.cursor()), ("set lead_out_ms ", 16));
+        typed(&mut line, "xyz");
+        line.key(KeyCode::Tab.into());
+        assert_eq!(line.text(), "set lead_out_ms xyz");
+    }
+
+    #[test]
+    fn what_the_firmware_would_not_take_is_not_typed() {
+        let mut line = CommandLine::default();
+        typed(&mut line, "h\u{e4}ld\u{1b}");
+        assert_eq!(line.text(), "hld");
+        typed(&mut line, &"x".repeat(200));
+        assert_eq!(line.text().len(), COMMAND_LENGTH);
+    }
+}

@@ -1,0 +1,61 @@
+//! `weeder replay`: a log's swings, decided anew on the host.
+
+use crate::Finding;
+use crate::output::say;
+use crate::source;
+use anyhow::{Context, Result};
+use clap::Args;
+use link::{log, replay};
+use serde_json::json;
+use std::path::PathBuf;
+
+/// What the user asks to be replayed.
+#[derive(Args)]
+#[command(after_help = "\
+The status is 1 where log and replay differ; the first difference is shown. A swing may differ by 12 ticks and by 25 ms of the \
+machine's way, because the log has the speed only ten times a second.\n\nExample:\n  weeder replay row.csv --json | jq .difference")]
+pub struct Arguments {
+    /// A log, as `weeder record` and `weeder monitor --log` write it; - for standard input.
+    #[arg(value_name = "LOG.csv", value_parser = source::file)]
+    log: PathBuf,
+    /// Print the result as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Replays, and prints on what log and replay agree.
+///
+/// # Errors
+/// Where the log cannot be read or replayed.
+pub fn run(arguments: &Arguments) -> Result<Finding> {
+    let name = arguments.log.display();
+    let replayed = replay::replay(&log::read(&arguments.log)?).with_context(|| format!("{name} cannot be replayed"))?;
+    let difference = replayed.difference.as_ref().map(ToString::to_string);
+    if arguments.json {
+        let result = json!({
+            "objects": replayed.objects,
+            "swings": replayed.swings,
+            "alarms": replayed.alarms,
+            "farthest_swing_ticks": replayed.farthest_swing,
+            "difference": difference,
+            "notes": replayed.notes,
+        });
+        say!("{result:#}")?;
+    } else {
+        for note in &replayed.notes {
+            say!("Note: {note}")?;
+        }
+        say!(
+            "The same: {} objects, {} alarms and {} swings, which differ by {} ticks at the most",
+            replayed.objects,
+            replayed.alarms,
+            replayed.swings,
+            replayed.farthest_swing
+        )?;
+        match &difference {
+            Some(difference) => say!("But {name}, {difference}")?,
+            None => say!("The decisions of {name} are those of this version")?,
+        }
+    }
+    Ok(if difference.is_none() { Finding::Good } else { Finding::Bad })
+}

@@ -1,0 +1,190 @@
+//! `weeder sim`: the real firmware on a virtual Uno, on a simulated row or on a recording of a real encoder.
+
+use crate::Finding;
+use crate::course::CourseArguments;
+use crate::destination::{FileName, FolderName, OutFile, OutFolder};
+use crate::output::{print, say};
+use crate::progress::Progress;
+use crate::source;
+use anyhow::Result;
+use clap::Args;
+use field::motion::mm_s;
+use field::row::Row;
+use field::trial::Trial;
+use field::verdict::{Timing, Verdict};
+use field::wiring;
+use serde_json::{Value, json};
+use signal::PinChange;
+use std::path::PathBuf;
+use trial::Outcome;
+use trial::replay::{Counted, replay};
+use trial::{firmware, picture, report};
+use uno::capture::Capture;
+use uno::waveform;
+
+/// What the user asks of a simulation.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  weeder sim --speed 1 --spacing 600 --plants 30 --weeds 8    another row, at another speed
+  weeder sim --row field.csv --out report                     your own plants, with tables and a picture
+  weeder sim --json | jq .in_row_weeded_percent               for a script
+  weeder sim --capture logic.vcd --channel-a D2 --channel-b D3    a logic analyser's recording
+The status is 1 where a plant was damaged.")]
+pub struct Arguments {
+    #[command(flatten)]
+    course: CourseArguments,
+    /// Command the swings where they should be done, as the paper does: without leads for the servo's time.
+    #[arg(long)]
+    paper: bool,
+    /// Write the tables as CSV and a picture of the row into this folder, which is made where there is none.
+    #[arg(long, value_name = "FOLDER")]
+    out: Option<FolderName>,
+    /// Write the levels on the virtual Uno's pins, for PulseView or GTKWave.
+    #[arg(long, value_name = "FILE.vcd")]
+    vcd: Option<FileName>,
+    /// Run this firmware instead of building the one in this repository.
+    #[arg(long, value_name = "FILE.elf")]
+    elf: Option<PathBuf>,
+    /// Play a logic analyser's recording to the encoder's pins instead of a row, and say what the firmware counts; - for standard
+    /// input.
+    #[arg(long, value_name = "FILE.vcd", value_parser = source::file, requires_all = ["channel_a", "channel_b"], conflicts_with_all = ["row", "out", "paper"])]
+    capture: Option<PathBuf>,
+    /// The recording's channel for encoder A.
+    #[arg(long, value_name = "NAME", requires = "capture")]
+    channel_a: Option<String>,
+    /// The recording's channel for encoder B.
+    #[arg(long, value_name = "NAME", requires = "capture")]
+    channel_b: Option<String>,
+    /// The recording's channel for the beam, low = broken.
+    #[arg(long, value_name = "NAME", requires = "capture")]
+    channel_beam: Option<String>,
+    /// Print the totals alone, without a line for each plant.
+    #[arg(long, conflicts_with_all = ["json", "capture"])]
+    totals: bool,
+    /// Print JSON for programs instead of tables.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs it and prints the result.
+///
+/// # Errors
+/// Where an argument or a file is wrong, or the firmware cannot be run.
+pub fn run(arguments: &Arguments) -> Result<Finding> {
+    let folder = arguments.out.as_ref().map(FolderName::check).transpose()?;
+    let vcd = arguments.vcd.as_ref().map(FileName::check).transpose()?;
+    match (&arguments.capture, &arguments.channel_a, &arguments.channel_b) {
+        (Some(path), Some(a), Some(b)) => {
+            let mut channels = vec![(wiring::ENCODER_A, a.as_str()), (wiring::ENCODER_B, b.as_str())];
+            channels.extend(arguments.channel_beam.iter().map(|beam| (wiring::BEAM, beam.as_str())));
+            let capture = Capture::read(path, &channels)?;
+            play(arguments, &capture, vcd.as_ref())
+        }
+        _ => weed(arguments, arguments.course.row()?, folder.as_ref(), vcd.as_ref()),
+    }
+}
+
+impl Arguments {
+    fn firmware(&self) -> Result<PathBuf> {
+        match &self.elf {
+            Some(path) => Ok(path.clone()),
+            None => Ok(firmware::build()?),
+        }
+    }
+}
+
+fn weed(arguments: &Arguments, row: Row, folder: Option<&OutFolder>, vcd: Option<&OutFile>) -> Result<Finding> {
+    let timing = if arguments.paper { Timing::as_in_the_paper() } else { Timing::default() };
+    let trial = Trial::at_speed(row, arguments.course.machine(), timing, mm_s(arguments.course.speed));
+    let elf = arguments.firmware()?;
+    if !arguments.json {
+        let manner = if arguments.paper { ", swings as in the paper" } else { "" };
+        let introduction = report::introduction(&trial.row, &trial.machine, &trial.motion);
+        say!("{introduction} at {} km/h{manner}", arguments.course.speed)?;
+    }
+    let bar = Progress::new("weeding");
+    let outcome = trial::run(&trial, &elf, |share| bar.show(share))?;
+    bar.finish();
+
+    let totals = report::totals(&trial, &outcome);
+    let printed = if arguments.json {
+        say!("{:#}", in_json(arguments, &trial, &outcome))
+    } else if arguments.totals {
+        print(format_args!("{totals}"))
+    } else {
+        print(format_args!("{}\n\n{totals}", report::table(&outcome)))
+    };
+    if let Some(folder) = folder {
+        write_folder(folder, &trial, &outcome)?;
+        if !arguments.json {
+            say!("Written     row.svg, row.csv, plants.csv and weeds.csv in {}", folder.path().display())?;
+        }
+    }
+    write_waveform(arguments, vcd, &outcome.changes)?;
+    printed?;
+    if outcome.judgement.count(Verdict::Damaged) == 0 { Ok(Finding::Good) } else { Ok(Finding::Bad) }
+}
+
+fn write_folder(folder: &OutFolder, trial: &Trial, outcome: &Outcome) -> Result<()> {
+    folder.write("row.csv", |to| trial.row.write_csv(to))?;
+    folder.write("plants.csv", |to| report::write_plants_csv(outcome, to))?;
+    folder.write("weeds.csv", |to| report::write_weeds_csv(outcome, to))?;
+    folder.write("row.svg", |to| svg::write(to, &picture::draw(&trial.row, &outcome.judgement)))
+}
+
+fn write_waveform(arguments: &Arguments, vcd: Option<&OutFile>, changes: &[PinChange]) -> Result<()> {
+    let Some(vcd) = vcd else { return Ok(()) };
+    vcd.write(|to| waveform::write_to(to, &wiring::WIRES, changes.iter().copied()))?;
+    if arguments.json { Ok(()) } else { say!("Waveform    {}", vcd.path().display()) }
+}
+
+/// What happened to the row, with the names of the CSV tables.
+fn in_json(arguments: &Arguments, trial: &Trial, outcome: &Outcome) -> Value {
+    let judgement = &outcome.judgement;
+    json!({
+        "speed_km_h": arguments.course.speed,
+        "as_in_the_paper": arguments.paper,
+        "damaged": judgement.count(Verdict::Damaged),
+        "margin_cut": judgement.count(Verdict::MarginCut),
+        "kept": judgement.count(Verdict::Kept),
+        "idle_swings": judgement.idle_swings,
+        "in_row_weeded_percent": 100.0 * judgement.weeded_share,
+        "in_row_bound_with_margins_percent": 100.0 * judgement.weedable_share,
+        "position_ticks": outcome.status.position_ticks,
+        "true_position_ticks": outcome.true_ticks,
+        "lost_ticks": outcome.status.lost_ticks,
+        "state": outcome.status.state,
+        "row_mm": [trial.row.span_mm().start, trial.row.span_mm().end],
+        "plants": report::plants(outcome),
+        "weeds": report::weeds(outcome),
+    })
+}
+
+fn play(arguments: &Arguments, capture: &Capture, vcd: Option<&OutFile>) -> Result<Finding> {
+    let elf = arguments.firmware()?;
+    let bar = Progress::new("playing");
+    let played = replay(capture, &elf, |share| bar.show(share))?;
+    bar.finish();
+    let Counted { net_ticks, lowest_ticks, highest_ticks, lost_ticks } = played.counted;
+    let printed = match arguments.json {
+        true => say!(
+            "{:#}",
+            json!({
+                "edges": played.edges,
+                "net_ticks": net_ticks,
+                "lowest_ticks": lowest_ticks,
+                "highest_ticks": highest_ticks,
+                "lost_ticks": lost_ticks,
+            })
+        ),
+        false => say!(
+            "Edges       {} in the recording\n\
+             Counted     net {net_ticks}, lowest {lowest_ticks}, highest {highest_ticks}; {lost_ticks} lost",
+            played.edges
+        ),
+    };
+    write_waveform(arguments, vcd, &played.changes)?;
+    printed?;
+    Ok(Finding::Good)
+}

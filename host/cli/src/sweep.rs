@@ -1,0 +1,230 @@
+//! `weeder sweep`: a result of the simulated trial against one or two of its parameters.
+
+use crate::destination::{FileName, OutFile};
+use crate::numbers::{number_within, whole_within};
+use crate::output::{print, say};
+use crate::progress::Progress;
+use crate::source;
+use anyhow::Result;
+use clap::{Args, ValueEnum, builder::PossibleValuesParser};
+use comfy_table::{CellAlignment, Table, presets};
+use field::conditions::{Conditions, PARAMETERS};
+use link::settings::{self, Setting};
+use serde_json::{Map, Value, json};
+use std::fmt::Write;
+use std::fs;
+use study::experiment::Controller;
+use study::sweep::{Axis, Point, Results, SPACINGS_CM, SPEEDS_KM_H, Sweep};
+
+/// The examples in the help.
+const EXAMPLES: &str = "\
+Examples:
+  weeder sweep --x lead_out_ms=0..300:20 --y speed=1..4:0.5
+  weeder sweep --x ground.slip_percent=0..15:1 --speed 2 --result in_row_weeding
+  weeder sweep --controller paper --x speed=0.5..3:0.5 --y crop.protected_mm=60..140:20
+  weeder sweep --x margin_mm=0..100:10 --y machine.load_percent=0..100:25 --out margin.csv
+  weeder sweep --x k=1..9:2 --json | jq .points[].plant_damage
+An axis is `speed` in km/h, `spacing` in cm, a parameter of the field as in its TOML file, or a setting of the firmware.";
+
+/// The examples, and all that an axis can be.
+fn long_help() -> String {
+    let mut text = format!("{EXAMPLES}\n\nWhat an axis can be:\n");
+    // Writing to a String cannot fail.
+    let mut line = |name: &str, range: String, meaning: &str| {
+        let _ = writeln!(text, "  {name:<28}{range:<16}{meaning}");
+    };
+    for (name, (least, greatest), meaning) in
+        [("speed", SPEEDS_KM_H, "forward speed in km/h"), ("spacing", SPACINGS_CM, "plant spacing in cm")]
+    {
+        line(name, format!("{least} to {greatest}"), meaning);
+    }
+    for parameter in PARAMETERS {
+        line(parameter.name, format!("{} to {}", parameter.least, parameter.greatest), parameter.meaning);
+    }
+    for setting in Setting::all() {
+        let range = setting.description();
+        line(&settings::name(setting), format!("{} to {}", range.least, range.greatest), &settings::help(setting));
+    }
+    text
+}
+
+/// What the user asks of a sweep.
+#[derive(Args)]
+#[command(after_help = format!("{EXAMPLES} `weeder sweep --help` lists them all."), after_long_help = long_help())]
+pub struct Arguments {
+    /// The parameter along the first axis, and its values.
+    #[arg(long, value_name = "NAME=FROM..TO:STEP")]
+    x: Axis,
+    /// The parameter along the second axis, and its values.
+    #[arg(long, value_name = "NAME=FROM..TO:STEP")]
+    y: Option<Axis>,
+    /// The result that a table with two axes shows.
+    #[arg(long, default_value = "plant_damage", value_parser = PossibleValuesParser::new(Results::NAMES))]
+    result: String,
+    /// Who weeds: the firmware, the firmware without its leads, the paper's controller, or who knows every plant.
+    #[arg(long, value_enum, default_value = "firmware")]
+    controller: ControllerName,
+    /// The field's conditions: a preset, or a TOML file, as of `weeder trial`.
+    #[arg(long, value_name = "PRESET|FILE.toml", value_parser = source::named, default_value = "transplanted")]
+    field: String,
+    /// Forward speed in km/h, 0.1 to 8, where no axis has it.
+    #[arg(long, default_value = "2.5", value_parser = number_within(SPEEDS_KM_H.0..=SPEEDS_KM_H.1))]
+    speed: f64,
+    /// Plant spacing in cm, 5 to 500, where no axis has it.
+    #[arg(long, default_value = "50", value_parser = number_within(SPACINGS_CM.0..=SPACINGS_CM.1))]
+    spacing: f64,
+    /// Which of all the possible fields, 0 to 18446744073709551615.
+    #[arg(long, default_value = "1", value_parser = whole_within(0..=u64::MAX))]
+    seed: u64,
+    /// Write all results of all points to this file as well.
+    #[arg(long, value_name = "FILE.csv")]
+    out: Option<FileName>,
+    /// Print JSON for programs instead of a table: all results of all points.
+    #[arg(long)]
+    json: bool,
+}
+
+/// The controllers by their names.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum ControllerName {
+    Firmware,
+    WithoutLookAhead,
+    Paper,
+    AllKnowing,
+}
+
+impl From<ControllerName> for Controller {
+    fn from(name: ControllerName) -> Self {
+        match name {
+            ControllerName::Firmware => Self::Firmware,
+            ControllerName::WithoutLookAhead => Self::WithoutLookAhead,
+            ControllerName::Paper => Self::Paper,
+            ControllerName::AllKnowing => Self::AllKnowing,
+        }
+    }
+}
+
+/// Runs it and prints the result.
+///
+/// # Errors
+/// Where an axis or the field is wrong, or the file cannot be written.
+pub fn run(arguments: &Arguments) -> Result<()> {
+    let out = arguments.out.as_ref().map(FileName::check).transpose()?;
+    let sweep = Sweep {
+        x: arguments.x.clone(),
+        y: arguments.y.clone(),
+        controller: arguments.controller.into(),
+        conditions: Conditions::load(&arguments.field, |file| fs::read_to_string(file))?,
+        speed_km_h: arguments.speed,
+        spacing_cm: arguments.spacing,
+        seed: arguments.seed,
+    };
+    let bar = Progress::new("sweeping");
+    let points = sweep.run(|share| bar.show(share))?;
+    bar.finish();
+    let printed = match arguments.json {
+        true => say!("{:#}", in_json(&sweep, &points)),
+        false => print(format_args!("{}", in_words(arguments, &sweep, &points))),
+    };
+    if let Some(out) = &out {
+        write(out, &sweep, &points)?;
+        if !arguments.json {
+            say!("Written: {}", out.path().display())?;
+        }
+    }
+    printed
+}
+
+/// The table, and what spoils it.
+fn in_words(arguments: &Arguments, sweep: &Sweep, points: &[Point]) -> String {
+    let mut text = match &sweep.y {
+        Some(y) => format!(
+            "{}, {} across, {} down\n{}\n",
+            arguments.result,
+            sweep.x.parameter,
+            y.parameter,
+            grid(sweep, y, points, &arguments.result)
+        ),
+        None => format!("{}\n", list(sweep, points)),
+    };
+    if points.iter().any(|point| point.results.alarms_percent > 0.0) {
+        text += "! an alarm took the tool out in some of the rows: --result alarms says in how many\n";
+    }
+    text
+}
+
+/// All results of all points, by the names of the file's columns; a result that there is not is null.
+fn in_json(sweep: &Sweep, points: &[Point]) -> Value {
+    let point = |point: &Point| {
+        let values = place(point).chain(point.results.values()).map(Value::from);
+        Map::from_iter(columns(sweep).map(str::to_owned).zip(values))
+    };
+    json!({ "points": points.iter().map(point).collect::<Vec<_>>() })
+}
+
+/// The axes by their names, and then the results.
+fn columns(sweep: &Sweep) -> impl Iterator<Item = &str> {
+    let axes = [Some(&sweep.x), sweep.y.as_ref()].into_iter().flatten();
+    axes.map(|axis| axis.parameter.as_str()).chain(Results::NAMES)
+}
+
+/// A point's values on the axes.
+fn place(point: &Point) -> impl Iterator<Item = f64> {
+    [Some(point.x), point.y].into_iter().flatten()
+}
+
+/// A result for people: with a mark where alarms spoil it, and a stroke where there is none.
+fn shown(value: f64, point: &Point) -> String {
+    match (value.is_finite(), point.results.alarms_percent > 0.0) {
+        (false, _) => "-".to_owned(),
+        (true, true) => format!("{value:.1} !"),
+        (true, false) => format!("{value:.1}"),
+    }
+}
+
+/// A line a value of the second axis, a column a value of the first.
+fn grid(sweep: &Sweep, y: &Axis, points: &[Point], result: &str) -> Table {
+    let result = Results::NAMES.iter().position(|name| *name == result).unwrap_or(0);
+    let mut table = table([String::new()].into_iter().chain(sweep.x.values.iter().map(f64::to_string)));
+    for (value, line) in y.values.iter().zip(points.chunks(sweep.x.values.len())) {
+        let results = line.iter().map(|point| shown(point.results.values()[result], point));
+        table.add_row([value.to_string()].into_iter().chain(results));
+    }
+    right(table)
+}
+
+/// A line a value of the only axis, a column a result.
+fn list(sweep: &Sweep, points: &[Point]) -> Table {
+    let names = Results::NAMES.iter().map(|name| name.replace('_', " "));
+    let mut table = table([sweep.x.parameter.clone()].into_iter().chain(names));
+    for point in points {
+        let results = point.results.values().map(|value| shown(value, point));
+        table.add_row([point.x.to_string()].into_iter().chain(results));
+    }
+    right(table)
+}
+
+fn table(header: impl Iterator<Item = String>) -> Table {
+    let mut table = Table::new();
+    table.load_style(presets::UTF8_BORDERS_ONLY).set_header(header);
+    table
+}
+
+fn right(mut table: Table) -> Table {
+    table.column_iter_mut().for_each(|column| column.set_cell_alignment(CellAlignment::Right));
+    table
+}
+
+fn write(out: &OutFile, sweep: &Sweep, points: &[Point]) -> Result<()> {
+    out.write(|to| {
+        let mut writer = csv::Writer::from_writer(to);
+        writer.write_record(columns(sweep))?;
+        for point in points {
+            let values = place(point).chain(point.results.values());
+            // A result that there is not has an empty cell.
+            writer
+                .write_record(values.map(|value| if value.is_finite() { value.to_string() } else { String::new() }))?;
+        }
+        Ok::<(), csv::Error>(writer.flush()?)
+    })
+}

@@ -1,0 +1,212 @@
+//! `weeder train`: makes an example table of labelled objects, and says how well it tells plants from weeds.
+
+use crate::Finding;
+use crate::destination::{FileName, OutFile};
+use crate::numbers::whole_within;
+use crate::output::{say, tell};
+use crate::source;
+use anyhow::{Result, bail};
+use clap::Args;
+use serde_json::{Value, json};
+use std::path::PathBuf;
+use std::str::FromStr;
+use study::training::{
+    self, Confusion, DEFAULT_MOST_EXAMPLES, Labelled, MOST_EXAMPLES, Training, listing, regions, synthetic, table,
+};
+
+/// What the user asks of a training.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  weeder train field.csv --picture field.svg                    say how well it would do, and draw it
+  weeder train field.csv --out control/src/examples/table.rs    have the next `weeder flash` take it along
+  weeder train --synthetic                                      the built-in table, from simulated rows")]
+pub struct Arguments {
+    /// CSV files with the columns speed_mm_s,spacing_mm,delay_mm,hold_mm,actuation_mm,label; label is plant or weed;
+    /// - for standard input.
+    #[arg(value_name = "FILE.csv", value_parser = source::file, required_unless_present = "synthetic", conflicts_with = "synthetic")]
+    files: Vec<PathBuf>,
+    /// Learn from simulated rows at four speeds and two spacings instead.
+    #[arg(long)]
+    synthetic: bool,
+    /// Which of all the possible simulated fields, 0 to 18446744073709551615: the same seed gives the same table.
+    #[arg(long, default_value = "1", value_parser = whole_within(0..=u64::MAX), conflicts_with = "files")]
+    seed: u64,
+    /// Write the table: as Rust source for the firmware (.rs), or as a table of examples (.csv).
+    #[arg(long, value_name = "FILE.rs|FILE.csv")]
+    out: Option<FileName>,
+    /// Examples that vote: 1 to 15, or `auto` for those that do best.
+    #[arg(long, value_name = "auto|N", default_value = "auto")]
+    k: Votes,
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = DEFAULT_MOST_EXAMPLES,
+        value_parser = whole_within(0..=MOST_EXAMPLES),
+        help = format!("Most examples that the table may have, 0 to {MOST_EXAMPLES}: flash has no room for more")
+    )]
+    max: usize,
+    /// Draw what the table decides.
+    #[arg(long, value_name = "FILE.svg")]
+    picture: Option<FileName>,
+    /// Print JSON for programs instead of words.
+    #[arg(long)]
+    json: bool,
+}
+
+/// How many examples vote.
+#[derive(Clone, Copy)]
+enum Votes {
+    Auto,
+    Given(u8),
+}
+
+impl FromStr for Votes {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text == "auto" {
+            return Ok(Self::Auto);
+        }
+        let given = text.parse().ok().filter(|k| (1..=training::MAX_K).contains(k));
+        given.map(Self::Given).ok_or_else(|| format!("it has to be auto or a number from 1 to {}", training::MAX_K))
+    }
+}
+
+/// Trains, and prints what came of it.
+///
+/// # Errors
+/// Where a file or its contents are wrong, or the table would not fit.
+pub fn run(arguments: &Arguments) -> Result<Finding> {
+    let table = arguments.out.as_ref().map(Destination::of).transpose()?;
+    let picture = arguments.picture.as_ref().map(FileName::check).transpose()?;
+    let objects = arguments.objects()?;
+    let k = match arguments.k {
+        Votes::Auto => None,
+        Votes::Given(k) => Some(k),
+    };
+    let training = training::train(&objects, k, arguments.max)?;
+    let another_field = match arguments.synthetic {
+        true => {
+            let seed = arguments.seed.wrapping_add(1);
+            Some((seed, training.model().judge(&synthetic::objects(seed)?)))
+        }
+        false => None,
+    };
+    let printed = match arguments.json {
+        true => say!("{:#}", in_json(&training, &objects, another_field.as_ref())),
+        false => report(&training, &objects, another_field.as_ref()),
+    };
+    if let Some(table) = &table {
+        table.write(&training, &arguments.command())?;
+        if !arguments.json {
+            say!("Table       {}", table.file.path().display())?;
+        }
+    }
+    if let Some(picture) = &picture {
+        picture.write(|to| svg::write(to, &regions::draw(&training, &objects)))?;
+        if !arguments.json {
+            say!("Picture     {}", picture.path().display())?;
+        }
+    }
+    printed?;
+    Ok(Finding::Good)
+}
+
+impl Arguments {
+    fn objects(&self) -> Result<Vec<Labelled>> {
+        if self.synthetic {
+            return Ok(synthetic::objects(self.seed)?);
+        }
+        let lesson = table::read_labelled(&self.files)?;
+        if lesson.unlabelled > 0 {
+            tell!("Passed over {} without a label", lesson.unlabelled);
+        }
+        Ok(lesson.objects)
+    }
+
+    /// The command that gives the same table again.
+    fn command(&self) -> String {
+        let mut words = vec!["weeder train".to_owned()];
+        if self.synthetic {
+            words.push(format!("--synthetic --seed {}", self.seed));
+        }
+        words.extend(self.files.iter().map(|file| file.display().to_string()));
+        if let Votes::Given(k) = self.k {
+            words.push(format!("--k {k}"));
+        }
+        words.push(format!("--max {}", self.max));
+        words.join(" ")
+    }
+}
+
+/// What is said of a training; `another_field` are the seed of another field and how its objects were judged.
+fn report(training: &Training, objects: &[Labelled], another_field: Option<&(u64, Confusion)>) -> Result<()> {
+    say!("Objects     {}", objects.len())?;
+    say!("k           {}", training.k)?;
+    say!("Radius      {} (squared distance beyond which an object is unknown)", training.radius)?;
+    say!("Scale       value that maps onto 0, and onto 255")?;
+    for (column, range) in table::COLUMNS.iter().zip(training.ranges) {
+        say!("            {column:<13} {:>6} {:>6}", range.lowest, range.highest)?;
+    }
+    say!("Taken out   {} as noise", training.edited_out)?;
+    say!("Examples    {} kept", training.kept.len())?;
+    say!("\nBefore condensing: each object judged by all others\n\n{}", training.leave_one_out)?;
+    say!("\nAfter condensing: all objects judged by the table\n\n{}", training.by_table)?;
+    if let Some((seed, judged)) = another_field {
+        say!("\nObjects of another field (seed {seed}), judged by the table\n\n{judged}")?;
+    }
+    say!("")
+}
+
+fn in_json(training: &Training, objects: &[Labelled], another_field: Option<&(u64, Confusion)>) -> Value {
+    let scale = table::COLUMNS.iter().zip(training.ranges);
+    let scale = scale.map(|(column, range)| ((*column).to_owned(), json!([range.lowest, range.highest])));
+    json!({
+        "objects": objects.len(),
+        "k": training.k,
+        "radius_squared": training.radius,
+        "scale": Value::Object(scale.collect()),
+        "taken_out": training.edited_out,
+        "examples": training.kept.len(),
+        "before_condensing": judged_in_json(&training.leave_one_out),
+        "after_condensing": judged_in_json(&training.by_table),
+        "another_field": another_field.map(|(_, judged)| judged_in_json(judged)),
+    })
+}
+
+fn judged_in_json(judged: &Confusion) -> Value {
+    json!({ "objects": judged.total(), "plants_taken_for_weeds": judged.plants_taken_for_weeds() })
+}
+
+/// How a table is written.
+enum Form {
+    Rust,
+    Csv,
+}
+
+/// Where a table goes, and how it is written there.
+struct Destination<'a> {
+    file: OutFile<'a>,
+    form: Form,
+}
+
+impl<'a> Destination<'a> {
+    /// A file that says by its name's ending how the table is written.
+    fn of(name: &'a FileName) -> Result<Self> {
+        let form = match name.path().extension().and_then(|ending| ending.to_str()) {
+            Some("rs") => Form::Rust,
+            Some("csv") => Form::Csv,
+            _ => bail!("{}: a table is written as Rust (.rs) or as CSV (.csv)", name.path().display()),
+        };
+        Ok(Self { file: name.check()?, form })
+    }
+
+    /// Writes a table, given the command that made it.
+    fn write(&self, training: &Training, command: &str) -> Result<()> {
+        match self.form {
+            Form::Rust => self.file.write(|to| to.write_all(listing::rust(training, command).as_bytes())),
+            Form::Csv => self.file.write(|to| listing::write_csv(training, to)),
+        }
+    }
+}

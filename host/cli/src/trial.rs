@@ -1,0 +1,287 @@
+//! `weeder trial`: the paper's experiment in a simulated field, with its report.
+
+use crate::Finding;
+use crate::destination::{FolderName, OutFolder};
+use crate::numbers::{number_within, whole_within};
+use crate::output::{self, say};
+use crate::progress::Progress;
+use crate::source;
+use anyhow::Result;
+use clap::{Args, ValueEnum};
+use comfy_table::{CellAlignment, Table, presets};
+use field::conditions::Conditions;
+use field::tool_path::{Effect, WeedCount};
+use serde_json::json;
+use std::fs;
+use std::path::PathBuf;
+use std::time::Instant;
+use study::evaluation::Analysis;
+use study::experiment::{self, Controller, Engine, Experiment, PlotOutcome, Total};
+use study::page::{Page, RowPicture};
+use study::sweep::{SPACINGS_CM, SPEEDS_KM_H};
+use trial::{firmware, picture};
+
+/// What the user asks of a trial.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  weeder trial                                       the paper's speeds and spacings, three replications
+  weeder trial --field soft-ground --out report      with its report as a page, report/report.html
+  weeder trial --engine uno --replications 1         with the real firmware on the virtual Uno
+  weeder trial --field my-field.toml --speeds 1,3 --spacings 30,40,50
+The status is 1 where the firmware damaged a plant, or an alarm stopped it.")]
+pub struct Arguments {
+    /// What runs the firmware: its code compiled for this computer, or the ELF on the virtual Uno, some 500 times slower.
+    #[arg(long, value_enum, default_value = "twin")]
+    engine: EngineName,
+    /// Plots of each speed and spacing, 1 to 1000.
+    #[arg(long, default_value = "3", value_parser = whole_within(1..=1000_u32))]
+    replications: u32,
+    /// Forward speeds in km/h, each 0.1 to 8.
+    #[arg(long, value_delimiter = ',', default_value = "1,1.5,2,2.5", value_parser = number_within(SPEEDS_KM_H.0..=SPEEDS_KM_H.1))]
+    speeds: Vec<f64>,
+    /// Plant spacings in cm, each 5 to 500.
+    #[arg(long, value_delimiter = ',', default_value = "50,60", value_parser = number_within(SPACINGS_CM.0..=SPACINGS_CM.1))]
+    spacings: Vec<f64>,
+    /// The field's conditions: a preset (transplanted, even-stand, direct-sown, weedy, soft-ground, heavy-soil, dusty), or a TOML
+    /// file that says what differs from the first of them; - for standard input.
+    #[arg(long, value_name = "PRESET|FILE.toml", value_parser = source::named, default_value = "transplanted")]
+    field: String,
+    /// Which of all the possible fields, 0 to 18446744073709551615: the same seed gives the same one.
+    #[arg(long, default_value = "1", value_parser = whole_within(0..=u64::MAX))]
+    seed: u64,
+    /// Run this firmware instead of building the one in this repository.
+    #[arg(long, value_name = "FILE.elf")]
+    elf: Option<PathBuf>,
+    /// Write report.html, trial.csv and controllers.csv into this folder, which is made where there is none.
+    #[arg(long, value_name = "FOLDER")]
+    out: Option<FolderName>,
+    /// Print JSON for programs instead of tables.
+    #[arg(long)]
+    json: bool,
+}
+
+/// The engines by their names.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum EngineName {
+    /// The firmware's code, compiled for this computer.
+    Twin,
+    /// The firmware itself, on the virtual Uno.
+    Uno,
+}
+
+/// Runs it and prints the result.
+///
+/// # Errors
+/// Where the field is wrong, the firmware cannot be built or run, or a file cannot be written.
+pub fn run(arguments: &Arguments) -> Result<Finding> {
+    let folder = arguments.out.as_ref().map(FolderName::check).transpose()?;
+    let experiment = Experiment {
+        speeds_km_h: ascending(&arguments.speeds),
+        spacings_cm: ascending(&arguments.spacings),
+        replications: arguments.replications,
+        controllers: Controller::ALL.to_vec(),
+        conditions: Conditions::load(&arguments.field, |file| fs::read_to_string(file))?,
+        seed: arguments.seed,
+    };
+    let engine = match (arguments.engine, &arguments.elf) {
+        (EngineName::Twin, _) => Engine::Twin,
+        (EngineName::Uno, Some(path)) => Engine::Uno(path.clone()),
+        (EngineName::Uno, None) => Engine::Uno(firmware::build()?),
+    };
+    let (bar, began) = (Progress::new("weeding"), Instant::now());
+    let outcomes = experiment.run(&engine, |share| bar.show(share))?;
+    bar.finish();
+    let took_s = began.elapsed().as_secs_f64();
+
+    let totals = experiment::totals(&outcomes);
+    let analysis = Analysis::of(experiment::records(&outcomes, Controller::Firmware))?;
+    let summary = summary(&experiment, &totals);
+    let printed = if arguments.json {
+        say!("{:#}", json!({ "summary": summary, "plots": outcomes.iter().map(in_json).collect::<Vec<_>>() }))
+    } else {
+        let worked_s: f64 = outcomes.iter().map(|outcome| outcome.moved_s).sum();
+        let pace = format!(
+            "Pace: {:.1} h of work in {took_s:.1} s, {:.0} times real time.",
+            worked_s / 3600.0,
+            worked_s / took_s
+        );
+        say!("{}\n\n{}\n{pace}", by_speed(&totals), summary.join("\n"))
+    };
+    let alarms: u32 = of(&totals, Controller::Firmware).map(|total| total.alarms).sum();
+    let damaged: u32 = of(&totals, Controller::Firmware).map(|total| total.effect.damaged).sum();
+    if let Some(folder) = &folder {
+        let findings = Findings { outcomes: &outcomes, totals, analysis, summary };
+        write_report(folder, arguments, &experiment, &engine, &findings)?;
+        if !arguments.json {
+            say!("\nWritten: report.html, trial.csv and controllers.csv in {}", folder.path().display())?;
+        }
+    }
+    printed?;
+    Ok(if damaged == 0 && alarms == 0 { Finding::Good } else { Finding::Bad })
+}
+
+/// Everything that came of a trial.
+struct Findings<'a> {
+    outcomes: &'a [PlotOutcome],
+    totals: Vec<Total>,
+    analysis: Analysis,
+    summary: Vec<String>,
+}
+
+/// Levels in ascending order, each once.
+fn ascending(levels: &[f64]) -> Vec<f64> {
+    let mut levels = levels.to_vec();
+    levels.sort_by(f64::total_cmp);
+    levels.dedup();
+    levels
+}
+
+/// What one controller did, by speed.
+fn of(totals: &[Total], controller: Controller) -> impl Iterator<Item = &Total> {
+    totals.iter().filter(move |total| total.controller == controller)
+}
+
+/// A line a speed and controller.
+fn by_speed(totals: &[Total]) -> Table {
+    let mut table = Table::new();
+    table.load_style(presets::UTF8_BORDERS_ONLY).set_header([
+        "km/h",
+        "controller",
+        "plants\ndamaged, %",
+        "canopies\nreached, %",
+        "margins\ncut, %",
+        "ground of the\nrow weeded, %",
+        "with all margins\nkept at most, %",
+        "weeds gone\nin the row, %",
+        "in the whole\nplot, %",
+        "rows with\nan alarm",
+    ]);
+    for total in totals {
+        let efficiency = |weeds: WeedCount| weeds.efficiency_percent().map_or("-".to_owned(), |it| format!("{it:.1}"));
+        table.add_row([
+            total.speed_km_h.to_string(),
+            total.controller.title().to_owned(),
+            format!("{:.1}", total.plant_damage_percent()),
+            format!("{:.1}", total.canopies_reached_percent()),
+            format!("{:.1}", total.margins_cut_percent()),
+            format!("{:.1}", 100.0 * total.weeded_share),
+            format!("{:.1}", 100.0 * total.weedable_share),
+            efficiency(total.effect.in_row),
+            efficiency(total.effect.in_plot),
+            total.alarms.to_string(),
+        ]);
+    }
+    for (index, column) in table.column_iter_mut().enumerate() {
+        column.set_cell_alignment(if index == 1 { CellAlignment::Left } else { CellAlignment::Right });
+    }
+    table
+}
+
+/// What came of it, in plain words.
+fn summary(experiment: &Experiment, totals: &[Total]) -> Vec<String> {
+    let mut sentences: Vec<String> =
+        experiment.controllers.iter().map(|&controller| damage(totals, controller)).collect();
+    let alarms: u32 = of(totals, Controller::Firmware).map(|total| total.alarms).sum();
+    if alarms > 0 {
+        sentences.push(format!(
+            "In {alarms} of {} rows an alarm took the firmware's tool out for the rest of the row: its figures are no good there.",
+            experiment.rows()
+        ));
+    }
+    let short_of_bound = of(totals, Controller::Firmware).map(|total| total.weedable_share - total.weeded_share);
+    sentences.push(format!(
+        "With every canopy and its margin kept, this servo could weed at most {:.1} points more of the row's ground than the \
+         firmware did.",
+        100.0 * short_of_bound.fold(0.0, f64::max)
+    ));
+    let mut weeds = Effect::default();
+    of(totals, Controller::Firmware).for_each(|total| weeds += total.effect);
+    if let (Some(in_row), Some(in_plot)) = (weeds.in_row.efficiency_percent(), weeds.in_plot.efficiency_percent()) {
+        sentences.push(format!(
+            "Of the weeds in the row the firmware removed {in_row:.0} %; of all weeds of the plot, as the paper counts them, \
+             {in_plot:.0} % were gone."
+        ));
+    }
+    sentences.push(format!(
+        "Field: {} rows of {} m for each controller, seed {}.",
+        experiment.rows(),
+        experiment.conditions.plot.row_m,
+        experiment.seed
+    ));
+    sentences
+}
+
+/// How many plants a controller damaged, and where most of them.
+fn damage(totals: &[Total], controller: Controller) -> String {
+    let name = controller.title();
+    let (damaged, plants) = of(totals, controller)
+        .fold((0, 0), |(damaged, plants), total| (damaged + total.effect.damaged, plants + total.effect.plants));
+    let worst = of(totals, controller).max_by(|a, b| a.plant_damage_percent().total_cmp(&b.plant_damage_percent()));
+    match worst {
+        Some(worst) if damaged > 0 => format!(
+            "Plants damaged by {name}: {damaged} of {plants}, most of them at {} km/h, {:.1} %.",
+            worst.speed_km_h,
+            worst.plant_damage_percent()
+        ),
+        _ => format!("Plants damaged by {name}: none of {plants}."),
+    }
+}
+
+fn write_report(
+    folder: &OutFolder,
+    arguments: &Arguments,
+    experiment: &Experiment,
+    engine: &Engine,
+    findings: &Findings,
+) -> Result<()> {
+    let engine_name = match engine {
+        Engine::Twin => "the firmware's code, compiled for the host",
+        Engine::Uno(_) => "the firmware on the virtual Uno",
+    };
+    let mut parameters = vec![
+        ("version".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
+        ("engine".to_owned(), engine_name.to_owned()),
+        ("field".to_owned(), arguments.field.clone()),
+        ("seed".to_owned(), experiment.seed.to_string()),
+    ];
+    parameters.extend(experiment.conditions.values().map(|(parameter, value)| {
+        (parameter.name.to_owned(), format!("{value}: {} ({})", parameter.meaning, parameter.source))
+    }));
+    let settings = experiment.conditions.settings.iter();
+    parameters.extend(settings.map(|(setting, value)| (format!("settings.{setting}"), value.to_string())));
+    let row = experiment.example(engine)?.map(|(row, judgement)| RowPicture {
+        drawing: picture::draw(&row, &judgement),
+        caption: "The first metres of a row at the highest speed, as the firmware weeded them.".to_owned(),
+    });
+    let page = Page {
+        title: "Field trial of the intra-row weeder, simulated",
+        summary: findings.summary.clone(),
+        command: &output::command_line()?,
+        parameters: &parameters,
+        analysis: &findings.analysis,
+        comparison: Some(&experiment::compare(&findings.totals)),
+        row: row.as_ref(),
+    };
+    let html = page.html()?;
+    folder.write("report.html", |to| to.write_all(html.as_bytes()))?;
+    folder.write("trial.csv", |to| experiment::write_csv(findings.outcomes, &[Controller::Firmware], to))?;
+    folder.write("controllers.csv", |to| experiment::write_csv(findings.outcomes, &experiment.controllers, to))
+}
+
+fn in_json(outcome: &PlotOutcome) -> serde_json::Value {
+    let in_row = outcome.effect.in_row;
+    json!({
+        "controller": outcome.controller.title(),
+        "record": outcome.record,
+        "performance": outcome.record.performance(),
+        "in_row_weeds_before": in_row.before,
+        "in_row_weeds_after": in_row.after,
+        "in_row_weeded_percent": 100.0 * outcome.weeded_share,
+        "in_row_bound_percent": 100.0 * outcome.weedable_share,
+        "canopies": outcome.canopies.all,
+        "canopies_reached": outcome.canopies.reached,
+        "margins_cut": outcome.canopies.margins_cut,
+        "alarms": outcome.alarms,
+    })
+}

@@ -1,0 +1,120 @@
+//! What the `weeder` command says to input that is wrong. None of these runs the firmware.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// Runs `weeder` with these arguments.
+fn weeder(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_weeder")).args(arguments).output().expect("cargo has built the command")
+}
+
+/// Asserts status 2 and a message that contains `words`.
+#[track_caller]
+fn assert_refused(arguments: &[&str], words: &str) {
+    let output = weeder(arguments);
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{message}");
+    assert!(message.contains(words), "{message}");
+}
+
+#[test]
+fn a_speed_that_no_machine_walks_is_refused_with_its_range() {
+    assert_refused(&["sim", "--speed", "11"], "it has to be a number from 0.1 to 10");
+    assert_refused(&["sim", "--speed", "fast"], "it has to be a number from 0.1 to 10");
+    assert_refused(&["sim", "--speed", "NaN"], "it has to be a number from 0.1 to 10");
+}
+
+#[test]
+fn canopies_wider_than_their_spacing_are_refused() {
+    assert_refused(&["sim", "--spacing", "100", "--canopy", "150"], "--spacing has to exceed --canopy");
+}
+
+#[test]
+fn more_weeds_than_there_is_room_for_are_refused() {
+    assert_refused(&["sim", "--plants", "2", "--weeds", "50"], "there is no room for 50 tall weeds between the plants");
+}
+
+#[test]
+fn a_row_and_a_recording_that_do_not_exist_are_named() {
+    assert_refused(&["sim", "--row", "no-such-row.csv"], "no-such-row.csv");
+    let recording = ["sim", "--capture", "no-such.vcd", "--channel-a", "A", "--channel-b", "B"];
+    assert_refused(&recording, "no-such.vcd");
+}
+
+#[test]
+fn a_recording_without_its_channels_is_refused() {
+    assert_refused(&["sim", "--capture", "some.vcd"], "--channel-a");
+}
+
+#[test]
+fn a_number_below_its_range_is_refused_with_the_range_and_not_as_an_option() {
+    assert_refused(&["sim", "--speed", "-1"], "it has to be a number from 0.1 to 10");
+    assert_refused(&["sim", "--plants", "-1"], "it has to be a whole number from 1 to 1000");
+    assert_refused(&["sim", "--seed", "-1"], "it has to be a whole number from 0 to 18446744073709551615");
+    assert_refused(&["trial", "--speeds", "-1,2"], "it has to be a number from 0.1 to 8");
+    assert_refused(&["soak", "--hours", "-5"], "it has to be a whole number from 0 to 10000");
+}
+
+#[test]
+fn a_row_that_no_machine_can_roll_along_is_refused_with_its_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let row = folder.path().join("row.csv");
+    for position in ["4294967296", "18446744073709551616", "-1e300", "nan"] {
+        std::fs::write(&row, format!("position_mm,width_mm,kind\n500,150,plant\n{position},150,plant\n")).unwrap();
+        assert_refused(&["sim", "--row", row.to_str().unwrap()], "row.csv, line 3: position_mm is ");
+    }
+    std::fs::write(&row, "position_mm,width_mm,kind\n-9e6,150,plant\n9e6,150,plant\n").unwrap();
+    assert_refused(
+        &["sim", "--row", row.to_str().unwrap()],
+        "line 3: the row is 18000 m long: it has to be at most 6000 m",
+    );
+}
+
+#[test]
+fn a_soak_of_nothing_is_refused() {
+    assert_refused(&["soak", "--hours", "0", "--uno-minutes", "0"], "one of them has to be above 0");
+}
+
+#[test]
+fn no_cause_is_told_twice() {
+    for arguments in [
+        &["virtual-uno", "--bootloader", "no-such.hex"][..],
+        &["virtual-uno", "--stand", "--bootloader", "optiboot", "--eeprom", "no-such/uno.eeprom"],
+        &["virtual-uno", "--stand", "--bootloader", "optiboot", "--link", "no-such/uno"],
+        &["hex", "weeder.hex", "--elf", "no-such.elf"],
+        &["replay", "no-such.csv"],
+        &["settings", "diff", "no-such.toml"],
+        &["design", "--machine", "no-such.toml"],
+    ] {
+        let message = String::from_utf8_lossy(&weeder(arguments).stderr).into_owned();
+        assert_eq!(message.matches("No such file or directory").count(), 1, "{arguments:?}: {message}");
+    }
+}
+
+/// A cause is told behind its message: one that the message has as well is told twice.
+#[test]
+fn no_message_in_the_source_repeats_its_cause() {
+    let host = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let mut folders = vec![host.join("../control/src")];
+    folders.extend(std::fs::read_dir(&host).unwrap().map(|entry| entry.unwrap().path().join("src")));
+    let mut messages = 0;
+    while let Some(folder) = folders.pop() {
+        for path in std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
+            if path.is_dir() {
+                folders.push(path);
+                continue;
+            }
+            let text = std::fs::read_to_string(&path).unwrap();
+            for message in text.split("#[error(").skip(1).filter_map(|rest| rest.split(")]").next()) {
+                assert!(!message.contains("{source"), "{}: {message}", path.display());
+                messages += 1;
+            }
+        }
+    }
+    assert!(messages > 50, "{messages}");
+}
+
+#[test]
+fn a_port_that_does_not_exist_is_named() {
+    assert_refused(&["flash", "--port", "/dev/no-such-port"], "/dev/no-such-port");
+}

@@ -1,0 +1,109 @@
+//! Where commands write: what cannot be written is said before the work, and costs no result after it.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+/// A field so small that a trial in it takes a moment.
+const SMALL: &str = "[plot]\nrows = 1\nrow_m = 6\n";
+
+fn weeder(folder: &Path, arguments: &[&str]) -> Output {
+    fs::write(folder.join("small.toml"), SMALL).unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
+    command.current_dir(folder).args(arguments).output().expect("cargo has built the command")
+}
+
+/// Every argument that names something to write, without it.
+const WRITERS: [(&[&str], Kind); 11] = [
+    (&["trial", "--field", "small.toml", "--out"], Kind::Folder),
+    (&["evaluate", concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/trial-example.csv"), "--out"], Kind::Folder),
+    (&["sim", "--out"], Kind::Folder),
+    (&["sim", "--vcd"], Kind::File("row.vcd")),
+    (&["sweep", "--field", "small.toml", "--x", "k=1..3:2", "--out"], Kind::File("sweep.csv")),
+    (&["train", "--synthetic", "--out"], Kind::File("table.rs")),
+    (&["train", "--synthetic", "--out"], Kind::File("table.csv")),
+    (&["train", "--synthetic", "--picture"], Kind::File("regions.svg")),
+    (&["hex"], Kind::File("weeder.hex")),
+    (&["record", "--port", "/dev/no-such-port", "--out"], Kind::File("log.csv")),
+    (&["settings", "pull", "--port", "/dev/no-such-port"], Kind::File("machine.toml")),
+];
+
+enum Kind {
+    Folder,
+    File(&'static str),
+}
+
+#[test]
+fn what_cannot_be_written_is_said_before_the_work_and_without_a_temporary_name() {
+    for (arguments, kind) in WRITERS {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("file"), "mine").unwrap();
+        let name = match kind {
+            Kind::Folder => "file/report".to_owned(),
+            Kind::File(name) => format!("no-such/{name}"),
+        };
+        let output = weeder(folder.path(), &[arguments, &[&name]].concat());
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert_eq!((output.status.code(), output.stdout.len()), (Some(2), 0), "{arguments:?}: {message}");
+        assert!(message.contains(&format!("{name} cannot be written: ")), "{arguments:?}: {message}");
+        assert!(!message.contains(".tmp"), "{message}");
+        assert_eq!(fs::read_to_string(folder.path().join("file")).unwrap(), "mine");
+    }
+}
+
+#[test]
+fn a_folder_is_no_file_and_a_file_is_no_folder() {
+    for (arguments, kind) in WRITERS {
+        let folder = tempfile::tempdir().unwrap();
+        let (name, wrong) = match kind {
+            Kind::Folder => {
+                fs::write(folder.path().join("report"), "mine").unwrap();
+                ("report", "report is a file, and a folder has to be named")
+            }
+            // A log is gone on with, and says so itself.
+            Kind::File("log.csv") => continue,
+            Kind::File(name) => {
+                fs::create_dir(folder.path().join(name)).unwrap();
+                (name, " is a folder, and a file has to be named")
+            }
+        };
+        let output = weeder(folder.path(), &[arguments, &[name]].concat());
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
+        assert!(message.contains(wrong), "{arguments:?}: {message}");
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let output = weeder(folder.path(), &["trial", "--field", "small.toml", "--out", "report.html"]);
+    assert!(String::from_utf8_lossy(&output.stderr).contains("report.html is named like a file"));
+    assert!(!folder.path().join("report.html").exists());
+}
+
+#[test]
+fn the_table_is_printed_whatever_happens_to_the_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let sweep = ["sweep", "--field", "small.toml", "--x", "k=1..3:2", "--out", "/dev/full"];
+    let output = weeder(folder.path(), &sweep);
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{message}");
+    assert!(message.contains("/dev/full cannot be written: No space left on device"), "{message}");
+    assert!(String::from_utf8_lossy(&output.stdout).contains("plant damage"));
+}
+
+#[test]
+fn what_is_written_to_a_device_goes_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = weeder(folder.path(), &["sweep", "--field", "small.toml", "--x", "k=1..3:2", "--out", "/dev/null"]);
+    assert!(output.status.success());
+    assert!(!Path::new("/dev/null").is_file());
+}
+
+#[test]
+fn every_out_is_a_folder_or_a_file_by_its_name_in_the_help() {
+    for command in ["trial", "evaluate", "sim", "sweep", "train", "record"] {
+        let output = Command::new(env!("CARGO_BIN_EXE_weeder")).args([command, "--help"]).output().unwrap();
+        let help = String::from_utf8_lossy(&output.stdout).into_owned();
+        let is_folder =
+            help.contains("--out <FOLDER>") && help.contains("into this folder, which is made where there is none");
+        assert!(is_folder || help.contains("--out <FILE."), "{command}: {help}");
+    }
+}

@@ -1,0 +1,174 @@
+//! `weeder evaluate`, as it is called: on the manual's example, on trials that carry no model, and on tables that are wrong.
+
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+use tempfile::TempDir;
+
+/// The manual's example.
+const EXAMPLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/trial-example.csv");
+
+const HEADER: &str =
+    "replication,speed_km_h,spacing_cm,weeds_before,weeds_after,plants,damaged,area_m2,time_s,width_m,power_hp\n";
+
+/// Runs `weeder evaluate` with these arguments in a folder.
+fn evaluate(folder: &Path, arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
+    command.current_dir(folder).arg("evaluate").args(arguments).output().expect("cargo has built the command")
+}
+
+/// What it prints where all is well.
+#[track_caller]
+fn said(output: &Output) -> String {
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout.clone()).expect("it prints text")
+}
+
+/// A folder with the file `trial.csv`, of these lines below the header.
+fn folder_with(lines: &str) -> TempDir {
+    let folder = TempDir::new().unwrap();
+    fs::write(folder.path().join("trial.csv"), format!("{HEADER}{lines}")).unwrap();
+    folder
+}
+
+/// Asserts status 2, this message, and that no report was begun.
+#[track_caller]
+fn assert_refused(folder: &TempDir, message: &str) {
+    let output = evaluate(folder.path(), &["trial.csv", "--out", "report"]);
+    let heard = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!((output.status.code(), heard.contains(message)), (Some(2), true), "{heard}");
+    assert!(output.stdout.is_empty() && !folder.path().join("report").exists(), "nothing is done by half");
+}
+
+#[test]
+fn the_manual_s_example_is_judged_in_plain_words_and_tables() {
+    let said = said(&evaluate(Path::new("."), &[EXAMPLE]));
+    for line in [
+        "24 plots of 8 treatments (1, 1.5, 2 and 2.5 km/h; 50 and 60 cm), 3 of each treatment.",
+        "13 of 1318 plants were damaged (0.99 %), at most 4.00 % in a plot",
+        "Plant damage rises by 1.292 points for each km/h (p = 0.0119) and shows no effect of spacing (p = 0.5347)",
+        "- Eq. 29 has -0.2068 a cm, where the text has +0.2068: one sign is wrong.",
+    ] {
+        assert!(said.contains(line), "{line:?} is not in\n{said}");
+    }
+    assert!(!said.contains("NaN") && !said.contains(" inf"), "{said}");
+}
+
+/// The figures are R's: `d <- read.csv("docs/trial-example.csv", comment = "#")`, `d$we <- (1 - d$weeds_after /
+/// d$weeds_before) * 100`, `summary(lm(we ~ speed_km_h + spacing_cm, d))`, `anova(lm(we ~ factor(speed_km_h) *
+/// factor(spacing_cm), d))`.
+#[test]
+fn the_json_has_what_r_makes_of_the_same_table() {
+    let json: Value = serde_json::from_str(&said(&evaluate(Path::new("."), &[EXAMPLE, "--json"]))).unwrap();
+    assert_eq!(json["plots"].as_array().unwrap().len(), 24);
+    assert_eq!(json["treatments"].as_array().unwrap().len(), 8);
+    let weeding = &json["responses"][1];
+    assert_eq!(weeding["response"], "weeding_efficiency");
+    let close = |value: &Value, r: f64| {
+        let value = value.as_f64().unwrap();
+        assert!((value / r - 1.0).abs() < 1e-9, "{value} is not {r}");
+    };
+    let speed = &weeding["model"]["terms"][1];
+    close(&speed["estimate"], -4.13734061881);
+    close(&speed["standard_error"], 0.331267121866);
+    close(&speed["t"], -12.4894393247);
+    close(&speed["p"], 3.47153171559e-11);
+    close(&weeding["model"]["adjusted_r_squared"], 0.874883842566);
+    let interaction = &weeding["variance"]["sources"][2];
+    assert_eq!(interaction["degrees_of_freedom"], 3);
+    close(&interaction["f"], 1.4459696981);
+    close(&interaction["p"], 0.266595646199);
+}
+
+#[test]
+fn the_report_is_one_page_in_a_folder_of_its_own() {
+    let folder = TempDir::new().unwrap();
+    let said = said(&evaluate(folder.path(), &[EXAMPLE, "--out", "trials/may"]));
+    assert!(said.ends_with("Report      trials/may/report.html\n"), "{said}");
+    let files: Vec<_> = fs::read_dir(folder.path().join("trials/may")).unwrap().collect();
+    assert_eq!(files.len(), 1, "{files:?}");
+    let page = fs::read_to_string(folder.path().join("trials/may/report.html")).unwrap();
+    assert!(page.contains("Field trial: trial-example.csv") && page.contains("<svg"), "{page}");
+    assert!(page.trim_end().ends_with("</html>"), "it is whole");
+}
+
+#[test]
+fn a_trial_without_damage_and_without_replications_is_judged_as_far_as_it_goes() {
+    let folder = folder_with(
+        "1,1,50,100,12,60,0,12,127,0.4,2.5\n1,1,60,100,10,50,0,12,126,0.4,2.5\n\
+         1,2,50,100,18,60,0,12,65,0.4,2.5\n1,2,60,100,17,50,0,12,64,0.4,2.5\n",
+    );
+    let said = said(&evaluate(folder.path(), &["trial.csv"]));
+    for line in [
+        "None of 220 plants was damaged.",
+        "Plant damage has no model: it is 0 in every plot",
+        "No analysis of variance: it is 0 in every plot",
+        "Note: no treatment was repeated",
+    ] {
+        assert!(said.contains(line), "{line:?} is not in\n{said}");
+    }
+    assert!(!said.contains("NaN"), "{said}");
+}
+
+#[test]
+fn a_single_plot_has_its_measures_and_is_told_that_it_carries_no_model() {
+    let folder = folder_with("1,1.5,50,200,30,50,1,24,180,0.4,2.5\n");
+    let said = said(&evaluate(folder.path(), &["trial.csv"]));
+    assert!(said.contains("159.94") && said.contains("Weeding efficiency has no model"), "{said}");
+}
+
+#[test]
+fn ground_covered_faster_than_the_machine_drives_is_pointed_out() {
+    let folder = folder_with("1,1,50,100,12,60,0,12,127,0.4,2.5\n2,1,50,100,10,50,0,12,12,0.4,2.5\n");
+    let said = said(&evaluate(folder.path(), &["trial.csv"]));
+    assert!(said.contains("Plot 2: more ground was covered than speed and width allow"), "{said}");
+}
+
+#[test]
+fn a_wrong_line_is_named_and_nothing_is_written() {
+    let good = "1,1.5,50,200,30,50,1,24,180,0.4,2.5\n";
+    for (wrong, message) in [
+        (
+            "2,1.5,50,200,201,50,1,24,180,0.4,2.5",
+            "trial.csv, line 3: weeds_after is 201: it cannot exceed weeds_before",
+        ),
+        ("2,1.5,50,200,30,50,60,24,180,0.4,2.5", "trial.csv, line 3: damaged is 60: it cannot exceed plants"),
+        ("2,1.5,50,200,30,50,1,0,180,0.4,2.5", "trial.csv, line 3: area_m2 is 0: it has to be from 0.01 to"),
+        ("2,1.5,50,200,30,50,1,a lot,180,0.4,2.5", "trial.csv, line 3: area_m2 is `a lot`: it has to be a number"),
+        (
+            "1,1.5,50,200,30,50,1,24,180,0.4,2.5",
+            "trial.csv, line 3: replication 1 of 1.5 km/h and 50 cm stands in line 2",
+        ),
+    ] {
+        assert_refused(&folder_with(&format!("{good}{wrong}\n")), message);
+    }
+}
+
+#[test]
+fn a_missing_column_is_named() {
+    let folder = folder_with("");
+    fs::write(folder.path().join("trial.csv"), "replication,speed_km_h\n1,1\n").unwrap();
+    assert_refused(
+        &folder,
+        "trial.csv, line 1: the column `spacing_cm` is missing: the header has to name replication,",
+    );
+}
+
+#[test]
+fn a_file_that_does_not_exist_is_named() {
+    assert_refused(&TempDir::new().unwrap(), "trial.csv cannot be read");
+}
+
+#[test]
+fn a_report_that_cannot_be_written_is_an_error() {
+    let folder = TempDir::new().unwrap();
+    fs::write(folder.path().join("report"), "a file, no folder").unwrap();
+    let output = evaluate(folder.path(), &[EXAMPLE, "--out", "report"]);
+    let heard = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(
+        (output.status.code(), heard.contains("report is a file, and a folder has to be named")),
+        (Some(2), true),
+        "{heard}"
+    );
+}

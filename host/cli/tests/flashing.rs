@@ -1,0 +1,289 @@
+//! The product on its way onto an Uno: `weeder flash` with the real avrdude, the real bootloaders in `weeder virtual-uno`, and what
+//! is said where something is not as it should be.
+//!
+//! Waits end when what is waited for has come; how long that takes on a busy host says nothing.
+
+use std::fs;
+use std::io::{BufRead, BufReader, ErrorKind, Write};
+use std::os::unix::fs::PermissionsExt;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::time::Duration;
+use trial::firmware;
+use uno::elf::Image;
+use uno::pty::Pty;
+
+/// Debian's arduino-core-avr has them here; setup.sh installs it.
+const BOOTLOADERS: &str = "/usr/share/arduino/hardware/arduino/avr/bootloaders";
+
+/// No answer after so long is none: a hundred times what a busy host takes.
+const PATIENCE: Duration = Duration::from_secs(120);
+
+fn weeder() -> Command {
+    Command::new(env!("CARGO_BIN_EXE_weeder"))
+}
+
+fn old_bootloader() -> PathBuf {
+    Path::new(BOOTLOADERS).join("atmega/ATmegaBOOT_168_atmega328.hex")
+}
+
+/// Asserts status 2 and a message that contains `words`.
+#[track_caller]
+fn assert_refused(output: &Output, words: &str) {
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{message}");
+    assert!(message.contains(words), "{message}");
+}
+
+/// `weeder virtual-uno` in a process of its own.
+struct VirtualUno {
+    process: Child,
+}
+
+impl VirtualUno {
+    /// Starts it, and waits until its port is there.
+    #[track_caller]
+    fn start(arguments: &[&Path]) -> VirtualUno {
+        let mut process =
+            weeder().arg("virtual-uno").args(arguments).stdout(Stdio::piped()).spawn().expect("cargo has built it");
+        let mut line = String::new();
+        let stdout = process.stdout.take().expect("it is piped");
+        BufReader::new(stdout).read_line(&mut line).expect("it says where its port is");
+        assert!(!line.is_empty(), "it ended before its port was there");
+        VirtualUno { process }
+    }
+
+    /// Ends it as Ctrl-C does, and returns whether it ended well.
+    fn interrupt(mut self) -> bool {
+        let id = self.process.id().to_string();
+        assert!(Command::new("kill").args(["-INT", &id]).status().expect("kill is there").success());
+        self.process.wait().expect("it ends").success()
+    }
+}
+
+impl Drop for VirtualUno {
+    fn drop(&mut self) {
+        // It may have ended.
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
+
+/// Reads until this text has come, and returns all of it.
+#[track_caller]
+fn read_until(port: &mut dyn serialport::SerialPort, text: &str) -> String {
+    let mut heard = Vec::new();
+    let mut byte = [0];
+    while !heard.ends_with(text.as_bytes()) {
+        match port.read(&mut byte) {
+            Ok(count) => heard.extend(&byte[..count]),
+            Err(error) if error.kind() == ErrorKind::Interrupted => {}
+            Err(error) => panic!("{text:?} has not come ({error}), but {:?}", String::from_utf8_lossy(&heard)),
+        }
+    }
+    String::from_utf8_lossy(&heard).into_owned()
+}
+
+/// Optiboot, the Uno's bootloader, from the sources that arduino-core-avr brings along: the file that Debian has made of them
+/// is longer than its boot section.
+fn optiboot(folder: &Path) -> PathBuf {
+    let (elf, hex) = (folder.join("optiboot.elf"), folder.join("optiboot.hex"));
+    let mut compiler = Command::new("avr-gcc");
+    compiler
+        .args(["-mmcu=atmega328p", "-DF_CPU=16000000L", "-DBAUD_RATE=115200", "-w", "-Os", "-mrelax", "-nostdlib"])
+        .args(["-fno-split-wide-types", "-fno-inline-small-functions", "-nostartfiles"])
+        .args(["-Wl,--section-start=.text=0x7e00", "-Wl,--section-start=.version=0x7ffe", "-o"])
+        .args([&elf, &Path::new(BOOTLOADERS).join("optiboot/optiboot.c")]);
+    assert!(compiler.status().expect("avr-gcc is there: setup.sh installs it").success());
+    let mut objcopy = Command::new("avr-objcopy");
+    objcopy.args(["-O", "ihex", "-j", ".text", "-j", ".version"]).args(["--set-section-flags", ".version=alloc,load"]);
+    assert!(objcopy.args([&elf, &hex]).status().expect("avr-objcopy is there: setup.sh installs it").success());
+    hex
+}
+
+/// Has `weeder flash` flash an Uno. On a busy host avrdude may come too late for the bootloader's window; a user would try again,
+/// too.
+#[track_caller]
+fn flash(port: &Path, arguments: &[&str]) {
+    let flashed = (0..5).any(|_| {
+        let status = weeder().arg("flash").args(arguments).arg("--port").arg(port).status();
+        status.expect("cargo has built it").success()
+    });
+    assert!(flashed, "avrdude's own words stand above");
+}
+
+/// Asserts that the firmware greets who opens the port, once the bootloader has waited, and answers.
+#[track_caller]
+fn assert_talks(link: &Path) {
+    let mut port = serialport::new(link.to_string_lossy(), 115_200).timeout(PATIENCE).open().unwrap();
+    let greeting = read_until(&mut *port, "help lists the commands\r\n");
+    assert!(greeting.contains("weeder"), "{greeting}");
+    port.write_all(b"version\n").unwrap();
+    assert!(read_until(&mut *port, "ok\r\n").contains(env!("CARGO_PKG_VERSION")));
+    port.write_all(b"status\n").unwrap();
+    assert!(read_until(&mut *port, "ok\r\n").contains("tool=out"));
+}
+
+/// An ELF for the chip that takes so many bytes of flash.
+fn elf_of(folder: &Path, bytes: usize) -> PathBuf {
+    let (source, elf) = (folder.join("filler.S"), folder.join("filler.elf"));
+    fs::write(&source, format!(".space {bytes}\n")).unwrap();
+    let mut compiler = Command::new("avr-gcc");
+    compiler.args(["-mmcu=atmega328p", "-nostdlib", "-o"]).args([&elf, &source]);
+    assert!(compiler.status().expect("avr-gcc is there: setup.sh installs it").success());
+    elf
+}
+
+#[test]
+fn an_empty_uno_is_flashed_through_optiboot_and_answers() {
+    let folder = tempfile::tempdir().unwrap();
+    let (link, eeprom) = (folder.path().join("uno"), folder.path().join("uno.eeprom"));
+    let mut arguments = vec![Path::new("--stand"), Path::new("--bootloader")];
+    let bootloader = optiboot(folder.path());
+    arguments.extend([&bootloader, Path::new("--link"), &link, Path::new("--eeprom"), &eeprom]);
+    let uno = VirtualUno::start(&arguments);
+    flash(&link, &[]);
+
+    assert_talks(&link);
+    assert!(uno.interrupt(), "Ctrl-C ends it well");
+    assert!(!link.is_symlink(), "it takes its link with it");
+    assert_eq!(fs::metadata(&eeprom).unwrap().len(), 1024);
+}
+
+#[test]
+fn an_uno_with_the_old_bootloader_is_flashed_at_its_own_baud_rate_and_answers() {
+    let folder = tempfile::tempdir().unwrap();
+    let link = folder.path().join("uno");
+    let arguments = [Path::new("--stand"), Path::new("--bootloader"), &old_bootloader(), Path::new("--link"), &link];
+    let _uno = VirtualUno::start(&arguments);
+    flash(&link, &["--old-bootloader"]);
+    assert_talks(&link);
+}
+
+#[test]
+fn a_firmware_that_reaches_into_the_old_bootloader_is_refused_and_one_that_does_not_is_written_for_avrdude() {
+    let folder = tempfile::tempdir().unwrap();
+    let pty = Pty::open().unwrap();
+    let elf = elf_of(folder.path(), 30_722);
+    let flash = |arguments: &[&str]| {
+        let mut command = weeder();
+        command.arg("flash").args(arguments).arg("--port").arg(pty.path()).arg("--elf").arg(&elf);
+        // Without a PATH there is no avrdude.
+        command.env("PATH", folder.path()).output().unwrap()
+    };
+    assert_refused(&flash(&["--old-bootloader"]), "takes 30722 bytes of flash: the bootloader leaves 30720");
+    assert_refused(&flash(&[]), "avrdude cannot be started: ./setup.sh installs it");
+    assert!(elf.with_extension("hex").exists());
+}
+
+#[test]
+fn a_firmware_that_reaches_into_optiboot_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let pty = Pty::open().unwrap();
+    let elf = elf_of(folder.path(), 32_258);
+    let output = weeder().args(["flash", "--elf"]).arg(elf).arg("--port").arg(pty.path()).output().unwrap();
+    assert_refused(&output, "takes 32258 bytes of flash: the bootloader leaves 32256");
+}
+
+#[test]
+fn a_port_that_is_in_use_is_said_to_be() {
+    let pty = Pty::open().unwrap();
+    let path = pty.path().to_string_lossy();
+    let _claim = serialport::new(path.clone(), 115_200).open().unwrap();
+    let output = weeder().args(["flash", "--port", &path]).output().unwrap();
+    assert_refused(&output, "is in use: close the serial monitor");
+}
+
+#[test]
+fn a_file_is_no_port() {
+    let file = tempfile::NamedTempFile::new().unwrap();
+    let output = weeder().args(["flash", "--port"]).arg(file.path()).output().unwrap();
+    assert_refused(&output, "cannot be opened as a serial port");
+}
+
+#[test]
+fn ravedude_is_given_the_firmware_and_the_port_where_it_is_installed() {
+    let folder = tempfile::tempdir().unwrap();
+    let ravedude = folder.path().join("ravedude");
+    fs::write(&ravedude, "#!/bin/sh\nprintf '%s' \"$1 $RAVEDUDE_PORT\" > \"${0%/*}/called\"\ntest -f Ravedude.toml\n")
+        .unwrap();
+    fs::set_permissions(&ravedude, fs::Permissions::from_mode(0o755)).unwrap();
+    let pty = Pty::open().unwrap();
+    let elf = elf_of(folder.path(), 100);
+    let mut command = weeder();
+    command.args(["flash", "--ravedude", "--elf"]).arg(&elf).arg("--port").arg(pty.path());
+    let output = command.env("PATH", folder.path()).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let called = fs::read_to_string(folder.path().join("called")).unwrap();
+    assert_eq!(called, format!("{} {}", elf.display(), pty.path().display()));
+}
+
+#[test]
+fn without_ravedude_avrdude_does_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let pty = Pty::open().unwrap();
+    let elf = elf_of(folder.path(), 100);
+    let mut command = weeder();
+    command.args(["flash", "--ravedude", "--elf"]).arg(&elf).arg("--port").arg(pty.path());
+    assert_refused(&command.env("PATH", folder.path()).output().unwrap(), "avrdude cannot be started");
+}
+
+#[test]
+fn the_advice_comes_after_each_of_avrdude_s_words_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let avrdude = folder.path().join("avrdude");
+    let script = "#!/bin/sh\nfor n in 1 2 3 4 5 6 7 8 9 10; do\n\
+                  echo \"avrdude: stk500_getsync() attempt $n of 10: not in sync: resp=0x0$n\" >&2\ndone\nexit 1\n";
+    fs::write(&avrdude, script).unwrap();
+    fs::set_permissions(&avrdude, fs::Permissions::from_mode(0o755)).unwrap();
+    let pty = Pty::open().unwrap();
+    let elf = elf_of(folder.path(), 100);
+    let output =
+        weeder().args(["flash", "--elf"]).arg(&elf).arg("--port").arg(pty.path()).env("PATH", folder.path()).output();
+    let output = output.unwrap();
+    assert_refused(&output, "or try with --old-bootloader");
+    assert_eq!(String::from_utf8_lossy(&output.stderr).matches("not in sync").count(), 1);
+}
+
+#[test]
+fn bootloaders_that_are_none_are_refused() {
+    let virtual_uno = |file: &Path| weeder().args(["virtual-uno", "--bootloader"]).arg(file).output().unwrap();
+    assert_refused(&virtual_uno(Path::new("no-such.hex")), "no-such.hex cannot be read: No such file");
+    let optiboot = Path::new(BOOTLOADERS).join("optiboot/optiboot_atmega328.hex");
+    // Debian's is longer than its boot section.
+    assert_refused(&virtual_uno(&optiboot), "it fills flash from 0x7e00 to 0x8014");
+    let folder = tempfile::tempdir().unwrap();
+    let text = folder.path().join("notes.hex");
+    fs::write(&text, "notes\n").unwrap();
+    assert_refused(&virtual_uno(&text), "is no Intel HEX file");
+}
+
+#[test]
+fn a_link_does_not_take_a_file_s_place() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("mine");
+    fs::write(&file, "mine").unwrap();
+    let mut command = weeder();
+    command.args(["virtual-uno", "--bootloader"]).arg(old_bootloader()).arg("--link").arg(&file);
+    assert_refused(&command.output().unwrap(), "exists already and is no link to a pseudo terminal");
+    assert_eq!(fs::read_to_string(&file).unwrap(), "mine");
+}
+
+#[test]
+fn the_hex_file_holds_what_the_elf_does() {
+    let folder = tempfile::tempdir().unwrap();
+    let elf = firmware::build().expect("the firmware builds");
+    let out = folder.path().join("weeder.hex");
+    let output = weeder().arg("hex").arg(&out).arg("--elf").arg(&elf).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    // Taken apart by binutils, which has not written it.
+    let binary = folder.path().join("weeder.bin");
+    let mut objcopy = Command::new("avr-objcopy");
+    objcopy.args(["-I", "ihex", "-O", "binary"]).args([&out, &binary]);
+    assert!(objcopy.status().expect("avr-objcopy is there: setup.sh installs it").success());
+    assert_eq!(fs::read(&binary).unwrap(), Image::read(&elf).unwrap().flash);
+
+    let nowhere = folder.path().join("no-such/weeder.hex");
+    let output = weeder().arg("hex").arg(&nowhere).arg("--elf").arg(&elf).output().unwrap();
+    assert_refused(&output, "No such file");
+}

@@ -1,0 +1,252 @@
+//! The host's tools over a pseudo terminal, as a user runs them, with the virtual Uno at its other end.
+
+use std::fs;
+use std::io::{BufRead, BufReader, Write};
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+use trial::firmware;
+use trial::live::{Background, LiveUno, Setup};
+
+/// A virtual Uno at rest that runs as fast as it can.
+fn uno() -> Background {
+    let setup = Setup {
+        elf: Some(firmware::build().expect("the firmware builds")),
+        bootloader: None,
+        eeprom: None,
+        link: None,
+        course: None,
+        fast: true,
+        keeps_running_when_opened: false,
+    };
+    LiveUno::start(setup).expect("there is a pseudo terminal").run_in_background()
+}
+
+/// Runs `weeder` with these words, then `--port` and the port, and this input.
+fn weeder(words: &[&str], port: &Path, input: &str) -> Output {
+    let mut weeder = Command::new(env!("CARGO_BIN_EXE_weeder"))
+        .args(words)
+        .arg("--port")
+        .arg(port)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("cargo has built the command");
+    // One that fails at once reads nothing.
+    let _ = weeder.stdin.take().expect("it is piped").write_all(input.as_bytes());
+    weeder.wait_with_output().expect("it ends")
+}
+
+/// What it printed, where it ended with this status.
+#[track_caller]
+fn printed(output: &Output, status: i32) -> String {
+    let [out, error] = [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes).into_owned());
+    assert_eq!(output.status.code(), Some(status), "{out}{error}");
+    out + &error
+}
+
+#[test]
+fn settings_are_pulled_changed_compared_and_pushed() {
+    let uno = uno();
+    let folder = tempfile::tempdir().expect("there is room for a file");
+    let file = folder.path().join("machine.toml");
+    let name = file.to_str().expect("it is text");
+
+    printed(&weeder(&["settings", "pull", name], uno.path(), ""), 0);
+    let text = fs::read_to_string(&file).expect("it was written");
+    assert!(text.contains("\n# 200 to 800 mm, default 400\nwheel_mm = 400\n"), "{text}");
+    let same = printed(&weeder(&["settings", "diff", name], uno.path(), ""), 0);
+    assert!(same.starts_with("The machine has the settings of "), "{same}");
+
+    fs::write(&file, text.replace("wheel_mm = 400", "wheel_mm = 405 # measured")).expect("it can be written");
+    let json = printed(&weeder(&["settings", "diff", name, "--json"], uno.path(), ""), 1);
+    let json: serde_json::Value = serde_json::from_str(&json).expect("it is JSON");
+    assert_eq!(json, serde_json::json!([{ "setting": "wheel_mm", "file": 405, "machine": 400 }]));
+    let pushed = printed(&weeder(&["monitor", "--plain"], uno.path(), "clear\n"), 0);
+    assert!(pushed.contains("ok\n"), "{pushed}");
+    let pushed = printed(&weeder(&["settings", "push", name, "--save"], uno.path(), ""), 0);
+    assert_eq!(pushed, "Set: wheel_mm\nAll settings are saved\n");
+    let again = printed(&weeder(&["settings", "push", name, "--json"], uno.path(), ""), 0);
+    let again: serde_json::Value = serde_json::from_str(&again).expect("it is JSON");
+    assert_eq!(again, serde_json::json!({ "set": [], "saved": true }));
+    // Each of these opened the port anew, which is a reset: what was saved is still there.
+    printed(&weeder(&["settings", "diff", name], uno.path(), ""), 0);
+    let json = printed(&weeder(&["settings", "pull", "--json"], uno.path(), ""), 0);
+    assert!(json.contains("\"wheel_mm\": 405") && json.contains("\"end_switch\": false"), "{json}");
+}
+
+#[test]
+fn what_is_pushed_is_kept_over_a_reset_unless_it_is_not_to_be() {
+    let uno = uno();
+    let folder = tempfile::tempdir().expect("there is room for a file");
+    let file = folder.path().join("machine.toml");
+    let name = file.to_str().expect("it is text");
+    let push = |text: &str, words: &[&str]| {
+        fs::write(&file, text).expect("it can be written");
+        printed(&weeder(&[&["settings", "push", name], words].concat(), uno.path(), ""), 0)
+    };
+    printed(&weeder(&["monitor", "--plain"], uno.path(), "clear\n"), 0);
+    assert_eq!(push("wheel_mm = 405\n", &[]), "Set: wheel_mm\nAll settings are saved\n");
+    // Opening the port is a reset.
+    printed(&weeder(&["settings", "diff", name], uno.path(), ""), 0);
+    let not_saved = push("wheel_mm = 410\n", &["--no-save"]);
+    assert!(
+        not_saved.ends_with("Not saved: the next reset takes them back, and on most Unos opening the port is one\n")
+    );
+    printed(&weeder(&["settings", "diff", name], uno.path(), ""), 1);
+}
+
+#[test]
+fn an_empty_file_has_no_settings_to_compare_or_to_push() {
+    let file = tempfile::NamedTempFile::new().expect("there is room for a file");
+    for action in ["diff", "push"] {
+        let words = ["settings", action, file.path().to_str().expect("it is text")];
+        let error = printed(&weeder(&words, Path::new("/dev/no-such-port"), ""), 2);
+        assert!(error.contains("names no setting: `weeder settings pull` writes them all"), "{error}");
+    }
+}
+
+#[test]
+fn a_second_virtual_uno_leaves_the_link_of_a_living_one_alone() {
+    let folder = tempfile::tempdir().expect("there is room for a link");
+    let link = folder.path().join("uno");
+    let words = ["virtual-uno", "--stand", "--bootloader", "optiboot", "--link"];
+    let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
+    let mut first = command.args(words).arg(&link).stdout(Stdio::piped()).spawn().expect("cargo has built the command");
+    let mut line = String::new();
+    BufReader::new(first.stdout.take().expect("it is piped")).read_line(&mut line).expect("it says where it is");
+    let leads_to = fs::read_link(&link).expect("it is a link");
+    let second = Command::new(env!("CARGO_BIN_EXE_weeder")).args(words).arg(&link).output().expect("it ends");
+    let error = printed(&second, 2);
+    assert!(error.contains(&format!("which process {} (weeder) has", first.id())), "{error}");
+    assert_eq!(fs::read_link(&link).expect("it is a link"), leads_to);
+    first.kill().expect("it runs");
+    first.wait().expect("it ends");
+}
+
+#[test]
+fn a_file_with_a_mistake_is_refused_before_the_port_is_opened() {
+    let folder = tempfile::tempdir().expect("there is room for a file");
+    let file = folder.path().join("machine.toml");
+    fs::write(&file, "k = 3\nwheel_mm = 4000\n").expect("it can be written");
+    let words = ["settings", "push", file.to_str().expect("it is text")];
+    let error = printed(&weeder(&words, Path::new("/dev/no-such-port"), ""), 2);
+    assert!(error.contains("line 2: wheel_mm is `4000`: it has to be a whole number, 200 to 800 mm"), "{error}");
+}
+
+#[test]
+fn the_plain_monitor_answers_line_by_line_and_tells_of_refusals_by_its_status() {
+    let uno = uno();
+    let answers = printed(&weeder(&["monitor", "--plain"], uno.path(), "version\nget k\n"), 0);
+    assert!(answers.starts_with("weeder 0.1.0\nok\nk=3 "), "{answers}");
+    let refused = printed(&weeder(&["monitor", "--plain"], uno.path(), "hepl\n"), 1);
+    assert_eq!(refused, "error: no such command, help lists them all\n");
+    let wrong = printed(&weeder(&["monitor", "--plain"], uno.path(), "h\u{e4}lt\n"), 2);
+    assert!(wrong.contains("is no command: it has to be one line of at most 80 printable ASCII characters"), "{wrong}");
+}
+
+#[test]
+fn a_session_is_logged_and_replayed() {
+    let uno = uno();
+    let folder = tempfile::tempdir().expect("there is room for a file");
+    let log = folder.path().join("log.csv");
+    let log = log.to_str().expect("it is text");
+    printed(&weeder(&["monitor", "--plain", "--log", log], uno.path(), "clear\nstart now\nstatus\nhold\n"), 0);
+    let text = fs::read_to_string(log).expect("it was written");
+    assert!(text.starts_with("time_ms,kind,line\n") && text.contains(",event,state is=work\n"), "{text}");
+    assert!(text.contains(",event,swing tool=out pos=0\n"), "{text}");
+    let output = Command::new(env!("CARGO_BIN_EXE_weeder")).args(["replay", log]).output().expect("it ends");
+    let replayed = printed(&output, 0);
+    assert!(replayed.contains("0 objects, 0 alarms and 2 swings"), "{replayed}");
+    // Opened again, it is gone on with.
+    printed(&weeder(&["monitor", "--plain", "--log", log], uno.path(), ""), 0);
+    assert_eq!(fs::read_to_string(log).expect("it is there").matches(",connected,").count(), 2);
+}
+
+#[test]
+fn ports_logs_and_recordings_that_do_not_exist_are_named() {
+    for words in [&["monitor"][..], &["monitor", "--plain"], &["settings", "pull", "x.toml"]] {
+        let error = printed(&weeder(words, Path::new("/dev/no-such-port"), ""), 2);
+        assert!(error.contains("there is no port /dev/no-such-port: plug the Uno in"), "{error}");
+    }
+    let output = Command::new(env!("CARGO_BIN_EXE_weeder")).args(["replay", "no-such.csv"]).output().expect("it ends");
+    assert!(printed(&output, 2).contains("no-such.csv cannot be read"));
+}
+
+#[test]
+fn a_virtual_uno_that_is_told_to_end_takes_its_link_with_it() {
+    let folder = tempfile::tempdir().expect("there is room for a link");
+    let link = folder.path().join("uno");
+    for signal in ["-INT", "-TERM", "-HUP"] {
+        let mut uno = Command::new(env!("CARGO_BIN_EXE_weeder"))
+            .args(["virtual-uno", "--stand", "--bootloader", "optiboot", "--link"])
+            .arg(&link)
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("cargo has built the command");
+        let mut line = String::new();
+        BufReader::new(uno.stdout.take().expect("it is piped")).read_line(&mut line).expect("it says where it is");
+        assert!(link.is_symlink(), "{line}");
+        Command::new("kill").args([signal, &uno.id().to_string()]).status().expect("there is a kill");
+        assert!(uno.wait().expect("it ends").success(), "{signal}");
+        assert!(!link.is_symlink(), "{signal} has left it behind");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_recording_survives_an_uno_that_is_unplugged_and_ends_by_ctrl_c() {
+    use std::os::unix::fs::symlink;
+    use std::thread::sleep;
+    use std::time::Duration;
+
+    let folder = tempfile::tempdir().expect("there is room for a file");
+    let (log, port) = (folder.path().join("log.csv"), folder.path().join("uno"));
+    let first = uno();
+    symlink(first.path(), &port).expect("there is room for a link");
+    let mut weeder = Command::new(env!("CARGO_BIN_EXE_weeder"))
+        .arg("record")
+        .args(["--out".as_ref(), log.as_os_str(), "--port".as_ref(), port.as_os_str()])
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("cargo has built the command");
+    // Waits for what the log shows; the test's own time limit is the test program's.
+    let wait_for = |what: &str, count: usize| {
+        for _ in 0..1200 {
+            if fs::read_to_string(&log).is_ok_and(|text| text.matches(what).count() >= count) {
+                return;
+            }
+            sleep(Duration::from_millis(50));
+        }
+        panic!("the log does not show {what} {count} times: {:?}", fs::read_to_string(&log));
+    };
+    wait_for(",status,", 3);
+    drop(first);
+    wait_for(",lost,", 1);
+    let second = uno();
+    fs::remove_file(&port).expect("it is there");
+    symlink(second.path(), &port).expect("there is room for a link");
+    wait_for(",connected,", 2);
+    let id = weeder.id().to_string();
+    Command::new("kill").args(["-INT", &id]).status().expect("there is a kill");
+    assert_eq!(weeder.wait().expect("it ends").code(), Some(0));
+    let text = fs::read_to_string(&log).expect("it is there");
+    assert!(text.ends_with('\n'));
+    // Gone on with, it counts what was added and what is there.
+    let words = ["record", "--out", log.to_str().expect("it is text")];
+    let mut weeder = Command::new(env!("CARGO_BIN_EXE_weeder"))
+        .args(words)
+        .arg("--port")
+        .arg(&port)
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("cargo has built the command");
+    wait_for(",connected,", 3);
+    Command::new("kill").args(["-INT", &weeder.id().to_string()]).status().expect("there is a kill");
+    let mut told = String::new();
+    std::io::Read::read_to_string(&mut weeder.stderr.take().expect("it is piped"), &mut told).expect("it is text");
+    weeder.wait().expect("it ends");
+    let (all, before) = (fs::read_to_string(&log).expect("it is there").lines().count() - 1, text.lines().count() - 1);
+    let counted = format!("{} lines were added: {} has {all} now", all - before, log.display());
+    assert!(told.contains(&counted), "{told}");
+}

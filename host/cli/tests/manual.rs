@@ -1,0 +1,330 @@
+//! The manual holds: what README, the pages beside it and docs/ tell to type is typed here, and their links lead somewhere.
+//!
+//! In a block marked `sh`, every command of this repository is known, with its options, and those that need neither an
+//! Uno nor a minute are run. In a block marked `console`, every line behind `>` is typed into the virtual Uno and answered
+//! by `ok`; the lines between are said in that order, or the beginning of what is said. Where the reader would roll the
+//! machine, the virtual Uno rolls.
+
+use field::machine::{Machine, cycle_at};
+use field::motion::Motion;
+use field::row::{Row, Thing};
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::thread;
+use std::time::Duration;
+use tempfile::TempDir;
+use trial::console::ask;
+use trial::firmware;
+use uno::Uno;
+
+/// The repository's folder.
+const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
+
+/// Objects as `dump` prints them, for the commands that learn of them.
+const OBJECTS: &str = "\
+speed_mm_s,spacing_mm,delay_mm,hold_mm,actuation_mm,answer,votes,label
+555,550,350,250,600,plant,3,plant
+555,548,350,255,605,plant,3,plant
+555,551,350,245,595,plant,3,plant
+555,553,350,248,598,plant,3,plant
+555,205,350,108,458,weed,3,weed
+555,188,350,112,462,weed,3,weed
+555,170,350,110,460,weed,3,weed
+555,310,350,106,456,weed,3,weed
+";
+
+/// Programs that are not of this repository; what they do with their options is their business.
+const FOREIGN: [&str; 4] = ["avrdude", "echo", "npm", "sudo"];
+
+/// Subcommands that need neither an Uno nor much time.
+const CHEAP: [&str; 7] = ["classify", "design", "evaluate", "hex", "sweep", "train", "trial"];
+
+/// A page of the manual.
+struct Page {
+    path: PathBuf,
+    text: String,
+}
+
+/// The README, the two pages beside it, and every page of docs/.
+fn pages() -> Vec<Page> {
+    let docs = fs::read_dir(Path::new(ROOT).join("docs")).expect("there is a manual");
+    let mut paths: Vec<PathBuf> = docs.map(|entry| entry.expect("it can be listed").path()).collect();
+    paths.extend(["README.md", "CONTRIBUTING.md", "CHANGELOG.md"].map(|page| Path::new(ROOT).join(page)));
+    paths.retain(|path| path.extension().is_some_and(|extension| extension == "md"));
+    paths.sort();
+    let read = |path: PathBuf| Page { text: fs::read_to_string(&path).expect("a page is text"), path };
+    paths.into_iter().map(read).collect()
+}
+
+impl Page {
+    /// The lines of each fenced block in this language.
+    fn blocks(&self, language: &str) -> Vec<Vec<&str>> {
+        let mut blocks = Vec::new();
+        let mut lines = self.text.lines();
+        while let Some(line) = lines.next() {
+            let Some(found) = line.strip_prefix("```") else { continue };
+            let block: Vec<&str> = lines.by_ref().take_while(|line| *line != "```").collect();
+            if found == language {
+                blocks.push(block);
+            }
+        }
+        blocks
+    }
+
+    /// The anchors of its headings, as the usual renderers of Markdown make them.
+    fn anchors(&self) -> Vec<String> {
+        let headings = self.text.lines().filter(|line| line.starts_with('#'));
+        let anchor = |heading: &str| {
+            let kept =
+                heading.trim_start_matches('#').trim().chars().filter(|c| c.is_alphanumeric() || " -_".contains(*c));
+            kept.collect::<String>().to_lowercase().replace(' ', "-")
+        };
+        headings.map(anchor).collect()
+    }
+}
+
+/// A command line's words up to its comment or to where its output goes.
+fn words(line: &str) -> Vec<String> {
+    let words = shlex::split(line).unwrap_or_else(|| panic!("unbalanced quotes: {line}"));
+    words.into_iter().take_while(|word| word != ">").collect()
+}
+
+/// The aliases of .cargo/config.toml that run `weeder`, with the arguments that they give it.
+fn aliases() -> Vec<(String, Vec<String>)> {
+    let config = fs::read_to_string(Path::new(ROOT).join(".cargo/config.toml")).expect("cargo is configured");
+    let alias = |line: &str| {
+        let (name, command) = line.split_once(" = \"")?;
+        let (_, arguments) = command.split_once("--package weeder-cli -- ")?;
+        Some((name.to_owned(), words(arguments.trim_end_matches('"'))))
+    };
+    config.lines().filter_map(alias).collect()
+}
+
+/// What a command line gives to `weeder`, if it runs it.
+fn weeder_arguments(words: &[String]) -> Option<Vec<String>> {
+    let (program, arguments) = words.split_first()?;
+    match (program.as_str(), arguments) {
+        ("weeder", arguments) => Some(arguments.to_vec()),
+        ("cargo", [run, rest @ ..]) if run == "run" => {
+            let start = rest.iter().position(|word| word == "--")?;
+            rest[..start].contains(&"weeder-cli".to_owned()).then(|| rest[start + 1..].to_vec())
+        }
+        ("cargo", [alias, rest @ ..]) => {
+            let (_, arguments) = aliases().into_iter().find(|(name, _)| name == alias)?;
+            Some([&arguments, rest].concat())
+        }
+        _ => None,
+    }
+}
+
+/// Runs `weeder` in a folder and returns what it said, if it went wrong.
+fn complaint(folder: &Path, arguments: &[String]) -> Option<String> {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
+    let output = command.current_dir(folder).args(arguments).output().expect("cargo has built the command");
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    // Status 1 is a finding, and no complaint.
+    (!matches!(output.status.code(), Some(0 | 1))).then_some(said)
+}
+
+/// The lines of all pages that are for a shell, as words.
+fn shell_lines() -> Vec<(String, Vec<String>)> {
+    let of_page = |page: &Page| -> Vec<(String, Vec<String>)> {
+        let name = page.path.display();
+        let blocks = page.blocks("sh");
+        let lines = blocks.iter().flatten();
+        lines.map(|line| (format!("{name}: {line}"), words(line))).filter(|(_, words)| !words.is_empty()).collect()
+    };
+    pages().iter().flat_map(of_page).collect()
+}
+
+#[test]
+fn every_command_in_the_manual_exists_with_its_options() {
+    let of_cargo = Command::new("cargo").current_dir(ROOT).arg("--list").output().expect("cargo is there").stdout;
+    let of_cargo = String::from_utf8(of_cargo).expect("cargo lists names");
+    let (mut complaints, mut seen) = (Vec::new(), 0);
+    for (line, words) in shell_lines() {
+        let known = if let Some(arguments) = weeder_arguments(&words) {
+            seen += 1;
+            // Options are read before it gives help and ends.
+            complaint(Path::new(ROOT), &[arguments, vec!["--help".to_owned()]].concat()).is_none()
+        } else if words[0] == "cargo" {
+            of_cargo.lines().any(|listed| listed.split_whitespace().next() == words.get(1).map(String::as_str))
+        } else if words[0].starts_with("./") {
+            Path::new(ROOT).join(&words[0]).is_file()
+        } else {
+            FOREIGN.contains(&words[0].as_str())
+        };
+        if !known {
+            complaints.push(line);
+        }
+    }
+    assert_eq!(complaints, [""; 0], "there are no such commands");
+    assert!(seen > 20, "only {seen} commands were found");
+}
+
+#[test]
+fn commands_in_the_manual_that_need_no_uno_do_what_they_say() {
+    let folder = TempDir::new().expect("a folder");
+    fs::create_dir_all(folder.path().join("control/src/examples")).expect("a folder in it");
+    fs::write(folder.path().join("field.csv"), OBJECTS).expect("a file in it");
+    fs::create_dir(folder.path().join("docs")).expect("a folder in it");
+    let example = "docs/trial-example.csv";
+    fs::copy(Path::new(ROOT).join(example), folder.path().join(example)).expect("the manual has an example");
+    // The reader makes it by `design --print-machine > my.toml`.
+    fs::write(folder.path().join("my.toml"), "weeder.mass = \"60 kg\"\n").expect("a file in it");
+    let mut run = Vec::new();
+    for (line, words) in shell_lines() {
+        let Some(arguments) = weeder_arguments(&words) else { continue };
+        // On the virtual Uno a trial takes minutes.
+        let cheap = arguments.first().is_some_and(|command| CHEAP.contains(&command.as_str()))
+            && !arguments.iter().any(|argument| argument == "uno");
+        if cheap && !run.contains(&arguments) {
+            assert_eq!(complaint(folder.path(), &arguments), None, "{line}");
+            run.push(arguments);
+        }
+    }
+    for command in CHEAP {
+        assert!(run.iter().any(|arguments| arguments[0] == command), "the manual does not tell of {command}");
+    }
+}
+
+#[test]
+fn the_readme_names_every_console_command() {
+    let readme = fs::read_to_string(Path::new(ROOT).join("README.md")).expect("there is a README");
+    let mut uno = trial::boot(&firmware::build().expect("the firmware builds"), &[]).expect("the firmware wakes up");
+    let help = ask(&mut uno, "help").expect("it has help");
+    assert!(help.len() > 10, "{help:?}");
+    for usage in help.iter().filter_map(|line| line.split_once(" - ")).map(|(usage, _)| usage) {
+        let word = usage.split(' ').next().unwrap_or(usage);
+        assert!(readme.contains(&format!("`{word}")), "{usage}");
+    }
+}
+
+#[test]
+fn every_console_line_in_the_manual_is_answered_by_ok_and_by_what_stands_there() {
+    let elf = firmware::build().expect("the firmware builds");
+    let mut typed = 0;
+    for page in pages() {
+        for block in page.blocks("console") {
+            let mut uno = trial::boot(&elf, &[]).expect("the firmware wakes up");
+            let mut said = String::new();
+            for line in block {
+                let place = format!("{}: {line}", page.path.display());
+                let Some(command) = line.strip_prefix("> ") else {
+                    expect(&mut uno, &mut said, line, &place);
+                    continue;
+                };
+                match command {
+                    "label plant" => roll(&mut uno, 1500.0),
+                    _ if command.starts_with("calibrate 1") => roll(&mut uno, 10_000.0),
+                    _ => {}
+                }
+                let answer = ask(&mut uno, command).unwrap_or_else(|error| panic!("{place}: {error}"));
+                said = answer.iter().map(|line| format!("{line}\n")).collect();
+                typed += 1;
+            }
+        }
+    }
+    assert!(typed > 30, "only {typed} lines were found");
+}
+
+/// Waits for a line that begins like this, and drops it with what was said before it.
+#[track_caller]
+fn expect(uno: &mut Uno, said: &mut String, line: &str, place: &str) {
+    const PATIENCE_S: u64 = 15;
+    for _ in 0..PATIENCE_S * 10 {
+        let complete = said.rfind('\n').map_or("", |end| &said[..=end]);
+        let mut end = 0;
+        for heard in complete.split_inclusive('\n') {
+            end += heard.len();
+            if heard.starts_with(line) {
+                said.drain(..end);
+                return;
+            }
+        }
+        uno.run_for_ms(100).expect("the firmware runs");
+        *said += &uno.received();
+    }
+    panic!("{place}: that is not said, but {said:?}");
+}
+
+/// Rolls on by so much at a walking pace, past a plant in the middle, with a wheel that is a little worn.
+fn roll(uno: &mut Uno, distance_mm: f64) {
+    const SPEED_MM_S: f64 = 1000.0;
+    const ACCELERATION_MM_S2: f64 = 2000.0;
+    let machine = Machine { wheel_mm: 396.0, ..Machine::default() };
+    let row = Row::new(vec![Thing::plant(distance_mm / 2.0, 150.0)]).expect("a plant is a row");
+    let motion =
+        Motion::starting_at(0.0).change_speed(SPEED_MM_S, ACCELERATION_MM_S2).stop_at(distance_mm, ACCELERATION_MM_S2);
+    let start_cycle = uno.cycle();
+    uno.drive(machine.pin_changes(&row, &motion, start_cycle));
+    uno.run_until(cycle_at(start_cycle, motion.duration_s() + 0.1)).expect("the firmware runs");
+}
+
+/// A program that runs until the test is over.
+struct Running(Child);
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        // It may have ended by itself, which the test has noticed.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+#[test]
+fn the_way_to_a_weeder_without_an_uno_is_followed_to_its_end() {
+    firmware::build().expect("the firmware builds");
+    let folder = TempDir::new().expect("a folder");
+    let link = folder.path().join("uno");
+    let with_port = |(line, words): (String, Vec<String>)| {
+        let port = link.to_str().expect("a name in plain text");
+        let words: Vec<String> = words.iter().map(|word| word.replace("/tmp/uno", port)).collect();
+        (line.contains("first-flash.md") && words.iter().any(|word| word == port))
+            .then(|| weeder_arguments(&words))
+            .flatten()
+    };
+    let lines: Vec<Vec<String>> = shell_lines().into_iter().filter_map(with_port).collect();
+    let [virtual_uno, monitor] = lines.as_slice() else { panic!("first the Uno, then the monitor, not {lines:?}") };
+
+    let weeder = |arguments: &[String]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
+        command.current_dir(folder.path()).args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped());
+        command.spawn().expect("cargo has built the command")
+    };
+    let mut uno = Running(weeder(virtual_uno));
+    while !link.exists() {
+        assert_eq!(uno.0.try_wait().expect("it is a child"), None, "the virtual Uno has ended");
+        thread::sleep(Duration::from_millis(50));
+    }
+    // A script has no screen.
+    let mut monitor = weeder(&[monitor.as_slice(), &["--plain".to_owned()]].concat());
+    let mut keyboard = monitor.stdin.take().expect("it is piped");
+    keyboard.write_all(b"clear\nhold\nsave\nstatus\n").expect("it listens");
+    drop(keyboard);
+    let output = monitor.wait_with_output().expect("it ends");
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success() && said.contains("state=hold tool=out"), "{said}");
+}
+
+#[test]
+fn every_link_in_the_manual_leads_somewhere() {
+    for page in pages() {
+        let folder = page.path.parent().expect("a page has a folder");
+        for link in page.text.split("](").skip(1).filter_map(|rest| rest.split_once(')')).map(|(link, _)| link) {
+            if link.starts_with("https://") {
+                continue;
+            }
+            let place = format!("{}: {link}", page.path.display());
+            let (file, anchor) = link.split_once('#').map_or((link, None), |(file, anchor)| (file, Some(anchor)));
+            let target = if file.is_empty() { page.path.clone() } else { folder.join(file) };
+            assert!(target.exists(), "{place}");
+            if let Some(anchor) = anchor {
+                let target = Page { text: fs::read_to_string(&target).expect("a page is text"), path: target };
+                assert!(target.anchors().iter().any(|known| known == anchor), "{place}: {:?}", target.anchors());
+            }
+        }
+    }
+}

@@ -1,0 +1,119 @@
+//! What stands in the manual and follows from the code: the wiring, every setting, what to do about every alarm, and the
+//! simulated field.
+//!
+//! `UPDATE_EXPECT=1 cargo test -p weeder-cli --test tables_of_the_manual` writes it anew.
+
+use control::alarm::{Alarm, Warning};
+use control::settings::{Description, Setting};
+use expect_test::{ExpectFile, expect_file};
+use field::conditions::{Conditions, Parameter};
+use field::wiring;
+use link::advice;
+use link::settings::{help, name, unit};
+use std::fmt::Write;
+
+/// The page with the part between `<!-- name -->` and `<!-- name end -->` replaced.
+#[track_caller]
+fn with_part(page: &ExpectFile, name: &str, part: &str) -> String {
+    let (begin, end) = (format!("<!-- {name} -->\n"), format!("<!-- {name} end -->"));
+    let text = page.data();
+    let (before, rest) = text.split_once(&begin).unwrap_or_else(|| panic!("no {begin:?}"));
+    let (_, after) = rest.split_once(&end).unwrap_or_else(|| panic!("no {end:?}"));
+    [before, &begin, "\n", part, "\n", &end, after].concat()
+}
+
+#[test]
+fn the_wiring_diagram_is_drawn_from_the_pin_table() {
+    expect_file!["../../../docs/wiring.svg"].assert_eq(&format!("{}\n", trial::wiring_diagram::draw()));
+}
+
+#[test]
+fn the_wiring_tables_are_the_pin_table() {
+    for page in [expect_file!["../../../README.md"], expect_file!["../../../docs/build.md"]] {
+        page.assert_eq(&with_part(&page, "wiring", &wiring::table()));
+    }
+}
+
+#[test]
+fn the_settings_page_is_the_settings_table() {
+    let page = expect_file!["../../../docs/settings.md"];
+    page.assert_eq(&with_part(&page, "settings", &settings()));
+}
+
+#[test]
+fn the_simulated_field_s_page_is_the_table_of_its_parameters() {
+    let page = expect_file!["../../../docs/field.md"];
+    page.assert_eq(&with_part(&page, "parameters", &parameters()));
+}
+
+#[test]
+fn the_settings_that_the_readme_names_have_the_defaults_that_it_gives() {
+    let readme = expect_file!["../../../README.md"].data();
+    let mut found = 0;
+    for line in readme.lines() {
+        let mut cells = line.trim_matches('|').split('|').map(str::trim);
+        let (Some(names), Some(defaults)) = (cells.next(), cells.next()) else { continue };
+        for (cell, default) in names.split(", ").zip(defaults.split(", ")) {
+            let setting = Setting::all().find(|&setting| cell == format!("`{}`", name(setting)));
+            let Some(setting) = setting else { continue };
+            assert_eq!(default, setting.description().default.to_string(), "{line}");
+            found += 1;
+        }
+    }
+    assert_eq!(found, 5, "the five that one sets first");
+}
+
+#[test]
+fn the_faults_page_says_what_the_monitor_says_to_do() {
+    let page = expect_file!["../../../docs/faults.md"].data();
+    let alarms = (0..).map_while(Alarm::from_index).map(|alarm| {
+        let (code, name) = (alarm.code(), alarm.text().bytes().map(char::from).collect::<String>());
+        (format!("| {}-{} | `{name}` |", code / 10, code % 10), advice::alarm(alarm))
+    });
+    let warnings = (0..).map_while(Warning::from_index).map(|warning| {
+        let name = warning.text().bytes().map(char::from).collect::<String>();
+        (format!("| | `{name}` (warning) |"), advice::warning(warning))
+    });
+    for (begin, advice) in alarms.chain(warnings) {
+        let row = page.lines().find(|line| line.starts_with(&begin)).unwrap_or_else(|| panic!("no row {begin}"));
+        assert!(row.ends_with(&format!(" | {advice} |")), "{row}: {advice}");
+    }
+}
+
+/// Every parameter of the simulated field as a table in Markdown.
+fn parameters() -> String {
+    let mut table = "| name | default | from | to | what it is | where the number is from |\n".to_owned();
+    table += "| --- | --- | --- | --- | --- | --- |\n";
+    for (Parameter { name, meaning, source, least, greatest }, default) in Conditions::default().values() {
+        writeln!(table, "| `{name}` | {default} | {least} | {greatest} | {meaning} | {source} |")
+            .expect("a string takes everything");
+    }
+    table
+}
+
+/// Every setting as a table in Markdown.
+fn settings() -> String {
+    let mut table = "| name | unit | from | to | default | set in | what it is |\n".to_owned();
+    table += "| --- | --- | --- | --- | --- | --- | --- |\n";
+    for setting in Setting::all() {
+        let Description { least, greatest, default, hold_only } = setting.description();
+        let shown = |value: u16| match (setting.is_switched(), value) {
+            (true, 0) => "off".to_owned(),
+            (true, _) => "on".to_owned(),
+            (false, _) => value.to_string(),
+        };
+        writeln!(
+            table,
+            "| `{}` | {} | {} | {} | {} | {} | {} |",
+            name(setting),
+            unit(setting),
+            shown(least),
+            shown(greatest),
+            shown(default),
+            if hold_only { "hold" } else { "any state" },
+            help(setting)
+        )
+        .expect("a string takes everything");
+    }
+    table
+}

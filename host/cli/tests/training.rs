@@ -1,0 +1,149 @@
+//! `weeder train` and `weeder classify`, as they are called.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+use study::training::MOST_EXAMPLES;
+use tempfile::TempDir;
+
+/// The table that the firmware is built from.
+const BUILT_IN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../control/src/examples/table.rs");
+
+const HEADER: &str = "speed_mm_s,spacing_mm,delay_mm,hold_mm,actuation_mm,label\n";
+
+/// Runs `weeder` with these arguments in a folder.
+fn weeder(folder: &Path, arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
+    command.current_dir(folder).args(arguments).output().expect("cargo has built the command")
+}
+
+/// A folder with the file `objects.csv`, of these lines below the header.
+fn folder_with(lines: &str) -> TempDir {
+    let folder = TempDir::new().unwrap();
+    fs::write(folder.path().join("objects.csv"), format!("{HEADER}{lines}")).unwrap();
+    folder
+}
+
+/// Asserts status 2 and a message that contains `words`.
+#[track_caller]
+fn assert_refused(lines: &str, arguments: &[&str], words: &str) {
+    let folder = folder_with(lines);
+    let output = weeder(folder.path(), arguments);
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{message}");
+    assert!(message.contains(words), "{message}");
+}
+
+#[test]
+fn the_built_in_table_is_what_the_command_writes() {
+    let folder = TempDir::new().unwrap();
+    let output = weeder(folder.path(), &["train", "--synthetic", "--out", "table.rs", "--picture", "regions.svg"]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let written = fs::read_to_string(folder.path().join("table.rs")).unwrap();
+    let built_in = fs::read_to_string(BUILT_IN).unwrap();
+    assert!(
+        written == built_in,
+        "the table is out of date: run `cargo run --release -p weeder-cli -- train --synthetic --out {BUILT_IN}`"
+    );
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert_eq!(said.matches("Plants taken for weeds   0 of ").count(), 3, "{said}");
+    assert!(fs::read_to_string(folder.path().join("regions.svg")).unwrap().starts_with("<svg"));
+}
+
+#[test]
+fn examples_written_as_csv_are_known_to_the_firmware() {
+    let folder = TempDir::new().unwrap();
+    assert!(weeder(folder.path(), &["train", "--synthetic", "--out", "examples.csv"]).status.success());
+    let output = weeder(folder.path(), &["classify", "examples.csv"]);
+    assert_eq!(output.status.code(), Some(0));
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(said.contains("Treated as they should   100.00 % of all"), "{said}");
+}
+
+#[test]
+fn a_plant_that_would_be_cut_ends_with_status_1() {
+    // A plant as narrow as a weed.
+    let folder = folder_with("694,300,226,116,439,plant\n694,500,226,250,573,plant\n");
+    let output = weeder(folder.path(), &["classify", "objects.csv"]);
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("Plants taken for weeds   1 of 2, 50.00 %"), "{said}");
+}
+
+#[test]
+fn answers_are_printed_as_json_for_scripts() {
+    let folder = folder_with("694,300,226,116,439,plant\n694,500,226,250,573,\n");
+    let output = weeder(folder.path(), &["classify", "objects.csv", "--json"]);
+    assert_eq!(output.status.code(), Some(1));
+    let rows: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((&rows[0]["answer"], &rows[0]["label"]), (&"weed".into(), &"plant".into()));
+    assert_eq!((&rows[1]["answer"], &rows[1]["label"]), (&"plant".into(), &serde_json::Value::Null));
+    assert!(rows[1]["votes_plant"].as_u64() > rows[1]["votes_weed"].as_u64(), "{rows}");
+}
+
+#[test]
+fn objects_without_labels_are_classified_without_a_score() {
+    let folder = folder_with("694,300,226,116,439,\n");
+    let output = weeder(folder.path(), &["classify", "objects.csv"]);
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert_eq!(output.status.code(), Some(0), "{said}");
+    assert!(said.contains("weed") && said.contains("known"), "{said}");
+    assert!(!said.contains("taken for"), "{said}");
+}
+
+#[test]
+fn a_table_larger_than_the_flash_budget_is_refused_by_name() {
+    let above = MOST_EXAMPLES + 1;
+    let room = format!("it has to be a whole number from 0 to {MOST_EXAMPLES}");
+    assert_refused("", &["train", "--synthetic", "--max", &above.to_string()], &room);
+    assert_refused("", &["train", "--synthetic", "--max", "9"], "too many examples for the flash budget");
+}
+
+#[test]
+fn objects_that_take_more_examples_than_the_flash_has_room_for_are_refused_by_name() {
+    // Plants and weeds like the squares of a chessboard, 200 of each; four objects a square, so that none is noise.
+    let square = |place: i32| {
+        let (spacing_mm, hold_mm) = (100 + place / 20 * 50, 100 + place % 20 * 10);
+        let label = if (place / 20 + place) % 2 == 0 { "plant" } else { "weed" };
+        format!("694,{spacing_mm},226,{hold_mm},500,{label}\n").repeat(4)
+    };
+    let chessboard: String = (0..400).map(square).collect();
+    for most in ["64".to_owned(), MOST_EXAMPLES.to_string()] {
+        let room = format!("and there is room for {most}: take out objects with a wrong label");
+        assert_refused(
+            &chessboard,
+            &["train", "objects.csv", "--max", &most],
+            "too many examples for the flash budget",
+        );
+        assert_refused(&chessboard, &["train", "objects.csv", "--max", &most], &room);
+    }
+}
+
+#[test]
+fn a_table_that_teaches_nothing_is_refused_with_file_and_line() {
+    let train = ["train", "objects.csv"];
+    assert_refused("", &train, "objects.csv, line 1: nothing stands below the header");
+    assert_refused("694,500,226,250,573,plant\n", &train, "objects.csv, line 2: up to here there is no label weed");
+    assert_refused("694,500,NaN,250,573,plant\n", &train, "objects.csv, line 2: delay_mm is `NaN`");
+}
+
+#[test]
+fn a_k_that_cannot_vote_is_refused() {
+    assert_refused("", &["train", "--synthetic", "--k", "16"], "it has to be auto or a number from 1 to 15");
+    assert_refused("", &["classify", "objects.csv", "--k", "0"], "it has to be a whole number from 1 to 15");
+}
+
+#[test]
+fn a_table_is_written_as_rust_or_csv_only() {
+    assert_refused(
+        "",
+        &["train", "--synthetic", "--out", "table.txt"],
+        "a table is written as Rust (.rs) or as CSV (.csv)",
+    );
+}
+
+#[test]
+fn objects_come_from_files_or_from_the_simulated_field() {
+    assert_refused("", &["train"], "FILE.csv");
+    assert_refused("", &["train", "objects.csv", "--synthetic"], "cannot be used with");
+}

@@ -1,0 +1,133 @@
+//! How a person drives a row: speed that wanders, stops on the way, and a wheel that slips.
+//!
+//! The row begins after a run-up, in which the machine gains its speed and the tool enters the ground, and ends when the tool
+//! has passed it. Turns at the row's end take time and no ground: they are a number, not a motion.
+
+use crate::conditions::Conditions;
+use crate::motion::{Motion, mm_s};
+use crate::planting::scatter;
+use rand::{Rng, RngExt};
+use std::ops::Range;
+
+/// How fast the machine gains speed, and how fast it brakes.
+const ACCELERATION_MM_S2: f64 = 500.0;
+const BRAKING_MM_S2: f64 = 1000.0;
+
+/// Distance over which speed and slip stay as they are, beside what changing the speed takes.
+const LEG_MM: Range<f64> = 1000.0..2000.0;
+
+/// Distance and time ahead of the row in which the machine rolls at its speed and the tool swings in.
+const RUN_UP_MM: f64 = 200.0;
+const SWING_IN_S: f64 = 0.6;
+
+/// Distance that the tool rolls on behind the row.
+const RUN_OUT_MM: f64 = 300.0;
+
+/// A stop takes its mean time within this share.
+const STOP_SCATTER: f64 = 0.5;
+
+/// A row, driven.
+#[derive(Clone, Debug)]
+pub struct Drive {
+    /// The machine's motion: its position is the ground below the beam.
+    pub motion: Motion,
+    /// How long the tool takes for the row, stops included.
+    pub row_s: f64,
+    /// How long the turn behind it takes.
+    pub turn_s: f64,
+}
+
+/// Drives the ground of a row at a mean speed.
+pub fn drive(conditions: &Conditions, span_mm: &Range<f64>, speed_km_h: f64, rng: &mut impl Rng) -> Drive {
+    let Conditions { ground, driving, machine, .. } = conditions;
+    let wander = |rng: &mut _| mm_s(speed_km_h) * (1.0 + scatter(rng, driving.speed_scatter_percent / 100.0));
+    let fastest_mm_s = mm_s(speed_km_h) * (1.0 + driving.speed_scatter_percent / 100.0);
+    // To gain the highest speed and to lose it.
+    let change_mm = fastest_mm_s.powi(2) * (0.5 / ACCELERATION_MM_S2 + 0.5 / BRAKING_MM_S2);
+    let speed_mm_s = wander(rng);
+    let run_up_mm = RUN_UP_MM + SWING_IN_S * speed_mm_s + speed_mm_s.powi(2) / (2.0 * ACCELERATION_MM_S2);
+    // No braking before the tool is out of the row.
+    let braking_mm = fastest_mm_s.powi(2) * 0.5 / BRAKING_MM_S2;
+    let end_mm = span_mm.end + machine.beam_to_tool_mm + RUN_OUT_MM + braking_mm;
+    let mut motion = Motion::starting_at(span_mm.start - run_up_mm).change_speed(speed_mm_s, ACCELERATION_MM_S2);
+    loop {
+        let leg_mm = change_mm + rng.random_range(LEG_MM);
+        let stops = rng.random_bool((driving.stops_per_100_m * leg_mm / 1e5).min(1.0));
+        let speed_mm_s = wander(rng);
+        let leg_end_mm = motion.end_mm() + leg_mm;
+        // The last leg ends where the motion does.
+        if leg_end_mm + change_mm > end_mm {
+            break;
+        }
+        motion = if stops {
+            let stop_s = driving.stop_s * (1.0 + scatter(rng, STOP_SCATTER));
+            motion.stop_at(leg_end_mm, BRAKING_MM_S2).go_on_for(stop_s)
+        } else {
+            motion.roll_to(leg_end_mm)
+        };
+        motion = motion.change_speed(speed_mm_s, ACCELERATION_MM_S2);
+    }
+    let slip = |rng: &mut _| (ground.slip_percent + scatter(rng, ground.slip_scatter_percent)).clamp(0.0, 90.0) / 100.0;
+    let motion = motion.stop_at(end_mm, BRAKING_MM_S2).with_slip(|| slip(rng));
+    let passed_s = |place_mm: f64| {
+        let passings = motion.passings(place_mm + machine.beam_to_tool_mm);
+        passings.first().map_or(0.0, |passing| passing.time_s)
+    };
+    let row_s = passed_s(span_mm.end) - passed_s(span_mm.start);
+    let turn_s = driving.turn_s * (1.0 + scatter(rng, STOP_SCATTER));
+    Drive { motion, row_s, turn_s }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    fn driven(conditions: &Conditions, speed_km_h: f64) -> Drive {
+        drive(conditions, &(0.0..20_000.0), speed_km_h, &mut ChaCha8Rng::seed_from_u64(5))
+    }
+
+    #[test]
+    fn without_scatter_and_stops_a_row_takes_its_length_over_its_speed() {
+        let drive = driven(&Conditions::preset("even-stand").unwrap().unwrap(), 2.0);
+        assert!((drive.row_s - 36.0).abs() < 1e-9, "{} s", drive.row_s);
+        assert!((3.0..9.0).contains(&drive.turn_s));
+        let fast = driven(&Conditions::preset("even-stand").unwrap().unwrap(), 8.0);
+        assert!((fast.row_s - 9.0).abs() < 1e-9, "{} s", fast.row_s);
+    }
+
+    #[test]
+    fn speed_wanders_within_its_scatter_and_stops_take_time() {
+        let mut conditions = Conditions::default();
+        conditions.set("driving.stops_per_100_m", 50.0).unwrap();
+        let drive = driven(&conditions, 2.0);
+        assert!(drive.motion.top_speed_mm_s() <= mm_s(2.0) * 1.08);
+        assert!(drive.row_s > 36.0 / 1.08 + 10.0, "{} s", drive.row_s);
+    }
+
+    #[test]
+    fn the_wheel_turns_farther_by_its_slip() {
+        let drive = driven(&Conditions::default(), 1.0);
+        let (rolled_mm, turned_mm) = (
+            drive.motion.end_mm() - drive.motion.start_mm(),
+            drive.motion.wheel_mm(drive.motion.duration_s()) - drive.motion.start_mm(),
+        );
+        let slip_percent = 100.0 * (1.0 - rolled_mm / turned_mm);
+        // The mean of some ten legs within 3 % of it.
+        assert!((slip_percent - 5.0).abs() < 2.0, "{slip_percent} %");
+    }
+
+    #[test]
+    fn even_the_fastest_row_and_the_shortest_can_be_driven() {
+        let mut conditions = Conditions::default();
+        conditions.set("driving.stops_per_100_m", 50.0).unwrap();
+        conditions.set("driving.speed_scatter_percent", 50.0).unwrap();
+        for seed in 0..200 {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let drive = drive(&conditions, &(0.0..2000.0), 5.0, &mut rng);
+            let least_s = 2.0 / (mm_s(5.0) * 1.5 / 1000.0);
+            assert!(drive.row_s >= least_s, "{} s", drive.row_s);
+        }
+    }
+}

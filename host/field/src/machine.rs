@@ -1,0 +1,358 @@
+//! The machine between row and firmware: wheel, encoder, beam, servo, arm and tool.
+//!
+//! The machine's position `p` is a place along the row: the beam sees the ground at `p`, and the tool works the ground at
+//! `p` less the distance from beam to tool. Rolling along a [`Motion`] past a [`Row`], the machine gives the firmware the
+//! levels of its encoder and its beam as a list of [`PinChange`]s. The motion does not depend on what the firmware does,
+//! so the list is complete before the firmware runs.
+//!
+//! The arm swings sideways about a pivot beside the row. At an angle `a` the tool's middle is `arm * sin(a)` beside the
+//! row's line, so the tool works the line while that is less than half its width. It is *clear* of the row only when it is
+//! fully out: that is the strict measure by which a trial judges plants, since canopies reach sideways as well.
+//!
+//! The encoder has no jitter; where its disc is dirty, pulses of its channel A are missing.
+
+use crate::motion::{Motion, marks};
+use crate::row::Row;
+use crate::servo::{OUT_DEGREES, Servo, Stroke};
+use crate::wiring;
+use rand::rngs::Xoshiro256PlusPlus;
+use rand::{RngExt, SeedableRng};
+use signal::{CYCLES_PER_SECOND, PinChange};
+use std::f64::consts::PI;
+use std::ops::Range;
+
+/// Dimensions of the machine.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Machine {
+    /// Diameter of the ground wheel.
+    pub wheel_mm: f64,
+    /// Encoder counts (edges of both channels) in a turn of the wheel.
+    pub ticks_per_rev: u32,
+    /// Distance from the beam back to the tool: the paper's X.
+    pub beam_to_tool_mm: f64,
+    /// Time after which the beam's sensor reports a change. A change that lasts less is not reported.
+    pub beam_response_ms: f64,
+    /// The servo.
+    pub servo: Servo,
+    /// Length of the arm from its pivot to the tool.
+    pub arm_mm: f64,
+    /// Width of the tool, across the row.
+    pub tool_width_mm: f64,
+    /// Dirt on the encoder's disc.
+    pub dirt: Dirt,
+}
+
+/// Dirt that hides slots of the encoder's disc from channel A, by chance: a hidden pulse loses four counts.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Dirt {
+    /// Share of the pulses that are hidden, from 0 to 1.
+    pub share: f64,
+    /// Which of all the possible discs.
+    pub seed: u64,
+}
+
+/// Counts of a pulse: both edges of both channels.
+const PULSE_TICKS: i64 = 4;
+
+impl Dirt {
+    /// Whether pulse number `pulse` is hidden: always the same ones for the same seed. It is asked for each pulse of a row, so
+    /// its chance is a quick one.
+    pub fn hides(&self, pulse: i64) -> bool {
+        self.share > 0.0
+            && Xoshiro256PlusPlus::seed_from_u64(self.seed ^ pulse.cast_unsigned())
+                .random_bool(self.share.clamp(0.0, 1.0))
+    }
+}
+
+impl Default for Machine {
+    fn default() -> Self {
+        Self {
+            wheel_mm: 400.0,
+            ticks_per_rev: 2400,
+            beam_to_tool_mm: 400.0,
+            beam_response_ms: 1.0,
+            servo: Servo::default(),
+            arm_mm: 350.0,
+            tool_width_mm: 55.0,
+            dirt: Dirt::default(),
+        }
+    }
+}
+
+/// An arm within this angle of fully out is fully out: a tenth of a millimetre at the tool's end.
+const CLEAR_WITHIN_DEGREES: f64 = 0.02;
+
+impl Machine {
+    /// Distance rolled between two encoder counts.
+    pub fn tick_mm(&self) -> f64 {
+        PI * self.wheel_mm / f64::from(self.ticks_per_rev)
+    }
+
+    /// Ground under the tool when the machine is at `position_mm`.
+    pub fn tool_mm(&self, position_mm: f64) -> f64 {
+        position_mm - self.beam_to_tool_mm
+    }
+
+    /// Counts of a clean encoder, net, from the beginning of a motion to a time.
+    pub fn ticks(&self, motion: &Motion, time_s: f64) -> i64 {
+        marks(motion.wheel_mm(time_s) - motion.start_mm(), self.tick_mm())
+    }
+
+    /// The pulse in which a clean encoder is at a count.
+    pub fn pulse(&self, clean_ticks: i64) -> i64 {
+        clean_ticks.div_euclid(PULSE_TICKS)
+    }
+
+    /// Counts of those of the pulses that dirt hides.
+    pub fn hidden_ticks(&self, pulses: Range<i64>) -> i64 {
+        pulses.filter(|&pulse| self.dirt.hides(pulse)).count() as i64 * PULSE_TICKS
+    }
+
+    /// Counts that are missing so far of the hidden pulse in which a clean encoder is: while A is hidden, B alone counts one back
+    /// and then one forward.
+    pub fn hidden_in_pulse(&self, clean_ticks: i64) -> i64 {
+        [0, 1, 3, 4][clean_ticks.rem_euclid(PULSE_TICKS) as usize]
+    }
+
+    /// How far the tool's middle is beside the row's line at an angle.
+    pub fn across_mm(&self, degrees: f64) -> f64 {
+        self.arm_mm * degrees.to_radians().sin()
+    }
+
+    /// Angle from which on the tool no longer works the row's line.
+    pub fn line_degrees(&self) -> f64 {
+        (self.tool_width_mm / 2.0 / self.arm_mm).min(1.0).asin().to_degrees()
+    }
+
+    /// Share of a stroke during which the tool does not work the row's line.
+    pub fn idle_share_of_stroke(&self) -> f64 {
+        (1.0 - self.line_degrees() / OUT_DEGREES).max(0.0)
+    }
+
+    /// The times within `during_s` at which the tool is not fully out.
+    pub fn times_not_clear_s(&self, stroke: &Stroke, during_s: &Range<f64>) -> Vec<Range<f64>> {
+        stroke.times_below_s(OUT_DEGREES - CLEAR_WITHIN_DEGREES, during_s)
+    }
+
+    /// The times within `during_s` at which the tool works the row's line.
+    pub fn times_weeding_s(&self, stroke: &Stroke, during_s: &Range<f64>) -> Vec<Range<f64>> {
+        stroke.times_below_s(self.line_degrees(), during_s)
+    }
+
+    /// The beam's level at power-up, before the motion begins.
+    pub fn beam_before(&self, row: &Row, motion: &Motion) -> PinChange {
+        let broken = row.blocks_mm().iter().any(|block| block.contains(&motion.start_mm()));
+        PinChange { cycle: 0, pin: wiring::BEAM, high: !broken }
+    }
+
+    /// What the encoder and the beam do to their pins while the machine rolls past the row, in order of time.
+    ///
+    /// The motion begins at `start_cycle`, with the encoder at rest and the beam as [`Machine::beam_before`] says.
+    pub fn pin_changes(&self, row: &Row, motion: &Motion, start_cycle: u64) -> Vec<PinChange> {
+        let mut changes = self.encoder_changes(motion, start_cycle);
+        changes.extend(self.beam_changes(row, motion, start_cycle));
+        changes.sort_by_key(|change| change.cycle);
+        changes
+    }
+
+    /// Quadrature: forward is AB = 00, 10, 11, 01, 00, a count an edge.
+    fn encoder_changes(&self, motion: &Motion, start_cycle: u64) -> Vec<PinChange> {
+        let mut ticks = 0_i64;
+        motion
+            .mark_passings(self.tick_mm())
+            .into_iter()
+            .filter_map(|passing| {
+                let before = ticks;
+                ticks += if passing.forward { 1 } else { -1 };
+                let (phase, cycle) = (ticks.rem_euclid(PULSE_TICKS), cycle_at(start_cycle, passing.time_s));
+                if channel_a(before.rem_euclid(PULSE_TICKS)) == channel_a(phase) {
+                    return Some(PinChange { cycle, pin: wiring::ENCODER_B, high: channel_b(phase) });
+                }
+                let hidden = self.dirt.hides(ticks.min(before).div_euclid(PULSE_TICKS));
+                (!hidden).then_some(PinChange { cycle, pin: wiring::ENCODER_A, high: channel_a(phase) })
+            })
+            .collect()
+    }
+
+    /// The beam's line, low while the beam is broken, later than the leaves by the sensor's response.
+    pub fn beam_changes(&self, row: &Row, motion: &Motion, start_cycle: u64) -> Vec<PinChange> {
+        let response_s = self.beam_response_ms / 1000.0;
+
+        // Each end of a leaf that is passed toggles the beam, in whatever direction.
+        let mut toggles_s: Vec<f64> = row
+            .blocks_mm()
+            .into_iter()
+            .flat_map(|block| [block.start, block.end])
+            .flat_map(|end_mm| motion.passings(end_mm))
+            .map(|passing| passing.time_s)
+            .collect();
+        toggles_s.sort_by(f64::total_cmp);
+        let mut reported_s: Vec<f64> = Vec::with_capacity(toggles_s.len());
+        for time_s in toggles_s {
+            match reported_s.last() {
+                // The sensor had not yet reported the change that this one takes back.
+                Some(last_s) if time_s - last_s < response_s => {
+                    reported_s.pop();
+                }
+                _ => reported_s.push(time_s),
+            }
+        }
+
+        let high_before = self.beam_before(row, motion).high;
+        reported_s
+            .into_iter()
+            .enumerate()
+            .map(|(index, time_s)| PinChange {
+                cycle: cycle_at(start_cycle, time_s + response_s),
+                pin: wiring::BEAM,
+                high: high_before == (index % 2 == 1),
+            })
+            .collect()
+    }
+}
+
+/// Level of channel A in the four phases of forward motion.
+fn channel_a(phase: i64) -> bool {
+    matches!(phase, 1 | 2)
+}
+
+/// Level of channel B in the four phases of forward motion.
+fn channel_b(phase: i64) -> bool {
+    matches!(phase, 2 | 3)
+}
+
+/// The cycle of the Uno's clock at a motion's time.
+pub fn cycle_at(start_cycle: u64, time_s: f64) -> u64 {
+    start_cycle.saturating_add_signed((time_s * CYCLES_PER_SECOND as f64).round() as i64)
+}
+
+/// A motion's time at a cycle of the Uno's clock.
+pub fn time_at_s(start_cycle: u64, cycle: u64) -> f64 {
+    (cycle as f64 - start_cycle as f64) / CYCLES_PER_SECOND as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::motion::mm_s;
+    use crate::row::Thing;
+
+    const START_CYCLE: u64 = 1_000_000;
+
+    /// Counts of a decoder that takes each pair of levels as they come.
+    fn decode(changes: &[PinChange]) -> i64 {
+        const FORWARD: [(bool, bool); 4] = [(false, false), (true, false), (true, true), (false, true)];
+        let phase = |levels| FORWARD.iter().position(|&pair| pair == levels).unwrap();
+        let (mut levels, mut count) = ((false, false), 0);
+        for change in changes {
+            let before = phase(levels);
+            match change.pin {
+                wiring::ENCODER_A => levels.0 = change.high,
+                wiring::ENCODER_B => levels.1 = change.high,
+                _ => continue,
+            }
+            count += match (phase(levels) + 4 - before) % 4 {
+                0 => 0,
+                1 => 1,
+                3 => -1,
+                _ => panic!("both channels changed at once"),
+            };
+        }
+        count
+    }
+
+    fn beam(changes: &[PinChange]) -> Vec<PinChange> {
+        changes.iter().copied().filter(|change| change.pin == wiring::BEAM).collect()
+    }
+
+    fn row() -> Row {
+        Row::new(vec![Thing::plant(500.0, 150.0), Thing::weed(800.0, 15.0)]).unwrap()
+    }
+
+    #[test]
+    fn what_dirt_hides_is_missing_from_the_pins_as_from_the_count() {
+        let machine = Machine { dirt: Dirt { share: 0.05, seed: 3 }, ..Machine::default() };
+        let motion = Motion::steady(0.0, 1000.0, 500.0, 1000.0).change_speed(0.0, 1000.0);
+        let changes = machine.encoder_changes(&motion, START_CYCLE);
+        let clean = machine.ticks(&motion, motion.duration_s());
+        let missing = |ticks: i64| {
+            let pulse = machine.pulse(ticks);
+            let in_pulse = if machine.dirt.hides(pulse) { machine.hidden_in_pulse(ticks) } else { 0 };
+            machine.hidden_ticks(0..pulse) + in_pulse
+        };
+        assert!((60..160).contains(&missing(clean)), "{} of {clean}", missing(clean));
+        assert_eq!(decode(&changes), clean - missing(clean));
+        // Half way as well, wherever in a pulse that is.
+        for passing in motion.mark_passings(machine.tick_mm()).iter().skip(600).take(200) {
+            let so_far = changes.iter().filter(|change| change.cycle <= cycle_at(START_CYCLE, passing.time_s));
+            let ticks = machine.ticks(&motion, passing.time_s + 1e-7);
+            assert_eq!(decode(&so_far.copied().collect::<Vec<_>>()), ticks - missing(ticks));
+        }
+    }
+
+    #[test]
+    fn a_metre_is_1910_counts() {
+        let motion = Motion::steady(0.0, 1000.0, mm_s(2.5), 1000.0);
+        let changes = Machine::default().pin_changes(&row(), &motion, START_CYCLE);
+        assert_eq!(decode(&changes), 1910);
+    }
+
+    #[test]
+    fn rolling_back_counts_down() {
+        let motion = Motion::starting_at(0.0)
+            .change_speed(500.0, 1000.0)
+            .stop_at(700.0, 1000.0)
+            .change_speed(-500.0, 1000.0)
+            .roll_to(-1000.0);
+        let machine = Machine::default();
+        let changes = machine.pin_changes(&row(), &motion, START_CYCLE);
+        assert_eq!(decode(&changes), -1910);
+        assert_eq!(machine.ticks(&motion, motion.duration_s()), -1910);
+    }
+
+    #[test]
+    fn the_beam_reports_each_thing_at_its_edges_a_millisecond_late() {
+        let motion = Motion::steady(0.0, 1000.0, mm_s(2.0), 1200.0);
+        let beam = beam(&Machine::default().pin_changes(&row(), &motion, START_CYCLE));
+        let levels: Vec<bool> = beam.iter().map(|change| change.high).collect();
+        assert_eq!(levels, [false, true, false, true]);
+        for (change, place_mm) in beam.iter().zip([425.0, 575.0, 792.5, 807.5]) {
+            let time_s = time_at_s(START_CYCLE, change.cycle) - 0.001;
+            assert!((motion.position_mm(time_s) - place_mm).abs() < 0.001, "{place_mm} mm");
+        }
+    }
+
+    #[test]
+    fn a_beam_that_is_broken_at_the_start_is_low_from_power_up_on() {
+        let motion = Motion::steady(500.0, 1000.0, mm_s(2.0), 700.0);
+        let machine = Machine::default();
+        let beam = beam(&machine.pin_changes(&row(), &motion, START_CYCLE));
+        assert!(!machine.beam_before(&row(), &motion).high);
+        assert!(beam.len() == 1 && beam[0].high);
+    }
+
+    #[test]
+    fn a_gap_shorter_than_the_sensors_response_is_not_seen() {
+        let mut plant = Thing::plant(500.0, 150.0);
+        // At 1 km/h a millisecond is 0.28 mm.
+        plant.leaves = vec![425.0..470.0, 470.2..520.0, 521.0..575.0];
+        let row = Row::new(vec![plant]).unwrap();
+        let motion = Motion::steady(0.0, 1000.0, mm_s(1.0), 1000.0);
+        let beam = beam(&Machine::default().pin_changes(&row, &motion, START_CYCLE));
+        assert_eq!(beam.len(), 4, "the plant and one gap of two");
+    }
+
+    #[test]
+    fn changes_come_in_order_of_time() {
+        let motion = Motion::steady(0.0, 1000.0, mm_s(2.5), 1000.0);
+        let changes = Machine::default().pin_changes(&row(), &motion, START_CYCLE);
+        assert!(changes.is_sorted_by_key(|change| change.cycle));
+    }
+
+    #[test]
+    fn the_tool_leaves_the_row_s_line_early_in_its_stroke() {
+        let machine = Machine::default();
+        assert!((machine.line_degrees() - 4.506).abs() < 0.001);
+        assert!((machine.idle_share_of_stroke() - 0.9).abs() < 0.001);
+    }
+}

@@ -1,0 +1,149 @@
+//! Other controllers for the same field, to hold the firmware against: the paper's, and one that knows everything.
+//!
+//! The paper's sketch was never published. [`as_in_the_paper`] is what its text describes, in the kindest reading: one slot holds
+//! the place at which to swing out and the place at which to come back (Eq. 1 to 3), a loop polls beam and encoder, nothing is
+//! led, and the Arduino's servo library shows a new pulse in the next frame. It measures the next canopy while the slot is
+//! still in use, closes the gaps in a canopy as the firmware does, and takes no weed for a plant.
+//!
+//! Where the beam stands nearer to the tool than a canopy is wide, it is late for another reason than its authors knew.
+//!
+//! [`all_knowing`] knows where each stem stands and what the servo may take: it has the tool out over the zones round the stems, by the
+//! servo's slowest swing, and in the row everywhere else. What it damages nobody could keep, and what it weeds nobody can have more of
+//! without a risk. Both have the machine of the [`Trial`], with the same servo.
+
+use crate::ground::union;
+use crate::machine::Machine;
+use crate::servo::Servo;
+use crate::stand::Stem;
+use crate::trial::Trial;
+use crate::twin::{Sensors, ServoLine};
+use control::servo;
+use signal::Pulse;
+use std::ops::Range;
+
+/// A turn of the paper's loop: `Arduino_KNN` takes 92,309 cycles for 32 examples, measured on the Uno.
+const PAPER_TURN_S: f64 = 92_309.0 / 16e6;
+
+/// Ground that the paper leaves alone on both sides of a canopy.
+const PAPER_MARGIN_MM: f64 = 50.0;
+
+/// Clear stretches shorter than this belong to the canopy: the firmware's default.
+const GAP_MM: f64 = 21.0;
+
+/// Objects narrower than this are no plants: half way between the built-in examples' widest weed and narrowest plant.
+const NARROWEST_PLANT_MM: f64 = 60.0;
+
+/// A turn of the loop that knows everything.
+const TURN_S: f64 = 0.001;
+
+/// Shortest gap between two servo pulses, the firmware's default; 0 for fixed frames.
+const SERVO_GAP_MS: u8 = 3;
+
+/// The paper's controller weeds the trial's row: the first of the servo's pulses of each width.
+pub fn as_in_the_paper(trial: &Trial) -> Vec<Pulse> {
+    let Machine { beam_to_tool_mm, servo, .. } = trial.machine;
+    let tick_mm = trial.machine.tick_mm();
+    let ticks = |mm: f64| (mm / tick_mm).round() as i64;
+    let (delay, hold) = (ticks(beam_to_tool_mm - PAPER_MARGIN_MM), ticks(2.0 * PAPER_MARGIN_MM));
+    let mut sensors = Sensors::new(trial);
+    let mut broken = !trial.machine.beam_before(&trial.row, &trial.motion).high;
+    let mut canopy: Option<Range<i64>> = None;
+    let mut slot: Option<Range<i64>> = None;
+    swing(trial, servo, PAPER_TURN_S, 0, |time_s| {
+        while let Some((_, is_broken)) = sensors.next_edge(time_s) {
+            broken = is_broken;
+        }
+        let position = sensors.position(time_s);
+        match &mut canopy {
+            None if broken => canopy = Some(position..position),
+            Some(canopy) if broken => canopy.end = position,
+            Some(Range { start, end }) if position - *end >= ticks(GAP_MM) => {
+                let (start, width) = (*start, *end - *start);
+                if width >= ticks(NARROWEST_PLANT_MM) {
+                    let out = start + delay;
+                    slot = Some(out..out + width + hold);
+                }
+                canopy = None;
+            }
+            _ => {}
+        }
+        slot.as_ref().is_some_and(|slot| slot.contains(&position))
+    })
+}
+
+/// Whoever knows where each stem stands weeds the trial's row: the first of the servo's pulses of each width.
+pub fn all_knowing(trial: &Trial, stems: &[Stem]) -> Vec<Pulse> {
+    let Trial { machine, motion, .. } = trial;
+    let Servo { dead_time_ms, travel_ms, scatter, out_us, .. } = machine.servo;
+    // A command may wait for a pulse and the gap behind it, and the loop for its turn.
+    let wait_s = (out_us / 1000.0 + f64::from(SERVO_GAP_MS)) / 1000.0 + 2.0 * TURN_S;
+    let slowest_s = (dead_time_ms + scatter.dead_time_ms + travel_ms * (1.0 + scatter.load)) / 1000.0 + wait_s;
+    let quickest_s = ((dead_time_ms - scatter.dead_time_ms) / 1000.0).max(0.0);
+    let passed_s = |place_mm: f64| Some(motion.passings(place_mm + machine.beam_to_tool_mm).first()?.time_s);
+    let zones =
+        union(stems.iter().map(|stem| stem.along_mm - stem.protected_mm..stem.along_mm + stem.protected_mm).collect());
+    let windows: Vec<Range<f64>> = zones
+        .into_iter()
+        .filter_map(|zone| Some(passed_s(zone.start)? - slowest_s..passed_s(zone.end)? - quickest_s))
+        .collect();
+    // A tool that has no time to be in the row and out again stays out.
+    let swings_s = union(windows.into_iter().map(|window| window.start..window.end + slowest_s).collect());
+    let mut next = 0;
+    swing(trial, machine.servo, TURN_S, SERVO_GAP_MS, |time_s| {
+        while swings_s.get(next).is_some_and(|swing| swing.end - slowest_s <= time_s) {
+            next += 1;
+        }
+        swings_s.get(next).is_some_and(|swing| swing.start <= time_s)
+    })
+}
+
+/// A loop that has the tool out whenever `is_out` at the time of a turn says so. It begins in the row.
+fn swing(trial: &Trial, servo: Servo, turn_s: f64, gap_ms: u8, mut is_out: impl FnMut(f64) -> bool) -> Vec<Pulse> {
+    let width = |microseconds: f64| servo::from_us(microseconds.round() as u16);
+    let mut line = ServoLine::new(width(servo.in_us), gap_ms);
+    let turns = (trial.motion.duration_s() / turn_s).ceil() as u64;
+    for turn in 0..=turns {
+        let time_s = turn as f64 * turn_s;
+        line.command(width(if is_out(time_s) { servo.out_us } else { servo.in_us }), time_s);
+    }
+    line.into_pulses()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::motion::mm_s;
+    use crate::row::{Row, Thing};
+    use crate::verdict::{Timing, Verdict, judge};
+
+    const PLACES: [f64; 8] = [500.0, 1000.0, 1500.0, 2000.0, 2500.0, 3000.0, 3500.0, 4000.0];
+
+    /// Plants over whose canopy the tool was not fully out.
+    fn reached_by(controller: impl Fn(&Trial) -> Vec<Pulse>, speed_km_h: f64) -> usize {
+        let row = Row::new(PLACES.map(|place_mm| Thing::plant(place_mm, 150.0)).to_vec()).unwrap();
+        let trial = Trial::at_speed(row, Machine::default(), Timing::default(), mm_s(speed_km_h));
+        let pulses = controller(&trial);
+        let judgement = judge(&trial.row, &trial.machine, &trial.motion, trial.timing, &pulses, 0);
+        assert!(judgement.weeded_share > 0.1);
+        judgement.count(Verdict::Damaged)
+    }
+
+    #[test]
+    fn who_knows_everything_has_the_tool_out_over_whatever_zone_is_to_be_kept() {
+        for speed_km_h in [1.0, 1.5, 2.0, 2.5, 3.0] {
+            let reached = |protected_mm: f64| {
+                let stems = PLACES.map(|along_mm| Stem { along_mm, across_mm: 0.0, protected_mm });
+                reached_by(|trial| all_knowing(trial, &stems), speed_km_h)
+            };
+            // As wide as the canopy, and narrower.
+            assert_eq!(reached(75.0), 0, "at {speed_km_h} km/h");
+            assert_eq!(reached(40.0), PLACES.len(), "at {speed_km_h} km/h");
+        }
+    }
+
+    #[test]
+    fn the_papers_controller_serves_every_plant_and_is_too_late_for_all_of_them_at_speed() {
+        assert_eq!(reached_by(as_in_the_paper, 0.5), 0);
+        assert_eq!(reached_by(as_in_the_paper, 2.5), 8);
+    }
+}

@@ -1,0 +1,376 @@
+//! What stands in a crop row, as the beam sees it: crop plants and tall weeds, each with its place along the row and its
+//! width at the beam's height.
+//!
+//! A [`Row`] comes from a list, from a CSV file of measured plants or, with [`Planting`](crate::planting::Planting), from a
+//! seed. Things in a row stand apart: where canopies close up, the beam sees one object, and so does the row. Weeds that
+//! are too short for the beam are not in it: they are the ground that the tool works. What flies past the beam without
+//! standing anywhere (clods, insects, dust) may be added ([`Row::with_dust`]).
+//!
+//! All places are millimetres along the ground, from an origin of the row's own.
+
+use crate::ground::union;
+use files::CsvTable;
+use serde::Serialize;
+use std::fmt;
+use std::io;
+use std::ops::Range;
+use std::path::Path;
+use std::str::FromStr;
+use thiserror::Error;
+
+pub use files::TableError;
+
+/// Widest thing that a row takes. Wider than any crop plant that is weeded between.
+pub const MAX_WIDTH_MM: f64 = 1000.0;
+
+/// Farthest from the origin that a thing stands, 10 km: farther than any row goes.
+pub const MAX_POSITION_MM: f64 = 1e7;
+
+/// Longest row, 6 km. What simulates one keeps every edge of the encoder on the way.
+pub const MAX_LENGTH_MM: f64 = 6e6;
+
+/// What a thing in the row is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kind {
+    /// A crop plant: the tool has to go round it.
+    Plant,
+    /// A weed tall enough to break the beam: the tool should not go round it.
+    Weed,
+}
+
+impl fmt::Display for Kind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Kind::Plant => "plant",
+            Kind::Weed => "weed",
+        })
+    }
+}
+
+/// A text is neither `plant` nor `weed`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[error("it has to be plant or weed")]
+pub struct UnknownKind;
+
+impl FromStr for Kind {
+    type Err = UnknownKind;
+
+    fn from_str(text: &str) -> Result<Self, UnknownKind> {
+        [Kind::Plant, Kind::Weed].into_iter().find(|kind| kind.to_string() == text).ok_or(UnknownKind)
+    }
+}
+
+/// A plant or a tall weed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Thing {
+    /// Its centre along the row.
+    pub position_mm: f64,
+    /// Its width at the beam's height: for a crop plant the canopy's.
+    pub width_mm: f64,
+    /// What it is.
+    pub kind: Kind,
+    /// Where within its width leaves break the beam, as places along the row in ascending order. Empty for a thing
+    /// without gaps.
+    pub leaves: Vec<Range<f64>>,
+}
+
+impl Thing {
+    /// A crop plant with a closed canopy.
+    pub fn plant(position_mm: f64, width_mm: f64) -> Self {
+        Self { position_mm, width_mm, kind: Kind::Plant, leaves: Vec::new() }
+    }
+
+    /// A tall weed.
+    pub fn weed(position_mm: f64, width_mm: f64) -> Self {
+        Self { position_mm, width_mm, kind: Kind::Weed, leaves: Vec::new() }
+    }
+
+    /// The stretch of ground below it.
+    pub fn span_mm(&self) -> Range<f64> {
+        self.position_mm - self.width_mm / 2.0..self.position_mm + self.width_mm / 2.0
+    }
+
+    /// The stretches where it breaks the beam.
+    pub fn blocks_mm(&self) -> Vec<Range<f64>> {
+        if self.leaves.is_empty() { vec![self.span_mm()] } else { self.leaves.clone() }
+    }
+
+    fn check(&self) -> Result<(), Problem> {
+        // A position that is no number is in no range.
+        if !(-MAX_POSITION_MM..=MAX_POSITION_MM).contains(&self.position_mm) {
+            return Err(Problem::Position(self.position_mm));
+        }
+        if !(self.width_mm > 0.0 && self.width_mm <= MAX_WIDTH_MM) {
+            return Err(Problem::Width(self.width_mm));
+        }
+        Ok(())
+    }
+
+    /// Whether a row that begins with `first` is still one if it goes up to this.
+    fn check_length(&self, first: &Thing) -> Result<(), Problem> {
+        let length_mm = self.position_mm - first.position_mm;
+        if length_mm <= MAX_LENGTH_MM { Ok(()) } else { Err(Problem::Length(length_mm)) }
+    }
+
+    /// Whether it comes after `before`, and stands apart from it.
+    fn check_after(&self, before: &Thing) -> Result<(), Problem> {
+        if before.span_mm().end < self.span_mm().start {
+            Ok(())
+        } else {
+            Err(Problem::Overlap {
+                kind: self.kind,
+                position_mm: self.position_mm,
+                other: before.kind,
+                other_mm: before.position_mm,
+            })
+        }
+    }
+}
+
+/// What is wrong with a thing or a row, and what would be right.
+#[derive(Debug, Error, PartialEq)]
+pub enum Problem {
+    /// The place is not a number, or farther off than rows go.
+    #[error("position_mm is {0}: it has to be from -{MAX_POSITION_MM} to {MAX_POSITION_MM}, millimetres along the row")]
+    Position(f64),
+    /// The width is none.
+    #[error("width_mm is {0}: it has to be above 0 and at most {MAX_WIDTH_MM} mm")]
+    Width(f64),
+    /// Two things share ground.
+    #[error(
+        "the {kind} at {position_mm} mm and the {other} at {other_mm} mm overlap: \
+         each has to end before the next begins (what has grown together is one line)"
+    )]
+    Overlap {
+        /// The later thing.
+        kind: Kind,
+        /// The later thing's place.
+        position_mm: f64,
+        /// The earlier thing.
+        other: Kind,
+        /// The earlier thing's place.
+        other_mm: f64,
+    },
+    /// The row is too long.
+    #[error("the row is {} m long: it has to be at most {} m", (.0 / 1000.0).ceil(), MAX_LENGTH_MM / 1000.0)]
+    Length(f64),
+    /// The row is empty.
+    #[error("nothing stands in the row: it has to have at least one plant or weed")]
+    Empty,
+}
+
+/// A line of a row's CSV file.
+#[derive(Debug, Serialize)]
+struct Record {
+    position_mm: f64,
+    width_mm: f64,
+    kind: Kind,
+}
+
+/// The columns of a row's CSV file.
+const COLUMNS: [&str; 3] = ["position_mm", "width_mm", "kind"];
+
+/// Plants and tall weeds in the order in which the machine meets them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row {
+    things: Vec<Thing>,
+    dust_mm: Vec<Range<f64>>,
+    /// Where its ends are known.
+    ground_mm: Option<Range<f64>>,
+}
+
+impl Row {
+    /// A row of things, in any order.
+    ///
+    /// # Errors
+    /// Where there are none, one is malformed, or two overlap.
+    pub fn new(mut things: Vec<Thing>) -> Result<Self, Problem> {
+        if things.is_empty() {
+            return Err(Problem::Empty);
+        }
+        things.iter().try_for_each(Thing::check)?;
+        things.sort_by(|a, b| a.position_mm.total_cmp(&b.position_mm));
+        things.windows(2).try_for_each(|pair| pair[1].check_after(&pair[0]))?;
+        things.iter().try_for_each(|thing| thing.check_length(&things[0]))?;
+        Ok(Self { things, dust_mm: Vec::new(), ground_mm: None })
+    }
+
+    /// The same row, which begins and ends where this ground does.
+    pub fn on_ground(self, ground_mm: Range<f64>) -> Self {
+        Self { ground_mm: Some(ground_mm), ..self }
+    }
+
+    /// The same row with dust that breaks the beam over these stretches.
+    pub fn with_dust(self, dust_mm: Vec<Range<f64>>) -> Self {
+        Self { dust_mm, ..self }
+    }
+
+    /// The stretches over which the beam is broken, in ascending order and without overlaps.
+    pub fn blocks_mm(&self) -> Vec<Range<f64>> {
+        union(self.things.iter().flat_map(Thing::blocks_mm).chain(self.dust_mm.iter().cloned()).collect())
+    }
+
+    /// What stands in the first `length_mm` of the row's ground; none where nothing does.
+    pub fn beginning(&self, length_mm: f64) -> Option<Self> {
+        let end_mm = self.span_mm().start + length_mm;
+        let things: Vec<Thing> = self.things.iter().filter(|thing| thing.span_mm().end < end_mm).cloned().collect();
+        (!things.is_empty()).then_some(Self {
+            things,
+            dust_mm: Vec::new(),
+            ground_mm: Some(self.span_mm().start..end_mm),
+        })
+    }
+
+    /// Everything that stands in the row, in ascending order of place.
+    pub fn things(&self) -> &[Thing] {
+        &self.things
+    }
+
+    /// The crop plants, in ascending order of place.
+    pub fn plants(&self) -> impl Iterator<Item = &Thing> {
+        self.things.iter().filter(|thing| thing.kind == Kind::Plant)
+    }
+
+    /// The tall weeds, in ascending order of place.
+    pub fn weeds(&self) -> impl Iterator<Item = &Thing> {
+        self.things.iter().filter(|thing| thing.kind == Kind::Weed)
+    }
+
+    /// The stretch of ground that counts as the row. Where its ends were not given: half a mean spacing beyond the outermost plants, so that every plant
+    /// has a spacing's length of its own, and in any case everything that stands in it.
+    pub fn span_mm(&self) -> Range<f64> {
+        if let Some(ground_mm) = &self.ground_mm {
+            return ground_mm.clone();
+        }
+        let (first, last) = (&self.things[0], &self.things[self.things.len() - 1]);
+        let places: Vec<f64> = self.plants().map(|plant| plant.position_mm).collect();
+        let around = match places.as_slice() {
+            [only] => only - LONE_PLANT_SPACING_MM / 2.0..only + LONE_PLANT_SPACING_MM / 2.0,
+            [start, .., end] => {
+                let half_spacing_mm = (end - start) / (places.len() - 1) as f64 / 2.0;
+                start - half_spacing_mm..end + half_spacing_mm
+            }
+            [] => first.position_mm..last.position_mm,
+        };
+        around.start.min(first.span_mm().start)..around.end.max(last.span_mm().end)
+    }
+
+    /// The row that stands in the text of a CSV file with the columns `position_mm,width_mm,kind`, in any order of columns and lines.
+    /// `kind` is `plant` or `weed`; lines that begin with `#` are comments.
+    ///
+    /// # Errors
+    /// Names the file, the line and what would be right.
+    pub fn parse_csv(path: &Path, text: Vec<u8>) -> Result<Self, TableError> {
+        let table = CsvTable::parse(path, text, &COLUMNS)?;
+        let mut lines = Vec::new();
+        for line in table.lines() {
+            let thing = Thing {
+                position_mm: line.value("position_mm", "a number of millimetres along the row")?,
+                width_mm: line.value("width_mm", "a number of millimetres")?,
+                kind: line.value("kind", "plant or weed")?,
+                leaves: Vec::new(),
+            };
+            thing.check().map_err(|problem| line.error(problem.to_string()))?;
+            lines.push((line, thing));
+        }
+        lines.sort_by(|(_, a), (_, b)| a.position_mm.total_cmp(&b.position_mm));
+        for pair in lines.windows(2) {
+            let (line, thing) = &pair[1];
+            let checked = thing.check_after(&pair[0].1).and_then(|()| thing.check_length(&lines[0].1));
+            checked.map_err(|problem| line.error(problem.to_string()))?;
+        }
+        Ok(Self { things: lines.into_iter().map(|(_, thing)| thing).collect(), dust_mm: Vec::new(), ground_mm: None })
+    }
+
+    /// Writes the row as a CSV table that [`Row::parse_csv`] reads. Gaps within a ragged canopy, dust and the row's ends are not kept.
+    ///
+    /// # Errors
+    /// Those of the writer.
+    pub fn write_csv(&self, to: impl io::Write) -> Result<(), csv::Error> {
+        let mut writer = csv::Writer::from_writer(to);
+        for thing in &self.things {
+            writer.serialize(Record { position_mm: thing.position_mm, width_mm: thing.width_mm, kind: thing.kind })?;
+        }
+        writer.flush()?;
+        Ok(())
+    }
+}
+
+/// The spacing that a plant without neighbours is given, for the figures that are counted per length of row.
+const LONE_PLANT_SPACING_MM: f64 = 500.0;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::planting::Planting;
+    use files::csv_table;
+
+    /// What reading this text says.
+    fn read(text: &str) -> Result<Row, String> {
+        Row::parse_csv(Path::new("row.csv"), text.into()).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn each_plant_has_a_spacing_of_row_to_itself() {
+        let row = Row::new(vec![Thing::plant(1000.0, 150.0), Thing::plant(1480.0, 150.0), Thing::plant(2000.0, 150.0)]);
+        assert_eq!(row.unwrap().span_mm(), 750.0..2250.0);
+    }
+
+    #[test]
+    fn a_written_row_reads_back() {
+        let row = Planting { weeds: 4, ..Planting::default() }.grow(5).unwrap();
+        let mut text = Vec::new();
+        row.write_csv(&mut text).unwrap();
+        assert_eq!(read(&String::from_utf8(text).unwrap()), Ok(row));
+    }
+
+    #[test]
+    fn columns_lines_and_spaces_may_come_in_any_order() {
+        let row = read("kind, position_mm, width_mm\n# measured in May\nplant, 900, 150\nweed, 500, 15\n");
+        let things = vec![Thing::weed(500.0, 15.0), Thing::plant(900.0, 150.0)];
+        assert_eq!(row, Ok(Row::new(things).unwrap()));
+    }
+
+    #[test]
+    fn a_bad_line_is_named_with_its_number_and_what_would_be_right() {
+        let header = "position_mm,width_mm,kind\n";
+        for (text, error) in [
+            ("250,150,plant\n750,-5,plant\n", "row.csv, line 3: width_mm is -5: it has to be above 0"),
+            ("250,wide,plant\n", "row.csv, line 2: width_mm is `wide`: it has to be a number of millimetres"),
+            ("250,150,crop\n", "row.csv, line 2: kind is `crop`: it has to be plant or weed"),
+            ("250,150\n", "row.csv, line 2: fields: 2, where the header has 3"),
+            ("NaN,150,plant\n", "row.csv, line 2: position_mm is NaN"),
+            ("250,150,plant\n4294967296,150,plant\n", "row.csv, line 3: position_mm is 4294967296: it has to be from"),
+            ("18446744073709551616,150,plant\n", "row.csv, line 2: position_mm is 18446744073709552000: it has to be"),
+            (
+                "-9e6,150,plant\n9e6,150,plant\n",
+                "row.csv, line 3: the row is 18000 m long: it has to be at most 6000 m",
+            ),
+            (
+                "750,150,plant\n250,150,plant\n700,20,weed\n",
+                "row.csv, line 2: the plant at 750 mm and the weed at 700 mm overlap",
+            ),
+            ("", "row.csv, line 1: nothing stands below the header"),
+        ] {
+            for end in ["\n", "\r\n"] {
+                let said = read(&format!("{header}{text}").replace('\n', end)).unwrap_err();
+                assert!(said.starts_with(error), "{said}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_missing_column_is_named() {
+        let said = read("position_mm,kind\n250,plant\n").unwrap_err();
+        assert!(said.starts_with("row.csv, line 1: the column `width_mm` is missing"), "{said}");
+    }
+
+    #[test]
+    fn a_missing_file_is_named() {
+        let path = Path::new("no/such/row.csv");
+        let read = csv_table::bytes(path).and_then(|text| Row::parse_csv(path, text));
+        let said = read.unwrap_err().to_string();
+        assert!(said.starts_with("no/such/row.csv cannot be read"), "{said}");
+    }
+}

@@ -1,0 +1,272 @@
+//! The servo that swings the tool: from the pulses on its line to its angle at any time.
+//!
+//! A servo knows a pulse's width at the pulse's falling edge. From there it takes a dead time until it begins to move
+//! (electronics, gears, slack), and then it turns at a constant rate until it has the angle asked for. A command that
+//! comes during a stroke takes the same dead time; then the servo turns from wherever it is. Widths between the two ends
+//! ask for angles between them.
+//!
+//! Widths that are no servo's are ignored. There is no overshoot and no acceleration here: dead and travel time stand for
+//! them, and for the soil's load. Where they scatter, each command has its own, by chance.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use signal::{CYCLES_PER_SECOND, Pulse};
+use std::ops::{Range, RangeInclusive};
+
+/// A hobby servo and how it is set up.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Servo {
+    /// Pulse width for the tool in the row, at 0 degrees.
+    pub in_us: f64,
+    /// Pulse width for the tool out of the row, at [`OUT_DEGREES`].
+    pub out_us: f64,
+    /// Time from a pulse's falling edge until the servo moves.
+    pub dead_time_ms: f64,
+    /// Time in which it then turns by [`OUT_DEGREES`].
+    pub travel_ms: f64,
+    /// What dead time and travel may be off by.
+    pub scatter: Scatter,
+}
+
+/// How much a servo's swings differ from each other.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Scatter {
+    /// The dead time lies within this of its mean, evenly spread.
+    pub dead_time_ms: f64,
+    /// The soil's load makes the travel longer by a share from 0 to this, evenly spread.
+    pub load: f64,
+    /// Which of all the possible sequences of swings.
+    pub seed: u64,
+}
+
+/// Angle of the tool that is fully out of the row.
+pub const OUT_DEGREES: f64 = 45.0;
+
+/// Pulse widths that differ by less than this ask for the same angle: the dead band of a digital servo.
+const DEAD_BAND_US: f64 = 2.0;
+
+/// Widths that a servo takes for a command. It ignores whatever else comes along its line, and so does this one.
+pub const WIDTHS_US: RangeInclusive<f64> = 400.0..=2600.0;
+
+/// Commands for more than this count as commands out of the row.
+const OUT_COMMAND_DEGREES: f64 = OUT_DEGREES / 2.0;
+
+/// A change of the angle asked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Command {
+    /// When the first pulse of this width began, in cycles since power-up: the command at the pin.
+    pub rise_cycle: u64,
+    /// When that pulse ended, and the servo knew.
+    pub fall_cycle: u64,
+    /// The angle asked for; 0 is in the row.
+    pub degrees: f64,
+}
+
+impl Command {
+    /// Whether it asks for the tool to leave the row.
+    pub fn is_out(&self) -> bool {
+        self.degrees > OUT_COMMAND_DEGREES
+    }
+}
+
+impl Default for Servo {
+    /// A 60 kg cm hobby servo unloaded: 60 ms of dead time, 120 ms for 45 degrees.
+    fn default() -> Self {
+        Self { in_us: 1500.0, out_us: 2000.0, dead_time_ms: 60.0, travel_ms: 120.0, scatter: Scatter::default() }
+    }
+}
+
+impl Servo {
+    /// The angle that a pulse asks for.
+    fn degrees(&self, pulse: Pulse) -> f64 {
+        (pulse.width_us() - self.in_us) / (self.out_us - self.in_us) * OUT_DEGREES
+    }
+
+    /// The pulses that asked for another angle than the one before them; the first pulse is the first command. Pulses
+    /// outside of [`WIDTHS_US`] are passed over.
+    pub fn commands(&self, pulses: &[Pulse]) -> Vec<Command> {
+        let mut commands = Vec::new();
+        let mut width_us = f64::NEG_INFINITY;
+        for &pulse in pulses.iter().filter(|pulse| WIDTHS_US.contains(&pulse.width_us())) {
+            if (pulse.width_us() - width_us).abs() >= DEAD_BAND_US {
+                width_us = pulse.width_us();
+                commands.push(Command { rise_cycle: pulse.rise, fall_cycle: pulse.fall, degrees: self.degrees(pulse) });
+            }
+        }
+        commands
+    }
+
+    /// The servo's movement under these commands. Before the first it rests at the angle that the first asks for: the
+    /// firmware starts with the tool out, and so does the machine.
+    ///
+    /// `start_cycle` is the cycle at which the movement's time is 0.
+    pub fn stroke(&self, commands: &[Command], start_cycle: u64) -> Stroke {
+        let Scatter { dead_time_ms, load, seed } = self.scatter;
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let rest_degrees = commands.first().map_or(OUT_DEGREES, |command| command.degrees);
+        let mut corners = vec![Corner { time_s: f64::NEG_INFINITY, degrees: rest_degrees }];
+        let mut target_degrees = rest_degrees;
+        for (index, command) in commands.iter().enumerate() {
+            let heard_s = (command.fall_cycle as f64 - start_cycle as f64) / CYCLES_PER_SECOND as f64;
+            let late_ms = rng.random_range(-1.0..=1.0) * dead_time_ms;
+            let travel_ms = self.travel_ms * (1.0 + rng.random_range(0.0..=1.0) * load);
+            let begin = Corner { time_s: heard_s + (self.dead_time_ms + late_ms) / 1000.0, degrees: 0.0 };
+            let begin = Corner { degrees: angle(&corners, begin.time_s, target_degrees), ..begin };
+            // A corner that the stroke had planned beyond this moment is not reached any more.
+            corners.retain(|corner| corner.time_s < begin.time_s);
+            corners.push(begin);
+            target_degrees = command.degrees;
+            if index > 0 {
+                let travel_s = (target_degrees - begin.degrees).abs() / OUT_DEGREES * travel_ms / 1000.0;
+                corners.push(Corner { time_s: begin.time_s + travel_s, degrees: target_degrees });
+            }
+        }
+        Stroke { corners, end_degrees: target_degrees }
+    }
+}
+
+/// The servo turns at a constant rate between two corners.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Corner {
+    time_s: f64,
+    degrees: f64,
+}
+
+/// The angle at a time: between corners on the straight line, behind the last one at rest.
+fn angle(corners: &[Corner], time_s: f64, end_degrees: f64) -> f64 {
+    let next = corners.partition_point(|corner| corner.time_s <= time_s);
+    match (next.checked_sub(1).map(|last| corners[last]), corners.get(next)) {
+        (Some(from), Some(to)) if from.time_s.is_finite() => {
+            let done = (time_s - from.time_s) / (to.time_s - from.time_s);
+            from.degrees + (to.degrees - from.degrees) * done
+        }
+        (Some(from), Some(_)) => from.degrees,
+        _ => end_degrees,
+    }
+}
+
+/// The tool's angle over time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stroke {
+    corners: Vec<Corner>,
+    end_degrees: f64,
+}
+
+impl Stroke {
+    /// The angle at a time in seconds; 0 is in the row.
+    pub fn degrees(&self, time_s: f64) -> f64 {
+        angle(&self.corners, time_s, self.end_degrees)
+    }
+
+    /// The times at which the servo begins or ends to turn. Between two of them the angle follows a straight line.
+    pub fn turns_s(&self) -> impl Iterator<Item = f64> {
+        self.corners.iter().map(|corner| corner.time_s).filter(|time_s| time_s.is_finite())
+    }
+
+    /// The times within `during_s` at which the angle is below `degrees`.
+    pub fn times_below_s(&self, degrees: f64, during_s: &Range<f64>) -> Vec<Range<f64>> {
+        let mut times = vec![during_s.start];
+        times.extend(self.corners.windows(2).filter_map(|pair| {
+            let (from, to) = (pair[0], pair[1]);
+            let crosses = (from.degrees < degrees) != (to.degrees < degrees);
+            let share = (degrees - from.degrees) / (to.degrees - from.degrees);
+            (crosses && from.time_s.is_finite())
+                .then_some(from.time_s + (to.time_s - from.time_s) * share)
+                .filter(|time_s| during_s.contains(time_s))
+        }));
+        times.push(during_s.end);
+        times
+            .windows(2)
+            .map(|pair| pair[0]..pair[1])
+            .filter(|span| span.start < span.end)
+            .filter(|span| self.degrees((span.start + span.end) / 2.0) < degrees)
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Frames of 20 ms whose width changes at the given frames.
+    fn frames(widths_us: &[(u64, u64)]) -> Vec<Pulse> {
+        let cycles_per_us = CYCLES_PER_SECOND / 1_000_000;
+        widths_us
+            .iter()
+            .flat_map(|&(count, width_us)| (0..count).map(move |_| width_us))
+            .enumerate()
+            .map(|(frame, width_us)| {
+                let rise = frame as u64 * 20_000 * cycles_per_us;
+                Pulse { rise, fall: rise + width_us * cycles_per_us }
+            })
+            .collect()
+    }
+
+    fn stroke(widths_us: &[(u64, u64)]) -> Stroke {
+        let servo = Servo::default();
+        servo.stroke(&servo.commands(&frames(widths_us)), 0)
+    }
+
+    #[track_caller]
+    fn assert_degrees(stroke: &Stroke, time_s: f64, degrees: f64) {
+        let is = stroke.degrees(time_s);
+        assert!((is - degrees).abs() < 1e-6, "{is} degrees at {time_s} s");
+    }
+
+    #[test]
+    fn the_servo_waits_its_dead_time_and_then_turns_evenly() {
+        // The tenth frame, at 0.2 s, is the first that asks for the row; its pulse lasts 1.5 ms.
+        let stroke = stroke(&[(10, 2000), (40, 1500)]);
+        assert_degrees(&stroke, -1.0, 45.0);
+        assert_degrees(&stroke, 0.2615, 45.0);
+        assert_degrees(&stroke, 0.3215, 22.5);
+        assert_degrees(&stroke, 0.3815, 0.0);
+        assert_degrees(&stroke, 9.0, 0.0);
+    }
+
+    #[test]
+    fn a_command_during_a_stroke_turns_it_round_where_it_is() {
+        // In at 0.2 s (begins at 0.2615), out again at 0.26 s (begins at 0.322 s, when 22.3 degrees are left).
+        let stroke = stroke(&[(10, 2000), (3, 1500), (20, 2000)]);
+        let turn_degrees = 45.0 - (0.322 - 0.2615) * 375.0;
+        assert_degrees(&stroke, 0.322, turn_degrees);
+        assert_degrees(&stroke, 0.332, turn_degrees + 3.75);
+        assert_degrees(&stroke, 0.322 + (45.0 - turn_degrees) / 375.0, 45.0);
+    }
+
+    #[test]
+    fn only_a_changed_width_is_a_command() {
+        let commands = Servo::default().commands(&frames(&[(5, 2000), (5, 1500), (5, 2000)]));
+        let degrees: Vec<f64> = commands.iter().map(|command| command.degrees).collect();
+        assert_eq!(degrees, [45.0, 0.0, 45.0]);
+        assert_eq!(commands[1].rise_cycle, 5 * 320_000);
+    }
+
+    #[test]
+    fn a_pulse_of_no_servos_width_is_no_command() {
+        let commands = Servo::default().commands(&frames(&[(5, 2000), (1, 3), (5, 2000), (1, 19_900), (5, 2000)]));
+        assert_eq!(commands.len(), 1);
+    }
+
+    #[test]
+    fn a_width_between_the_ends_asks_for_an_angle_between_them() {
+        assert_degrees(&stroke(&[(5, 1500), (20, 1750)]), 1.0, 22.5);
+    }
+
+    #[test]
+    fn the_times_below_an_angle_begin_and_end_where_it_is_crossed() {
+        let stroke = stroke(&[(10, 2000), (20, 1500), (20, 2000)]);
+        let times = stroke.times_below_s(22.5, &(0.0..2.0));
+        assert_eq!(times.len(), 1);
+        assert_degrees(&stroke, times[0].start, 22.5);
+        assert_degrees(&stroke, times[0].end, 22.5);
+        assert!(times[0].start < times[0].end);
+    }
+
+    #[test]
+    fn a_tool_that_is_never_commanded_stays_out() {
+        let stroke = Servo::default().stroke(&[], 0);
+        assert_degrees(&stroke, 1.0, 45.0);
+        assert!(stroke.times_below_s(44.0, &(0.0..5.0)).is_empty());
+    }
+}

@@ -1,0 +1,227 @@
+//! A crop stand: the plants and weeds of a row, as they grow from a seed under some conditions.
+//!
+//! It is seen twice. The beam sees a [`Row`]: canopies and tall weeds, of which those that touch have grown together, and
+//! dust. The tools meet stems with a protected zone round each, and weeds everywhere ([`crate::tool_path`]).
+//!
+//! Places are millimetres along the row, and across it from its line, left above 0. What grows does not depend on the
+//! machine, nor on what is done there.
+
+use crate::conditions::Conditions;
+use crate::ground::union;
+use crate::planting::{WEED_WIDTHS_MM, leaves, scatter};
+use crate::row::{Kind, Problem, Row, Thing};
+use rand::{Rng, RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, Poisson};
+use std::ops::Range;
+
+/// A crop plant's stem, and the zone round it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stem {
+    /// Its place along the row.
+    pub along_mm: f64,
+    /// Its place across the row.
+    pub across_mm: f64,
+    /// Radius of the zone that no tool may enter.
+    pub protected_mm: f64,
+}
+
+/// A weed, of whatever height.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Weed {
+    /// Its place along the row.
+    pub along_mm: f64,
+    /// Its place across the row.
+    pub across_mm: f64,
+}
+
+/// A row that has grown.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stand {
+    /// What the beam sees.
+    pub row: Row,
+    /// The crop plants, in ascending order of place.
+    pub stems: Vec<Stem>,
+    /// The weeds, those that are tall included.
+    pub weeds: Vec<Weed>,
+    /// The row's ground.
+    pub span_mm: Range<f64>,
+}
+
+/// How far a double plant's stem stands behind the first one's.
+const DOUBLE_MM: Range<f64> = 20.0..80.0;
+
+/// Ground over which dust breaks the beam.
+const DUST_MM: Range<f64> = 0.5..4.0;
+
+/// Leads the beam over bare ground before the first plant and behind the last one.
+const HEADLAND_MM: f64 = 1000.0;
+
+impl Stand {
+    /// The stand that grows with plants `spacing_mm` apart.
+    ///
+    /// # Errors
+    /// Where canopies grow together to something that is no row, or the row is shorter than the spacing.
+    pub fn grow(conditions: &Conditions, spacing_mm: f64, rng: &mut impl Rng) -> Result<Self, Problem> {
+        let Conditions { plot, crop, weeds, sensors, .. } = conditions;
+        let span_mm = 0.0..plot.row_m * 1000.0;
+        // Each has a chance of its own, so that a parameter of one leaves the others as they are.
+        let [mut leaf_rng, mut weed_rng, mut dust_rng] = [(); 3].map(|()| ChaCha8Rng::from_rng(rng));
+        let mut stems = Vec::new();
+        let mut things = Vec::new();
+        let places = (span_mm.end / spacing_mm).floor() as u32;
+        for place in 0..places {
+            let at_mm = (f64::from(place) + 0.5) * spacing_mm;
+            // One stands in any case: a row without a plant is none.
+            let is_missing = chance(rng, crop.missing_percent) && (place + 1 < places || !stems.is_empty());
+            let plants = if is_missing { 0 } else { 1 + usize::from(chance(rng, crop.double_percent)) };
+            let mut along_mm = at_mm + scatter(rng, crop.spacing_scatter_mm);
+            for _ in 0..plants {
+                let width_mm = (crop.canopy_mm + scatter(rng, crop.canopy_scatter_mm)).max(MIN_CANOPY_MM);
+                let mut plant = Thing::plant(along_mm, width_mm);
+                if chance(&mut leaf_rng, crop.ragged_percent) {
+                    plant.leaves = leaves(&mut leaf_rng, plant.span_mm());
+                }
+                if !chance(rng, sensors.unseen_percent) {
+                    things.push(plant);
+                }
+                let across_mm = scatter(rng, crop.across_scatter_mm);
+                stems.push(Stem { along_mm, across_mm, protected_mm: crop.protected_mm / 2.0 });
+                along_mm += rng.random_range(DOUBLE_MM);
+            }
+        }
+        let half_mm = plot.row_spacing_mm / 2.0;
+        let area_m2 = plot.row_m * plot.row_spacing_mm / 1000.0;
+        let mut grown: Vec<Weed> = (0..count(&mut weed_rng, weeds.short_per_m2 * area_m2))
+            .map(|_| Weed {
+                along_mm: weed_rng.random_range(span_mm.clone()),
+                across_mm: weed_rng.random_range(-half_mm..half_mm),
+            })
+            .collect();
+        for _ in 0..count(&mut weed_rng, weeds.tall_per_m * plot.row_m) {
+            let along_mm = weed_rng.random_range(span_mm.clone());
+            things.push(Thing::weed(along_mm, weed_rng.random_range(WEED_WIDTHS_MM)));
+            grown.push(Weed { along_mm, across_mm: scatter(&mut weed_rng, crop.across_scatter_mm) });
+        }
+        let air_mm = span_mm.start - HEADLAND_MM..span_mm.end + HEADLAND_MM;
+        let dust_mm = (0..count(&mut dust_rng, sensors.dust_per_m * (air_mm.end - air_mm.start) / 1000.0))
+            .map(|_| {
+                let start_mm = dust_rng.random_range(air_mm.clone());
+                start_mm..start_mm + dust_rng.random_range(DUST_MM)
+            })
+            .collect();
+        stems.sort_by(|a, b| a.along_mm.total_cmp(&b.along_mm));
+        let row = Row::new(grown_together(things))?.with_dust(dust_mm).on_ground(span_mm.clone());
+        Ok(Self { row, stems, weeds: grown, span_mm })
+    }
+}
+
+/// No scatter makes a canopy narrower.
+const MIN_CANOPY_MM: f64 = 10.0;
+
+/// Whether something happens that happens in so many of a hundred cases.
+fn chance(rng: &mut impl Rng, percent: f64) -> bool {
+    rng.random_bool((percent / 100.0).clamp(0.0, 1.0))
+}
+
+/// How many of something there are where `mean` are to be expected.
+fn count(rng: &mut impl Rng, mean: f64) -> usize {
+    // A mean of 0 has no distribution, but a result.
+    Poisson::new(mean).map_or(0, |poisson| poisson.sample(rng) as usize)
+}
+
+/// The things as the beam sees them: those that touch are one, and a plant if any of them is.
+fn grown_together(mut things: Vec<Thing>) -> Vec<Thing> {
+    things.sort_by(|a, b| a.span_mm().start.total_cmp(&b.span_mm().start));
+    let mut together: Vec<Thing> = Vec::with_capacity(things.len());
+    for thing in things {
+        match together.last_mut() {
+            Some(last) if thing.span_mm().start <= last.span_mm().end => {
+                let span = last.span_mm().start..last.span_mm().end.max(thing.span_mm().end);
+                let blocks = union(last.blocks_mm().into_iter().chain(thing.blocks_mm()).collect());
+                let kind = if last.kind == Kind::Plant { Kind::Plant } else { thing.kind };
+                *last = Thing {
+                    position_mm: (span.start + span.end) / 2.0,
+                    width_mm: span.end - span.start,
+                    kind,
+                    leaves: if blocks.len() > 1 { blocks } else { Vec::new() },
+                };
+            }
+            _ => together.push(thing),
+        }
+    }
+    together
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn grow(conditions: &Conditions, seed: u64) -> Stand {
+        Stand::grow(conditions, 500.0, &mut ChaCha8Rng::seed_from_u64(seed)).expect("a row")
+    }
+
+    #[test]
+    fn the_same_seed_grows_the_same_stand_and_another_seed_another() {
+        let conditions = Conditions::default();
+        assert_eq!(grow(&conditions, 1), grow(&conditions, 1));
+        assert_ne!(grow(&conditions, 1), grow(&conditions, 2));
+    }
+
+    #[test]
+    fn an_even_stand_has_a_plant_in_every_place_and_nothing_else_in_the_beam() {
+        let stand = grow(&Conditions::preset("even-stand").unwrap().unwrap(), 1);
+        let places: Vec<f64> = stand.stems.iter().map(|stem| stem.along_mm).collect();
+        let expected: Vec<f64> = (0..40).map(|place| 250.0 + 500.0 * f64::from(place)).collect();
+        assert_eq!(places, expected);
+        assert_eq!(stand.row.blocks_mm().len(), 40);
+        assert!(stand.stems.iter().all(|stem| stem.across_mm == 0.0));
+    }
+
+    #[test]
+    fn missing_and_double_plants_come_as_often_as_asked_for() {
+        let mut conditions = Conditions::preset("direct-sown").unwrap().unwrap();
+        conditions.set("plot.row_m", 1000.0).unwrap();
+        let stand = grow(&conditions, 3);
+        // 2000 places less 12 %, a tenth of which are double; three standard deviations are about 60.
+        let expected = 2000.0 * 0.88 * 1.1;
+        assert!((stand.stems.len() as f64 - expected).abs() < 60.0, "{}", stand.stems.len());
+    }
+
+    #[test]
+    fn weeds_are_as_many_as_their_density_says_and_lie_in_the_plot() {
+        let mut conditions = Conditions::preset("weedy").unwrap().unwrap();
+        conditions.set("plot.row_m", 100.0).unwrap();
+        let stand = grow(&conditions, 3);
+        let expected = 200.0 * 100.0 * 0.4 + 1.2 * 100.0;
+        assert!((stand.weeds.len() as f64 - expected).abs() < 3.0 * f64::sqrt(expected), "{}", stand.weeds.len());
+        assert!(stand.weeds.iter().all(|weed| stand.span_mm.contains(&weed.along_mm) && weed.across_mm.abs() <= 200.0));
+    }
+
+    #[test]
+    fn a_parameter_of_one_leaves_the_others_as_they_are() {
+        let closed = grow(&Conditions::default(), 1);
+        let mut conditions = Conditions::default();
+        conditions.set("crop.ragged_percent", 100.0).unwrap();
+        conditions.set("sensors.dust_per_m", 1.0).unwrap();
+        let ragged = grow(&conditions, 1);
+        assert_eq!((&closed.stems, &closed.weeds), (&ragged.stems, &ragged.weeds));
+        assert_ne!(closed.row, ragged.row);
+    }
+
+    #[test]
+    fn a_row_shorter_than_its_spacing_is_none() {
+        let mut conditions = Conditions::default();
+        conditions.set("plot.row_m", 2.0).unwrap();
+        conditions.set("weeds.tall_per_m", 0.0).unwrap();
+        let grown = Stand::grow(&conditions, 2500.0, &mut ChaCha8Rng::seed_from_u64(1));
+        assert_eq!(grown, Err(Problem::Empty));
+    }
+
+    #[test]
+    fn what_touches_is_one_thing_and_a_plant_if_any_of_it_is() {
+        let things = vec![Thing::weed(100.0, 20.0), Thing::plant(150.0, 100.0), Thing::weed(300.0, 20.0)];
+        let together = grown_together(things);
+        assert_eq!(together, [Thing::plant(145.0, 110.0), Thing::weed(300.0, 20.0)]);
+    }
+}

@@ -1,0 +1,102 @@
+//! A trial: everything that decides how a row is weeded, but for who weeds it.
+//!
+//! The machine's motion does not depend on the firmware, so that a trial is told in full before anything runs: row, machine,
+//! motion, and what the firmware is set to. Who weeds it is for others to say: the [`twin`](crate::twin), its
+//! [`rivals`](crate::rivals), or the real firmware, which is not here.
+
+use crate::machine::Machine;
+use crate::motion::Motion;
+use crate::row::Row;
+use crate::verdict::Timing;
+use control::settings::Setting;
+
+/// How the firmware is put to work.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Start {
+    /// By the command `start`: the tool enters the row when ground that the beam has seen reaches it.
+    Command,
+    /// By the command `start now`: the tool enters the row at once.
+    Now,
+    /// By the work switch, from high to low.
+    Switch,
+}
+
+/// Everything that makes a trial.
+#[derive(Clone, Debug)]
+pub struct Trial {
+    /// What stands in the row.
+    pub row: Row,
+    /// The machine.
+    pub machine: Machine,
+    /// How it rolls.
+    pub motion: Motion,
+    /// Margin and leads that the firmware is set to.
+    pub timing: Timing,
+    /// How the firmware is put to work.
+    pub start: Start,
+    /// What else the firmware is told, after the settings that follow from machine and timing.
+    pub settings: Vec<(Setting, u16)>,
+}
+
+/// Distance that the machine rolls ahead of the row, so that it has its speed and the tool is in the row when the row
+/// begins; and the time in which it has to swing in, which adds to it at speed.
+const RUN_UP_MM: f64 = 200.0;
+const SWING_IN_S: f64 = 0.6;
+
+/// How fast the machine gains its speed.
+const ACCELERATION_MM_S2: f64 = 1000.0;
+
+/// How fast it brakes at the end.
+const BRAKING_MM_S2: f64 = 3000.0;
+
+/// Distance that the tool rolls on behind the row.
+const RUN_OUT_MM: f64 = 100.0;
+
+/// The highest top speed that the firmware takes, 10.8 km/h. A machine is set to a quarter more than it drives, as far as its
+/// beam stands ahead for that.
+const TOP_SPEED_MM_S: f64 = 3000.0;
+
+/// The lowest that it takes: nothing contradicts it.
+const SLOWEST_TOP_SPEED_MM_S: f64 = 100.0;
+
+impl Trial {
+    /// The whole row at one speed, from standstill far enough ahead until the tool has passed its end.
+    pub fn at_speed(row: Row, machine: Machine, timing: Timing, speed_mm_s: f64) -> Self {
+        let span = row.span_mm();
+        let run_up_mm = RUN_UP_MM + SWING_IN_S * speed_mm_s + speed_mm_s.powi(2) / (2.0 * ACCELERATION_MM_S2);
+        let motion = Motion::steady(
+            span.start - run_up_mm,
+            ACCELERATION_MM_S2,
+            speed_mm_s,
+            span.end + machine.beam_to_tool_mm + RUN_OUT_MM,
+        );
+        // No machine stops dead, and one that did would look like one whose encoder has failed.
+        let motion = motion.change_speed(0.0, BRAKING_MM_S2);
+        Self { row, machine, motion, timing, start: Start::Command, settings: Vec::new() }
+    }
+
+    /// All that the firmware is told, in an order in which machine and timing do not contradict each other on the way.
+    pub fn told(&self) -> Vec<(Setting, u16)> {
+        let Machine { wheel_mm, ticks_per_rev, beam_to_tool_mm, servo, .. } = self.machine;
+        let Timing { margin_mm, lead_out_ms, lead_in_ms } = self.timing;
+        let notice_mm = beam_to_tool_mm - f64::from(margin_mm) - 2.0;
+        // As the firmware counts: the lead, an eighth of it, and what the sensor may take.
+        let notice_s = f64::from(lead_out_ms) * 1.125e-3 + 0.002;
+        let wanted_mm_s = (1.25 * self.motion.top_speed_mm_s()).max(SLOWEST_TOP_SPEED_MM_S);
+        let top_speed_mm_s = wanted_mm_s.min(notice_mm / notice_s).min(TOP_SPEED_MM_S);
+        let mut told = vec![
+            (Setting::TopSpeedMmS, SLOWEST_TOP_SPEED_MM_S as u16),
+            (Setting::TicksPerRev, ticks_per_rev as u16),
+            (Setting::WheelMm, wheel_mm.round() as u16),
+            (Setting::BeamToToolMm, beam_to_tool_mm.round() as u16),
+            (Setting::MarginMm, margin_mm as u16),
+            (Setting::LeadOutMs, lead_out_ms as u16),
+            (Setting::LeadInMs, lead_in_ms as u16),
+            (Setting::ServoInUs, servo.in_us.round() as u16),
+            (Setting::ServoOutUs, servo.out_us.round() as u16),
+            (Setting::TopSpeedMmS, top_speed_mm_s as u16),
+        ];
+        told.extend(&self.settings);
+        told
+    }
+}

@@ -1,0 +1,504 @@
+//! What the tool did to the row: from the servo's pulses to a verdict on each plant.
+//!
+//! Pulses become commands and the tool's angle over time ([`crate::servo`]); with the machine's motion that is an angle
+//! over the ground. A plant is damaged when the tool was anything but fully out at any time over its canopy; its margin
+//! is cut when the tool was clear of the canopy by less than the margin and [`MARGIN_TOLERANCE_MM`]. Both are strict: for
+//! most of its stroke the tool is beside the row's line already, and a canopy is as wide as the beam saw it only at the
+//! height of the beam.
+//!
+//! A swing is also held against the place where it should have been commanded. Ideal are the true ends of the canopy, the
+//! margin, the leads of the [`Timing`] and the true speed at that moment. Plants that share one swing out and one in share
+//! its two commands: the first plant has the one, the last the other.
+
+use crate::ground::{share_of, union};
+use crate::machine::{Machine, time_at_s};
+use crate::motion::Motion;
+use crate::row::{Row, Thing};
+use crate::servo::{Command, Stroke};
+use signal::Pulse;
+use std::fmt;
+use std::ops::Range;
+
+/// A margin that is short by less than this still counts as kept.
+pub const MARGIN_TOLERANCE_MM: f64 = 10.0;
+
+/// Margin and leads, as the firmware's settings have them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Timing {
+    /// Ground kept free on both sides of a canopy.
+    pub margin_mm: u32,
+    /// Time by which the command to leave the row comes ahead.
+    pub lead_out_ms: u32,
+    /// Time by which the command to come back comes ahead.
+    pub lead_in_ms: u32,
+}
+
+impl Default for Timing {
+    fn default() -> Self {
+        Self { margin_mm: 50, lead_out_ms: 180, lead_in_ms: 40 }
+    }
+}
+
+impl Timing {
+    /// The paper's schedule: swings are commanded where they should be done (Eq. 1 to 3).
+    pub fn as_in_the_paper() -> Self {
+        Self { lead_out_ms: 0, lead_in_ms: 0, ..Self::default() }
+    }
+}
+
+/// How a plant fared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// The tool kept away from it by the margin.
+    Kept,
+    /// The tool came nearer than the margin allows, but not to the canopy.
+    MarginCut,
+    /// The tool was not out of the row over its canopy.
+    Damaged,
+}
+
+impl fmt::Display for Verdict {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Verdict::Kept => "kept",
+            Verdict::MarginCut => "margin cut",
+            Verdict::Damaged => "DAMAGED",
+        })
+    }
+}
+
+/// What happened to a plant.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlantOutcome {
+    /// The plant.
+    pub plant: Thing,
+    /// From the place where the tool was fully out to the canopy's leading end; negative inside the canopy. `None` where
+    /// the tool was out from the beginning.
+    pub clearance_before_mm: Option<f64>,
+    /// From the canopy's trailing end to the place where the tool began to come back; negative inside the canopy. `None`
+    /// where it stayed out to the end.
+    pub clearance_behind_mm: Option<f64>,
+    /// How often the tool was swung out over it.
+    pub swings: usize,
+    /// Counts by which the command to swing out for this plant came late (early: negative). `None` where the plant had no
+    /// such command of its own.
+    pub out_error_ticks: Option<f64>,
+    /// Counts by which the command to come back behind this plant came late (early: negative). `None` as above.
+    pub in_error_ticks: Option<f64>,
+    /// The verdict.
+    pub verdict: Verdict,
+}
+
+impl PlantOutcome {
+    /// Where along the row the tool was fully out before the plant.
+    pub fn clear_mm(&self) -> Option<f64> {
+        self.clearance_before_mm.map(|clearance_mm| self.plant.span_mm().start - clearance_mm)
+    }
+
+    /// Where along the row the tool began to come back behind the plant.
+    pub fn back_mm(&self) -> Option<f64> {
+        self.clearance_behind_mm.map(|clearance_mm| self.plant.span_mm().end + clearance_mm)
+    }
+}
+
+/// What happened to a tall weed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WeedOutcome {
+    /// The weed.
+    pub weed: Thing,
+    /// Whether the tool worked the row's line over the weed's middle.
+    pub cut: bool,
+}
+
+/// What happened to the row.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Judgement {
+    /// Every plant, in the order of the row.
+    pub plants: Vec<PlantOutcome>,
+    /// Every tall weed, in the order of the row.
+    pub weeds: Vec<WeedOutcome>,
+    /// Windows: the ground that the tool was to leave alone, each canopy with its margins.
+    pub windows_mm: Vec<Range<f64>>,
+    /// Ground over which the tool was fully out.
+    pub clear_mm: Vec<Range<f64>>,
+    /// The tool's angle over the ground below it: places and degrees between which straight lines run.
+    pub path: Vec<(f64, f64)>,
+    /// Swings out that passed no plant, the first way into the row left out.
+    pub idle_swings: usize,
+    /// Share of the row's length that was weeded, from 0 to 1.
+    pub weeded_share: f64,
+    /// Share of the row's length that could be weeded at best: see [`weedable_share`].
+    pub weedable_share: f64,
+}
+
+impl Judgement {
+    /// Number of plants with a verdict.
+    pub fn count(&self, verdict: Verdict) -> usize {
+        self.plants.iter().filter(|plant| plant.verdict == verdict).count()
+    }
+
+    /// Every swing's error in counts, late above 0.
+    pub fn swing_errors_ticks(&self) -> Vec<f64> {
+        self.plants.iter().flat_map(|plant| [plant.out_error_ticks, plant.in_error_ticks]).flatten().collect()
+    }
+}
+
+/// The largest share of the row's length that this machine can weed at this motion without cutting a margin.
+///
+/// Around each plant a length `U = w + 2 m + k v (T_out + T_in)` is left: canopy, both margins, and what the machine rolls
+/// while the tool swings and does not work the row's line. `T` is the servo's travel; its dead time costs nothing where it
+/// is led. The inter-row tools beside the row have no part in this figure.
+pub fn weedable_share(row: &Row, machine: &Machine, motion: &Motion, timing: Timing) -> f64 {
+    let swing_s = machine.idle_share_of_stroke() * machine.servo.travel_ms / 1000.0;
+    let margin_mm = f64::from(timing.margin_mm);
+    let lost = row.plants().map(|plant| {
+        let span = plant.span_mm();
+        let swing_mm = |ground_mm: f64| {
+            let first = motion.passings(ground_mm + machine.beam_to_tool_mm);
+            first.first().map_or(0.0, |passing| motion.speed_mm_s(passing.time_s).abs()) * swing_s
+        };
+        let (start_mm, end_mm) = (span.start - margin_mm, span.end + margin_mm);
+        start_mm - swing_mm(start_mm)..end_mm + swing_mm(end_mm)
+    });
+    1.0 - share_of(&row.span_mm(), &union(lost.collect()))
+}
+
+/// Judges what these pulses did to the row. The motion began at `start_cycle`.
+pub fn judge(
+    row: &Row,
+    machine: &Machine,
+    motion: &Motion,
+    timing: Timing,
+    pulses: &[Pulse],
+    start_cycle: u64,
+) -> Judgement {
+    let commands = machine.servo.commands(pulses);
+    let stroke = machine.servo.stroke(&commands, start_cycle);
+    let whole_s = 0.0..motion.duration_s();
+    let ground_of = |times_s: &[Range<f64>]| -> Vec<Range<f64>> {
+        let stretches = times_s.iter().map(|times_s| {
+            let stretch = motion.stretch_mm(times_s);
+            machine.tool_mm(stretch.start)..machine.tool_mm(stretch.end)
+        });
+        union(stretches.collect())
+    };
+    let closed = ground_of(&machine.times_not_clear_s(&stroke, &whole_s));
+    let weeded = ground_of(&machine.times_weeding_s(&stroke, &whole_s));
+    let run = motion.stretch_mm(&whole_s);
+    let run = machine.tool_mm(run.start)..machine.tool_mm(run.end);
+    let swings = Swing::all(&commands, motion, start_cycle);
+
+    let mut plants: Vec<PlantOutcome> = row.plants().map(|plant| plant_outcome(plant, &closed, timing)).collect();
+    let mut idle_swings = 0;
+    for swing in &swings {
+        let passed = swing.passed_mm(machine, motion);
+        // Plants stand in ascending order, and apart.
+        let first = plants.partition_point(|plant| plant.plant.span_mm().end <= passed.start);
+        let behind = plants.partition_point(|plant| plant.plant.span_mm().start < passed.end);
+        for plant in plants.iter_mut().take(behind).skip(first) {
+            plant.swings += 1;
+        }
+        if let (true, Some(last)) = (first < behind, behind.checked_sub(1)) {
+            let error = SwingError { machine, motion, timing };
+            plants[first].out_error_ticks =
+                swing.out_s.and_then(|time_s| error.out_ticks(time_s, &plants[first].plant));
+            plants[last].in_error_ticks = swing.in_s.and_then(|time_s| error.in_ticks(time_s, &plants[last].plant));
+        } else if swing.out_s.is_some() {
+            idle_swings += 1;
+        }
+    }
+
+    let margin_mm = f64::from(timing.margin_mm);
+    let window = |plant: &Thing| plant.span_mm().start - margin_mm..plant.span_mm().end + margin_mm;
+    Judgement {
+        plants,
+        windows_mm: union(row.plants().map(window).collect()),
+        weeds: row.weeds().map(|weed| weed_outcome(weed, machine, motion, &stroke)).collect(),
+        clear_mm: between(&closed, &run),
+        path: path(machine, motion, &stroke),
+        idle_swings,
+        weeded_share: share_of(&row.span_mm(), &weeded),
+        weedable_share: weedable_share(row, machine, motion, timing),
+    }
+}
+
+/// The time from a command out of the row to the next one into it.
+struct Swing {
+    /// `None` for the tool that was out at power-up.
+    out_s: Option<f64>,
+    /// `None` for the tool that is still out at the end.
+    in_s: Option<f64>,
+    during_s: Range<f64>,
+}
+
+impl Swing {
+    fn all(commands: &[Command], motion: &Motion, start_cycle: u64) -> Vec<Self> {
+        let mut swings = Vec::new();
+        let mut out: Option<Option<f64>> = None;
+        for (index, command) in commands.iter().enumerate() {
+            let time_s = time_at_s(start_cycle, command.rise_cycle);
+            match (command.is_out(), out) {
+                (true, None) => out = Some((index > 0).then_some(time_s)),
+                (false, Some(out_s)) => {
+                    swings.push(Self { out_s, in_s: Some(time_s), during_s: out_s.unwrap_or(0.0)..time_s });
+                    out = None;
+                }
+                _ => {}
+            }
+        }
+        if let Some(out_s) = out {
+            swings.push(Self { out_s, in_s: None, during_s: out_s.unwrap_or(0.0)..motion.duration_s() });
+        }
+        swings
+    }
+
+    /// The ground that the tool passed during the swing.
+    fn passed_mm(&self, machine: &Machine, motion: &Motion) -> Range<f64> {
+        let passed = motion.stretch_mm(&self.during_s);
+        machine.tool_mm(passed.start)..machine.tool_mm(passed.end)
+    }
+}
+
+/// Where swings should have been commanded.
+struct SwingError<'a> {
+    machine: &'a Machine,
+    motion: &'a Motion,
+    timing: Timing,
+}
+
+impl SwingError<'_> {
+    fn out_ticks(&self, time_s: f64, plant: &Thing) -> Option<f64> {
+        let window_mm = plant.span_mm().start - f64::from(self.timing.margin_mm);
+        self.ticks(time_s, window_mm, self.timing.lead_out_ms)
+    }
+
+    fn in_ticks(&self, time_s: f64, plant: &Thing) -> Option<f64> {
+        let window_mm = plant.span_mm().end + f64::from(self.timing.margin_mm);
+        self.ticks(time_s, window_mm, self.timing.lead_in_ms)
+    }
+
+    /// Counts by which a command came behind its ideal place. There is one only while the machine rolls forward.
+    fn ticks(&self, time_s: f64, window_mm: f64, lead_ms: u32) -> Option<f64> {
+        let speed_mm_s = self.motion.speed_mm_s(time_s);
+        let ideal_mm = window_mm + self.machine.beam_to_tool_mm - speed_mm_s * f64::from(lead_ms) / 1000.0;
+        (speed_mm_s > 0.0).then(|| (self.motion.position_mm(time_s) - ideal_mm) / self.machine.tick_mm())
+    }
+}
+
+/// Clearances and verdict of a plant, given the ground over which the tool was not fully out.
+fn plant_outcome(plant: &Thing, closed: &[Range<f64>], timing: Timing) -> PlantOutcome {
+    let span = plant.span_mm();
+    // What was done before the plant and what was done behind it part in the canopy's middle, or where a swing ended or
+    // began that reached beyond the middle.
+    let across = closed.iter().find(|ground| ground.contains(&plant.position_mm));
+    let parting_mm = match across {
+        Some(ground) if ground.end < span.end => ground.end,
+        Some(ground) if ground.start > span.start => ground.start,
+        _ => plant.position_mm,
+    };
+    let clearance_before_mm = closed
+        .iter()
+        .rev()
+        .find(|ground| ground.start < parting_mm)
+        .map(|ground| span.start - ground.end.min(span.end));
+    let clearance_behind_mm =
+        closed.iter().find(|ground| ground.end > parting_mm).map(|ground| ground.start.max(span.start) - span.end);
+    let narrowest_mm = [clearance_before_mm, clearance_behind_mm].into_iter().flatten().fold(f64::INFINITY, f64::min);
+    let verdict = if narrowest_mm < 0.0 {
+        Verdict::Damaged
+    } else if narrowest_mm < f64::from(timing.margin_mm) - MARGIN_TOLERANCE_MM {
+        Verdict::MarginCut
+    } else {
+        Verdict::Kept
+    };
+    PlantOutcome {
+        plant: plant.clone(),
+        clearance_before_mm,
+        clearance_behind_mm,
+        swings: 0,
+        out_error_ticks: None,
+        in_error_ticks: None,
+        verdict,
+    }
+}
+
+fn weed_outcome(weed: &Thing, machine: &Machine, motion: &Motion, stroke: &Stroke) -> WeedOutcome {
+    let passings = motion.passings(weed.position_mm + machine.beam_to_tool_mm);
+    WeedOutcome {
+        weed: weed.clone(),
+        cut: passings.iter().any(|passing| stroke.degrees(passing.time_s) < machine.line_degrees()),
+    }
+}
+
+/// The parts of `whole` between the stretches of a union.
+fn between(union: &[Range<f64>], whole: &Range<f64>) -> Vec<Range<f64>> {
+    let starts = std::iter::once(whole.start).chain(union.iter().map(|stretch| stretch.end));
+    let ends = union.iter().map(|stretch| stretch.start).chain([whole.end]);
+    starts.zip(ends).map(|(start, end)| start..end).filter(|stretch| stretch.start < stretch.end).collect()
+}
+
+fn path(machine: &Machine, motion: &Motion, stroke: &Stroke) -> Vec<(f64, f64)> {
+    let during_s = 0.0..motion.duration_s();
+    let turns_s = stroke.turns_s().filter(|time_s| during_s.contains(time_s));
+    std::iter::once(during_s.start)
+        .chain(turns_s)
+        .chain([during_s.end])
+        .map(|time_s| {
+            let ground_mm = machine.tool_mm(motion.position_mm(time_s));
+            (ground_mm, stroke.degrees(time_s))
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::machine::cycle_at;
+    use crate::motion::mm_s;
+    use signal::CYCLES_PER_SECOND;
+
+    const START_CYCLE: u64 = 16_000_000;
+
+    /// Two plants and a weed between them, passed at 2.5 km/h.
+    fn row() -> Row {
+        Row::new(vec![Thing::plant(1000.0, 150.0), Thing::weed(1300.0, 15.0), Thing::plant(1600.0, 150.0)]).unwrap()
+    }
+
+    fn motion() -> Motion {
+        Motion::steady(-500.0, 1000.0, mm_s(2.5), 3000.0)
+    }
+
+    /// Frames 20 ms apart that restart where the width changes: out at power-up, in at the first place (of the machine),
+    /// out at the second, and so on.
+    fn pulses(motion: &Motion, changes_mm: &[f64]) -> Vec<Pulse> {
+        let times_s = changes_mm.iter().map(|&mm| motion.passings(mm)[0].time_s);
+        let mut edges = vec![0];
+        edges.extend(times_s.map(|time_s| cycle_at(START_CYCLE, time_s)));
+        edges.push(cycle_at(START_CYCLE, motion.duration_s()));
+        let mut pulses = Vec::new();
+        for (index, edge) in edges.windows(2).enumerate() {
+            let width_us = if index % 2 == 0 { 2000 } else { 1500 };
+            for rise in (edge[0]..edge[1]).step_by(CYCLES_PER_SECOND as usize / 50) {
+                let fall = rise + width_us * CYCLES_PER_SECOND / 1_000_000;
+                pulses.push(Pulse { rise, fall });
+            }
+        }
+        pulses
+    }
+
+    /// Places of the machine at which the swings of [`row`] should be commanded, with these leads.
+    fn ideal_mm(timing: Timing) -> Vec<f64> {
+        let lead_mm = |lead_ms: u32| mm_s(2.5) * f64::from(lead_ms) / 1000.0;
+        let mut places = vec![200.0];
+        for plant in row().plants() {
+            let span = plant.span_mm();
+            let margin_mm = f64::from(timing.margin_mm);
+            places.push(span.start + 400.0 - margin_mm - lead_mm(timing.lead_out_ms));
+            places.push(span.end + 400.0 + margin_mm - lead_mm(timing.lead_in_ms));
+        }
+        places
+    }
+
+    fn judged(changes_mm: &[f64], timing: Timing) -> Judgement {
+        let motion = motion();
+        let pulses = pulses(&motion, changes_mm);
+        judge(&row(), &Machine::default(), &motion, timing, &pulses, START_CYCLE)
+    }
+
+    #[test]
+    fn swings_with_their_leads_keep_every_plant_and_its_margin() {
+        let judgement = judged(&ideal_mm(Timing::default()), Timing::default());
+        for plant in &judgement.plants {
+            assert_eq!((plant.verdict, plant.swings), (Verdict::Kept, 1));
+            // The servo knows the command only at the end of the pulse, 2 ms and 1.4 mm after its beginning.
+            let before_mm = plant.clearance_before_mm.unwrap();
+            assert!((before_mm - 48.6).abs() < 0.2, "{before_mm} mm before");
+            // Led by 40 of 60 ms of dead time.
+            let behind_mm = plant.clearance_behind_mm.unwrap();
+            assert!((behind_mm - 64.9).abs() < 0.2, "{behind_mm} mm behind");
+        }
+        let worst = judgement.swing_errors_ticks().into_iter().fold(0.0, |worst: f64, error| worst.max(error.abs()));
+        assert_eq!(judgement.swing_errors_ticks().len(), 4);
+        assert!(worst < 0.01, "{worst} ticks");
+        assert!(judgement.weeds[0].cut);
+        assert_eq!(judgement.idle_swings, 0);
+        assert!(judgement.weeded_share <= judgement.weedable_share);
+    }
+
+    #[test]
+    fn swings_commanded_where_they_should_be_done_damage_the_plants_at_speed() {
+        let timing = Timing::as_in_the_paper();
+        let judgement = judged(&ideal_mm(timing), timing);
+        assert_eq!(judgement.count(Verdict::Damaged), 2);
+        // 180 ms of dead time and travel, less the margin.
+        let before_mm = judgement.plants[0].clearance_before_mm.unwrap();
+        assert!((before_mm - (50.0 - 0.182 * mm_s(2.5))).abs() < 0.2, "{before_mm} mm");
+    }
+
+    #[test]
+    fn a_swing_that_is_late_by_less_than_the_margin_cuts_only_the_margin() {
+        let mut places = ideal_mm(Timing::default());
+        places[1] += 30.0;
+        let judgement = judged(&places, Timing::default());
+        assert_eq!(judgement.plants[0].verdict, Verdict::MarginCut);
+        assert_eq!(judgement.plants[1].verdict, Verdict::Kept);
+        let error = judgement.plants[0].out_error_ticks.unwrap();
+        assert!((error - 30.0 / Machine::default().tick_mm()).abs() < 0.01, "{error} ticks");
+    }
+
+    #[test]
+    fn a_plant_without_a_swing_is_damaged() {
+        let judgement = judged(&[200.0], Timing::default());
+        assert_eq!(judgement.count(Verdict::Damaged), 2);
+        assert!(judgement.plants.iter().all(|plant| plant.swings == 0));
+        assert!(judgement.swing_errors_ticks().is_empty());
+        assert_eq!(judgement.weeded_share, 1.0);
+    }
+
+    #[test]
+    fn plants_that_share_a_swing_share_its_commands() {
+        let places = ideal_mm(Timing::default());
+        let judgement = judged(&[places[0], places[1], places[4]], Timing::default());
+        let [first, last] = judgement.plants.as_slice() else {
+            panic!("two plants");
+        };
+        assert_eq!((first.swings, last.swings), (1, 1));
+        assert!(first.out_error_ticks.is_some() && first.in_error_ticks.is_none());
+        assert!(last.out_error_ticks.is_none() && last.in_error_ticks.is_some());
+        assert!(!judgement.weeds[0].cut, "the tool was out over the weed");
+    }
+
+    #[test]
+    fn a_swing_for_a_weed_is_idle() {
+        let mut places = ideal_mm(Timing::default());
+        places.splice(3..3, [1600.0, 1700.0]);
+        let judgement = judged(&places, Timing::default());
+        assert_eq!(judgement.idle_swings, 1);
+        assert!(!judgement.weeds[0].cut);
+    }
+
+    #[test]
+    fn a_tool_that_stays_out_weeds_nothing_and_harms_nothing() {
+        let judgement = judged(&[], Timing::default());
+        assert_eq!(judgement.count(Verdict::Kept), 2);
+        assert_eq!(judgement.weeded_share, 0.0);
+        assert_eq!(judgement.plants[0].clear_mm(), None);
+    }
+
+    #[test]
+    fn rolling_back_with_the_tool_in_damages_a_plant_that_was_kept_on_the_way_there() {
+        let places = ideal_mm(Timing::default());
+        let there = motion();
+        let pulses = pulses(&there, &places);
+        let back = motion().change_speed(-mm_s(1.0), 1000.0).roll_to(1000.0);
+        let judgement = judge(&row(), &Machine::default(), &back, Timing::default(), &pulses, START_CYCLE);
+        assert_eq!(judgement.count(Verdict::Damaged), 2);
+    }
+
+    #[test]
+    fn the_weedable_share_follows_from_canopy_margins_and_swings() {
+        let share = weedable_share(&row(), &Machine::default(), &motion(), Timing::default());
+        let lost_mm = 150.0 + 2.0 * 50.0 + 2.0 * 0.9 * mm_s(2.5) * 0.12;
+        assert!((share - (1.0 - lost_mm / 600.0)).abs() < 0.001, "{share}");
+    }
+}

@@ -1,0 +1,235 @@
+//! Reading CSV tables that people made, with errors that name the file, the line, and what would be right.
+//!
+//! The columns may come in any order, with others among them; lines that begin with `#` are comments. Lines may end as
+//! any system or serial monitor ends them. What the values mean is for the reader of each table to say.
+
+use csv::StringRecord;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+use thiserror::Error;
+
+/// A table could not be read, and what would be right.
+#[derive(Debug, Error)]
+pub enum TableError {
+    /// The file itself.
+    #[error("{path} cannot be read")]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// A line of it.
+    #[error("{path}, line {line}: {problem}")]
+    Line {
+        /// The file.
+        path: PathBuf,
+        /// The line, counted from 1.
+        line: u64,
+        /// What is wrong with it.
+        problem: String,
+    },
+}
+
+/// A table: some lines of text in columns.
+pub struct CsvTable {
+    path: PathBuf,
+    header: StringRecord,
+    lines: Vec<(u64, StringRecord)>,
+}
+
+impl CsvTable {
+    /// Reads a file as [`parse`](Self::parse) does its text.
+    ///
+    /// # Errors
+    /// As [`parse`](Self::parse), and where the file cannot be read.
+    pub fn read(path: &Path, columns: &[&str]) -> Result<Self, TableError> {
+        Self::parse(path, bytes(path)?, columns)
+    }
+
+    /// The table in a file's text, which has to have these columns and at least one line below its header.
+    ///
+    /// A last line `ok` is passed over: the firmware's console ends its answers by one, and tables are pasted from there.
+    ///
+    /// # Errors
+    /// Names the file, the line and what would be right.
+    pub fn parse(path: &Path, text: Vec<u8>, columns: &[&str]) -> Result<Self, TableError> {
+        let at = |line: u64, problem: String| TableError::Line { path: path.into(), line, problem };
+        let text = String::from_utf8(text)
+            .map_err(|_| at(1, "this is not text: a table is a CSV file in UTF-8".to_owned()))?;
+        // The reader counts line feeds, so that each line has to have just one.
+        let text = text.replace("\r\n", "\n").replace('\r', "\n");
+        let text = text.trim_end();
+        let text = text.strip_suffix("\nok").unwrap_or(text).to_owned() + "\n";
+
+        let mut reader =
+            csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(text.as_bytes());
+        let header = reader.headers().map_err(|error| at(1, explain(&error)))?.clone();
+        // The reader stands at the line behind the one that it has read; a record's own position may be a comment's.
+        let header_line = reader.position().line() - 1;
+        if let Some(missing) = columns.iter().find(|&column| !header.iter().any(|name| name == *column)) {
+            let semicolons = header.iter().any(|name| name.contains(';'));
+            let hint = if semicolons { "; fields are separated by commas, not by semicolons" } else { "" };
+            let problem = format!("the column `{missing}` is missing: the header has to name {}", columns.join(","));
+            return Err(at(header_line, problem + hint));
+        }
+        let is_twice = |column: &&&str| header.iter().filter(|name| name == *column).count() > 1;
+        if let Some(twice) = columns.iter().find(is_twice) {
+            return Err(at(
+                header_line,
+                format!("the column `{twice}` stands there twice: each has a name of its own"),
+            ));
+        }
+        let mut lines = Vec::new();
+        let mut record = StringRecord::new();
+        loop {
+            let read = reader.read_record(&mut record);
+            let line = reader.position().line() - 1;
+            match read {
+                Ok(true) => lines.push((line, record.clone())),
+                Ok(false) => break,
+                Err(error) => return Err(at(line, explain(&error))),
+            }
+        }
+        if lines.is_empty() {
+            return Err(at(header_line, "nothing stands below the header: at least one line has to".to_owned()));
+        }
+        Ok(Self { path: path.into(), header, lines })
+    }
+
+    /// The lines below the header, at least one.
+    pub fn lines(&self) -> impl Iterator<Item = Line<'_>> {
+        self.lines.iter().map(|(number, record)| Line { table: self, number: *number, record })
+    }
+}
+
+/// What stands in a file.
+///
+/// # Errors
+/// Where it cannot be read.
+pub fn bytes(path: &Path) -> Result<Vec<u8>, TableError> {
+    fs::read(path).map_err(|source| TableError::File { path: path.into(), source })
+}
+
+/// A line of a table.
+#[derive(Clone, Copy)]
+pub struct Line<'a> {
+    table: &'a CsvTable,
+    number: u64,
+    record: &'a StringRecord,
+}
+
+impl Line<'_> {
+    /// Its number in the file, counted from 1.
+    pub fn number(&self) -> u64 {
+        self.number
+    }
+
+    /// The text in a column; empty where the table has no such column.
+    pub fn text(&self, column: &str) -> &str {
+        let place = self.table.header.iter().position(|name| name == column);
+        place.and_then(|place| self.record.get(place)).unwrap_or_default()
+    }
+
+    /// The value in a column. `right` says what it has to be.
+    ///
+    /// # Errors
+    /// Where the text is none.
+    pub fn value<T: FromStr>(&self, column: &str, right: &str) -> Result<T, TableError> {
+        let text = self.text(column);
+        text.parse().map_err(|_| self.error(format!("{column} is `{text}`: it has to be {right}")))
+    }
+
+    /// The error that this line has a problem.
+    pub fn error(&self, problem: impl Into<String>) -> TableError {
+        TableError::Line { path: self.table.path.clone(), line: self.number, problem: problem.into() }
+    }
+}
+
+/// What a CSV error says about the line, without the record number and byte that nobody asked for.
+fn explain(error: &csv::Error) -> String {
+    match error.kind() {
+        csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
+            format!("fields: {len}, where the header has {expected_len}: each line has one field a column")
+        }
+        _ => error.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::error::Error;
+
+    /// The values of the column `place_mm` with their lines, or what reading a file with this text says.
+    fn read(text: &str) -> Result<Vec<(u64, i16)>, String> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("table.csv");
+        fs::write(&path, text).unwrap();
+        let values = CsvTable::read(&path, &["place_mm"]).and_then(|table| {
+            table.lines().map(|line| Ok((line.number, line.value("place_mm", "a whole number")?))).collect()
+        });
+        values.map_err(|error: TableError| error.to_string().replace(&format!("{}/", folder.path().display()), ""))
+    }
+
+    #[test]
+    fn lines_are_counted_alike_however_they_end() {
+        let text = "# measured in May\nplace_mm,width_mm\n\n7,1\n# a gap\n\n8,1\n";
+        for end in ["\n", "\r\n", "\r"] {
+            assert_eq!(read(&text.replace('\n', end)), Ok(vec![(4, 7), (7, 8)]), "{end:?}");
+            let wrong = "table.csv, line 8: place_mm is `far`: it has to be a whole number";
+            assert_eq!(read(&format!("{text}far,1").replace('\n', end)), Err(wrong.to_owned()), "{end:?}");
+            let short = "table.csv, line 8: fields: 1, where the header has 2: each line has one field a column";
+            assert_eq!(read(&format!("{text}9").replace('\n', end)), Err(short.to_owned()), "{end:?}");
+        }
+    }
+
+    #[test]
+    fn a_missing_column_is_named_with_the_header_s_line() {
+        let wrong = "table.csv, line 2: the column `place_mm` is missing: the header has to name place_mm";
+        assert_eq!(read("# measured in May\nwidth_mm\n7\n"), Err(wrong.to_owned()));
+        assert!(read("").unwrap_err().starts_with("table.csv, line 1: the column `place_mm` is missing"));
+    }
+
+    #[test]
+    fn a_column_that_stands_there_twice_is_refused() {
+        let wrong = "table.csv, line 1: the column `place_mm` stands there twice: each has a name of its own";
+        assert_eq!(read("place_mm,width_mm,place_mm\n7,1,8\n"), Err(wrong.to_owned()));
+        assert_eq!(read("place_mm,width_mm,width_mm\n7,1,8\n"), Ok(vec![(2, 7)]), "it is not read");
+    }
+
+    #[test]
+    fn semicolons_between_the_fields_are_noticed() {
+        let said = read("place_mm;width_mm\n7;1\n").unwrap_err();
+        assert!(said.ends_with("; fields are separated by commas, not by semicolons"), "{said}");
+    }
+
+    #[test]
+    fn the_console_s_ok_at_the_end_is_no_line_of_the_table() {
+        for end in ["ok", "ok\n", "ok\n\n"] {
+            for between in ["\n", "\r\n"] {
+                let text = format!("place_mm,width_mm\n7,1\n{end}").replace('\n', between);
+                assert_eq!(read(&text), Ok(vec![(2, 7)]), "{text:?}");
+            }
+        }
+        assert!(read("place_mm,width_mm\nok\n7,1\n").unwrap_err().starts_with("table.csv, line 2: fields: 1"));
+        assert!(read("place_mm,width_mm\nok\n").unwrap_err().starts_with("table.csv, line 1: nothing stands below"));
+    }
+
+    #[test]
+    fn what_the_system_says_of_a_missing_file_is_said_once() {
+        let error = CsvTable::read(Path::new("no/such/table.csv"), &[]).err().unwrap();
+        assert_eq!(error.to_string(), "no/such/table.csv cannot be read");
+        assert!(error.source().is_some());
+    }
+
+    #[test]
+    fn a_file_that_is_no_text_is_refused() {
+        let mut file = tempfile::NamedTempFile::new().unwrap();
+        io::Write::write_all(&mut file, b"place_mm\n\xFF\n").unwrap();
+        let error = CsvTable::read(file.path(), &["place_mm"]).err().unwrap().to_string();
+        assert!(error.ends_with("this is not text: a table is a CSV file in UTF-8"), "{error}");
+    }
+}

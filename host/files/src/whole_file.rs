@@ -1,0 +1,142 @@
+//! Files that are written whole or not at all: what goes wrong half-way leaves what was there before.
+//!
+//! The text goes to a temporary file in the same folder, which then takes the name; behind a link it is the file to which that
+//! leads. What is no file, such as `/dev/null` or a pipe, is written as it is. It does not make folders. The temporary name is
+//! nobody's business, and in no error.
+
+use std::borrow::Cow;
+use std::fs::OpenOptions;
+use std::io::{self, ErrorKind, Write};
+use std::path::Path;
+use tempfile::{Builder, NamedTempFile};
+
+/// Writes a file, or replaces one.
+///
+/// # Errors
+/// Those of the system, and of `contents`; the file is then as it was before.
+pub fn write<E: From<io::Error>>(path: &Path, contents: impl FnOnce(&mut dyn Write) -> Result<(), E>) -> Result<(), E> {
+    let path = target(path);
+    if is_device(&path) {
+        let mut buffered = io::BufWriter::new(OpenOptions::new().write(true).open(&path)?);
+        contents(&mut buffered)?;
+        return Ok(buffered.flush()?);
+    }
+    let mut file = temporary(&path)?;
+    let mut buffered = io::BufWriter::new(file.as_file_mut());
+    contents(&mut buffered)?;
+    buffered.flush()?;
+    drop(buffered);
+    file.persist(path).map_err(|error| without_name(error.error))?;
+    Ok(())
+}
+
+/// Whether a file could be written now. Nothing is left behind.
+///
+/// # Errors
+/// Those of the system where it could not.
+pub fn check(path: &Path) -> io::Result<()> {
+    let path = target(path);
+    if path.is_dir() {
+        Err(ErrorKind::IsADirectory.into())
+    } else if is_device(&path) {
+        // A pipe would be opened for its reader; what is wrong with it shows when it is written.
+        Ok(())
+    } else {
+        temporary(&path).map(drop)
+    }
+}
+
+/// The file itself, where a link leads to one.
+fn target(path: &Path) -> Cow<'_, Path> {
+    path.canonicalize().map_or(Cow::Borrowed(path), Cow::Owned)
+}
+
+/// Whether something is there that is no file, and that no file may take the place of.
+fn is_device(path: &Path) -> bool {
+    path.metadata().is_ok_and(|there| !there.is_file() && !there.is_dir())
+}
+
+/// A file in the same folder that is gone again unless it takes the name.
+fn temporary(path: &Path) -> io::Result<NamedTempFile> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    #[cfg_attr(not(unix), expect(unused_mut, reason = "only the permissions change it"))]
+    let mut builder = Builder::new();
+    // A temporary file is its owner's alone, which a report is not: the system's mask decides, as for any file.
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    builder.tempfile_in(folder).map_err(without_name)
+}
+
+/// What the system said, without the temporary name that the library adds.
+fn without_name(error: io::Error) -> io::Error {
+    let said = error.to_string();
+    match said.split_once(" at path ") {
+        Some((cause, _)) => io::Error::new(error.kind(), cause),
+        None => error,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    #[test]
+    fn a_file_that_fails_half_way_leaves_what_was_there() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("report.html");
+        write(&path, |to| to.write_all(b"whole")).unwrap();
+        let error = write(&path, |to| {
+            to.write_all(b"half")?;
+            Err(io::Error::other("no more"))
+        });
+        assert_eq!(error.unwrap_err().to_string(), "no more");
+        assert_eq!(fs::read_to_string(&path).unwrap(), "whole");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "nothing else is left behind");
+    }
+
+    #[test]
+    fn a_file_is_replaced_and_others_may_read_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let (path, plain) = (folder.path().join("trial.csv"), folder.path().join("plain.csv"));
+        for text in ["first", "second"] {
+            write(&path, |to| to.write_all(text.as_bytes())).unwrap();
+            assert_eq!(fs::read_to_string(&path).unwrap(), text);
+        }
+        fs::write(&plain, "").unwrap();
+        assert_eq!(fs::metadata(&path).unwrap().permissions(), fs::metadata(&plain).unwrap().permissions());
+    }
+
+    #[test]
+    fn a_folder_that_does_not_exist_is_an_error() {
+        let folder = tempfile::tempdir().unwrap();
+        let written = write(&folder.path().join("no/such/file"), |to| to.write_all(b"text"));
+        assert_eq!(written.unwrap_err().kind(), io::ErrorKind::NotFound);
+    }
+
+    #[test]
+    fn what_cannot_be_written_is_known_before_and_nothing_is_left_behind() {
+        let folder = tempfile::tempdir().unwrap();
+        assert!(check(&folder.path().join("report.html")).is_ok());
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+        assert_eq!(check(folder.path()).unwrap_err().kind(), ErrorKind::IsADirectory);
+        let error = check(&folder.path().join("no/such/file")).unwrap_err().to_string();
+        assert!(error.starts_with("No such file or directory") && !error.contains("tmp"), "{error}");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_stays_one_and_a_device_stays_what_it_is() {
+        let folder = tempfile::tempdir().unwrap();
+        let (file, link) = (folder.path().join("table.csv"), folder.path().join("newest.csv"));
+        fs::write(&file, "old").unwrap();
+        std::os::unix::fs::symlink(&file, &link).unwrap();
+        write(&link, |to| to.write_all(b"new")).unwrap();
+        assert!(link.is_symlink());
+        assert_eq!(fs::read_to_string(&file).unwrap(), "new");
+        write(Path::new("/dev/null"), |to| to.write_all(b"nothing")).unwrap();
+        assert!(!Path::new("/dev/null").is_file());
+        let full = write(Path::new("/dev/full"), |to| to.write_all(b"more than a disk holds")).unwrap_err();
+        assert_eq!(full.kind(), ErrorKind::StorageFull);
+    }
+}

@@ -1,0 +1,328 @@
+//! The console from the other end of the wire: what the weeder's firmware says and takes over its serial line.
+//!
+//! [`Link::open`] opens an Uno's port, real or virtual, waits out the reset that opening a real one causes, and makes sure
+//! that the weeder's firmware answers. [`Link::ask`] types a command and waits for its answer; [`Link::next_line`] hears
+//! what the machine says by itself, and a [`session`] does both for as long as one likes. What a line means is told by [`Told`] and [`Status`], and [`settings`] and
+//! [`settings_file`] move all settings at once.
+//!
+//! Whatever comes from the port is suspect: noise, lines without an end, a firmware that is not the weeder's. What is kept
+//! of it is bounded, characters that could move a terminal's cursor are taken out, and no wait is endless.
+//!
+//! A link does not reconnect: one whose port is gone says so, and the session opens another. Nothing here knows a row or a
+//! simulator. In a browser there is no serial port, and all but that compiles for it.
+
+pub mod advice;
+pub mod completion;
+mod lines;
+pub mod log;
+#[cfg(not(target_arch = "wasm32"))]
+mod port;
+pub mod replay;
+pub mod session;
+pub mod settings;
+pub mod settings_file;
+mod told;
+
+pub use self::lines::LineReader;
+#[cfg(not(target_arch = "wasm32"))]
+pub use self::port::{find_uno, try_port};
+pub use self::told::{Mode, Status, Told, Values};
+pub use control::classifier::Class;
+
+use std::collections::VecDeque;
+use std::io::{self, Read, Write};
+use std::time::{Duration, Instant};
+use thiserror::Error;
+
+/// Characters that the firmware takes in a line.
+pub const COMMAND_LENGTH: usize = control::console::LINE_LENGTH;
+
+/// Reads in which nothing came, after which an answer is given up: two seconds.
+const SILENT_READS: usize = 100;
+
+/// Longest time that an answer may take although something keeps coming. The longest good one, all examples, takes less than
+/// a second.
+const ANSWER_TIME: Duration = Duration::from_secs(10);
+
+/// Bytes in which an answer has to end, six times what the longest one takes.
+const ANSWER_BYTES: usize = 40_000;
+
+/// Silent reads in which the greeting has to come after a reset: the longest wait of an old bootloader, and some patience.
+const BOOT_READS: usize = 150;
+
+/// Times that the version is asked for again.
+const RETRIES: usize = 2;
+
+/// What the firmware's name begins with, in its greeting and its version.
+const NAME: &str = "weeder ";
+
+/// Why there is no link, or no good answer.
+#[derive(Debug, Error)]
+pub enum LinkError {
+    /// The system has no list of its serial ports.
+    #[cfg(not(target_arch = "wasm32"))]
+    #[error("the serial ports cannot be listed: name the Uno's by --port")]
+    NoList(#[source] serialport::Error),
+    /// No port looks like an Uno.
+    #[error(
+        "there is no Uno at any USB port{}: plug it in with a cable that carries data, or name its port by --port",
+        others(.0)
+    )]
+    NoUno(Vec<String>),
+    /// Several do.
+    #[error("there are several Unos: choose one by --port, of {}", .0.join(", "))]
+    SeveralUnos(Vec<String>),
+    /// There is no such port.
+    #[error("there is no port {0}: plug the Uno in, or leave --port out to have it found")]
+    Absent(String),
+    /// Somebody else has the port.
+    #[error("{0} is in use: close the serial monitor or whatever else has it open")]
+    Busy(String),
+    /// The user may not open the port.
+    #[error(
+        "{0} may not be opened: add yourself to the port's group (on Debian and Ubuntu `sudo usermod -aG dialout $USER`) \
+         and log in anew"
+    )]
+    Forbidden(String),
+    /// The port cannot be opened for another reason.
+    #[cfg(not(target_arch = "wasm32"))]
+    #[error("{port} cannot be opened as a serial port")]
+    NotOpened {
+        /// Its name.
+        port: String,
+        /// What the system says.
+        source: serialport::Error,
+    },
+    /// The port went away.
+    #[error("the port is gone: plug the Uno in again")]
+    Gone(#[source] io::Error),
+    /// The firmware did not finish its answer.
+    #[error(
+        "nothing finishes the answer to `{command}`: press the Uno's reset, and see that the weeder's firmware is on it \
+         (`weeder flash`); it sent {received:?}"
+    )]
+    Silent {
+        /// The command.
+        command: String,
+        /// The end of what came.
+        received: String,
+    },
+    /// What comes is not text.
+    #[error("what comes from the port is no text: see that nothing else is wired to D0 and D1, and flash the Uno anew")]
+    Noise,
+    /// Something else answers.
+    #[error("it is not the weeder's firmware that answers, but {0:?}: put it on the Uno by `weeder flash`")]
+    NotTheWeeder(String),
+    /// The firmware started anew while it was asked.
+    #[error("the Uno was reset while it was asked `{0}`: see to its supply, then try again")]
+    Restarted(String),
+    /// The firmware refused.
+    #[error("the firmware answers `{command}` by `{answer}`")]
+    Refused {
+        /// The command.
+        command: String,
+        /// The line that begins with `error:`.
+        answer: String,
+    },
+    /// This cannot be typed into the console.
+    #[error("{0:?} is no command: it has to be one line of at most {COMMAND_LENGTH} printable ASCII characters")]
+    NoCommand(String),
+}
+
+/// What other ports there are, for the message that none is an Uno's.
+fn others(ports: &[String]) -> String {
+    if ports.is_empty() { String::new() } else { format!(" (there is {})", ports.join(", ")) }
+}
+
+/// A line of bytes, both ways.
+///
+/// A read waits at most some hundredths of a second, and then fails by [`io::ErrorKind::TimedOut`]. A read of no bytes, and every
+/// other error, says that the port is gone.
+pub trait Port: Read + Write {}
+
+impl<T: Read + Write + ?Sized> Port for T {}
+
+/// Something from the port.
+enum Heard {
+    Line(String),
+    Bytes(usize),
+    Nothing,
+}
+
+/// A link to the firmware's console.
+pub struct Link {
+    port: Box<dyn Port>,
+    lines: LineReader,
+    /// Lines that came before an answer and belong to none.
+    told: VecDeque<String>,
+    version: String,
+}
+
+impl Link {
+    /// Opens a port by its name, or that of the only Uno, and makes sure that the weeder's firmware answers.
+    ///
+    /// # Errors
+    /// Where the port is absent, busy or forbidden, or something else than the weeder's firmware is at its other end.
+    #[cfg(not(target_arch = "wasm32"))]
+    pub fn open(port: Option<&str>) -> Result<Self, LinkError> {
+        let (port, resets) = match port {
+            Some(port) => port::open(port)?,
+            None => port::open(&find_uno()?)?,
+        };
+        Self::over(port, resets)
+    }
+
+    /// A link over a port that is open already; `resets` says whether opening it has reset the Uno.
+    ///
+    /// # Errors
+    /// Where the port is gone, or something else than the weeder's firmware is at its other end.
+    pub fn over(port: impl Port + 'static, resets: bool) -> Result<Self, LinkError> {
+        let mut link =
+            Self { port: Box::new(port), lines: LineReader::new(), told: VecDeque::new(), version: String::new() };
+        link.wait_for_greeting(if resets { BOOT_READS } else { 0 })?;
+        // Whatever was typed before ends here, and its answer is nobody's.
+        link.type_line("")?;
+        link.wait_until_quiet()?;
+        let mut answer = link.ask("version");
+        // The Uno may be starting right now, which no modem line has told.
+        for _ in 0..RETRIES {
+            if !matches!(answer, Err(LinkError::Restarted(_) | LinkError::Silent { .. })) {
+                break;
+            }
+            answer = link.ask("version");
+        }
+        let answer = answer?;
+        match answer.last().and_then(|line| line.strip_prefix(NAME)) {
+            Some(version) => link.version = version.to_owned(),
+            None => return Err(LinkError::NotTheWeeder(answer.join(" "))),
+        }
+        Ok(link)
+    }
+
+    /// The firmware's version.
+    pub fn version(&self) -> &str {
+        &self.version
+    }
+
+    /// Types a command and returns the lines of its answer, the `ok` left out.
+    ///
+    /// # Errors
+    /// Where it is no command, the firmware refuses, or no whole answer comes.
+    pub fn ask(&mut self, command: &str) -> Result<Vec<String>, LinkError> {
+        self.send(command)?;
+        let deadline = Instant::now() + ANSWER_TIME;
+        let (mut silent_reads, mut bytes) = (0, 0);
+        let mut answer: Vec<String> = Vec::new();
+        while silent_reads < SILENT_READS && bytes < ANSWER_BYTES && Instant::now() < deadline {
+            match self.hear()? {
+                Heard::Nothing => silent_reads += 1,
+                Heard::Bytes(count) => bytes += count,
+                Heard::Line(line) if line == "ok" => return Ok(answer),
+                Heard::Line(line) if line.starts_with("error:") => {
+                    return Err(LinkError::Refused { command: command.to_owned(), answer: line });
+                }
+                Heard::Line(line) if is_greeting(&line) => return Err(LinkError::Restarted(command.to_owned())),
+                // Events come before an answer, and never within it.
+                Heard::Line(line) if answer.is_empty() && Told::parse(&line).is_some() => self.told.push_back(line),
+                Heard::Line(line) => answer.push(line),
+            }
+        }
+        answer.push(self.lines.partial().to_owned());
+        let received = answer.join("\n");
+        let strange = received.matches(lines::STRANGE).count();
+        if 4 * strange > received.chars().count() {
+            return Err(LinkError::Noise);
+        }
+        let tail = received.char_indices().rev().nth(200).map_or(0, |(at, _)| at);
+        Err(LinkError::Silent { command: command.to_owned(), received: received[tail..].trim().to_owned() })
+    }
+
+    /// Types a command and does not wait for its answer, which comes by [`next_line`](Self::next_line).
+    ///
+    /// # Errors
+    /// Where it is no command, or the port is gone.
+    pub fn send(&mut self, command: &str) -> Result<(), LinkError> {
+        if !is_command(command) {
+            return Err(LinkError::NoCommand(command.to_owned()));
+        }
+        self.type_line(command)
+    }
+
+    /// The next line that the machine says; none where no line was complete within a fiftieth of a second.
+    ///
+    /// # Errors
+    /// Where the port is gone.
+    pub fn next_line(&mut self) -> Result<Option<String>, LinkError> {
+        if let Some(line) = self.told.pop_front() {
+            return Ok(Some(line));
+        }
+        match self.hear()? {
+            Heard::Line(line) => Ok(Some(line)),
+            // The line that these bytes complete is there at once.
+            Heard::Bytes(_) => Ok(self.lines.next_line()),
+            Heard::Nothing => Ok(None),
+        }
+    }
+
+    fn type_line(&mut self, line: &str) -> Result<(), LinkError> {
+        let gone = |error| LinkError::Gone(error);
+        self.port.write_all(format!("{line}\n").as_bytes()).map_err(gone)?;
+        self.port.flush().map_err(gone)
+    }
+
+    /// A line that is there already, or one read.
+    fn hear(&mut self) -> Result<Heard, LinkError> {
+        if let Some(line) = self.lines.next_line() {
+            return Ok(Heard::Line(line));
+        }
+        let mut bytes = [0; 256];
+        match self.port.read(&mut bytes) {
+            Ok(0) => Err(LinkError::Gone(io::ErrorKind::UnexpectedEof.into())),
+            Ok(count) => {
+                self.lines.take(&bytes[..count]);
+                Ok(Heard::Bytes(count))
+            }
+            Err(error) if is_nothing(&error) => Ok(Heard::Nothing),
+            Err(error) => Err(LinkError::Gone(error)),
+        }
+    }
+
+    fn wait_for_greeting(&mut self, reads: usize) -> Result<(), LinkError> {
+        for _ in 0..reads {
+            if let Heard::Line(line) = self.hear()?
+                && is_greeting(&line)
+            {
+                return Ok(());
+            }
+        }
+        Ok(())
+    }
+
+    /// Drops what comes until nothing comes any more, or for a second if it does not end.
+    fn wait_until_quiet(&mut self) -> Result<(), LinkError> {
+        let deadline = Instant::now() + Duration::from_secs(1);
+        let mut quiet_reads = 0;
+        while quiet_reads < 2 && Instant::now() < deadline {
+            quiet_reads = if let Heard::Nothing = self.hear()? { quiet_reads + 1 } else { 0 };
+        }
+        Ok(())
+    }
+}
+
+/// Whether this can be typed into the console: one line of printable ASCII, and not too long.
+pub fn is_command(line: &str) -> bool {
+    line.len() <= COMMAND_LENGTH && line.bytes().all(|byte| matches!(byte, b' '..=b'~'))
+}
+
+/// Whether a line is the one by which the firmware says that it has started.
+pub fn is_greeting(line: &str) -> bool {
+    line.starts_with(NAME) && line.contains(", reset by ")
+}
+
+/// Whether a read ended without a byte, but may be repeated.
+fn is_nothing(error: &io::Error) -> bool {
+    matches!(error.kind(), io::ErrorKind::TimedOut | io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted)
+}
+
+#[cfg(test)]
+mod tests;

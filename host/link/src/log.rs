@@ -1,0 +1,242 @@
+//! The log of a session: what happened, a line each, as a CSV file that can be read anywhere and replayed.
+//!
+//! The columns are `time_ms` since the log was opened, `kind` and `line`. A line stands as the firmware wrote it. What the
+//! machine was when it connected, its settings and its examples, stands there too, so that a log can be replayed by itself.
+//! Each line is written out before the next is waited for: what is in the file when power goes stays whole but for its
+//! last line.
+
+use super::session::Happening;
+use super::settings::{Setting, name};
+use files::csv_table::{CsvTable, TableError};
+use std::fs::{File, OpenOptions};
+use std::io::{self, Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+use thiserror::Error;
+
+/// What kind of line stands in a log.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// The Uno is there; the version.
+    Connected,
+    /// The Uno is gone; why.
+    Lost,
+    /// One of its settings, `name=value`.
+    Setting,
+    /// One of its examples.
+    Example,
+    /// Its status.
+    Status,
+    /// What it told by itself.
+    Event,
+    /// What was typed.
+    Command,
+    /// What it answered.
+    Answer,
+}
+
+impl Kind {
+    const ALL: [Self; 8] = [
+        Self::Connected,
+        Self::Lost,
+        Self::Setting,
+        Self::Example,
+        Self::Status,
+        Self::Event,
+        Self::Command,
+        Self::Answer,
+    ];
+
+    /// As it stands in the file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Connected => "connected",
+            Self::Lost => "lost",
+            Self::Setting => "setting",
+            Self::Example => "example",
+            Self::Status => "status",
+            Self::Event => "event",
+            Self::Command => "command",
+            Self::Answer => "answer",
+        }
+    }
+
+    fn find(word: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| kind.name() == word)
+    }
+}
+
+/// The first line of a log.
+const HEADER: &str = "time_ms,kind,line";
+
+/// Why a log cannot be written.
+#[derive(Debug, Error)]
+pub enum LogError {
+    /// The file cannot be written.
+    #[error("{path} cannot be written")]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// The file is something else.
+    #[error("{0} is there and is no log: choose another name")]
+    NoLog(PathBuf),
+}
+
+/// Writes a log.
+pub struct LogWriter {
+    path: PathBuf,
+    file: csv::Writer<File>,
+    began: Instant,
+    /// Lines below the header that were there, and that were added.
+    found: u64,
+    added: u64,
+}
+
+impl LogWriter {
+    /// Opens a log; one that is there is gone on with.
+    ///
+    /// # Errors
+    /// Where the file cannot be written, or is something else.
+    pub fn open(path: &Path) -> Result<Self, LogError> {
+        let failed = |source| LogError::File { path: path.into(), source };
+        let mut file =
+            OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path).map_err(failed)?;
+        let mut bytes = Vec::new();
+        file.read_to_end(&mut bytes).map_err(failed)?;
+        if !bytes.is_empty() && !bytes.starts_with(HEADER.as_bytes()) {
+            return Err(LogError::NoLog(path.into()));
+        }
+        // A last line that power has cut off would spoil the next.
+        let whole = bytes.iter().rposition(|&byte| byte == b'\n').map_or(0, |end| end + 1);
+        file.set_len(whole as u64).and_then(|()| file.seek(SeekFrom::End(0))).map_err(failed)?;
+        // What stands in quotes may have lines of its own, which the firmware's lines never have.
+        let found = bytes[..whole].iter().filter(|&&byte| byte == b'\n').count().saturating_sub(1) as u64;
+        let mut log =
+            Self { path: path.into(), file: csv::Writer::from_writer(file), began: Instant::now(), found, added: 0 };
+        if whole == 0 {
+            log.record(HEADER.split(','))?;
+        }
+        Ok(log)
+    }
+
+    /// Writes down what happened.
+    ///
+    /// # Errors
+    /// Where the file cannot be written.
+    pub fn write(&mut self, happening: &Happening) -> Result<(), LogError> {
+        match happening {
+            Happening::Connected { version, settings, examples } => {
+                self.line(Kind::Connected, version)?;
+                for setting in Setting::all() {
+                    self.line(Kind::Setting, &format!("{}={}", name(setting), settings.get(setting)))?;
+                }
+                examples.iter().try_for_each(|example| self.line(Kind::Example, example))
+            }
+            Happening::Lost(why) => self.line(Kind::Lost, why),
+            Happening::Status(_, line) => self.line(Kind::Status, line),
+            Happening::Told(_, line) => self.line(Kind::Event, line),
+            Happening::Command(line) => self.line(Kind::Command, line),
+            Happening::Answer(line) => self.line(Kind::Answer, line),
+            // They follow from the commands.
+            Happening::Settings(_) => Ok(()),
+        }
+    }
+
+    /// Lines in the file, the header left out.
+    pub fn lines(&self) -> u64 {
+        self.found + self.added
+    }
+
+    /// Those of them that were written since it was opened.
+    pub fn added(&self) -> u64 {
+        self.added
+    }
+
+    fn line(&mut self, kind: Kind, line: &str) -> Result<(), LogError> {
+        let time_ms = self.began.elapsed().as_millis().to_string();
+        self.added += 1;
+        self.record([time_ms.as_str(), kind.name(), line])
+    }
+
+    fn record<'a>(&mut self, fields: impl IntoIterator<Item = &'a str>) -> Result<(), LogError> {
+        let written = self.file.write_record(fields).map_err(io::Error::from).and_then(|()| self.file.flush());
+        written.map_err(|source| LogError::File { path: self.path.clone(), source })
+    }
+}
+
+/// A line of a log.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Entry {
+    /// The line in the file, counted from 1.
+    pub number: u64,
+    /// The host's time since the log was opened.
+    pub time_ms: u64,
+    /// What kind of line it is.
+    pub kind: Kind,
+    /// What stands there.
+    pub text: String,
+}
+
+/// Reads a log.
+///
+/// # Errors
+/// Names the file, the line and what would be right.
+pub fn read(path: &Path) -> Result<Vec<Entry>, TableError> {
+    let table = CsvTable::read(path, &HEADER.split(',').collect::<Vec<_>>())?;
+    table
+        .lines()
+        .map(|line| {
+            let kind = Kind::find(line.text("kind")).ok_or_else(|| {
+                let known = Kind::ALL.map(Kind::name).join(", ");
+                line.error(format!("kind is `{}`: it has to be one of {known}", line.text("kind")))
+            })?;
+            let time_ms = line.value("time_ms", "a whole number of milliseconds")?;
+            Ok(Entry { number: line.number(), time_ms, kind, text: line.text("line").to_owned() })
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    #[test]
+    fn a_log_is_read_as_it_was_written_and_gone_on_with_behind_a_line_cut_off() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("log.csv");
+        let answer = "speed_mm_s,spacing_mm \"quoted\"";
+        LogWriter::open(&path).unwrap().write(&Happening::Answer(answer.to_owned())).unwrap();
+        let mut cut = fs::read(&path).unwrap();
+        cut.extend(b"17,sta");
+        fs::write(&path, cut).unwrap();
+        LogWriter::open(&path).unwrap().write(&Happening::Lost("unplugged".to_owned())).unwrap();
+        let entries: Vec<(u64, Kind, String)> =
+            read(&path).unwrap().into_iter().map(|entry| (entry.number, entry.kind, entry.text)).collect();
+        assert_eq!(entries, [(2, Kind::Answer, answer.to_owned()), (3, Kind::Lost, "unplugged".to_owned())]);
+    }
+
+    #[test]
+    fn another_file_is_not_written_over() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        fs::write(file.path(), "my diary\n").unwrap();
+        assert!(matches!(LogWriter::open(file.path()), Err(LogError::NoLog(_))));
+        assert_eq!(fs::read_to_string(file.path()).unwrap(), "my diary\n");
+    }
+
+    #[test]
+    fn a_line_that_is_none_of_a_log_is_named() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        for (line, wrong) in [
+            ("0,gossip,hello", "line 2: kind is `gossip`: it has to be one of connected, lost, setting"),
+            ("soon,event,swing", "line 2: time_ms is `soon`: it has to be a whole number of milliseconds"),
+        ] {
+            fs::write(file.path(), format!("{HEADER}\n{line}\n")).unwrap();
+            let error = read(file.path()).unwrap_err().to_string();
+            assert!(error.contains(wrong), "{error}");
+        }
+    }
+}

@@ -1,0 +1,144 @@
+//! The serial ports of this computer: the search for the Uno's, and how one is opened.
+//!
+//! What else a link can be over is a [`Port`](crate::Port) too. This module is left out where there is no serial port: in a browser.
+
+use super::LinkError;
+use serialport::{ErrorKind, SerialPort, SerialPortInfo, SerialPortType, UsbPortInfo};
+use std::io;
+use std::time::Duration;
+
+/// Bits in a second on the firmware's serial line.
+const BAUD: u32 = 115_200;
+
+/// Longest time that a read waits for a byte.
+const READ_MS: u64 = 20;
+
+/// Longest time that a write waits for room, and a read where it has to.
+const PATIENCE: Duration = Duration::from_millis(READ_MS);
+
+/// USB vendors and products of the Uno, and of the converters on boards that are built like it.
+const UNOS: [(u16, u16); 10] = [
+    (0x2341, 0x0001),
+    (0x2341, 0x0043),
+    (0x2341, 0x0243),
+    (0x2A03, 0x0043),
+    (0x2A03, 0x0243),
+    (0x1A86, 0x7523), // CH340
+    (0x1A86, 0x5523), // CH341
+    (0x0403, 0x6001), // FT232R
+    (0x0403, 0x6015), // FT231X
+    (0x10C4, 0xEA60), // CP2102
+];
+
+/// The only Uno's port among those of this machine.
+///
+/// # Errors
+/// Where there is none, or several.
+pub fn find_uno() -> Result<String, LinkError> {
+    only_uno(&serialport::available_ports().map_err(LinkError::NoList)?)
+}
+
+/// The only Uno's port among these, known by its USB vendor and product.
+///
+/// # Errors
+/// Where there is none, or several.
+fn only_uno(ports: &[SerialPortInfo]) -> Result<String, LinkError> {
+    let is_uno = |port: &&SerialPortInfo| match &port.port_type {
+        SerialPortType::UsbPort(UsbPortInfo { vid, pid, .. }) => UNOS.contains(&(*vid, *pid)),
+        _ => false,
+    };
+    let unos: Vec<String> = ports.iter().filter(is_uno).map(|port| port.port_name.clone()).collect();
+    match unos.as_slice() {
+        [only] => Ok(only.clone()),
+        [] => Err(LinkError::NoUno(ports.iter().map(|port| port.port_name.clone()).collect())),
+        _ => Err(LinkError::SeveralUnos(unos)),
+    }
+}
+
+/// Opens a port by its name and closes it again.
+///
+/// # Errors
+/// Where it is absent, in use, forbidden, or no serial port; each says what to do.
+pub fn try_port(name: &str) -> Result<(), LinkError> {
+    open(name).map(drop)
+}
+
+/// Opens a port by its name, and says whether that has reset the Uno.
+pub(super) fn open(name: &str) -> Result<(Box<dyn SerialPort>, bool), LinkError> {
+    let mut port = serialport::new(name, BAUD).timeout(PATIENCE).open().map_err(|error| explain(name, error))?;
+    // The line that pulls an Uno's reset; a pseudo-terminal has none.
+    let resets = port.write_data_terminal_ready(true).is_ok();
+    Ok((port, resets))
+}
+
+/// Why a port does not open.
+fn explain(name: &str, error: serialport::Error) -> LinkError {
+    let name = name.to_owned();
+    match error.kind() {
+        ErrorKind::Io(io::ErrorKind::PermissionDenied) => LinkError::Forbidden(name),
+        ErrorKind::Io(io::ErrorKind::ResourceBusy) => LinkError::Busy(name),
+        ErrorKind::Io(io::ErrorKind::NotFound) => LinkError::Absent(name),
+        // A port that is there and yet no device is one that somebody else has locked.
+        ErrorKind::NoDevice if std::fs::exists(&name).unwrap_or(false) => LinkError::Busy(name),
+        ErrorKind::NoDevice => LinkError::Absent(name),
+        _ => LinkError::NotOpened { port: name, source: error },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn port(name: &str, ids: Option<(u16, u16)>) -> SerialPortInfo {
+        SerialPortInfo {
+            port_name: name.to_owned(),
+            port_type: match ids {
+                None => SerialPortType::Unknown,
+                Some((vid, pid)) => SerialPortType::UsbPort(UsbPortInfo {
+                    vid,
+                    pid,
+                    serial_number: None,
+                    manufacturer: None,
+                    product: None,
+                }),
+            },
+        }
+    }
+
+    #[test]
+    fn the_only_uno_is_found_among_other_ports() {
+        let ports = [port("ttyS0", None), port("ttyACM0", Some((0x2341, 0x0043)))];
+        assert_eq!(only_uno(&ports).unwrap(), "ttyACM0");
+    }
+
+    #[test]
+    fn two_unos_have_to_be_told_apart() {
+        let ports = [port("ttyACM0", Some((0x2341, 0x0043))), port("ttyUSB0", Some((0x1A86, 0x7523)))];
+        let error = only_uno(&ports).unwrap_err().to_string();
+        assert!(error.ends_with("choose one by --port, of ttyACM0, ttyUSB0"), "{error}");
+    }
+
+    #[test]
+    fn no_uno_is_said_with_what_there_is_instead() {
+        let error = only_uno(&[port("ttyS0", None)]).unwrap_err().to_string();
+        assert!(error.contains("(there is ttyS0): plug it in"), "{error}");
+        let error = only_uno(&[]).unwrap_err().to_string();
+        assert!(error.starts_with("there is no Uno at any USB port: plug it in"), "{error}");
+    }
+
+    #[test]
+    fn a_port_that_is_absent_and_a_file_that_is_no_port_are_told_apart() {
+        let error = try_port("/dev/no-such-port").unwrap_err().to_string();
+        assert!(error.starts_with("there is no port /dev/no-such-port: plug the Uno in"), "{error}");
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let error = try_port(file.path().to_str().unwrap()).unwrap_err().to_string();
+        assert!(error.ends_with("cannot be opened as a serial port"), "{error}");
+    }
+
+    #[test]
+    fn who_may_not_open_a_port_is_told_of_its_group() {
+        let denied = serialport::Error::new(ErrorKind::Io(io::ErrorKind::PermissionDenied), "Permission denied");
+        let error = explain("/dev/ttyACM0", denied).to_string();
+        assert!(error.contains("`sudo usermod -aG dialout $USER`) and log in anew"), "{error}");
+    }
+}

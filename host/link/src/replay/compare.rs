@@ -1,0 +1,155 @@
+//! What a log tells beside what its replay tells.
+
+use super::{Difference, OBJECT_TICKS, Replayed, SWING_MS, SWING_TICKS};
+use crate::{Class, Told};
+
+/// Farther than any object's hold goes, 5 m at the default wheel.
+const FAR_TICKS: i32 = 10_000;
+
+/// Something that was told.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Heard {
+    /// The log's line; 0 for the replay.
+    pub(super) line: u64,
+    /// What.
+    pub(super) told: Told,
+    /// The machine's speed then, in ticks a second.
+    pub(super) speed: i32,
+    /// Whether its place is given, not decided.
+    pub(super) is_given: bool,
+}
+
+/// Where a stretch of a log was replayed.
+pub(super) struct Bounds {
+    /// The first place.
+    pub(super) first: i32,
+    /// Swings before this place are not judged.
+    pub(super) judged_from: i32,
+    /// The last place.
+    pub(super) end: i32,
+}
+
+/// Compares what both tell, each kind in its order, and notes the first difference.
+pub(super) fn compare(logged: &[Heard], replayed: &[Heard], bounds: &Bounds, result: &mut Replayed) {
+    let kinds: [fn(&Told) -> bool; 3] = [
+        |told| matches!(told, Told::Object { .. }),
+        |told| matches!(told, Told::Swing { .. }),
+        |told| matches!(told, Told::Alarm { .. }),
+    ];
+    let is_judged = |heard: &&Heard| match heard.told {
+        // What was in the beam when the log began is cut for the replay.
+        Told::Object { position, .. } => position.wrapping_sub(bounds.first) >= 0,
+        Told::Swing { position, .. } => position >= bounds.judged_from,
+        _ => !heard.is_given,
+    };
+    // What is at the very end may come in the one and not yet in the other; an object is told some way behind it.
+    let is_at_end = |heard: &Heard| match heard.told {
+        Told::Swing { position, .. } => bounds.end.wrapping_sub(position).saturating_abs() <= swing_ticks(heard, heard),
+        Told::Object { position, hold, .. } => {
+            (-FAR_TICKS..=OBJECT_TICKS).contains(&bounds.end.wrapping_sub(position.wrapping_add(hold)))
+        }
+        _ => false,
+    };
+    // What is at the very beginning may be judged in the one and come before that in the other.
+    let is_at_beginning = |heard: &Heard| match heard.told {
+        Told::Swing { position, .. } => {
+            bounds.judged_from > i32::MIN
+                && position.wrapping_sub(bounds.judged_from).saturating_abs() <= swing_ticks(heard, heard)
+        }
+        // Told by both it is, and only by one of them as judged.
+        Told::Object { position, .. } => {
+            let is_told = |told: &[Heard]| told.iter().any(|other| agree(heard, other));
+            position.wrapping_sub(bounds.first).saturating_abs() <= OBJECT_TICKS && is_told(logged) && is_told(replayed)
+        }
+        _ => false,
+    };
+    let mut differences = Vec::new();
+    for is_kind in kinds {
+        let mut ours = replayed.iter().filter(|heard| is_kind(&heard.told)).filter(is_judged).peekable();
+        let mut theirs = logged.iter().filter(|heard| is_kind(&heard.told)).filter(is_judged).peekable();
+        let is_one_sided = match (theirs.peek(), ours.peek()) {
+            (Some(logged), Some(replayed)) => !agree(logged, replayed),
+            (logged, replayed) => logged.is_some() != replayed.is_some(),
+        };
+        if is_one_sided && theirs.next_if(|heard| is_at_beginning(heard)).is_none() {
+            ours.next_if(|heard| is_at_beginning(heard));
+        }
+        loop {
+            match (theirs.next(), ours.next()) {
+                (None, None) => break,
+                (Some(logged), Some(replayed)) if agree(logged, replayed) => result.count(logged, replayed),
+                (Some(only), None) | (None, Some(only)) if is_at_end(only) => break,
+                (logged, replayed) => {
+                    let line = logged.map(|heard| heard.line);
+                    differences.push(Difference { line, logged: describe(logged), replayed: describe(replayed) });
+                    break;
+                }
+            }
+        }
+    }
+    if result.difference.is_none() {
+        result.difference = differences.into_iter().min_by_key(|difference| difference.line.unwrap_or(u64::MAX));
+    }
+}
+
+impl Replayed {
+    /// Counts what both agree on.
+    fn count(&mut self, logged: &Heard, replayed: &Heard) {
+        match (logged.told, replayed.told) {
+            (Told::Object { .. }, _) => self.objects += 1,
+            (Told::Alarm { .. }, _) => self.alarms += 1,
+            (Told::Swing { position, .. }, Told::Swing { position: ours, .. }) => {
+                self.swings += 1;
+                if !logged.is_given {
+                    self.farthest_swing = self.farthest_swing.max(position.wrapping_sub(ours).saturating_abs());
+                }
+            }
+            _ => {}
+        }
+    }
+}
+
+/// By how many ticks the places of these swings may differ.
+fn swing_ticks(logged: &Heard, replayed: &Heard) -> i32 {
+    SWING_TICKS + logged.speed.abs().max(replayed.speed.abs()) * SWING_MS / 1000
+}
+
+/// Whether log and replay tell the same.
+fn agree(logged: &Heard, replayed: &Heard) -> bool {
+    let near = |one: i32, other: i32, ticks: i32| one.wrapping_sub(other).saturating_abs() <= ticks;
+    match (logged.told, replayed.told) {
+        (
+            Told::Object { class, position, votes, hold, .. },
+            Told::Object { class: our_class, position: our_position, votes: our_votes, hold: our_hold, .. },
+        ) => {
+            (class, votes) == (our_class, our_votes)
+                && near(position, our_position, OBJECT_TICKS)
+                && near(hold, our_hold, OBJECT_TICKS)
+        }
+        (Told::Swing { out, position }, Told::Swing { out: ours, position: our_position }) => {
+            out == ours && (logged.is_given || near(position, our_position, swing_ticks(logged, replayed)))
+        }
+        (Told::Alarm { alarm, .. }, Told::Alarm { alarm: ours, .. }) => alarm == ours,
+        _ => false,
+    }
+}
+
+fn describe(heard: Option<&Heard>) -> String {
+    let Some(heard) = heard else { return "none".to_owned() };
+    match heard.told {
+        Told::Object { class, position, votes, hold, .. } => {
+            let class = match class {
+                Class::Plant => "plant",
+                Class::Weed => "weed",
+                Class::Unknown => "unknown",
+            };
+            format!("`{class} pos={position} votes={votes} hold={hold}`")
+        }
+        Told::Swing { out, position } => format!("`swing tool={} pos={position}`", if out { "out" } else { "in" }),
+        Told::Alarm { alarm, position } => {
+            let name: String = alarm.text().bytes().map(char::from).collect();
+            format!("`alarm name={name} pos={position}`")
+        }
+        Told::State(_) | Told::Warning(_) | Told::Calibrated | Told::Plot => "something else".to_owned(),
+    }
+}

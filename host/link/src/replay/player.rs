@@ -1,0 +1,331 @@
+//! The decisions, driven along a log: the machine's way, the beam's edges, and what was typed.
+
+use super::judge::{Judge, Seen, Witness};
+use super::{Happened, Heard, OBJECT_TICKS, Stretch};
+use crate::settings::{Setting, steps};
+use crate::{Mode, Status, Told};
+use control::alarm::Alarm;
+use control::classifier::Vote;
+use control::console::{self, Command};
+use control::controller::{Controller, Readings, State, WakeUp};
+use control::event::Event;
+use control::memory::Volatile;
+use control::reset::Cause;
+use control::units::{Instant, Interval, Position, Ticks, TicksPerSecond};
+use std::rc::Rc;
+
+/// Time between two steps of a machine at rest.
+const REST_MS: u32 = 5;
+
+/// Longest rest that is replayed: nothing that it changes takes longer.
+const LONGEST_REST_MS: u64 = 2_000;
+
+/// The speed at which a machine comes to a stop without surprise.
+const SLOWLY_MM_S: i32 = 20;
+
+/// Longest way between two lines of a log. A machine at 10 km/h rolls it in some minutes.
+const LONGEST_WAY: i32 = 1_000_000;
+
+/// Faster than any machine, and as far as [`control::units::Wheel::ticks`] goes with every encoder.
+const FASTEST_MM_S: u16 = 3_800;
+
+/// The decisions, driven along the log.
+pub(super) struct Player<'a> {
+    controller: Controller<Judge<'a>, Volatile>,
+    witness: Rc<Witness>,
+    /// The ground over which the beam was broken.
+    canopies: Vec<Canopy>,
+    broken: bool,
+    now: Instant,
+    position: i32,
+    /// The machine's speed over the ground.
+    pub(super) speed_mm_s: i32,
+    /// What the decisions told.
+    pub(super) heard: Vec<Heard>,
+    /// Whether the next alarm told is one that was given.
+    swallows_alarm: bool,
+}
+
+impl<'a> Player<'a> {
+    /// A machine as it was when the stretch began. It has rolled there from where watching began, as far as the log tells where
+    /// that was.
+    pub(super) fn new(stretch: &'a Stretch<'a>) -> Self {
+        let canopies = canopies(stretch);
+        // A little before, so that what stands at that place is seen in full and the log says what it was taken for.
+        let began = stretch.began();
+        let has_rolled = began != stretch.first.position;
+        let position = if has_rolled { began.wrapping_sub(OBJECT_TICKS + 1) } else { began };
+        let broken = is_in(&canopies, position);
+        let readings = Readings::new(Instant::new(0), Position::new(position));
+        let wake_up = WakeUp { readings, beam_broken: broken, cause: Cause::Unknown };
+        let witness = Rc::new(Witness::default());
+        let classifier = Judge::new(&stretch.examples, stretch.built_in, Rc::clone(&witness));
+        let mut controller = Controller::new(classifier, Volatile::new(), wake_up);
+        controller.clear();
+        for (setting, value) in steps(controller.settings(), &stretch.settings) {
+            // In an order that the firmware takes, and every value is in its range.
+            let _ = controller.set(setting, value);
+        }
+        let mut player = Self {
+            controller,
+            witness,
+            canopies,
+            broken,
+            now: Instant::new(0),
+            position,
+            speed_mm_s: stretch.first.speed_mm_s,
+            heard: Vec::new(),
+            swallows_alarm: false,
+        };
+        player.roll_in(&stretch.first);
+        if stretch.first.mode == Mode::Work {
+            let _ = player.controller.start(stretch.first.unseen_mm <= 0);
+        }
+        player.controller.tell_events(true);
+        player
+    }
+
+    /// Rolls from where watching began to where the log begins, at the speed that the machine has there; so slowly where it stands
+    /// there that an encoder which falls silent then is no wonder.
+    fn roll_in(&mut self, first: &Status) {
+        let way = first.position.wrapping_sub(self.position);
+        let speed_mm_s = if first.speed_mm_s > 0 { first.speed_mm_s } else { SLOWLY_MM_S };
+        let way_mm = i64::from(self.controller.settings().wheel().millimetres(Ticks(way)));
+        let time_ms = (way_mm * 1000 / i64::from(speed_mm_s)).unsigned_abs();
+        self.roll_by(way, speed_mm_s, speed_mm_s, time_ms);
+        self.speed_mm_s = first.speed_mm_s;
+    }
+
+    /// Where the machine is.
+    pub(super) fn position(&self) -> i32 {
+        self.position
+    }
+
+    /// The machine's speed in ticks.
+    pub(super) fn speed(&self) -> TicksPerSecond {
+        let wheel = self.controller.settings().wheel();
+        let ticks = wheel.ticks(self.speed_mm_s.unsigned_abs().min(FASTEST_MM_S.into()) as u16).0;
+        TicksPerSecond(if self.speed_mm_s < 0 { -ticks } else { ticks })
+    }
+
+    /// Rolls from one status to the next, `host_ms` later by the host's clock, gaining or losing speed evenly.
+    pub(super) fn roll(&mut self, from: &Status, to: &Status, host_ms: u64) -> Result<(), ()> {
+        let way = to.position.wrapping_sub(self.position);
+        if way.saturating_abs() > LONGEST_WAY {
+            return Err(());
+        }
+        if way == 0 {
+            self.speed_mm_s = to.speed_mm_s;
+            self.rest(host_ms.min(LONGEST_REST_MS));
+            return Ok(());
+        }
+        self.roll_by(way, from.speed_mm_s, to.speed_mm_s, host_ms);
+        Ok(())
+    }
+
+    /// Rolls to a place on the way to the next status, if it lies there.
+    pub(super) fn roll_to(&mut self, place: i32, from: &Status, next: Option<&Status>) {
+        let way = place.wrapping_sub(self.position);
+        let Some(next) = next else { return };
+        let whole = next.position.wrapping_sub(self.position);
+        if way == 0 || way.signum() != whole.signum() || way.unsigned_abs() > whole.unsigned_abs() {
+            return;
+        }
+        if way.unsigned_abs() > LONGEST_WAY as u32 {
+            return;
+        }
+        let share = f64::from(way) / f64::from(whole);
+        let speed = f64::from(from.speed_mm_s) + share * (f64::from(next.speed_mm_s) - f64::from(from.speed_mm_s));
+        self.roll_by(way, from.speed_mm_s, speed.round() as i32, 0);
+    }
+
+    /// Rolls a way, tick by tick. The speeds say how long it takes; where they cannot, the host's clock does.
+    fn roll_by(&mut self, way: i32, from_mm_s: i32, to_mm_s: i32, host_ms: u64) {
+        let tick_mm = 100.0 / f64::from(self.controller.settings().wheel().ticks(100).0.max(1));
+        let (from, to) = (f64::from(from_mm_s) / tick_mm, f64::from(to_mm_s) / tick_mm);
+        let ways = f64::from(way);
+        let mean = (from + to) / 2.0;
+        let by_speed = ways / mean;
+        self.witness.speeds_mm_s.set((from_mm_s.min(to_mm_s), from_mm_s.max(to_mm_s)));
+        let host_s = host_ms.max(1) as f64 / 1000.0;
+        let duration_s = if by_speed > 0.0 && by_speed < 3.0 * host_s.max(0.1) { by_speed } else { host_s };
+        let steps = way.unsigned_abs();
+        let start = self.position;
+        let mut elapsed_s = 0.0;
+        for step in 1..=steps {
+            let share = f64::from(step) / f64::from(steps);
+            // Even acceleration: the square of the speed goes evenly with the way.
+            let speed = (from * from + share * (to * to - from * from)).max(0.0).sqrt();
+            let even = duration_s * share;
+            let due_s = if by_speed == duration_s && from.abs() + speed > 0.0 {
+                2.0 * ways.abs() * share / (from.abs() + speed)
+            } else {
+                even
+            };
+            let interval_s = (due_s - elapsed_s).max(0.0);
+            elapsed_s = due_s;
+            self.speed_mm_s = (from_mm_s.signum() | to_mm_s.signum()) * (speed * tick_mm).round() as i32;
+            self.now = self.now + Interval::from_steps((interval_s * f64::from(Interval::STEPS_PER_SECOND)) as u32);
+            self.position = start.wrapping_add(way.signum() * step as i32);
+            self.step();
+        }
+        self.speed_mm_s = to_mm_s;
+    }
+
+    fn rest(&mut self, time_ms: u64) {
+        for _ in 0..time_ms.div_ceil(u64::from(REST_MS)) {
+            self.now = self.now + Interval::from_ms(REST_MS);
+            self.step();
+        }
+    }
+
+    /// Has the decisions take the place where the machine now is.
+    fn step(&mut self) {
+        let response = self.speed().distance_in_ms(self.controller.settings().get(Setting::BeamResponseMs));
+        let ground = (Position::new(self.position) - response).count();
+        let broken = is_in(&self.canopies, ground);
+        if broken != self.broken {
+            self.broken = broken;
+            // The edge may end the object before, which is then judged.
+            self.controller.beam_edge(Position::new(self.position), broken);
+            if let Some(canopy) = self.canopies.iter().find(|canopy| canopy.is_over(ground)) {
+                self.witness.seen.set(canopy.seen);
+            }
+        }
+        let mut readings = Readings::new(self.now, Position::new(self.position));
+        // An end switch that does as it is told.
+        readings.end_switch_on = self.controller.tool_out();
+        self.controller.step(readings);
+        self.listen();
+    }
+
+    fn listen(&mut self) {
+        let speed = self.speed().0;
+        while let Some(event) = self.controller.next_event() {
+            let told = match event {
+                Event::Object { vote, leading, spacing, plan } => Told::Object {
+                    class: vote.class,
+                    position: leading.count(),
+                    votes: vote.votes,
+                    spacing: spacing.0,
+                    delay: plan.delay.0,
+                    hold: plan.hold.0,
+                    actuation: plan.actuation().0,
+                },
+                Event::Swing { out, position } => Told::Swing { out, position: position.count() },
+                Event::Alarm { .. } if std::mem::take(&mut self.swallows_alarm) => continue,
+                Event::Alarm { alarm, position } => Told::Alarm { alarm, position: position.count() },
+                // They rest on time, which the log has only roughly; or follow from the others.
+                Event::State(_) | Event::Warning(_) | Event::Calibrated { .. } => continue,
+            };
+            self.heard.push(Heard { line: 0, told, speed, is_given: false });
+        }
+    }
+
+    /// Goes to a state, unless it is there already.
+    pub(super) fn enter(&mut self, mode: Mode) {
+        match (mode, self.controller.state()) {
+            (Mode::Work, State::Hold) => {
+                let _ = self.controller.start(false);
+            }
+            (Mode::Hold, State::Work | State::Alarm(_)) => {
+                self.controller.hold();
+                self.controller.clear();
+            }
+            _ => return,
+        }
+        self.step();
+    }
+
+    /// Raises an alarm that the log has; whether the replay did not have it by itself.
+    pub(super) fn raise(&mut self) -> bool {
+        let is_given = !matches!(self.controller.state(), State::Alarm(_));
+        if is_given {
+            // All alarms do the same; this one can be given from outside.
+            self.swallows_alarm = true;
+            // What was in the beam begins anew here, give or take what an object's place may differ by.
+            self.broken = (0..=OBJECT_TICKS).any(|ahead| is_in(&self.canopies, self.position.wrapping_add(ahead)));
+            self.controller.beam_edges_lost(self.broken);
+            self.step();
+        }
+        is_given
+    }
+
+    /// Carries out what was typed; false where that cannot be replayed.
+    pub(super) fn command(&mut self, line: &str) -> bool {
+        match console::parse(line.as_bytes()) {
+            Ok(Command::Start { now }) => {
+                let _ = self.controller.start(now);
+            }
+            Ok(Command::Hold) => self.controller.hold(),
+            Ok(Command::Clear) => self.controller.clear(),
+            Ok(Command::Set(setting, value)) => {
+                // Refused here as there.
+                let _ = self.controller.set(setting, value);
+            }
+            Ok(Command::Label { label, force }) => {
+                let _ = self.controller.label(label, force);
+            }
+            Ok(Command::Forget(_) | Command::ForgetAll) => return false,
+            _ => {
+                let word = line.split_whitespace().next().unwrap_or_default();
+                return !["servo", "calibrate", "test", "defaults", "revert"].contains(&word);
+            }
+        }
+        self.step();
+        true
+    }
+}
+
+/// Ground over which the beam was broken.
+struct Canopy {
+    from: i32,
+    to: i32,
+    /// What the log tells of it, where it was judged.
+    seen: Option<Seen>,
+}
+
+impl Canopy {
+    fn is_over(&self, ground: i32) -> bool {
+        ground.wrapping_sub(self.from) >= 0 && ground.wrapping_sub(self.to) < 0
+    }
+}
+
+/// The ground over which the beam was broken, as far as the log tells.
+fn canopies(stretch: &Stretch) -> Vec<Canopy> {
+    let mut settings = stretch.settings.clone();
+    let mut canopies = Vec::new();
+    for (_, happened) in &stretch.happened {
+        let wheel = settings.wheel();
+        match happened {
+            Happened::Told(Told::Object { class, position, votes, spacing, hold, .. }) => {
+                let width = hold.wrapping_sub(wheel.ticks(2 * settings.get(Setting::MarginMm)).0);
+                let seen = Seen {
+                    vote: Vote { class: *class, votes: *votes },
+                    spacing_mm: wheel.millimetres(Ticks(*spacing)),
+                    width_mm: wheel.millimetres(Ticks(width)),
+                    is_given: position.wrapping_sub(stretch.first.position) < 0,
+                };
+                canopies.push(Canopy { from: *position, to: position.wrapping_add(width), seen: Some(seen) });
+            }
+            // It is latched as soon as the object is wider than it may be.
+            Happened::Told(Told::Alarm { alarm: Alarm::BeamBlocked, position }) => {
+                let from = position.wrapping_sub(settings.ticks(Setting::MaxWidthMm).0 + 1);
+                canopies.push(Canopy { from, to: position.wrapping_add(1), seen: None });
+            }
+            Happened::Command(line) => {
+                // The holds behind it have the new margin. Refused here as there.
+                if let Ok(Command::Set(setting, value)) = console::parse(line.as_bytes()) {
+                    let _ = settings.set(setting, value);
+                }
+            }
+            _ => {}
+        }
+    }
+    canopies
+}
+
+/// Whether the beam is broken over this ground.
+fn is_in(canopies: &[Canopy], ground: i32) -> bool {
+    canopies.iter().any(|canopy| canopy.is_over(ground))
+}

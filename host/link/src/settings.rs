@@ -1,0 +1,289 @@
+//! The machine's settings, all at once: reading them, and changing them without a step on the way that cannot be right.
+//!
+//! Names, ranges and defaults are those of the firmware's own table ([`control::settings`]). The firmware refuses a value that
+//! contradicts the others, so the order in which values are sent matters; [`steps`] finds one.
+
+use super::{Link, LinkError, Mode, Status};
+pub use control::settings::{Contradiction, Setting, Settings};
+use thiserror::Error;
+
+/// Why settings could not be read or changed.
+#[derive(Debug, Error)]
+pub enum SettingsError {
+    /// The console failed.
+    #[error(transparent)]
+    Link(#[from] LinkError),
+    /// The firmware does not know a setting that this program knows, or gives no value that can be.
+    #[error(
+        "the firmware gives no good value for {setting}: it is of another version, put this one on it by `weeder flash`"
+    )]
+    Unknown {
+        /// The setting's name.
+        setting: String,
+    },
+    /// The machine is at work.
+    #[error("the machine is at work, where its settings cannot all be changed: hold it first, by its switch or `hold`")]
+    AtWork,
+    /// The settings would contradict each other.
+    #[error("{0}; nothing was sent")]
+    Contradiction(String),
+    /// A setting has another value than it was set to.
+    #[error("{setting} was set to {wanted} and is {found}: try again, and see to the supply if it stays so")]
+    NotTaken {
+        /// The setting's name.
+        setting: String,
+        /// What was sent.
+        wanted: u16,
+        /// What the firmware has.
+        found: u16,
+    },
+}
+
+/// A setting's name.
+pub fn name(setting: Setting) -> String {
+    setting.text().to_string()
+}
+
+/// What a setting is, for the operator.
+pub fn help(setting: Setting) -> String {
+    setting.help().to_string()
+}
+
+/// A setting's unit; empty for a count.
+pub fn unit(setting: Setting) -> String {
+    // The console puts it behind a number, and its blank with it.
+    setting.unit().to_string().trim_start().to_owned()
+}
+
+/// What a setting may be, with its unit and default.
+pub fn range(setting: Setting) -> String {
+    let description = setting.description();
+    if setting.is_switched() {
+        return format!("true or false, default {}", description.default == 1);
+    }
+    let unit = unit(setting);
+    let space = if unit.is_empty() { "" } else { " " };
+    format!("{} to {}{space}{unit}, default {}", description.least, description.greatest, description.default)
+}
+
+/// What contradicts what, and what would be right.
+pub fn explain(contradiction: Contradiction) -> String {
+    match contradiction {
+        Contradiction::PulsesEqual => {
+            "servo_in_us and servo_out_us are equal, and the tool would not move: let them differ".to_owned()
+        }
+        Contradiction::BeamTooNear { needed_mm } => format!(
+            "margin_mm, lead_out_ms, beam_response_ms and top_speed_mm_s together need a beam_to_tool_mm of {needed_mm} or \
+             more: raise it, or lower one of them"
+        ),
+    }
+}
+
+/// Reads all settings in use.
+///
+/// # Errors
+/// Where the console fails, or the firmware has other settings than this program.
+pub fn read(link: &mut Link) -> Result<Settings, SettingsError> {
+    shown_by(&link.ask("get")?)
+}
+
+/// The settings that the answer to `get` shows.
+///
+/// # Errors
+/// Where one of them is missing, or has a value that cannot be.
+pub(super) fn shown_by(lines: &[String]) -> Result<Settings, SettingsError> {
+    let shown: Vec<(Setting, u16)> = lines.iter().filter_map(|line| shown(line)).collect();
+    let mut settings = Settings::new();
+    for setting in Setting::all() {
+        let unknown = || SettingsError::Unknown { setting: name(setting) };
+        let &(_, value) = shown.iter().find(|(known, _)| *known == setting).ok_or_else(unknown)?;
+        settings.set(setting, value).map_err(|_| unknown())?;
+    }
+    Ok(settings)
+}
+
+/// The setting that a line shows, as `name=value` with more behind it; none where it shows none.
+pub fn shown(line: &str) -> Option<(Setting, u16)> {
+    let (name, rest) = line.split_once('=')?;
+    let setting = Setting::find(name.as_bytes())?;
+    let value = match rest.split([' ', ',']).next()? {
+        "on" if setting.is_switched() => 1,
+        "off" if setting.is_switched() => 0,
+        number => number.parse().ok()?,
+    };
+    Some((setting, value))
+}
+
+/// The values to send, one after the other, that lead from some settings to others with no contradiction on the way.
+///
+/// Whatever makes room for others can always go first. Only the two pulses can be in each other's way, where they change
+/// places: one of them then goes by way of its neighbour.
+pub fn steps(from: &Settings, to: &Settings) -> Vec<(Setting, u16)> {
+    let mut now = from.clone();
+    let mut steps = Vec::new();
+    loop {
+        let mut rest = Setting::all().filter(|&setting| now.get(setting) != to.get(setting)).peekable();
+        let Some(&first) = rest.peek() else { return steps };
+        let can_go = |&setting: &Setting| {
+            let mut next = now.clone();
+            // Values of settings are in their ranges.
+            let _ = next.set(setting, to.get(setting));
+            next.contradiction().is_none() || now.contradiction().is_some()
+        };
+        let (setting, value) = match rest.find(can_go) {
+            Some(setting) => (setting, to.get(setting)),
+            // Both pulses wait for each other.
+            None => (first, beside(first, &now, to)),
+        };
+        take(&mut now, setting, value);
+        steps.push((setting, value));
+    }
+}
+
+/// Sets a value as the firmware does: it forgets what was measured of another wheel.
+fn take(settings: &mut Settings, setting: Setting, value: u16) {
+    // Values of settings are in their ranges.
+    let _ = settings.set(setting, value);
+    if setting.is_of_the_wheel() {
+        let _ = settings.set(Setting::TicksPerM, 0);
+    }
+}
+
+/// The nearest pulse to the one that `setting` is to have, which none of both pulses has or is to have.
+fn beside(setting: Setting, now: &Settings, to: &Settings) -> u16 {
+    let taken = [now, to].map(|settings| [settings.get(Setting::ServoInUs), settings.get(Setting::ServoOutUs)]);
+    let description = setting.description();
+    let wanted = to.get(setting);
+    (description.least..=description.greatest)
+        .filter(|pulse| !taken.as_flattened().contains(pulse))
+        .min_by_key(|pulse| pulse.abs_diff(wanted))
+        .unwrap_or(wanted)
+}
+
+/// Sets some settings, leaves the others as they are, and reads all back; `save` keeps them for good.
+///
+/// Nothing is sent where the result would contradict itself, or the machine is at work. Returns what was changed.
+///
+/// # Errors
+/// As said, where the console fails, and where a value was not taken.
+pub fn push(link: &mut Link, wanted: &[(Setting, u16)], save: bool) -> Result<Vec<Setting>, SettingsError> {
+    let before = read(link)?;
+    let mut after = before.clone();
+    for &(setting, value) in wanted {
+        after.set(setting, value).map_err(|_| SettingsError::Unknown { setting: name(setting) })?;
+    }
+    let names = |wheel: Setting| wanted.iter().any(|&(setting, _)| setting == wheel);
+    let is_another = |setting: Setting| setting.is_of_the_wheel() && before.get(setting) != after.get(setting);
+    if Setting::all().any(is_another) && !names(Setting::TicksPerM) {
+        // Nobody has measured that wheel yet.
+        let _ = after.set(Setting::TicksPerM, 0);
+    }
+    if let Some(contradiction) = after.contradiction() {
+        return Err(SettingsError::Contradiction(explain(contradiction)));
+    }
+    let steps = steps(&before, &after);
+    let needs_hold = save || steps.iter().any(|(setting, _)| setting.description().hold_only);
+    if needs_hold && status(link)?.mode == Mode::Work {
+        return Err(SettingsError::AtWork);
+    }
+    for &(setting, value) in &steps {
+        link.ask(&format!("set {} {value}", name(setting)))?;
+    }
+    let found = read(link)?;
+    if let Some(setting) = Setting::all().find(|&setting| found.get(setting) != after.get(setting)) {
+        let (wanted, found) = (after.get(setting), found.get(setting));
+        return Err(SettingsError::NotTaken { setting: name(setting), wanted, found });
+    }
+    if save {
+        link.ask("save")?;
+    }
+    Ok(Setting::all().filter(|&setting| before.get(setting) != after.get(setting)).collect())
+}
+
+/// What the machine is doing.
+fn status(link: &mut Link) -> Result<Status, SettingsError> {
+    let lines = link.ask("status")?;
+    lines.iter().find_map(|line| Status::parse(line)).ok_or_else(|| LinkError::NotTheWeeder(lines.join(" ")).into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    fn settings(values: &[(Setting, u16)]) -> Settings {
+        let mut settings = Settings::new();
+        for &(setting, value) in values {
+            settings.set(setting, value).unwrap();
+        }
+        settings
+    }
+
+    /// Takes the steps as the firmware does, which refuses a contradiction where there was none.
+    #[track_caller]
+    fn assert_leads(from: &Settings, to: &Settings) {
+        let mut now = from.clone();
+        for (setting, value) in steps(from, to) {
+            let was_right = now.contradiction().is_none();
+            take(&mut now, setting, value);
+            assert!(!was_right || now.contradiction().is_none(), "{setting:?} {value} from {from:?} to {to:?}");
+        }
+        assert_eq!(&now, to);
+    }
+
+    #[test]
+    fn what_makes_room_goes_before_what_takes_it() {
+        let near = settings(&[(Setting::TopSpeedMmS, 100), (Setting::BeamToToolMm, 100), (Setting::MarginMm, 10)]);
+        let far = settings(&[(Setting::BeamToToolMm, 2000), (Setting::MarginMm, 200), (Setting::LeadOutMs, 500)]);
+        assert_leads(&near, &far);
+        assert_leads(&far, &near);
+    }
+
+    #[test]
+    fn a_measured_wheel_is_told_after_the_wheel() {
+        let one = settings(&[(Setting::WheelMm, 400), (Setting::TicksPerM, 1950)]);
+        let other = settings(&[(Setting::WheelMm, 410), (Setting::TicksPerM, 1950)]);
+        assert_leads(&one, &other);
+        assert_leads(&other, &one);
+    }
+
+    #[test]
+    fn pulses_that_change_places_never_meet() {
+        let one = settings(&[(Setting::ServoInUs, 500), (Setting::ServoOutUs, 2500)]);
+        let other = settings(&[(Setting::ServoInUs, 2500), (Setting::ServoOutUs, 500)]);
+        assert_leads(&one, &other);
+        assert_leads(&other, &one);
+        let neighbours = settings(&[(Setting::ServoInUs, 2499), (Setting::ServoOutUs, 2500)]);
+        let changed = settings(&[(Setting::ServoInUs, 2500), (Setting::ServoOutUs, 2499)]);
+        assert_leads(&neighbours, &changed);
+        assert_leads(&changed, &neighbours);
+    }
+
+    #[test]
+    fn settings_that_contradict_each_other_are_mended() {
+        let wrong = settings(&[(Setting::BeamToToolMm, 100), (Setting::ServoOutUs, 1500)]);
+        assert!(wrong.contradiction().is_some());
+        assert_leads(&wrong, &Settings::new());
+    }
+
+    #[test]
+    fn any_settings_that_can_be_right_are_reached_from_any_others() {
+        let mut random = ChaCha8Rng::seed_from_u64(1);
+        let mut right = || {
+            loop {
+                let mut settings = Settings::new();
+                for setting in Setting::all() {
+                    let description = setting.description();
+                    settings.set(setting, random.random_range(description.least..=description.greatest)).unwrap();
+                }
+                if settings.contradiction().is_none() {
+                    return settings;
+                }
+            }
+        };
+        for _ in 0..200 {
+            assert_leads(&right(), &right());
+        }
+    }
+}

@@ -1,0 +1,223 @@
+//! Settings as a TOML file with comments, one key a setting.
+//!
+//! A file is written from the firmware's own table: help, range, unit and default stand above each value. A file that is there
+//! already keeps its comments and its order. What a file does not name is left alone. Everything in it is checked against
+//! the table, and the first thing that is wrong is said with its line and what would be right.
+
+use super::settings::{Setting, Settings, help, name, range};
+use files::whole_file;
+use std::path::{Path, PathBuf};
+use std::{fs, io};
+use thiserror::Error;
+use toml_edit::{Decor, Document, DocumentMut, Item, TomlError, Value};
+
+/// Why a settings file cannot be used.
+#[derive(Debug, Error)]
+pub enum SettingsFileError {
+    /// The file itself.
+    #[error("{path} cannot be {done}")]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// `read` or `written`.
+        done: &'static str,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// Something in it.
+    #[error("{path}, line {line}: {problem}")]
+    Line {
+        /// The file.
+        path: PathBuf,
+        /// The line, counted from 1.
+        line: usize,
+        /// What is wrong with it, and what would be right.
+        problem: String,
+    },
+}
+
+/// What stands at the head of a new file.
+const HEAD: &str = "\
+# Settings of a weeder. `weeder settings push` sends them to the machine, `weeder settings diff` compares.
+# What is not named here is left as it is.
+";
+
+/// Reads a file's settings, each within its range.
+///
+/// # Errors
+/// Names the file, the line, and what would be right.
+pub fn read(path: &Path) -> Result<Vec<(Setting, u16)>, SettingsFileError> {
+    parse(path, &text(path)?)
+}
+
+/// Writes all settings into a file; one that is there keeps its comments, and has to be a settings file.
+///
+/// # Errors
+/// As [`read`], and where the file cannot be written.
+pub fn write(path: &Path, settings: &Settings) -> Result<(), SettingsFileError> {
+    let old = if path.exists() { text(path)? } else { HEAD.to_owned() };
+    let new = updated(path, &old, settings)?;
+    let written = whole_file::write(path, |to| to.write_all(new.as_bytes()));
+    written.map_err(|source| SettingsFileError::File { path: path.into(), done: "written", source })
+}
+
+/// A setting's value as it stands in TOML and JSON: a switched one is true or false.
+pub fn is_true(setting: Setting, value: u16) -> Option<bool> {
+    setting.is_switched().then_some(value != 0)
+}
+
+fn text(path: &Path) -> Result<String, SettingsFileError> {
+    let bytes = fs::read(path).map_err(|source| SettingsFileError::File { path: path.into(), done: "read", source })?;
+    String::from_utf8(bytes).map_err(|_| SettingsFileError::Line {
+        path: path.into(),
+        line: 1,
+        problem: "this is no text: a settings file is TOML in UTF-8".to_owned(),
+    })
+}
+
+fn parse(path: &Path, text: &str) -> Result<Vec<(Setting, u16)>, SettingsFileError> {
+    let at = |start: usize, problem: String| {
+        let line = 1 + text.bytes().take(start).filter(|&byte| byte == b'\n').count();
+        SettingsFileError::Line { path: path.into(), line, problem }
+    };
+    let broken = |error: TomlError| at(error.span().map_or(0, |span| span.start), error.message().replace('\n', ", "));
+    let document = Document::parse(text).map_err(broken)?;
+    let mut settings = Vec::new();
+    for (key, item) in document.as_table().iter() {
+        let start = document.as_table().key(key).and_then(|key| key.span()).or_else(|| item.span());
+        let wrong = |problem| at(start.map_or(0, |span| span.start), problem);
+        let Some(setting) = Setting::find(key.as_bytes()) else {
+            let known: Vec<String> = Setting::all().map(name).collect();
+            return Err(wrong(format!("there is no setting `{key}`: there are {}", known.join(", "))));
+        };
+        let value = value(setting, item)
+            .ok_or_else(|| wrong(format!("{key} is `{}`: it has to be {}", item.to_string().trim(), right(setting))))?;
+        settings.push((setting, value));
+    }
+    Ok(settings)
+}
+
+/// What an item says for a setting, if it says something that is right.
+fn value(setting: Setting, item: &Item) -> Option<u16> {
+    if setting.is_switched() {
+        return item.as_bool().map(u16::from);
+    }
+    let description = setting.description();
+    let value = u16::try_from(item.as_integer()?).ok()?;
+    (description.least..=description.greatest).contains(&value).then_some(value)
+}
+
+/// What a setting has to be.
+fn right(setting: Setting) -> String {
+    let whole = if setting.is_switched() { "" } else { "a whole number, " };
+    format!("{whole}{}", range(setting))
+}
+
+fn updated(path: &Path, old: &str, settings: &Settings) -> Result<String, SettingsFileError> {
+    parse(path, old)?;
+    let mut document: DocumentMut = old.parse().map_err(|error: TomlError| SettingsFileError::Line {
+        path: path.into(),
+        line: 1,
+        problem: error.message().to_owned(),
+    })?;
+    // The comments of a file without a value are its end: new values would go before them.
+    let head = if document.is_empty() {
+        document = DocumentMut::new();
+        old
+    } else {
+        ""
+    };
+    for setting in Setting::all() {
+        let name = name(setting);
+        let value = settings.get(setting);
+        let mut value = is_true(setting, value).map_or_else(|| Value::from(i64::from(value)), Value::from);
+        match document.get_mut(&name).and_then(Item::as_value_mut) {
+            Some(old) => {
+                *value.decor_mut() = old.decor().clone();
+                *old = value;
+            }
+            None => {
+                document.insert(&name, Item::Value(value));
+                let comment = format!("\n# {}\n# {}\n", help(setting), range(setting));
+                if let Some(mut key) = document.key_mut(&name) {
+                    *key.leaf_decor_mut() = Decor::new(comment, " ");
+                }
+            }
+        }
+    }
+    Ok(format!("{head}{document}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What a file with this text says, or what is wrong with it.
+    fn parsed(text: &str) -> Result<Vec<(Setting, u16)>, String> {
+        parse(Path::new("machine.toml"), text).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn a_new_file_holds_every_setting_with_its_help_and_range_and_is_read_back() {
+        let mut settings = Settings::new();
+        settings.set(Setting::WheelMm, 405).unwrap();
+        settings.set(Setting::EndSwitch, 1).unwrap();
+        let text = updated(Path::new("machine.toml"), HEAD, &settings).unwrap();
+        assert!(text.starts_with(HEAD), "{text}");
+        let wheel = "\n# diameter of the ground wheel\n# 200 to 800 mm, default 400\nwheel_mm = 405\n";
+        assert!(text.contains(wheel), "{text}");
+        assert!(text.ends_with("# true or false, default false\nend_switch = true\n"), "{text}");
+        let all: Vec<(Setting, u16)> = Setting::all().map(|setting| (setting, settings.get(setting))).collect();
+        assert_eq!(parsed(&text), Ok(all));
+    }
+
+    #[test]
+    fn comments_and_order_of_a_file_stay() {
+        let old = "# my machine\nk = 5 # five plants\n\nwheel_mm = 405\n# the end\n";
+        let new = updated(Path::new("machine.toml"), old, &Settings::new()).unwrap();
+        assert!(new.starts_with("# my machine\nk = 3 # five plants\n\nwheel_mm = 400\n"), "{new}");
+        assert!(new.contains("\nmargin_mm = 50\n") && new.ends_with("\n# the end\n"), "{new}");
+        assert_eq!(updated(Path::new("machine.toml"), &new, &Settings::new()).unwrap(), new);
+    }
+
+    #[test]
+    fn what_is_wrong_in_a_file_is_said_with_its_line_and_what_would_be_right() {
+        for (text, wrong) in [
+            (
+                "k = 3\nwheel = 400\n",
+                "machine.toml, line 2: there is no setting `wheel`: there are ticks_per_rev, wheel_mm",
+            ),
+            ("# x\n\nk = 0\n", "machine.toml, line 3: k is `0`: it has to be a whole number, 1 to 15, default 3"),
+            (
+                "wheel_mm = \"400\"",
+                "line 1: wheel_mm is `\"400\"`: it has to be a whole number, 200 to 800 mm, default 400",
+            ),
+            ("wheel_mm = 400.5", "it has to be a whole number"),
+            ("wheel_mm = -400", "it has to be a whole number"),
+            ("wheel_mm = 65936", "it has to be a whole number"),
+            ("end_switch = 1", "line 1: end_switch is `1`: it has to be true or false, default false"),
+            ("[machine]\nwheel_mm = 400", "line 1: there is no setting `machine`"),
+            ("k = 3\nk = 5\n", "line 2: duplicate key"),
+            ("k = 3\nwheel_mm 400\n", "machine.toml, line 2: "),
+        ] {
+            let error = parsed(text).unwrap_err();
+            assert!(error.contains(wrong), "{text:?}: {error}");
+        }
+    }
+
+    #[test]
+    fn a_file_of_something_else_is_not_written_over() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        for content in [&b"[package]\nname = \"weeder\"\n"[..], b"\xFF\xFE"] {
+            fs::write(file.path(), content).unwrap();
+            assert!(write(file.path(), &Settings::new()).is_err());
+            assert_eq!(fs::read(file.path()).unwrap(), content);
+        }
+    }
+
+    #[test]
+    fn a_file_that_does_not_exist_is_named() {
+        let error = read(Path::new("no/such.toml")).unwrap_err();
+        assert_eq!(error.to_string(), "no/such.toml cannot be read");
+    }
+}

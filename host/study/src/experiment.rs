@@ -1,0 +1,530 @@
+//! The paper's experiment: speeds by plant spacings by replications, in a simulated field, with several controllers on the
+//! same ground.
+//!
+//! Each plot's rows grow and are driven from the seed, the plot and the row alone, so that the result depends neither on the
+//! number of threads nor on which controllers take part. The firmware is either its native twin ([`field::twin`]) or the ELF on the
+//! virtual Uno ([`uno`]); its rivals ([`field::rivals`]) are models in both cases. A plot comes out as somebody
+//! with a notebook would write it down ([`PlotRecord`]), and is judged by the same code as a real one.
+
+pub mod table;
+pub mod total;
+
+use crate::evaluation::PlotRecord;
+use control::controller::State;
+use field::conditions::Conditions;
+use field::driving::{Drive, drive};
+use field::rivals;
+use field::row::{MAX_WIDTH_MM, Problem, Row};
+use field::stand::Stand;
+use field::tool_path::{Effect, effect};
+use field::trial::{Start, Trial};
+use field::twin::{self, Refused};
+use field::verdict::{Judgement, Timing, Verdict, judge};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use signal::Pulse;
+use std::ops::AddAssign;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use thiserror::Error;
+use trial::TrialError;
+
+pub use table::write_csv;
+pub use total::{Total, compare, totals};
+
+/// What runs the firmware.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Engine {
+    /// Its code, compiled for the host.
+    Twin,
+    /// This ELF, on the virtual Uno.
+    Uno(PathBuf),
+}
+
+/// Who swings the tool.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Controller {
+    /// The firmware with its leads.
+    Firmware,
+    /// The firmware with both leads at 0: a queue of windows, without look-ahead.
+    WithoutLookAhead,
+    /// The paper's: one slot, no look-ahead, a loop that polls.
+    Paper,
+    /// Who knows where each stem stands and how slow the servo may be: whose damage, if any, nobody can avoid.
+    AllKnowing,
+}
+
+impl Controller {
+    /// All, the firmware first.
+    pub const ALL: [Self; 4] = [Self::Firmware, Self::WithoutLookAhead, Self::Paper, Self::AllKnowing];
+
+    /// What it is called.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Firmware => "this firmware",
+            Self::WithoutLookAhead => "a queue without look-ahead",
+            Self::Paper => "the paper's controller",
+            Self::AllKnowing => "whoever knows every plant",
+        }
+    }
+}
+
+/// An experiment: the full factorial of speeds and spacings.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Experiment {
+    /// Forward speeds, km/h.
+    pub speeds_km_h: Vec<f64>,
+    /// Plant spacings, cm.
+    pub spacings_cm: Vec<f64>,
+    /// How often each speed and spacing is tried.
+    pub replications: u32,
+    /// Who weeds.
+    pub controllers: Vec<Controller>,
+    /// Where.
+    pub conditions: Conditions,
+    /// Which of all the possible fields.
+    pub seed: u64,
+}
+
+/// One plot, weeded by one controller.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlotOutcome {
+    /// Who weeded it.
+    pub controller: Controller,
+    /// What is written down.
+    pub record: PlotRecord,
+    /// Plants and weeds, counted.
+    pub effect: Effect,
+    /// Canopies, counted.
+    pub canopies: Canopies,
+    /// Share of the rows' ground that the tool weeded, from 0 to 1.
+    pub weeded_share: f64,
+    /// Share that could be weeded at best with this servo ([`field::verdict::weedable_share`]).
+    pub weedable_share: f64,
+    /// Rows in which an alarm took the tool out.
+    pub alarms: u32,
+    /// Time that was simulated, run-ups included and turns not, s.
+    pub moved_s: f64,
+}
+
+/// Canopies as the beam sees them, and how the tool passed them: a stricter measure than damage, which is the tool in the zone
+/// round a stem ([`field::verdict`]).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Canopies {
+    /// All of them; plants that have grown together have one.
+    pub all: u32,
+    /// Those over which the tool was not fully out.
+    pub reached: u32,
+    /// Those whose margin was cut, but not they.
+    pub margins_cut: u32,
+}
+
+impl AddAssign for Canopies {
+    fn add_assign(&mut self, other: Self) {
+        self.all += other.all;
+        self.reached += other.reached;
+        self.margins_cut += other.margins_cut;
+    }
+}
+
+/// Why an experiment had no outcome.
+#[derive(Debug, Error)]
+pub enum ExperimentError {
+    /// The plants close up.
+    #[error(
+        "plants {spacing_cm} cm apart grow together to more than {MAX_WIDTH_MM} mm: \
+         ask for a larger spacing or narrower canopies"
+    )]
+    TooClose {
+        /// The spacing.
+        spacing_cm: f64,
+    },
+    /// There is no plant, or none that the beam could see.
+    #[error(
+        "nothing for the beam stands in a row of {row_m} m with plants {spacing_cm} cm apart: \
+         ask for a longer row or a smaller spacing"
+    )]
+    TooShort {
+        /// The row's length.
+        row_m: f64,
+        /// The spacing.
+        spacing_cm: f64,
+    },
+    /// The decisions refuse their settings.
+    #[error(transparent)]
+    Refused(#[from] Refused),
+    /// The virtual Uno failed.
+    #[error(transparent)]
+    Trial(#[from] TrialError),
+}
+
+/// A plot's place in the experiment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Plot {
+    index: u64,
+    replication: u32,
+    speed_km_h: f64,
+    spacing_cm: f64,
+}
+
+/// What one controller did in one row.
+#[derive(Clone, Copy, Debug)]
+struct RowOutcome {
+    effect: Effect,
+    canopies: Canopies,
+    weeded_share: f64,
+    weedable_share: f64,
+    /// For the row and its turn, and of these what was simulated.
+    seconds: f64,
+    moved_s: f64,
+    alarm: bool,
+}
+
+/// Rows of a plot that are kept in memory at once.
+const BATCH: u32 = 256;
+
+/// Ground of the row that is drawn.
+const DRAWN_MM: f64 = 4500.0;
+
+impl Experiment {
+    /// The paper's: its Table 2, by all controllers.
+    pub fn as_in_the_paper(conditions: Conditions, seed: u64) -> Self {
+        Self {
+            speeds_km_h: vec![1.0, 1.5, 2.0, 2.5],
+            spacings_cm: vec![50.0, 60.0],
+            replications: 3,
+            controllers: Controller::ALL.to_vec(),
+            conditions,
+            seed,
+        }
+    }
+
+    /// All plots, by speed, spacing and replication.
+    fn plots(&self) -> Vec<Plot> {
+        let treatments = self.speeds_km_h.iter().flat_map(|&speed| self.spacings_cm.iter().map(move |&s| (speed, s)));
+        treatments
+            .flat_map(|treatment| (1..=self.replications).map(move |replication| (treatment, replication)))
+            .zip(0..)
+            .map(|(((speed_km_h, spacing_cm), replication), index)| Plot { index, replication, speed_km_h, spacing_cm })
+            .collect()
+    }
+
+    /// Number of rows that each controller weeds.
+    pub fn rows(&self) -> usize {
+        self.plots().len() * self.conditions.plot.rows as usize
+    }
+
+    /// Weeds the field: an outcome for each plot and each controller, by speed, spacing and replication. `progress` is told
+    /// the share of the rows done, from 0 to 1.
+    ///
+    /// # Errors
+    /// The first that a row meets.
+    pub fn run(&self, engine: &Engine, progress: impl Fn(f64) + Sync) -> Result<Vec<PlotOutcome>, ExperimentError> {
+        let (done, all) = (AtomicUsize::new(0), self.rows() as f64);
+        let row_done = || progress((done.fetch_add(1, Ordering::Relaxed) + 1) as f64 / all);
+        let of_plots: Vec<Vec<PlotOutcome>> = self
+            .plots()
+            .par_iter()
+            .map(|plot| self.weed_plot(plot, engine, &row_done))
+            .collect::<Result<_, ExperimentError>>()?;
+        Ok(of_plots.into_iter().flatten().collect())
+    }
+
+    /// One row of the experiment, the first plot's at the highest speed, and what the firmware did to it: its first metres, to
+    /// be drawn.
+    ///
+    /// # Errors
+    /// As [`Experiment::run`].
+    pub fn example(&self, engine: &Engine) -> Result<Option<(Row, Judgement)>, ExperimentError> {
+        let fastest = self.plots().into_iter().reduce(|a, b| if b.speed_km_h > a.speed_km_h { b } else { a });
+        let Some(plot) = fastest else { return Ok(None) };
+        let (stand, _, trial) = self.grow(&plot, 0)?;
+        let weeded = weed(&trial, &stand, Controller::Firmware, engine)?;
+        let Trial { row, machine, motion, timing, .. } = &trial;
+        let judgement = judge(row, machine, motion, *timing, &weeded.pulses, weeded.start_cycle);
+        Ok(row.beginning(DRAWN_MM).map(|beginning| (beginning, judgement)))
+    }
+
+    fn weed_plot(
+        &self,
+        plot: &Plot,
+        engine: &Engine,
+        row_done: &(impl Fn() + Sync),
+    ) -> Result<Vec<PlotOutcome>, ExperimentError> {
+        let rows = self.conditions.plot.rows;
+        let mut outcomes: Vec<PlotOutcome> =
+            self.controllers.iter().map(|&controller| self.untouched(plot, controller)).collect();
+        for first in (0..rows).step_by(BATCH as usize) {
+            let batch = first..rows.min(first + BATCH);
+            let weeded: Vec<Vec<RowOutcome>> = batch
+                .into_par_iter()
+                .map(|row| {
+                    let outcomes = self.weed_row(plot, row, engine)?;
+                    row_done();
+                    Ok(outcomes)
+                })
+                .collect::<Result<_, ExperimentError>>()?;
+            for by_controller in weeded {
+                for (outcome, row) in outcomes.iter_mut().zip(by_controller) {
+                    outcome.add(&row, rows);
+                }
+            }
+        }
+        Ok(outcomes)
+    }
+
+    /// A plot that nobody has weeded yet.
+    fn untouched(&self, plot: &Plot, controller: Controller) -> PlotOutcome {
+        let Conditions { plot: area, machine, .. } = &self.conditions;
+        let width_m = area.row_spacing_mm / 1000.0;
+        let record = PlotRecord {
+            replication: plot.replication,
+            speed_km_h: plot.speed_km_h,
+            spacing_cm: plot.spacing_cm,
+            weeds_before: 0,
+            weeds_after: 0,
+            plants: 0,
+            damaged: 0,
+            area_m2: f64::from(area.rows) * area.row_m * width_m,
+            time_s: 0.0,
+            width_m,
+            power_hp: machine.power_hp,
+        };
+        PlotOutcome {
+            controller,
+            record,
+            effect: Effect::default(),
+            canopies: Canopies::default(),
+            weeded_share: 0.0,
+            weedable_share: 0.0,
+            alarms: 0,
+            moved_s: 0.0,
+        }
+    }
+
+    /// What every controller does in the same row.
+    fn weed_row(&self, plot: &Plot, row: u32, engine: &Engine) -> Result<Vec<RowOutcome>, ExperimentError> {
+        let (stand, drive, trial) = self.grow(plot, row)?;
+        let outcome = |&controller: &Controller| {
+            let weeded = weed(&trial, &stand, controller, engine)?;
+            let Trial { row, machine, motion, timing, .. } = &trial;
+            let (pulses, start_cycle) = (&weeded.pulses, weeded.start_cycle);
+            let judgement = judge(row, machine, motion, *timing, pulses, start_cycle);
+            Ok(RowOutcome {
+                effect: effect(&stand, machine, &self.conditions.machine, motion, pulses, start_cycle),
+                canopies: Canopies {
+                    all: judgement.plants.len() as u32,
+                    reached: judgement.count(Verdict::Damaged) as u32,
+                    margins_cut: judgement.count(Verdict::MarginCut) as u32,
+                },
+                weeded_share: judgement.weeded_share,
+                weedable_share: judgement.weedable_share,
+                seconds: drive.row_s + drive.turn_s,
+                moved_s: motion.duration_s(),
+                alarm: weeded.alarm,
+            })
+        };
+        self.controllers.iter().map(outcome).collect()
+    }
+
+    /// A row that has grown, how it is driven, and both as a trial for the firmware.
+    fn grow(&self, plot: &Plot, row: u32) -> Result<(Stand, Drive, Trial), ExperimentError> {
+        // What grows, how it is driven and what the machine is like have a chance of their own each.
+        let chance = |of: u64| {
+            let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
+            rng.set_stream(plot.index << 34 | u64::from(row) << 2 | of);
+            rng
+        };
+        let spacing_cm = plot.spacing_cm;
+        let stand =
+            Stand::grow(&self.conditions, spacing_cm * 10.0, &mut chance(0)).map_err(|problem| match problem {
+                Problem::Empty => ExperimentError::TooShort { row_m: self.conditions.plot.row_m, spacing_cm },
+                _ => ExperimentError::TooClose { spacing_cm },
+            })?;
+        let drive = drive(&self.conditions, &stand.span_mm, plot.speed_km_h, &mut chance(1));
+        let trial = Trial {
+            row: stand.row.clone(),
+            machine: self.conditions.machine(chance(2).random()),
+            motion: drive.motion.clone(),
+            timing: self.conditions.timing(),
+            start: Start::Command,
+            settings: self.conditions.told(),
+        };
+        Ok((stand, drive, trial))
+    }
+}
+
+/// What came of a row.
+struct Weeded {
+    pulses: Vec<Pulse>,
+    start_cycle: u64,
+    alarm: bool,
+}
+
+/// Has a controller weed a row.
+fn weed(trial: &Trial, stand: &Stand, controller: Controller, engine: &Engine) -> Result<Weeded, ExperimentError> {
+    let firmware = |trial: &Trial| match engine {
+        Engine::Twin => {
+            let weeded = twin::weed(trial)?;
+            Ok(Weeded { pulses: weeded.pulses, start_cycle: 0, alarm: weeded.state != State::Work })
+        }
+        Engine::Uno(elf) => {
+            let outcome = trial::run(trial, elf, |_| ())?;
+            let alarm = outcome.status.state != "work";
+            Ok(Weeded { pulses: outcome.pulses, start_cycle: outcome.start_cycle, alarm })
+        }
+    };
+    let rival = |pulses| Ok(Weeded { pulses, start_cycle: 0, alarm: false });
+    match controller {
+        Controller::Firmware => firmware(trial),
+        Controller::WithoutLookAhead => {
+            let timing = Timing { lead_out_ms: 0, lead_in_ms: 0, ..trial.timing };
+            firmware(&Trial { timing, ..trial.clone() })
+        }
+        Controller::Paper => rival(rivals::as_in_the_paper(trial)),
+        Controller::AllKnowing => rival(rivals::all_knowing(trial, &stand.stems)),
+    }
+}
+
+impl PlotOutcome {
+    /// Adds one of the plot's rows.
+    fn add(&mut self, row: &RowOutcome, rows: u32) {
+        self.effect += row.effect;
+        self.canopies += row.canopies;
+        self.weeded_share += row.weeded_share / f64::from(rows);
+        self.weedable_share += row.weedable_share / f64::from(rows);
+        self.alarms += u32::from(row.alarm);
+        self.moved_s += row.moved_s;
+        let Effect { plants, damaged, in_plot, .. } = self.effect;
+        self.record = PlotRecord {
+            weeds_before: in_plot.before,
+            weeds_after: in_plot.after,
+            plants,
+            damaged,
+            time_s: self.record.time_s + row.seconds,
+            ..self.record
+        };
+    }
+}
+
+/// The records of what one controller did.
+pub fn records(outcomes: &[PlotOutcome], controller: Controller) -> Vec<PlotRecord> {
+    outcomes.iter().filter(|outcome| outcome.controller == controller).map(|outcome| outcome.record).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::evaluation::Analysis;
+    use field::conditions::{PARAMETERS, presets};
+
+    fn experiment(speeds_km_h: &[f64], preset: &str) -> Experiment {
+        let conditions = Conditions::preset(preset).unwrap().unwrap();
+        Experiment { speeds_km_h: speeds_km_h.to_vec(), replications: 1, ..Experiment::as_in_the_paper(conditions, 1) }
+    }
+
+    fn run(experiment: &Experiment) -> Vec<PlotOutcome> {
+        experiment.run(&Engine::Twin, |_| ()).unwrap()
+    }
+
+    #[test]
+    fn the_result_does_not_depend_on_the_number_of_threads() {
+        let experiment = experiment(&[2.0], "transplanted");
+        let on = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| run(&experiment))
+        };
+        assert_eq!(on(1), on(3));
+    }
+
+    #[test]
+    fn a_controller_finds_the_same_field_whoever_else_takes_part() {
+        let all = experiment(&[1.5], "transplanted");
+        let alone = Experiment { controllers: vec![Controller::Firmware], ..all.clone() };
+        assert_eq!(records(&run(&all), Controller::Firmware), records(&run(&alone), Controller::Firmware));
+    }
+
+    #[test]
+    fn the_firmware_damages_no_plant_and_weeds_up_to_the_bound_where_the_papers_damages_more_the_faster_it_goes() {
+        for seed in 1..=3 {
+            let experiment = Experiment { seed, ..experiment(&[1.0, 1.5, 2.0, 2.5, 3.0, 3.5], "transplanted") };
+            let totals = totals(&run(&experiment));
+            let of = |controller| totals.iter().filter(move |total| total.controller == controller);
+            for total in of(Controller::Firmware) {
+                assert_eq!((total.effect.damaged, total.canopies.reached, total.alarms), (0, 0, 0), "{total:?}");
+                assert!(total.weedable_share - total.weeded_share < 0.05, "{total:?}");
+            }
+            assert!(of(Controller::AllKnowing).all(|total| total.effect.damaged == 0));
+            let damage: Vec<f64> = of(Controller::Paper).map(Total::plant_damage_percent).collect();
+            assert!(damage.is_sorted() && damage[3] < damage[4] && damage[4] < damage[5], "{damage:?}");
+        }
+    }
+
+    #[test]
+    fn whoever_knows_every_plant_damages_none_in_any_field_and_weeds_more_than_the_firmware() {
+        for preset in presets() {
+            let totals = totals(&run(&experiment(&[1.0, 2.5], preset)));
+            for pair in totals.chunks(Controller::ALL.len()) {
+                let (firmware, all_knowing) = (pair[0], pair[3]);
+                assert_eq!(
+                    (firmware.controller, all_knowing.controller),
+                    (Controller::Firmware, Controller::AllKnowing)
+                );
+                assert_eq!(all_knowing.effect.damaged, 0, "{preset}");
+                assert!(all_knowing.weeded_share > firmware.weeded_share, "{preset}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_firmware_that_is_told_wrong_leads_damages_what_could_have_been_kept() {
+        let mut experiment = experiment(&[3.5], "transplanted");
+        for lead in ["lead_out_ms", "lead_in_ms"] {
+            experiment.conditions.set(lead, 0.0).unwrap();
+        }
+        let totals = totals(&run(&experiment));
+        assert!(totals[0].effect.damaged > 0 && totals[3].effect.damaged == 0, "{totals:?}");
+    }
+
+    #[test]
+    fn a_machine_that_outruns_its_beam_ends_in_alarms_and_not_in_a_clean_result() {
+        let totals = totals(&run(&experiment(&[7.0], "transplanted")));
+        assert!(totals[0].alarms > 0, "{totals:?}");
+    }
+
+    #[test]
+    fn no_parameter_at_an_end_of_its_range_upsets_a_trial() {
+        for parameter in PARAMETERS.iter().filter(|parameter| !["plot.rows", "plot.row_m"].contains(&parameter.name)) {
+            for end in [parameter.least, parameter.greatest] {
+                let mut experiment = experiment(&[1.0, 4.0], "transplanted");
+                let small = [("plot.rows", 1.0), ("plot.row_m", 4.0), ("machine.sweeps_a_side", 0.0)];
+                for (name, value) in small.into_iter().chain([(parameter.name, end)]) {
+                    // Sweeps so wide would run through the next row, and are refused.
+                    let _ = experiment.conditions.set(name, value);
+                }
+                match experiment.run(&Engine::Twin, |_| ()) {
+                    Ok(outcomes) => assert!(
+                        outcomes
+                            .iter()
+                            .all(|outcome| { outcome.record.check().is_ok() && outcome.weeded_share.is_finite() })
+                    ),
+                    Err(error) => {
+                        let place = format!("{} = {end}", parameter.name);
+                        let is_told =
+                            matches!(error, ExperimentError::TooClose { .. } | ExperimentError::TooShort { .. });
+                        assert!(is_told, "{place}: {error}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn every_plot_can_be_judged_like_a_real_one() {
+        let outcomes = run(&experiment(&[1.0, 2.5], "weedy"));
+        let analysis = Analysis::of(records(&outcomes, Controller::Firmware)).unwrap();
+        assert_eq!(analysis.records.len(), 4);
+        assert!(analysis.performances.iter().all(|plot| plot.field_efficiency_percent < 100.0));
+    }
+}

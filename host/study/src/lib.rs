@@ -1,0 +1,19 @@
+//! Studies of many rows, and what is made of them.
+//!
+//! - **Field trials**: [`experiment`] has controllers weed the same plots, on the virtual Uno or as the firmware's native twin, and
+//!   [`sweep`] maps a result against parameters. [`evaluation`] judges the plots of a trial, real or simulated, with the
+//!   [`statistics`] that this takes, and [`page`] shows them in a browser.
+//! - **Training**: [`training`] makes the example table that the firmware carries, of labelled objects.
+//!
+//! How a single row is weeded is not here: that is for [`field`] and [`trial`].
+
+pub mod evaluation;
+pub mod experiment;
+pub mod page;
+pub mod statistics;
+pub mod sweep;
+pub mod training;
+
+pub use evaluation::{Analysis, PlotRecord};
+pub use experiment::{Controller, Engine, Experiment};
+pub use sweep::Sweep;

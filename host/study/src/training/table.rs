@@ -1,0 +1,86 @@
+//! Tables of objects in CSV files, as the firmware's console and its users write them.
+//!
+//! The header names the five features and `label`, in any order; more columns are passed over, and so are lines that
+//! begin with `#` and the `ok` that ends what the console prints. All features are whole numbers. A label is `plant`,
+//! `weed`, or empty where nobody said what it was.
+
+use super::Labelled;
+use control::features::Features;
+use field::row::Kind;
+use files::csv_table::{CsvTable, Line};
+use std::path::{Path, PathBuf};
+
+pub use files::csv_table::TableError;
+
+/// The columns of the features, in the order of [`Features::values`].
+pub const COLUMNS: [&str; 5] = ["speed_mm_s", "spacing_mm", "delay_mm", "hold_mm", "actuation_mm"];
+
+/// The column of the label.
+pub const LABEL: &str = "label";
+
+/// An object that was recorded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Recorded {
+    /// What the machine measured.
+    pub features: Features,
+    /// What it was, where somebody said so.
+    pub kind: Option<Kind>,
+}
+
+/// Reads objects that may or may not have a label. At least one is there.
+///
+/// # Errors
+/// Names the file, the line and what would be right.
+pub fn read(path: &Path) -> Result<Vec<Recorded>, TableError> {
+    CsvTable::read(path, &COLUMNS)?.lines().map(object).collect()
+}
+
+/// Objects to learn from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Lesson {
+    /// Those with a label, of both classes.
+    pub objects: Vec<Labelled>,
+    /// How many there were without, which teach nothing.
+    pub unlabelled: usize,
+}
+
+/// Reads objects of both classes from files that together make one table.
+///
+/// # Errors
+/// Names the file, the line and what would be right.
+pub fn read_labelled(paths: &[PathBuf]) -> Result<Lesson, TableError> {
+    let columns: Vec<&str> = COLUMNS.into_iter().chain([LABEL]).collect();
+    let tables = paths.iter().map(|path| CsvTable::read(path, &columns)).collect::<Result<Vec<_>, _>>()?;
+    let mut lesson = Lesson { objects: Vec::new(), unlabelled: 0 };
+    let mut last = None;
+    for line in tables.iter().flat_map(CsvTable::lines) {
+        let Recorded { features, kind } = object(line)?;
+        match kind {
+            Some(kind) => lesson.objects.push(Labelled { features, kind }),
+            None => lesson.unlabelled += 1,
+        }
+        last = Some(line);
+    }
+    let has = |kind: Kind| lesson.objects.iter().any(|object| object.kind == kind);
+    let missing = [Kind::Plant, Kind::Weed].into_iter().find(|&kind| !has(kind));
+    match (missing, last) {
+        (Some(kind), Some(line)) => {
+            Err(line.error(format!("up to here there is no {LABEL} {kind}: some objects of either class are needed")))
+        }
+        _ => Ok(lesson),
+    }
+}
+
+/// The object in a line.
+fn object(line: Line) -> Result<Recorded, TableError> {
+    let mut values = [0; COLUMNS.len()];
+    for (value, column) in values.iter_mut().zip(COLUMNS) {
+        *value = line.value(column, "a whole number from -32768 to 32767")?;
+    }
+    let [speed_mm_s, spacing_mm, delay_mm, hold_mm, actuation_mm] = values;
+    let kind = match line.text(LABEL) {
+        "" => None,
+        _ => Some(line.value(LABEL, "plant or weed, or empty")?),
+    };
+    Ok(Recorded { features: Features { speed_mm_s, spacing_mm, delay_mm, hold_mm, actuation_mm }, kind })
+}

@@ -1,0 +1,94 @@
+//! The classifier alone: cycles of a classification, from the bench's ELF.
+//!
+//! The bench (`bench/` in the workspace) raises D13 around each call that it measures: the cycles between the edges are
+//! exact. It also compares every answer of the search in flash with a plain search's, and no figure is given where
+//! they differ.
+
+use super::BenchError;
+use field::wiring;
+use knn_bench::{QUERIES, Task};
+use signal::CYCLES_PER_SECOND;
+use std::path::Path;
+use uno::Uno;
+
+/// Cycles that D13 is high for longer than the call: those of the instruction that raises it (`sbi`, 2).
+const EDGE_CYCLES: u64 = 2;
+
+/// Longest time that the bench may take: ten times what it does.
+const BENCH_CYCLES: u64 = 20 * CYCLES_PER_SECOND;
+
+/// Simulated time between two reports of progress.
+const PROGRESS_CYCLES: u64 = CYCLES_PER_SECOND / 20;
+
+/// Cycles of the calls of one task.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cycles {
+    /// The fastest call.
+    pub fewest: u64,
+    /// The mean of all calls.
+    pub mean: f64,
+    /// The slowest call.
+    pub most: u64,
+}
+
+impl Cycles {
+    /// `None` without a call.
+    fn of(calls: &[u64]) -> Option<Self> {
+        let (fewest, most) = (*calls.iter().min()?, *calls.iter().max()?);
+        Some(Self { fewest, mean: calls.iter().sum::<u64>() as f64 / calls.len() as f64, most })
+    }
+}
+
+/// What the classifier costs.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ClassifierCosts {
+    /// The cycles of each task.
+    pub tasks: Vec<(Task, Cycles)>,
+    /// Bytes of stack below the bench's own.
+    pub stack: u16,
+}
+
+/// Runs the bench at `elf`. `progress` is told the share of the calls done, from 0 to 1.
+///
+/// # Errors
+/// Where the ELF cannot be run or is not the bench, and where its search answers otherwise than the plain one.
+pub fn classifier(elf: &Path, mut progress: impl FnMut(f64)) -> Result<ClassifierCosts, BenchError> {
+    let mut uno = Uno::boot(elf)?;
+    variable(&uno, "DIFFERENT_ANSWERS")?;
+    let expected = Task::ALL.len() * QUERIES;
+    let mut calls = Vec::new();
+    let mut stack = None;
+    while uno.cycle() < BENCH_CYCLES {
+        uno.run_until(uno.cycle() + PROGRESS_CYCLES)?;
+        if calls.len() < expected {
+            calls = call_cycles(&uno);
+            progress(calls.len() as f64 / expected as f64);
+            // The plain search comes after all that is measured, and needs more stack.
+            stack = (calls.len() < expected).then(|| uno.deepest_stack() as u16).or(stack);
+        } else {
+            match variable(&uno, "DIFFERENT_ANSWERS")? {
+                u16::MAX => {}
+                0 => break,
+                different => return Err(BenchError::Different(different)),
+            }
+        }
+    }
+    if calls.len() != expected {
+        return Err(BenchError::Unfinished { seen: calls.len(), expected });
+    }
+    // The stack grows down from the end of SRAM, and its pointer stands on the first free byte.
+    let own = 0x8FF - variable(&uno, "STACK_POINTER")?;
+    let cycles = calls.chunks(QUERIES).filter_map(Cycles::of);
+    Ok(ClassifierCosts { tasks: Task::ALL.into_iter().zip(cycles).collect(), stack: stack.unwrap_or(own) - own })
+}
+
+/// Cycles of each call that D13 has shown.
+fn call_cycles(uno: &Uno) -> Vec<u64> {
+    let edges: Vec<_> = uno.changes().iter().filter(|change| change.pin == wiring::LED).collect();
+    edges.chunks_exact(2).map(|edges| edges[1].cycle - edges[0].cycle - EDGE_CYCLES).collect()
+}
+
+fn variable(uno: &Uno, name: &'static str) -> Result<u16, BenchError> {
+    let bytes = uno.read(name).and_then(|bytes| bytes.try_into().ok());
+    bytes.map(u16::from_le_bytes).ok_or(BenchError::NoVariable(name))
+}

@@ -1,0 +1,367 @@
+//! How fast the encoder may turn: the highest rate at which the firmware loses no count.
+//!
+//! A trial turns the encoder at one rate and then asks the firmware for its position. It is passed where that is exact, where
+//! the firmware knows of no lost count, where it did not start anew, and where its telemetry went on meanwhile: a
+//! trial lasts longer than its heartbeat and its watchdog wait for a loop that gets no time any more.
+//!
+//! Each rate has two trials. [`turn`] turns the encoder evenly, or with jitter by chance, and so leaves the loop as little time
+//! as the rate does. But an edge comes at the worst moment there by chance alone, and a function that has moved makes
+//! for another chance. [`turn_at_worst`] sees to it: the edge waits, no shorter than the rate has it, until another interrupt's
+//! handler begins, and then the next two come as soon as they may. The beam's edges and the bytes received, whose
+//! moments the world has in hand, come right before the loop turns interrupts off, so that the edge has to wait for the
+//! critical section as well.
+//!
+//! [`highest_rate`] finds the rate by bisection to [`RESOLUTION`], and then tries rates below it: edges that come in step with
+//! something else may pass at a rate by chance.
+//!
+//! The firmware is in HOLD. What weeding adds is less than [`Load::Telemetry`], which asks for more than the serial line can
+//! carry and has the beam flicker as fast as its sensor can.
+
+use super::BenchError;
+use super::load::{EDGE_CYCLES, Telemetry, flicker};
+use crate::console::{ConsoleError, Status, ask};
+use crate::run;
+use field::wiring;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use signal::{CYCLES_PER_SECOND, PinChange};
+use std::path::Path;
+use uno::{Place, SENT_BYTE_CYCLES, Uno};
+
+/// Fewest counts of a trial: the count's second byte changes more than a hundred times.
+const FEWEST_COUNTS: f64 = 40_000.0;
+
+/// Shortest trial: twice what the watchdog waits.
+const SHORTEST_S: f64 = 0.5;
+
+/// Share of the serial line below which the telemetry counts as silent: some eight lines of status a second.
+const SILENT_SHARE: f64 = 0.1;
+
+/// Relative distance between a rate that was passed and one that was not, at the end of the search.
+pub const RESOLUTION: f64 = 0.01;
+
+/// What else the firmware does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Load {
+    /// What it does by itself: clock, loop and servo.
+    Idle,
+    /// Its status is asked for without an end at 115200 baud, and the beam flickers.
+    Telemetry,
+}
+
+/// Which way the encoder turns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Direction {
+    /// AB = 00, 10, 11, 01.
+    Forward,
+    /// The other way.
+    Backward,
+}
+
+/// How the encoder turns, and beside what.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Turning {
+    /// What else the firmware does.
+    pub load: Load,
+    /// Which way.
+    pub direction: Direction,
+    /// Each edge comes early or late by up to this share of the time between two, evenly spread; from 0 to 0.5.
+    pub jitter: f64,
+}
+
+/// The jitter of an encoder whose disc is worn or off its centre.
+pub const JITTER: f64 = 0.3;
+
+/// What a trial showed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Counted {
+    /// What else the firmware did.
+    pub load: Load,
+    /// Counts that came, net.
+    pub true_ticks: i64,
+    /// Counts that the firmware has; `None` where it could not be asked any more.
+    pub position_ticks: Option<i64>,
+    /// Counts that it knows to have lost.
+    pub lost_ticks: u64,
+    /// How often it started anew.
+    pub restarts: usize,
+    /// Share of the serial line's capacity that it used meanwhile, from 0 to 1.
+    pub line_share: f64,
+}
+
+impl Counted {
+    /// Whether nothing was lost and the rest of the firmware went on.
+    pub fn is_passed(&self) -> bool {
+        let is_heard = self.load == Load::Idle || self.line_share >= SILENT_SHARE;
+        self.position_ticks == Some(self.true_ticks) && self.lost_ticks == 0 && self.restarts == 0 && is_heard
+    }
+}
+
+/// Time from the last edge to the question, in which answers under way come to their end.
+const SETTLE_MS: u64 = 100;
+
+/// Turns the encoder of the firmware at `elf` for half a second and by 40,000 counts at least.
+///
+/// # Errors
+/// Where the ELF cannot be run.
+pub fn turn(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<Counted, BenchError> {
+    let mut uno = run::boot(elf, &[])?;
+    ask(&mut uno, "events on")?;
+    let step_cycles = CYCLES_PER_SECOND as f64 / counts_per_s;
+    let counts = (counts_per_s * SHORTEST_S).max(FEWEST_COUNTS).ceil() as u32;
+    let begin = uno.cycle() + step_cycles.ceil() as u64;
+    let end = begin + (f64::from(counts) * step_cycles).ceil() as u64;
+    uno.drive(edges(turning, step_cycles, begin).take(counts as usize));
+    let mut telemetry = Telemetry::default();
+    match turning.load {
+        Load::Idle => uno.run_until(end)?,
+        Load::Telemetry => {
+            uno.drive(flicker(begin, end));
+            telemetry.run_until(&mut uno, end)?;
+        }
+    }
+    let line_share = telemetry.line_share(end - begin);
+    counted(&mut uno, turning, counts.into(), line_share)
+}
+
+/// Asks for what the firmware has counted of `counts` edges, once it has come to rest.
+fn counted(uno: &mut Uno, turning: Turning, counts: i64, line_share: f64) -> Result<Counted, BenchError> {
+    uno.run_for_ms(SETTLE_MS)?;
+    let status = match Status::ask(uno) {
+        Ok(status) => Some(status),
+        Err(ConsoleError::Uno(error)) => return Err(error.into()),
+        // A console that was starved is as bad as a count that was lost.
+        Err(_) => None,
+    };
+    Ok(Counted {
+        load: turning.load,
+        true_ticks: if turning.direction == Direction::Forward { counts } else { -counts },
+        position_ticks: status.as_ref().map(|status| status.position_ticks),
+        lost_ticks: status.map_or(0, |status| status.lost_ticks),
+        restarts: uno.resets().len(),
+        line_share,
+    })
+}
+
+/// Time that the edges have to wait for the worst moments, in cycles.
+const WORST_CYCLES: u64 = (SHORTEST_S * CYCLES_PER_SECOND as f64) as u64;
+
+/// Edges that come one after the other once the first has met its moment, at the least and at the most.
+const RUN: std::ops::RangeInclusive<u32> = 3..=12;
+
+/// Edges of the run-up, and the cycles between two of them: a tenth of a second at 40,000 a second.
+const RUN_UP: u32 = 4000;
+const RUN_UP_CYCLES: u64 = CYCLES_PER_SECOND / 40_000;
+
+/// Critical sections of the loop that pass between two of which one is made worse, at most: some turns of the loop.
+const SECTIONS_PASSED: u32 = 40;
+
+/// Turns the encoder of the firmware at `elf` for half a second, with edges that wait for the moments at which they have to wait
+/// longest themselves, and are never closer together than `counts_per_s` and the jitter have them.
+///
+/// # Errors
+/// Where the ELF cannot be run.
+pub fn turn_at_worst(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<Counted, BenchError> {
+    let mut uno = run::boot(elf, &[])?;
+    ask(&mut uno, "events on")?;
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    let step_cycles = CYCLES_PER_SECOND as f64 / counts_per_s;
+    let begin = uno.cycle();
+    let end = begin + WORST_CYCLES;
+    let mut world = World::new(turning.load, begin);
+    // A first edge at leisure: which way it goes resolves a jump.
+    uno.set(nth_edge(turning.direction, 0).pin, nth_edge(turning.direction, 0).high);
+    uno.run_for_ms(1)?;
+    // No wheel is fast from one moment to the next: the firmware would take its jumps for noise until it knows how fast.
+    let run_up = uno.cycle();
+    uno.drive((1..=RUN_UP).map(|number| PinChange {
+        cycle: run_up + u64::from(number) * RUN_UP_CYCLES,
+        ..nth_edge(turning.direction, number)
+    }));
+    uno.run_until(run_up + u64::from(RUN_UP + 1) * RUN_UP_CYCLES)?;
+    let mut number = RUN_UP + 1;
+    while uno.cycle() < end {
+        let moment = world.worst_moment(&mut uno, rng.random_range(0..SECTIONS_PASSED))?;
+        // The first edge comes late, the second in time and the third early, and so on.
+        let shift = |edge: u32| turning.jitter * (1.0 - f64::from(edge % 3));
+        let edges = rng.random_range(RUN);
+        for edge in 0..edges {
+            let steps = f64::from(edge) + shift(edge) - shift(0);
+            let cycle = moment + (steps * step_cycles).round() as u64;
+            uno.drive([PinChange { cycle, ..nth_edge(turning.direction, number) }]);
+            number += 1;
+        }
+        // Whatever its own shift: the next edge is one that comes late.
+        let next = moment + (f64::from(edges) * step_cycles).ceil() as u64;
+        uno.run_until(next)?;
+        while uno.place() == Place::InHandler {
+            uno.run_instruction()?;
+        }
+        world.telemetry.take(&uno.received_bytes());
+    }
+    uno.set(wiring::BEAM, true);
+    uno.send(world.telemetry.rest_of_question());
+    let line_share = world.telemetry.line_share(uno.cycle() - begin);
+    counted(&mut uno, turning, number.into(), line_share)
+}
+
+/// What happens at the firmware's other inputs, with the moments chosen.
+struct World {
+    load: Load,
+    telemetry: Telemetry,
+    beam: bool,
+    /// When the beam and the serial line may come up with something again.
+    beam_after: u64,
+    byte_after: u64,
+}
+
+impl World {
+    fn new(load: Load, begin: u64) -> Self {
+        let line = begin + SENT_BYTE_CYCLES;
+        Self { load, telemetry: Telemetry::default(), beam: true, beam_after: begin, byte_after: line }
+    }
+
+    /// Runs until a handler begins or, where nothing comes from outside, until the loop is about to turn interrupts off. Returns
+    /// the cycle of the handler's entry. Something comes from outside once the loop has passed so many critical sections.
+    fn worst_moment(&mut self, uno: &mut Uno, mut sections: u32) -> Result<u64, BenchError> {
+        loop {
+            let cycle = uno.cycle();
+            if uno.place() == Place::BeforeCriticalSection {
+                sections = sections.saturating_sub(1);
+                if sections == 0 && self.load == Load::Idle {
+                    return Ok(cycle);
+                }
+                if sections == 0 {
+                    self.act(uno);
+                }
+            }
+            uno.run_instruction()?;
+            if uno.place() == Place::InHandler {
+                return Ok(cycle);
+            }
+        }
+    }
+
+    /// Has the beam change or a byte come in, whichever may.
+    fn act(&mut self, uno: &mut Uno) {
+        let cycle = uno.cycle();
+        if cycle >= self.beam_after {
+            self.beam = !self.beam;
+            uno.set(wiring::BEAM, self.beam);
+            self.beam_after = cycle + EDGE_CYCLES;
+        } else if cycle >= self.byte_after
+            && let Some(byte) = self.telemetry.next_byte()
+        {
+            uno.receive(byte);
+            self.byte_after = cycle + SENT_BYTE_CYCLES;
+        }
+    }
+}
+
+/// The encoder's edges without an end, in order of time.
+fn edges(turning: Turning, step_cycles: f64, begin: u64) -> impl Iterator<Item = PinChange> {
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    (0_u32..).map(move |number| {
+        let early = rng.random_range(-1.0..=1.0) * turning.jitter;
+        let cycle = begin + ((f64::from(number) + turning.jitter + early) * step_cycles).round() as u64;
+        PinChange { cycle, ..nth_edge(turning.direction, number) }
+    })
+}
+
+/// Pin and level of an edge, counted from 0.
+fn nth_edge(direction: Direction, number: u32) -> PinChange {
+    // Forward, A leads B; backward, B leads A.
+    let (first, second) = match direction {
+        Direction::Forward => (wiring::ENCODER_A, wiring::ENCODER_B),
+        Direction::Backward => (wiring::ENCODER_B, wiring::ENCODER_A),
+    };
+    let pin = if number.is_multiple_of(2) { first } else { second };
+    PinChange { cycle: 0, pin, high: number % 4 < 2 }
+}
+
+/// The highest rate without a lost count.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rate {
+    /// Counts a second.
+    pub counts_per_s: f64,
+    /// Share of the serial line's capacity that the firmware used at that rate, from 0 to 1.
+    pub line_share: f64,
+}
+
+/// Where the search begins: a rate that is passed in any case, and one that an ATmega328P cannot pass: 20 cycles a count.
+const LOWEST_PER_S: f64 = 10_000.0;
+const HIGHEST_PER_S: f64 = 800_000.0;
+
+/// Shares of the rate found that have to be passed as well.
+const BELOW: [f64; 8] = [0.99, 0.98, 0.97, 0.95, 0.9, 0.8, 0.7, 0.5];
+
+/// Both trials of a rate; `None` where one of them was not passed.
+fn follow(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<Option<Rate>, BenchError> {
+    let mut line_share = 1.0_f64;
+    for trial in [turn_at_worst, turn] {
+        let counted = trial(elf, turning, counts_per_s)?;
+        if !counted.is_passed() {
+            return Ok(None);
+        }
+        line_share = line_share.min(counted.line_share);
+    }
+    Ok(Some(Rate { counts_per_s, line_share }))
+}
+
+/// Searches the highest rate of the firmware at `elf`. `progress` is told the share of the search done, from 0 to 1.
+///
+/// # Errors
+/// Where the ELF cannot be run.
+pub fn highest_rate(elf: &Path, turning: Turning, mut progress: impl FnMut(f64)) -> Result<Rate, BenchError> {
+    let mut passed = Rate { counts_per_s: LOWEST_PER_S, line_share: 0.0 };
+    let mut failed = HIGHEST_PER_S;
+    let bisections = ((HIGHEST_PER_S / LOWEST_PER_S).ln() / RESOLUTION.ln_1p()).log2().ceil();
+    let trials = bisections + BELOW.len() as f64;
+    let mut done = 0.0;
+    loop {
+        while failed > passed.counts_per_s * (1.0 + RESOLUTION) {
+            let middle = (failed * passed.counts_per_s).sqrt();
+            match follow(elf, turning, middle)? {
+                Some(rate) => passed = rate,
+                None => failed = middle,
+            }
+            done += 1.0;
+            progress((done / trials).min(1.0));
+        }
+        let mut below = BELOW.iter().map(|share| share * passed.counts_per_s);
+        let chance = loop {
+            let Some(rate) = below.next() else { break None };
+            if follow(elf, turning, rate)?.is_none() {
+                break Some(rate);
+            }
+            done += 1.0;
+            progress((done / trials).min(1.0));
+        };
+        match chance {
+            Some(rate) => {
+                failed = rate;
+                passed = Rate { counts_per_s: LOWEST_PER_S, line_share: 0.0 };
+            }
+            None => return Ok(passed),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn edges_go_through_the_four_states_in_order_and_never_change_places() {
+        for (direction, first) in [(Direction::Forward, wiring::ENCODER_A), (Direction::Backward, wiring::ENCODER_B)] {
+            let turning = Turning { load: Load::Idle, direction, jitter: JITTER };
+            let edges: Vec<PinChange> = edges(turning, 80.0, 1000).take(1000).collect();
+            assert!(
+                edges.windows(2).all(|pair| pair[1].cycle - pair[0].cycle >= 31),
+                "40 % of a step and its rounding"
+            );
+            let levels: Vec<_> = edges.iter().take(4).map(|edge| (edge.pin == first, edge.high)).collect();
+            assert_eq!(levels, [(true, true), (false, true), (true, false), (false, false)]);
+        }
+    }
+}

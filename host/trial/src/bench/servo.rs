@@ -1,0 +1,66 @@
+//! The servo's jitter: how much its pulses and its frames differ while the firmware has all hands full.
+
+use super::BenchError;
+use super::load::{Telemetry, flicker};
+use crate::run;
+use field::wiring;
+use signal::{CYCLES_PER_SECOND, PinChange};
+use std::path::Path;
+
+/// Pulses of the measurement.
+pub const PULSES: usize = 500;
+
+/// How fast the encoder turns meanwhile.
+pub const COUNTS_PER_S: u64 = 20_000;
+
+/// The greatest less the least of [`PULSES`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Jitter {
+    /// Of the pulses' widths, in cycles.
+    pub width_cycles: u64,
+    /// Of the frames, from rise to rise, in cycles.
+    pub frame_cycles: u64,
+    /// Pulses that were compared.
+    pub pulses: usize,
+}
+
+/// Cycles of the servo's frame.
+const FRAME_CYCLES: u64 = CYCLES_PER_SECOND / 50;
+
+/// Measures the pulses of the firmware at `elf` in HOLD, while the encoder turns, the status streams and the beam flickers.
+/// `progress` is told the share of the time that has passed, from 0 to 1.
+///
+/// # Errors
+/// Where the ELF cannot be run.
+pub fn jitter(elf: &Path, mut progress: impl FnMut(f64)) -> Result<Jitter, BenchError> {
+    let mut uno = run::boot(elf, &[])?;
+    uno.send(b"events on\n");
+    let begin = uno.cycle();
+    let end = begin + (PULSES as u64 + 2) * FRAME_CYCLES;
+    let step_cycles = CYCLES_PER_SECOND / COUNTS_PER_S;
+    // Forward: A and B in turns, each two counts high and two low.
+    uno.drive((0..(end - begin) / step_cycles).map(|number| PinChange {
+        cycle: begin + number * step_cycles,
+        pin: if number % 2 == 0 { wiring::ENCODER_A } else { wiring::ENCODER_B },
+        high: number % 4 < 2,
+    }));
+    uno.drive(flicker(begin, end));
+    let mut telemetry = Telemetry::default();
+    while uno.cycle() < end {
+        let next = (uno.cycle() + FRAME_CYCLES).min(end);
+        telemetry.run_until(&mut uno, next)?;
+        progress((uno.cycle() - begin) as f64 / (end - begin) as f64);
+    }
+
+    let mut pulses = uno.servo_pulses();
+    pulses.retain(|pulse| pulse.rise >= begin);
+    pulses.truncate(PULSES);
+    let widths = pulses.iter().map(|pulse| pulse.fall - pulse.rise);
+    let frames = pulses.windows(2).map(|pair| pair[1].rise - pair[0].rise);
+    Ok(Jitter { width_cycles: spread(widths), frame_cycles: spread(frames), pulses: pulses.len() })
+}
+
+/// The greatest less the least; 0 of nothing.
+fn spread(values: impl Iterator<Item = u64> + Clone) -> u64 {
+    values.clone().max().unwrap_or(0) - values.min().unwrap_or(0)
+}

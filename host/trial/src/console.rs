@@ -1,0 +1,131 @@
+//! The firmware's console, as a patient operator uses it: one command, then all of its answer.
+//!
+//! The firmware answers a command by its lines and then exactly one `ok` or `error: ...` (the README's console chapter).
+//! [`link`] does the same over a serial port, by the host's clock and with every suspicion; here the clock is the virtual
+//! Uno's own, so that the same commands always come at the same cycles.
+
+use link::{LineReader, Values};
+use thiserror::Error;
+use uno::{Uno, UnoError};
+
+/// Longest time that an answer may take. `help` and `get` write some thousand characters in a tenth of a second.
+const TIMEOUT_MS: u64 = 1000;
+
+/// Why a command had no good answer.
+#[derive(Debug, Error)]
+pub enum ConsoleError {
+    /// The virtual Uno stopped.
+    #[error(transparent)]
+    Uno(#[from] UnoError),
+    /// The firmware refused.
+    #[error("the firmware answers `{command}` by `{answer}`")]
+    Refused {
+        /// The command.
+        command: String,
+        /// The line that begins with `error:`.
+        answer: String,
+    },
+    /// The firmware went silent.
+    #[error("the firmware does not finish its answer to `{command}`: it sent {received:?}")]
+    Silent {
+        /// The command.
+        command: String,
+        /// What came.
+        received: String,
+    },
+    /// A status line without a figure that it should have.
+    #[error("the firmware's status has no `{key}=`: {line:?}")]
+    Status {
+        /// The missing key.
+        key: &'static str,
+        /// The line.
+        line: String,
+    },
+}
+
+/// A part of the time that a character takes on the line, which is 1390 cycles.
+const CHARACTER_CYCLES: u64 = 500;
+
+/// Types a command and returns the lines of its answer, the `ok` left out.
+///
+/// The Uno's clock runs until the answer is complete. What the firmware had sent before is dropped.
+///
+/// # Errors
+/// Where the firmware refuses, goes silent or stops.
+pub fn ask(uno: &mut Uno, command: &str) -> Result<Vec<String>, ConsoleError> {
+    uno.received();
+    uno.send(format!("{command}\n").as_bytes());
+    let (mut lines, mut answer) = (LineReader::new(), Vec::new());
+    for _ in 0..TIMEOUT_MS {
+        uno.run_for_ms(1)?;
+        let mut received = uno.received();
+        lines.take(received.as_bytes());
+        while let Some(line) = lines.next_line() {
+            if line == "ok" {
+                // The end of its line belongs to it, and what comes behind that is somebody else's.
+                while received.ends_with('\r') {
+                    uno.run_until(uno.cycle() + CHARACTER_CYCLES)?;
+                    received += &uno.received();
+                }
+                return Ok(answer);
+            }
+            if line.starts_with("error:") {
+                return Err(ConsoleError::Refused { command: command.to_owned(), answer: line });
+            }
+            answer.push(line);
+        }
+    }
+    answer.push(lines.partial().to_owned());
+    Err(ConsoleError::Silent { command: command.to_owned(), received: answer.join("\n") })
+}
+
+/// What the firmware says of itself on `status`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Status {
+    /// `hold`, `work` or `alarm`.
+    pub state: String,
+    /// Encoder counts, net, since power-up.
+    pub position_ticks: i64,
+    /// Encoder counts that the firmware knows to have lost.
+    pub lost_ticks: u64,
+}
+
+impl Status {
+    /// Asks for it.
+    ///
+    /// # Errors
+    /// As [`ask`], and where the answer lacks one of the figures.
+    pub fn ask(uno: &mut Uno) -> Result<Self, ConsoleError> {
+        Self::parse(&ask(uno, "status")?.join(" "))
+    }
+
+    fn parse(line: &str) -> Result<Self, ConsoleError> {
+        let values = Values(line);
+        let missing = |key| ConsoleError::Status { key, line: line.to_owned() };
+        Ok(Self {
+            state: values.text("state").ok_or_else(|| missing("state"))?.to_owned(),
+            position_ticks: values.number("pos").ok_or_else(|| missing("pos"))?,
+            lost_ticks: values.number("lost").ok_or_else(|| missing("lost"))?,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_status_line_is_read_by_its_keys() {
+        let status = Status::parse("state=work tool=in pos=-12 speed_mm_s=0 windows=0 lost=3 unseen_mm=0");
+        let expected = Status { state: "work".to_owned(), position_ticks: -12, lost_ticks: 3 };
+        assert_eq!(status.unwrap(), expected);
+    }
+
+    #[test]
+    fn a_status_line_without_a_figure_is_refused_by_its_name() {
+        let error = Status::parse("state=work pos=many lost=0").unwrap_err();
+        assert!(error.to_string().starts_with("the firmware's status has no `pos=`"), "{error}");
+        let error = Status::parse("state=work pos=1").unwrap_err();
+        assert!(error.to_string().starts_with("the firmware's status has no `lost=`"), "{error}");
+    }
+}

@@ -1,0 +1,120 @@
+//! The firmware built from this workspace.
+//!
+//! [`build`] runs `cargo firmware` once a process, in a target directory of its own, so that a test or a trial always
+//! meets the sources as they stand. What the ELF holds is read by [`uno::elf`].
+
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::sync::OnceLock;
+
+use cargo_metadata::Message;
+
+/// A program for the chip: its package, which is its binary's name too, and the alias that builds it.
+struct Program {
+    package: &'static str,
+    alias: &'static str,
+}
+
+const FIRMWARE: Program = Program { package: "weeder-firmware", alias: "firmware" };
+const BENCH: Program = Program { package: "knn-bench", alias: "bench-firmware" };
+
+/// What an outer cargo, or a shell, may have set that would change how the firmware is compiled.
+const FOREIGN_SETTINGS: [&str; 7] = [
+    // Either of the flags replaces the target-cpu of .cargo/config.toml.
+    "RUSTFLAGS",
+    "CARGO_ENCODED_RUSTFLAGS",
+    "CARGO_BUILD_RUSTFLAGS",
+    "CARGO_BUILD_TARGET",
+    // `cargo clippy` sets it, and would check the firmware instead of compiling it.
+    "RUSTC_WORKSPACE_WRAPPER",
+    "RUSTC",
+    // The workspace's rust-toolchain.toml decides.
+    "RUSTUP_TOOLCHAIN",
+];
+
+/// Why the firmware could not be built.
+#[derive(Clone, Debug, thiserror::Error)]
+pub enum BuildError {
+    /// Cargo could not be started.
+    #[error("cargo could not be started ({0}): put it on PATH, ./setup.sh says how")]
+    Start(String),
+    /// Cargo's messages could not be read.
+    #[error("cargo's messages could not be read: {0}")]
+    Messages(String),
+    /// Cargo ran and failed.
+    #[error("`cargo {0}` failed ({1}): its own messages stand above; where a tool is missing, run ./setup.sh")]
+    Failed(&'static str, String),
+    /// Cargo was content, but no ELF came of it.
+    #[error("no ELF was made: the package `{0}` should have a binary of that name")]
+    NoElf(&'static str),
+}
+
+/// Builds the firmware of this workspace and returns the path of its ELF.
+///
+/// Cargo runs at most once a process; later calls return the first one's answer. Its progress and the compiler's
+/// messages go to standard error.
+///
+/// # Errors
+///
+/// Where cargo cannot be started, fails, or makes no ELF.
+pub fn build() -> Result<PathBuf, BuildError> {
+    static BUILT: OnceLock<Result<PathBuf, BuildError>> = OnceLock::new();
+    BUILT.get_or_init(|| FIRMWARE.build()).clone()
+}
+
+/// Builds the classifier's bench, which [`trial::bench`] runs, and returns the path of its ELF.
+///
+/// # Errors
+///
+/// As [`build`].
+pub fn build_bench() -> Result<PathBuf, BuildError> {
+    static BUILT: OnceLock<Result<PathBuf, BuildError>> = OnceLock::new();
+    BUILT.get_or_init(|| BENCH.build()).clone()
+}
+
+impl Program {
+    fn build(&self) -> Result<PathBuf, BuildError> {
+        let mut command = Command::new("cargo");
+        command
+            .args([self.alias, "--message-format", "json-render-diagnostics"])
+            .arg("--target-dir")
+            .arg(target_directory())
+            .current_dir(workspace_root())
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped());
+        for name in FOREIGN_SETTINGS {
+            command.env_remove(name);
+        }
+        let mut cargo = command.spawn().map_err(|error| BuildError::Start(error.to_string()))?;
+
+        let mut elf = None;
+        if let Some(messages) = cargo.stdout.take() {
+            for message in Message::parse_stream(BufReader::new(messages)) {
+                match message.map_err(|error| BuildError::Messages(error.to_string()))? {
+                    Message::CompilerArtifact(artifact) if artifact.target.name == self.package => {
+                        elf = artifact.executable.map(PathBuf::from).or(elf);
+                    }
+                    _ => {}
+                }
+            }
+        }
+        let status = cargo.wait().map_err(|error| BuildError::Start(error.to_string()))?;
+        if !status.success() {
+            return Err(BuildError::Failed(self.alias, status.to_string()));
+        }
+        elf.ok_or(BuildError::NoElf(self.package))
+    }
+}
+
+/// The folder of the workspace's Cargo.toml, two above this crate's.
+pub fn workspace_root() -> &'static Path {
+    let this_crate = Path::new(env!("CARGO_MANIFEST_DIR"));
+    this_crate.ancestors().nth(2).unwrap_or(this_crate)
+}
+
+/// A target directory of the firmware's own: an outer cargo keeps the usual one locked while it runs a test.
+fn target_directory() -> PathBuf {
+    let usual = std::env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into());
+    workspace_root().join(usual).join("firmware")
+}

@@ -1,0 +1,352 @@
+//! The virtual Uno, live: in real time, at a pseudo terminal that any serial program opens, with a machine around it that rolls
+//! along a row again and again.
+//!
+//! [`LiveUno::start`] powers it up, [`LiveUno::run`] lets it run until it is told to stop, and [`LiveUno::run_in_background`] does so in
+//! a thread. Each millisecond of the chip's time, bytes are taken from and given to the terminal; then the host's clock is
+//! waited for. A host that is too slow makes the chip slower, never the time between two of its events wrong.
+//!
+//! - **Reset.** A program that opens the port of a real Uno resets it, by the modem line DTR. A pseudo terminal has no such
+//!   line; so the opening itself is what resets, unless [`Setup::keeps_running_when_opened`]. Then a bootloader waits for a
+//!   new firmware for a second or two, as on the desk.
+//! - **Baud rate.** The chip sends and receives at the pace of its UBRR. The terminal carries bytes at any rate, so that a
+//!   program's wrong one goes unnoticed. What no program has read is lost when the next one opens the port.
+//! - **The machine.** It stands, gains its speed ahead of the row, rolls past it and brakes behind it; after a few seconds it does
+//!   so again, forward, with the same row before it. The tool does what the firmware says and the row does not mind.
+//! - **EEPROM.** It is read from a file at the start, where there is one, and written to it whenever it has changed.
+
+use field::machine::{Machine, cycle_at};
+use field::motion::Motion;
+use field::row::Row;
+use field::wiring;
+use signal::{CYCLES_PER_SECOND, PinChange};
+use std::collections::VecDeque;
+use std::io::{self, ErrorKind};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
+use thiserror::Error;
+use uno::elf::EEPROM_BYTES;
+use uno::hex::Bootloader;
+use uno::pty::{Pty, PtyError};
+use uno::{Uno, UnoError};
+
+/// What is on the desk.
+#[derive(Clone, Debug, Default)]
+pub struct Setup {
+    /// The firmware's ELF; without one, and with a bootloader, the rest of the flash is erased.
+    pub elf: Option<PathBuf>,
+    /// The bootloader; without one, a reset starts the firmware.
+    pub bootloader: Option<Bootloader>,
+    /// The file that keeps the EEPROM; without one it is erased at the start and forgotten at the end.
+    pub eeprom: Option<PathBuf>,
+    /// Where to make a symbolic link to the pseudo terminal.
+    pub link: Option<PathBuf>,
+    /// What the machine rolls along; without it, it stands.
+    pub course: Option<Course>,
+    /// Whether to run as fast as the host can, not in real time.
+    pub fast: bool,
+    /// Whether to leave the chip alone when a program opens the port.
+    pub keeps_running_when_opened: bool,
+}
+
+/// A row, and the machine that rolls along it.
+#[derive(Clone, Debug)]
+pub struct Course {
+    /// What stands in the row.
+    pub row: Row,
+    /// The machine.
+    pub machine: Machine,
+    /// Its speed.
+    pub speed_mm_s: f64,
+}
+
+/// Why a live Uno could not start, or stopped.
+#[derive(Debug, Error)]
+pub enum LiveError {
+    /// There is neither a firmware nor a bootloader.
+    #[error("there is nothing to run: give a firmware's ELF, a bootloader, or both")]
+    NothingToRun,
+    /// The virtual Uno stopped.
+    #[error(transparent)]
+    Uno(#[from] UnoError),
+    /// The pseudo terminal failed.
+    #[error(transparent)]
+    Pty(#[from] PtyError),
+    /// The EEPROM's file cannot be read or written.
+    #[error("the EEPROM's file {path} cannot be read or written")]
+    Eeprom {
+        /// The file.
+        path: PathBuf,
+        /// The operating system's answer.
+        source: io::Error,
+    },
+    /// The EEPROM's file is another one.
+    #[error("{path} has {bytes} bytes: a file that keeps the EEPROM has {EEPROM_BYTES}")]
+    NotEeprom {
+        /// The file.
+        path: PathBuf,
+        /// Its length.
+        bytes: usize,
+    },
+}
+
+/// Chip time between two looks at the terminal and at the host's clock.
+const SLICE_MS: u64 = 1;
+
+/// Slices between two looks at the EEPROM.
+const EEPROM_SLICES: u64 = 100;
+
+/// Time that the host may be late by. What it is later by is given up: the chip would otherwise run too fast afterwards.
+const LATE_BY: Duration = Duration::from_millis(50);
+
+/// Bytes that may be on their way to the chip. More are left to the terminal, which makes the program wait.
+const MOST_BYTES_ON_THEIR_WAY: usize = 64;
+
+/// Bytes from the chip that wait for a program to read; what is older is lost.
+const MOST_BYTES_UNREAD: usize = 64 * 1024;
+
+/// Ground ahead of the row: more than a machine has from its beam to its tool, which the tool waits for before it begins.
+const AHEAD_MM: f64 = 2500.0;
+
+/// Ground that the tool rolls on over behind the row.
+const BEHIND_MM: f64 = 500.0;
+
+/// How fast the machine gains its speed, and brakes.
+const ACCELERATION_MM_S2: f64 = 1000.0;
+
+/// Time for which the machine stands before and after it rolls along.
+const STANDING_S: u64 = 3;
+
+/// Counts in a step of the encoder after which both channels are as they were.
+const TICKS_IN_A_PERIOD: f64 = 4.0;
+
+impl Course {
+    /// How the machine rolls along the row once. It ends with the encoder's channels as they were.
+    fn motion(&self) -> Motion {
+        let span = self.row.span_mm();
+        let start_mm = span.start - AHEAD_MM;
+        let braking_mm = self.speed_mm_s.powi(2) / (2.0 * ACCELERATION_MM_S2);
+        let wanted_mm = span.end + self.machine.beam_to_tool_mm + BEHIND_MM + braking_mm - start_mm;
+        let period_mm = TICKS_IN_A_PERIOD * self.machine.tick_mm();
+        let length_mm = (wanted_mm / period_mm).ceil() * period_mm;
+        Motion::steady(start_mm, ACCELERATION_MM_S2, self.speed_mm_s, start_mm + length_mm - braking_mm)
+            .change_speed(0.0, ACCELERATION_MM_S2)
+    }
+
+    /// What the machine does to the pins, beginning at a cycle, and the cycle at which it stands again.
+    fn roll_along(&self, start_cycle: u64) -> (Vec<PinChange>, u64) {
+        let motion = self.motion();
+        (self.machine.pin_changes(&self.row, &motion, start_cycle), cycle_at(start_cycle, motion.duration_s()))
+    }
+}
+
+/// A virtual Uno at a pseudo terminal.
+pub struct LiveUno {
+    uno: Uno,
+    pty: Pty,
+    course: Option<Course>,
+    /// When the machine sets off again.
+    sets_off: u64,
+    eeprom: Option<EepromFile>,
+    /// Bytes from the chip that the program has not had room for.
+    unread: VecDeque<u8>,
+    resets_when_opened: bool,
+    fast: bool,
+}
+
+impl LiveUno {
+    /// Powers it up. Its clock stands until it runs.
+    ///
+    /// # Errors
+    /// Where there is nothing to run or it does not fit, no terminal is to be had, or a file is wrong.
+    pub fn start(setup: Setup) -> Result<LiveUno, LiveError> {
+        let eeprom = setup.eeprom.map(EepromFile::open).transpose()?;
+        let content = eeprom.as_ref().map_or(&[][..], |file| &file.content);
+        let mut uno = match (&setup.bootloader, &setup.elf) {
+            (Some(bootloader), elf) => Uno::boot_with_bootloader(bootloader, elf.as_deref(), content)?,
+            (None, Some(elf)) => Uno::boot_with_eeprom(elf, content)?,
+            (None, None) => return Err(LiveError::NothingToRun),
+        };
+        uno = uno.wired(&wiring::WIRES);
+        uno.follow_baud();
+        let mut pty = Pty::open()?;
+        if let Some(link) = &setup.link {
+            pty.link(link)?;
+        }
+        Ok(LiveUno {
+            uno,
+            pty,
+            course: setup.course,
+            sets_off: STANDING_S * CYCLES_PER_SECOND,
+            eeprom,
+            unread: VecDeque::new(),
+            resets_when_opened: !setup.keeps_running_when_opened,
+            fast: setup.fast,
+        })
+    }
+
+    /// The path under which programs open its serial port.
+    pub fn path(&self) -> &Path {
+        self.pty.path()
+    }
+
+    /// Runs until `stop` is set.
+    ///
+    /// # Errors
+    /// Where the firmware crashes or halts, or the terminal or the EEPROM's file fails.
+    pub fn run(&mut self, stop: &AtomicBool) -> Result<(), LiveError> {
+        let mut due = Instant::now();
+        let mut slices = 0_u64;
+        while !stop.load(Ordering::Relaxed) {
+            self.serve_terminal()?;
+            self.roll();
+            self.uno.run_for_ms(SLICE_MS)?;
+            // Nobody looks at them, and they would pile up.
+            self.uno.take_changes();
+            slices += 1;
+            if slices.is_multiple_of(EEPROM_SLICES) {
+                self.keep_eeprom()?;
+            }
+            if !self.fast {
+                due += Duration::from_millis(SLICE_MS);
+                let now = Instant::now();
+                match due.checked_duration_since(now) {
+                    Some(wait) => thread::sleep(wait),
+                    None if now - due > LATE_BY => due = now,
+                    None => {}
+                }
+            }
+        }
+        self.serve_terminal()?;
+        self.keep_eeprom()
+    }
+
+    /// Runs in a thread until the handle is dropped.
+    pub fn run_in_background(mut self) -> Background {
+        let path = self.path().to_owned();
+        let stop = Arc::new(AtomicBool::new(false));
+        let stop_there = Arc::clone(&stop);
+        let thread = thread::spawn(move || {
+            self.run(&stop_there)?;
+            Ok(self)
+        });
+        Background { path, stop, thread: Some(thread) }
+    }
+
+    /// The Uno itself.
+    pub fn uno(&self) -> &Uno {
+        &self.uno
+    }
+
+    /// Resets the chip where a program has opened the port, and passes bytes both ways.
+    fn serve_terminal(&mut self) -> Result<(), LiveError> {
+        if self.pty.was_opened()? {
+            self.unread.clear();
+            if self.resets_when_opened {
+                self.uno.reset();
+            }
+        }
+
+        let mut buffer = [0; MOST_BYTES_ON_THEIR_WAY];
+        let room = MOST_BYTES_ON_THEIR_WAY.saturating_sub(self.uno.bytes_on_their_way());
+        let count = self.pty.read(&mut buffer[..room])?;
+        self.uno.send(&buffer[..count]);
+
+        self.unread.extend(self.uno.received_bytes().iter().map(|received| received.byte));
+        let written = self.pty.write(self.unread.make_contiguous())?;
+        self.unread.drain(..written);
+        let too_many = self.unread.len().saturating_sub(MOST_BYTES_UNREAD);
+        self.unread.drain(..too_many);
+        Ok(())
+    }
+
+    /// Sets the machine off once it has stood for long enough.
+    fn roll(&mut self) {
+        if let Some(course) = &self.course
+            && self.uno.cycle() >= self.sets_off
+        {
+            let (changes, end) = course.roll_along(self.uno.cycle());
+            self.uno.drive(changes);
+            self.sets_off = end + STANDING_S * CYCLES_PER_SECOND;
+        }
+    }
+
+    fn keep_eeprom(&mut self) -> Result<(), LiveError> {
+        match &mut self.eeprom {
+            Some(file) => file.keep(self.uno.eeprom()),
+            None => Ok(()),
+        }
+    }
+}
+
+/// A live Uno that runs in a thread. Dropped, it ends, its terminal and link with it.
+pub struct Background {
+    path: PathBuf,
+    stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<Result<LiveUno, LiveError>>>,
+}
+
+impl Background {
+    /// The path under which programs open its serial port.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Stops it, and gives it back.
+    ///
+    /// # Errors
+    /// What ended it before.
+    ///
+    /// # Panics
+    /// Where its thread did.
+    pub fn stop(mut self) -> Result<LiveUno, LiveError> {
+        self.stop.store(true, Ordering::Relaxed);
+        let thread = self.thread.take().expect("it is taken here and by drop alone");
+        thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+    }
+}
+
+impl Drop for Background {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            // Its user did not ask what became of it.
+            let _ = thread.join();
+        }
+    }
+}
+
+/// The file that keeps the EEPROM.
+struct EepromFile {
+    path: PathBuf,
+    content: Vec<u8>,
+}
+
+impl EepromFile {
+    /// Reads it; a file that does not exist yet is an erased EEPROM.
+    fn open(path: PathBuf) -> Result<EepromFile, LiveError> {
+        match std::fs::read(&path) {
+            Ok(content) if content.len() == EEPROM_BYTES => Ok(EepromFile { path, content }),
+            Ok(content) => Err(LiveError::NotEeprom { path, bytes: content.len() }),
+            Err(error) if error.kind() == ErrorKind::NotFound => {
+                let mut file = EepromFile { path, content: Vec::new() };
+                // A file that cannot be written is better known now.
+                file.keep(vec![0xFF; EEPROM_BYTES])?;
+                Ok(file)
+            }
+            Err(source) => Err(LiveError::Eeprom { path, source }),
+        }
+    }
+
+    /// Writes it where the content has changed.
+    fn keep(&mut self, content: Vec<u8>) -> Result<(), LiveError> {
+        if content != self.content {
+            std::fs::write(&self.path, &content)
+                .map_err(|source| LiveError::Eeprom { path: self.path.clone(), source })?;
+            self.content = content;
+        }
+        Ok(())
+    }
+}

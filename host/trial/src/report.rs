@@ -1,0 +1,351 @@
+//! A trial's outcome for people: a table with a line per plant, the totals in plain words, and CSV tables.
+//!
+//! The picture of the row is in [`crate::picture`].
+
+use crate::console::Status;
+use crate::run::Outcome;
+use comfy_table::{Attribute, Cell, CellAlignment, Color, Table, presets};
+use field::counted;
+use field::machine::Machine;
+use field::motion::Motion;
+use field::row::Row;
+use field::trial::Trial;
+use field::verdict::{PlantOutcome, Verdict, WeedOutcome};
+use serde::Serialize;
+use std::fmt::Write;
+use std::io;
+use uno::elf::Size;
+
+/// Width that the machine weeds with its inter-row tools (the paper's chapter on the tines: 40 cm).
+const WORKING_WIDTH_MM: f64 = 400.0;
+
+/// Flash that the older and larger of the Uno's bootloaders leaves, and SRAM, of the ATmega328P (its data sheet, section 8).
+const FLASH_BYTES: u64 = 32_768 - 2048;
+const SRAM_BYTES: u64 = 2048;
+
+/// One line per plant: where it stood, where the tool was clear of the row and where it came back, and the verdict.
+pub fn table(outcome: &Outcome) -> Table {
+    let mut table = Table::new();
+    table.load_style(presets::UTF8_BORDERS_ONLY).set_header([
+        "plant",
+        "place\nmm",
+        "canopy\nmm",
+        "tool clear\nfrom mm",
+        "tool clear\nto mm",
+        "clearance\nbefore mm",
+        "clearance\nbehind mm",
+        "out late\nticks",
+        "in late\nticks",
+        "swings",
+        "verdict",
+    ]);
+    for (index, plant) in outcome.judgement.plants.iter().enumerate() {
+        let whole = |value: Option<f64>, none: &str| value.map_or(none.to_owned(), |value| format!("{value:.0}"));
+        let tenths = |value: Option<f64>| value.map_or("shared".to_owned(), |value| format!("{value:+.1}"));
+        table.add_row([
+            Cell::new(index + 1),
+            Cell::new(format!("{:.0}", plant.plant.position_mm)),
+            Cell::new(format!("{:.0}", plant.plant.width_mm)),
+            Cell::new(whole(plant.clear_mm(), "start")),
+            Cell::new(whole(plant.back_mm(), "end")),
+            Cell::new(whole(plant.clearance_before_mm, "-")),
+            Cell::new(whole(plant.clearance_behind_mm, "-")),
+            Cell::new(tenths(plant.out_error_ticks)),
+            Cell::new(tenths(plant.in_error_ticks)),
+            Cell::new(plant.swings),
+            verdict_cell(plant.verdict),
+        ]);
+    }
+    let columns = table.column_iter_mut();
+    for column in columns.take(10) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    table
+}
+
+fn verdict_cell(verdict: Verdict) -> Cell {
+    let cell = Cell::new(verdict);
+    match verdict {
+        Verdict::Kept => cell.fg(Color::Green),
+        Verdict::MarginCut => cell.fg(Color::Yellow),
+        Verdict::Damaged => cell.fg(Color::Red).add_attribute(Attribute::Bold),
+    }
+}
+
+/// The totals, a paragraph in plain words.
+pub fn totals(trial: &Trial, outcome: &Outcome) -> String {
+    let Outcome { judgement, status, .. } = outcome;
+    let plants = judgement.plants.len();
+    let mut text = String::new();
+    // Writing to a String cannot fail.
+    let mut line = |label: &str, words: String| {
+        let _ = writeln!(text, "{label:<12}{words}");
+    };
+
+    line(
+        "Plants",
+        format!(
+            "{plants}: {} damaged, {} with the margin cut, {} kept",
+            judgement.count(Verdict::Damaged),
+            judgement.count(Verdict::MarginCut),
+            judgement.count(Verdict::Kept),
+        ),
+    );
+    if let Some(depth_mm) = deepest_mm(&judgement.plants) {
+        line("", format!("the tool reached {depth_mm:.0} mm into the canopy that was hit worst"));
+    }
+    if judgement.idle_swings > 0 {
+        line("", format!("the tool swung out {} for no plant", counted(judgement.idle_swings, "time")));
+    }
+    if !judgement.weeds.is_empty() {
+        let cut = judgement.weeds.iter().filter(|weed| weed.cut).count();
+        let left = match judgement.weeds.len() - cut {
+            0 => String::new(),
+            left => format!("; the tool was aside over the other {left}"),
+        };
+        line("Tall weeds", format!("{cut} of {} cut{left}", judgement.weeds.len()));
+    }
+    let span = trial.row.span_mm();
+    line(
+        "Row weeded",
+        format!(
+            "{:.1} % of the row's {:.2} m; with every canopy and its margin kept, this servo allows {:.1} % at most",
+            judgement.weeded_share * 100.0,
+            (span.end - span.start) / 1000.0,
+            judgement.weedable_share * 100.0,
+        ),
+    );
+    line(
+        "",
+        format!(
+            "({:.1} % of the {WORKING_WIDTH_MM:.0} mm strip that the inter-row tools weed along with it)",
+            strip_share(&trial.machine, judgement.weeded_share) * 100.0,
+        ),
+    );
+    line("Swings", swing_words(&judgement.plants, &trial.machine));
+    if outcome.stray_pulses > 0 {
+        let pulses = counted(outcome.stray_pulses, "pulse");
+        line("", format!("{pulses} of a width that no servo knows: ignored"));
+    }
+    line("Encoder", count_words(outcome));
+    if status.state != "work" {
+        line("Firmware", format!("ended in `{}`, not at work", status.state));
+    }
+    let Size { flash, sram } = outcome.size;
+    line("Memory", format!("{flash} of {FLASH_BYTES} bytes of flash, {sram} of {SRAM_BYTES} bytes of SRAM"));
+    text
+}
+
+/// How far the tool came into a canopy, at worst; `None` where it never did.
+fn deepest_mm(plants: &[PlantOutcome]) -> Option<f64> {
+    plants
+        .iter()
+        .flat_map(|plant| [plant.clearance_before_mm, plant.clearance_behind_mm])
+        .flatten()
+        .filter(|clearance_mm| *clearance_mm < 0.0)
+        .map(f64::abs)
+        .max_by(f64::total_cmp)
+}
+
+/// The share weeded of the whole strip, as weeds were counted in the paper: all that is beside the row, and of the tool's
+/// own width what it weeded.
+fn strip_share(machine: &Machine, weeded_share: f64) -> f64 {
+    1.0 - (1.0 - weeded_share) * machine.tool_width_mm / WORKING_WIDTH_MM
+}
+
+fn swing_words(plants: &[PlantOutcome], machine: &Machine) -> String {
+    let errors: Vec<f64> =
+        plants.iter().flat_map(|plant| [plant.out_error_ticks, plant.in_error_ticks]).flatten().map(f64::abs).collect();
+    if errors.is_empty() {
+        return "none was commanded for a plant".to_owned();
+    }
+    let worst = errors.iter().copied().fold(0.0, f64::max);
+    let mean = errors.iter().sum::<f64>() / errors.len() as f64;
+    format!(
+        "{}, off their ideal place by {mean:.1} ticks ({:.1} mm) in the mean, {worst:.1} ticks ({:.1} mm) at worst",
+        counted(errors.len(), "command"),
+        mean * machine.tick_mm(),
+        worst * machine.tick_mm(),
+    )
+}
+
+fn count_words(outcome: &Outcome) -> String {
+    let off = outcome.status.position_ticks - outcome.true_ticks;
+    let place = match off {
+        0 => "exactly where the machine is".to_owned(),
+        off => format!("{off:+} from where the machine is"),
+    };
+    let Status { position_ticks, lost_ticks, .. } = outcome.status;
+    format!("position {}, {place}; {} lost", counted(position_ticks, "tick"), counted(lost_ticks, "count"))
+}
+
+/// What happened to a plant, as a line of a table.
+#[derive(Debug, Serialize)]
+pub struct PlantRecord {
+    position_mm: f64,
+    width_mm: f64,
+    clear_from_mm: Option<f64>,
+    clear_to_mm: Option<f64>,
+    clearance_before_mm: Option<f64>,
+    clearance_behind_mm: Option<f64>,
+    out_error_ticks: Option<f64>,
+    in_error_ticks: Option<f64>,
+    swings: usize,
+    verdict: &'static str,
+}
+
+/// What happened to a tall weed, as a line of a table.
+#[derive(Debug, Serialize)]
+pub struct WeedRecord {
+    position_mm: f64,
+    width_mm: f64,
+    cut: bool,
+}
+
+/// A line per plant. An empty field is what [`PlantOutcome`] calls `None`.
+pub fn plants(outcome: &Outcome) -> Vec<PlantRecord> {
+    let record = |plant: &PlantOutcome| PlantRecord {
+        position_mm: plant.plant.position_mm,
+        width_mm: plant.plant.width_mm,
+        clear_from_mm: plant.clear_mm(),
+        clear_to_mm: plant.back_mm(),
+        clearance_before_mm: plant.clearance_before_mm,
+        clearance_behind_mm: plant.clearance_behind_mm,
+        out_error_ticks: plant.out_error_ticks,
+        in_error_ticks: plant.in_error_ticks,
+        swings: plant.swings,
+        verdict: match plant.verdict {
+            Verdict::Kept => "kept",
+            Verdict::MarginCut => "margin_cut",
+            Verdict::Damaged => "damaged",
+        },
+    };
+    outcome.judgement.plants.iter().map(record).collect()
+}
+
+/// A line per tall weed.
+pub fn weeds(outcome: &Outcome) -> Vec<WeedRecord> {
+    let weeds = outcome.judgement.weeds.iter();
+    let record = |weed: &WeedOutcome| WeedRecord {
+        position_mm: weed.weed.position_mm,
+        width_mm: weed.weed.width_mm,
+        cut: weed.cut,
+    };
+    weeds.map(record).collect()
+}
+
+/// Writes [`plants`] as a CSV table.
+///
+/// # Errors
+/// Those of the writer.
+pub fn write_plants_csv(outcome: &Outcome, to: impl io::Write) -> Result<(), csv::Error> {
+    write_csv(&plants(outcome), to)
+}
+
+/// Writes [`weeds`] as a CSV table.
+///
+/// # Errors
+/// Those of the writer.
+pub fn write_weeds_csv(outcome: &Outcome, to: impl io::Write) -> Result<(), csv::Error> {
+    write_csv(&weeds(outcome), to)
+}
+
+fn write_csv(records: &[impl Serialize], to: impl io::Write) -> Result<(), csv::Error> {
+    let mut writer = csv::Writer::from_writer(to);
+    records.iter().try_for_each(|record| writer.serialize(record))?;
+    writer.flush()?;
+    Ok(())
+}
+
+/// What is about to be tried, in a line.
+pub fn introduction(row: &Row, machine: &Machine, motion: &Motion) -> String {
+    let span = row.span_mm();
+    format!(
+        "{} and {} on {:.2} m of row, beam {:.0} mm ahead of the tool, {:.0} s on the field",
+        counted(row.plants().count(), "plant"),
+        counted(row.weeds().count(), "tall weed"),
+        (span.end - span.start) / 1000.0,
+        machine.beam_to_tool_mm,
+        motion.duration_s(),
+    )
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use field::motion::mm_s;
+    use field::row::Thing;
+    use field::verdict::{Timing, judge};
+    use signal::{CYCLES_PER_SECOND, Pulse};
+
+    /// A trial in which the tool stayed in the row from one second on, and what came of it.
+    pub fn ruined_row() -> (Trial, Outcome) {
+        let row =
+            Row::new(vec![Thing::plant(500.0, 150.0), Thing::weed(750.0, 15.0), Thing::plant(1000.0, 150.0)]).unwrap();
+        let trial = Trial::at_speed(row, Machine::default(), Timing::default(), mm_s(1.0));
+        let frame = |rise, width_us: u64| Pulse { rise, fall: rise + width_us * CYCLES_PER_SECOND / 1_000_000 };
+        let pulses = vec![frame(0, 2000), frame(CYCLES_PER_SECOND, 1500)];
+        let outcome = Outcome {
+            judgement: judge(&trial.row, &trial.machine, &trial.motion, trial.timing, &pulses, 0),
+            status: Status { state: "work".to_owned(), position_ticks: 99, lost_ticks: 2 },
+            true_ticks: 101,
+            size: Size { flash: 20_000, sram: 800 },
+            pulses,
+            stray_pulses: 0,
+            changes: Vec::new(),
+            start_cycle: 0,
+        };
+        (trial, outcome)
+    }
+
+    #[test]
+    fn the_totals_tell_what_happened_in_plain_words() {
+        let (trial, outcome) = ruined_row();
+        let totals = totals(&trial, &outcome);
+        for words in [
+            "2: 2 damaged, 0 with the margin cut, 0 kept",
+            "the tool reached 150 mm into the canopy that was hit worst",
+            "1 of 1 cut",
+            "100.0 % of the row's 1.00 m",
+            "none was commanded for a plant",
+            "position 99 ticks, -2 from where the machine is; 2 counts lost",
+            "20000 of 30720 bytes of flash, 800 of 2048 bytes of SRAM",
+        ] {
+            assert!(totals.contains(words), "{words:?} is not in\n{totals}");
+        }
+    }
+
+    #[test]
+    fn one_thing_is_told_from_several() {
+        let (trial, mut outcome) = ruined_row();
+        (outcome.stray_pulses, outcome.judgement.idle_swings, outcome.status.lost_ticks) = (1, 1, 1);
+        let words = totals(&trial, &outcome);
+        assert!(words.contains("swung out 1 time for no plant"), "{words}");
+        assert!(words.contains("1 pulse of a width that no servo knows: ignored"), "{words}");
+        assert!(words.contains("; 1 count lost"), "{words}");
+        outcome.stray_pulses = 2;
+        let words = totals(&trial, &outcome);
+        assert!(words.contains("2 pulses of a width that no servo knows: ignored"), "{words}");
+        let introduction = introduction(&trial.row, &trial.machine, &trial.motion);
+        assert!(introduction.starts_with("2 plants and 1 tall weed on 1.00 m of row"), "{introduction}");
+    }
+
+    #[test]
+    fn the_table_has_a_line_for_each_plant_with_its_verdict() {
+        let (_, outcome) = ruined_row();
+        let text = table(&outcome).to_string();
+        assert_eq!(text.matches("DAMAGED").count(), 2, "{text}");
+    }
+
+    #[test]
+    fn the_csv_tables_have_a_header_and_a_line_each() {
+        let (_, outcome) = ruined_row();
+        let (mut plants, mut weeds) = (Vec::new(), Vec::new());
+        write_plants_csv(&outcome, &mut plants).unwrap();
+        write_weeds_csv(&outcome, &mut weeds).unwrap();
+        let plants = String::from_utf8(plants).unwrap();
+        assert_eq!(plants.lines().count(), 3);
+        assert!(plants.lines().nth(1).unwrap().starts_with("500.0,150.0,"), "{plants}");
+        assert_eq!(String::from_utf8(weeds).unwrap(), "position_mm,width_mm,cut\n750.0,15.0,true\n");
+    }
+}

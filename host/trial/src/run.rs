@@ -1,0 +1,156 @@
+//! A row: the real firmware in the virtual Uno weeds it.
+//!
+//! The machine's motion does not depend on the firmware, so a [`Trial`] runs in one direction: motion and row give the levels
+//! on the firmware's inputs, the virtual Uno plays them, and its servo pulses tell what happened to the row
+//! ([`field::verdict`]). Before that the firmware is set up over its console, as an operator would: settings, then the
+//! start.
+
+use crate::console::{ConsoleError, Status, ask};
+use field::counted;
+use field::servo::WIDTHS_US;
+use field::trial::{Start, Trial};
+use field::verdict::{Judgement, judge};
+use field::wiring;
+use link::settings::name;
+use signal::{CYCLES_PER_SECOND, PinChange, Pulse};
+use std::path::Path;
+use thiserror::Error;
+use uno::elf::Size;
+use uno::{Uno, UnoError};
+
+/// Why a trial had no outcome.
+#[derive(Debug, Error)]
+pub enum TrialError {
+    /// The virtual Uno stopped.
+    #[error(transparent)]
+    Uno(#[from] UnoError),
+    /// The firmware's console did not answer as it should.
+    #[error(transparent)]
+    Console(#[from] ConsoleError),
+    /// The firmware started anew on the way.
+    #[error("the firmware restarted {} during the trial, so that its position means nothing", counted(.0, "time"))]
+    Restarted(usize),
+}
+
+/// What came of a trial.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// What happened to the row.
+    pub judgement: Judgement,
+    /// What the firmware said at the end.
+    pub status: Status,
+    /// Encoder counts, net, that a perfect counter would have at the end.
+    pub true_ticks: i64,
+    /// Memory that the firmware takes.
+    pub size: Size,
+    /// The servo's pulses.
+    pub pulses: Vec<Pulse>,
+    /// How many of them have no width that a servo knows.
+    pub stray_pulses: usize,
+    /// Every level on every pin, inputs first.
+    pub changes: Vec<PinChange>,
+    /// The cycle at which the motion began.
+    pub start_cycle: u64,
+}
+
+/// Longest time that the firmware takes from power-up to its first line, a bootloader's wait included.
+const BOOT_CYCLES: u64 = 3 * CYCLES_PER_SECOND;
+
+/// Time for the firmware to see that a switch has stopped bouncing.
+const SWITCH_MS: u64 = 100;
+
+/// Time between the start and the first movement, and between the last one and the final question.
+const STILL_MS: u64 = 50;
+
+/// Simulated time between two reports of progress.
+const PROGRESS_CYCLES: u64 = CYCLES_PER_SECOND / 20;
+
+/// Powers up the firmware with these levels on its inputs, and waits for the line by which it says that it is there.
+///
+/// # Errors
+/// Where the ELF cannot be run, or no line comes.
+pub fn power_up(elf: &Path, levels: &[PinChange]) -> Result<Uno, UnoError> {
+    let mut uno = Uno::boot(elf)?.wired(&wiring::WIRES);
+    for level in levels {
+        uno.set(level.pin, level.high);
+    }
+    uno.run_until_serial("\n", BOOT_CYCLES)?;
+    Ok(uno)
+}
+
+/// As [`power_up`], and clears the alarm by which the firmware says that its EEPROM holds no settings yet.
+///
+/// # Errors
+/// As [`power_up`].
+pub fn boot(elf: &Path, levels: &[PinChange]) -> Result<Uno, UnoError> {
+    let mut uno = power_up(elf, levels)?;
+    uno.send(b"clear\n");
+    uno.run_until_serial("ok\r\n", BOOT_CYCLES)?;
+    Ok(uno)
+}
+
+/// Has the firmware at `elf` weed a trial's row. `progress` is told the share of the motion done, from 0 to 1.
+///
+/// # Errors
+/// Where the firmware cannot be run or does not answer.
+pub fn run(trial: &Trial, elf: &Path, mut progress: impl FnMut(f64)) -> Result<Outcome, TrialError> {
+    let Trial { row, machine, motion, .. } = trial;
+    let mut inputs = vec![machine.beam_before(row, motion)];
+    let mut uno = boot(elf, &inputs)?;
+    set_up(trial, &mut uno)?;
+    match trial.start {
+        Start::Command => {
+            ask(&mut uno, "start")?;
+        }
+        Start::Now => {
+            ask(&mut uno, "start now")?;
+        }
+        Start::Switch => {
+            let work = PinChange { cycle: uno.cycle(), pin: wiring::WORK_SWITCH, high: false };
+            inputs.push(work);
+            uno.drive([work]);
+            uno.run_for_ms(SWITCH_MS)?;
+        }
+    }
+    uno.run_for_ms(STILL_MS)?;
+
+    let start_cycle = uno.cycle();
+    let rolling = machine.pin_changes(row, motion, start_cycle);
+    uno.drive(rolling.iter().copied());
+    inputs.extend(rolling);
+    let cycles = (motion.duration_s() * CYCLES_PER_SECOND as f64) as u64;
+    while uno.cycle() < start_cycle + cycles {
+        let next = (uno.cycle() + PROGRESS_CYCLES).min(start_cycle + cycles);
+        uno.run_until(next)?;
+        progress((uno.cycle() - start_cycle) as f64 / cycles as f64);
+    }
+    uno.run_for_ms(STILL_MS)?;
+    let status = Status::ask(&mut uno)?;
+    if !uno.resets().is_empty() {
+        return Err(TrialError::Restarted(uno.resets().len()));
+    }
+
+    let pulses = uno.servo_pulses();
+    inputs.extend_from_slice(uno.changes());
+    Ok(Outcome {
+        judgement: judge(row, machine, motion, trial.timing, &pulses, start_cycle),
+        status,
+        true_ticks: machine.ticks(motion, motion.duration_s()),
+        size: uno.size(),
+        stray_pulses: pulses.iter().filter(|pulse| !WIDTHS_US.contains(&pulse.width_us())).count(),
+        pulses,
+        changes: inputs,
+        start_cycle,
+    })
+}
+
+/// Tells the firmware what it has to know of machine and timing, by its settings.
+///
+/// # Errors
+/// Where it refuses one of them, or does not answer.
+pub fn set_up(trial: &Trial, uno: &mut Uno) -> Result<(), ConsoleError> {
+    for (setting, value) in trial.told() {
+        ask(uno, &format!("set {} {value}", name(setting)))?;
+    }
+    Ok(())
+}

@@ -1,0 +1,106 @@
+//! The soak: hours of field work with everything going wrong now and then.
+//!
+//! [`hours`] has the decision core, the code of the firmware with its real classifier, work rows by chance for simulated hours
+//! on the host; its clock and its count run over their ends on the way. [`minutes`] does the same for minutes with the real ELF
+//! on the virtual Uno. Both have faults injected by chance, and an operator who clears what is latched and starts again.
+//!
+//! A plant is *harmed* where the tool was not fully out over its canopy although the firmware could know of it: this must not
+//! be, and it ends the soak with the seed and the time at which it can be seen again. Excused are, and counted apart:
+//! - *mistaken*: plants that the classifier took for weeds;
+//! - *blind*: on the host, plants reached while the count was off by a quarter of the margin because the encoder had lied, or
+//!   within a swing and a tenth of a second of the lie; on the virtual Uno all of a row in which both channels jumped
+//!   at once, and those reached within 0.7 s of a reset.
+
+mod core;
+mod elf;
+
+pub use self::core::hours;
+pub use self::elf::minutes;
+
+use crate::run::TrialError;
+use field::planting::PlantingError;
+use std::collections::BTreeMap;
+use std::fmt;
+use thiserror::Error;
+
+/// What a soak is to be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plan {
+    /// Which of all the possible ones.
+    pub seed: u64,
+    /// Faults in an hour, on average.
+    pub faults_an_hour: f64,
+}
+
+/// Why a soak had no result.
+#[derive(Debug, Error)]
+pub enum SoakError {
+    /// A row did not grow.
+    #[error(transparent)]
+    Planting(#[from] PlantingError),
+    /// The virtual Uno or its console failed.
+    #[error(transparent)]
+    Trial(#[from] TrialError),
+}
+
+/// What a soak has shown.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Tally {
+    /// Simulated seconds.
+    pub seconds: f64,
+    /// Distance rolled, forward and back, in metres.
+    pub metres: f64,
+    /// Rows worked.
+    pub rows: u64,
+    /// Plants that the tool came to.
+    pub plants: u64,
+    /// Distance rolled with the tool in the row, in metres.
+    pub weeded_metres: f64,
+    /// Plants that were harmed although the firmware could know of them.
+    pub harmed: u64,
+    /// Plants that were harmed because they were taken for weeds.
+    pub mistaken: u64,
+    /// Plants that were harmed while the firmware could not know where it was.
+    pub blind: u64,
+    /// Faults injected, alarms latched, resets and warnings, by name.
+    pub faults: BTreeMap<String, u64>,
+    /// Alarms by name.
+    pub alarms: BTreeMap<String, u64>,
+    /// Resets by cause.
+    pub resets: BTreeMap<String, u64>,
+    /// Warnings by name.
+    pub warnings: BTreeMap<String, u64>,
+    /// What must not be, each with its time.
+    pub violations: Vec<String>,
+}
+
+impl Tally {
+    /// Notes what must not be.
+    fn violated(&mut self, time_s: f64, what: impl fmt::Display) {
+        self.violations.push(format!("at {time_s:.3} s: {what}"));
+    }
+}
+
+/// Counts a name.
+fn count(names: &mut BTreeMap<String, u64>, name: &str) {
+    *names.entry(name.to_owned()).or_default() += 1;
+}
+
+impl fmt::Display for Tally {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "Worked      {:.2} h, {:.2} km, {} rows", self.seconds / 3600.0, self.metres / 1000.0, self.rows)?;
+        writeln!(f, "Weeded      {:.0} % of the way", 100.0 * self.weeded_metres / self.metres.max(1.0))?;
+        writeln!(
+            f,
+            "Plants      {} passed, {} harmed; excused: {} taken for weeds, {} reached while the firmware could not know",
+            self.plants, self.harmed, self.mistaken, self.blind
+        )?;
+        for (title, names) in
+            [("Faults", &self.faults), ("Alarms", &self.alarms), ("Resets", &self.resets), ("Warnings", &self.warnings)]
+        {
+            let names: Vec<String> = names.iter().map(|(name, times)| format!("{name} {times}")).collect();
+            writeln!(f, "{title:11} {}", if names.is_empty() { "none".to_owned() } else { names.join(", ") })?;
+        }
+        self.violations.iter().try_for_each(|violation| writeln!(f, "VIOLATED    {violation}"))
+    }
+}

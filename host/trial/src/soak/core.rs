@@ -1,0 +1,575 @@
+//! Hours of the decision core on the host: a turn of the loop is a millisecond, and an edge of the beam comes at its tick.
+//!
+//! Clock and count go on over resets, unlike on the chip, and begin shortly before their ends, so that both run over them.
+
+use super::{Plan, SoakError, Tally, count};
+use control::{
+    classifier::{Class, Nearest},
+    console::LineBuffer,
+    controller::{Controller, Readings, State, WakeUp},
+    event::Event,
+    examples::EXAMPLES,
+    line::Line,
+    memory::{Memory, Volatile},
+    reply,
+    reset::Cause,
+    saved::{COPY, SavedSettings},
+    settings::{Setting, Settings},
+    units::{Instant, Position},
+};
+use field::machine::Machine;
+use field::motion::mm_s;
+use field::planting::Planting;
+use field::row::{Kind, Row};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::{cell::RefCell, ops::Range, rc::Rc};
+
+/// A turn of the loop.
+const TURN_S: f64 = 0.001;
+
+/// Where clock and count begin: the clock a minute before its end, the count five kilometres.
+const FIRST_STEPS: u32 = u32::MAX - 15_000_000;
+const FIRST_COUNT: i32 = i32::MAX - 9_550_000;
+
+/// Simulated time between two reports of progress.
+const PROGRESS_TURNS: u64 = 1_000_000;
+
+/// The rows: plants half a metre apart, as the examples were trained.
+const PLANTING: Planting = Planting {
+    plants: 40,
+    spacing_mm: 500.0,
+    spacing_scatter_mm: 40.0,
+    canopy_mm: 150.0,
+    canopy_scatter_mm: 25.0,
+    weeds: 10,
+    ragged: false,
+};
+
+/// Ground before and behind each row.
+const HEADLAND_MM: f64 = 1000.0;
+
+/// The measured speed is right again so long after the encoder was silent.
+const SPEED_SETTLES_TURNS: u64 = 100;
+
+/// An offset between the ground and the count from which on the firmware cannot know: a quarter of the margin. The rest is
+/// what a push or a jerk may use up.
+const BLIND_TICKS: i64 = 24;
+
+/// What the ends of an object may be off by.
+const EDGE_TICKS: i64 = 4;
+
+type Weeder = Controller<Nearest<&'static [knn::Example<5>], Shared>, Shared>;
+
+/// A memory that stays when the machine is reset.
+#[derive(Clone, Debug, Default)]
+struct Shared(Rc<RefCell<Volatile>>);
+
+impl Memory for Shared {
+    fn read(&self, address: u16) -> u8 {
+        self.0.borrow().read(address)
+    }
+
+    fn is_ready(&self) -> bool {
+        true
+    }
+
+    fn write(&mut self, address: u16, byte: u8) {
+        self.0.borrow_mut().write(address, byte);
+    }
+}
+
+impl Shared {
+    /// What is found when the power is back.
+    fn recover(&self) {
+        let found = self.0.borrow().clone().with_power();
+        *self.0.borrow_mut() = found;
+    }
+}
+
+/// A row in ticks of the wheel.
+struct Ground {
+    /// Whether the beam is broken over each tick.
+    broken: Vec<bool>,
+    plants: Vec<Range<i64>>,
+}
+
+impl Ground {
+    fn of(row: &Row, machine: &Machine) -> Self {
+        let start_mm = row.span_mm().start - HEADLAND_MM;
+        let tick = |mm: f64| ((mm - start_mm) / machine.tick_mm()).round() as i64;
+        let length = tick(row.span_mm().end + HEADLAND_MM + machine.beam_to_tool_mm);
+        let mut broken = vec![false; length as usize];
+        for thing in row.things() {
+            let span = thing.span_mm();
+            broken[tick(span.start) as usize..tick(span.end) as usize].fill(true);
+        }
+        let plants = row.things().iter().filter(|thing| thing.kind == Kind::Plant);
+        let plants = plants.map(|plant| tick(plant.span_mm().start)..tick(plant.span_mm().end)).collect();
+        Self { broken, plants }
+    }
+
+    fn is_broken(&self, place: i64) -> bool {
+        usize::try_from(place).is_ok_and(|place| self.broken.get(place).copied().unwrap_or(false))
+    }
+}
+
+/// The machine in the field, with its operator.
+struct Field {
+    rng: ChaCha8Rng,
+    machine: Machine,
+    weeder: Weeder,
+    memories: [Shared; 2],
+    line: LineBuffer,
+    turns: u64,
+    /// Where the machine is in its row, in ticks, and the encoder's count.
+    place: f64,
+    count: i64,
+    speed: f64,
+    broken: bool,
+    /// Turns for which the encoder is yet to be dead, and whether one of its channels is alive then.
+    silent_turns: u32,
+    one_channel_lives: bool,
+    jumps: u16,
+    stack_free: u16,
+    /// Ticks that the count lacks since the firmware last began to see its ground anew.
+    lost_ticks: i64,
+    blind_until_turn: u64,
+    /// What went wrong last, and at which turn.
+    last_fault: (&'static str, u64),
+    /// How long the tool has been told where it is, and whether it was fully out before.
+    told_turns: u64,
+    was_clear: bool,
+    tool_out: bool,
+    /// Plants of the row that were mistaken or reached blindly.
+    excused: Vec<Excuse>,
+    tally: Tally,
+}
+
+/// What may have become of a plant.
+#[derive(Clone, Copy, Default)]
+struct Excuse {
+    mistaken: bool,
+    blind: bool,
+    passed: bool,
+    harmed: bool,
+}
+
+/// Works for so many simulated hours; `progress` is told the share done, from 0 to 1.
+///
+/// # Errors
+/// [`SoakError::Planting`].
+pub fn hours(plan: Plan, hours: f64, mut progress: impl FnMut(f64)) -> Result<Tally, SoakError> {
+    let machine = Machine::default();
+    let turns = (hours * 3600.0 / TURN_S) as u64;
+    Field::new(plan.seed, machine).work_until(turns, plan.faults_an_hour, &mut progress)
+}
+
+impl Field {
+    fn new(seed: u64, machine: Machine) -> Self {
+        let memories = [Shared::default(), Shared::default()];
+        let readings = Readings::new(Instant::new(FIRST_STEPS), Position::new(FIRST_COUNT));
+        let weeder = wake_up(&memories, readings, false, Cause::PowerOn);
+        Self {
+            rng: ChaCha8Rng::seed_from_u64(seed),
+            machine,
+            weeder,
+            memories,
+            line: LineBuffer::new(),
+            turns: 0,
+            place: 0.0,
+            count: FIRST_COUNT.into(),
+            speed: 0.0,
+            broken: false,
+            silent_turns: 0,
+            one_channel_lives: false,
+            jumps: 0,
+            stack_free: 300,
+            lost_ticks: 0,
+            blind_until_turn: 0,
+            last_fault: ("nothing", 0),
+            told_turns: 0,
+            was_clear: true,
+            tool_out: true,
+            excused: Vec::new(),
+            tally: Tally::default(),
+        }
+    }
+
+    fn time_s(&self) -> f64 {
+        self.turns as f64 * TURN_S
+    }
+
+    fn distance(&self) -> i64 {
+        (self.machine.beam_to_tool_mm / self.machine.tick_mm()).round() as i64
+    }
+
+    /// Works row after row until so many turns are done, or something was violated.
+    fn work_until(
+        mut self,
+        last_turn: u64,
+        faults_an_hour: f64,
+        progress: &mut impl FnMut(f64),
+    ) -> Result<Tally, SoakError> {
+        let chance = faults_an_hour * TURN_S / 3600.0;
+        while self.turns < last_turn && self.tally.violations.is_empty() {
+            let row = PLANTING.grow(self.rng.random())?;
+            self.work(&Ground::of(&row, &self.machine), chance, last_turn, progress);
+        }
+        self.tally.seconds = self.time_s();
+        Ok(self.tally)
+    }
+
+    /// Works a row from its headland to its end, or to the soak's end.
+    fn work(&mut self, ground: &Ground, chance: f64, last_turn: u64, progress: &mut impl FnMut(f64)) {
+        self.tally.rows += 1;
+        self.excused = vec![Excuse::default(); ground.plants.len()];
+        // The machine was turned round and stands in the headland: the operator knows, and tells it.
+        self.weeder.hold();
+        (self.place, self.speed) = (0.0, 0.0);
+        self.reset(Cause::ResetPin);
+        let (mut target, mut leg_turns) = (0.0_f64, 0_u32);
+        while (self.place as usize) < ground.broken.len() && self.turns < last_turn && self.tally.violations.is_empty()
+        {
+            if leg_turns == 0 {
+                target = self.next_speed();
+                leg_turns =
+                    if target < 0.0 { self.rng.random_range(300..1500) } else { self.rng.random_range(500..6000) };
+                self.start_again();
+            }
+            leg_turns -= 1;
+            // A person pushes, and brakes, with 1 m/s2.
+            let most = 1000.0 / self.machine.tick_mm() * TURN_S;
+            self.speed += (target - self.speed).clamp(-most, most);
+            if self.rng.random_bool(chance) {
+                self.fail(ground);
+            }
+            self.turn(ground);
+            if self.turns.is_multiple_of(PROGRESS_TURNS) {
+                progress(self.turns as f64 / last_turn as f64);
+            }
+        }
+        for excuse in &self.excused {
+            self.tally.plants += u64::from(excuse.passed);
+            if excuse.harmed {
+                match excuse {
+                    Excuse { mistaken: true, .. } => self.tally.mistaken += 1,
+                    Excuse { blind: true, .. } => self.tally.blind += 1,
+                    _ => self.tally.harmed += 1,
+                }
+            }
+        }
+    }
+
+    /// The next leg's speed in ticks/s: mostly a walk, now and then a stop or some way back.
+    fn next_speed(&mut self) -> f64 {
+        let km_h = match self.rng.random_range(0..10) {
+            0 => 0.0,
+            1 if self.place > 5000.0 => -self.rng.random_range(0.5..1.5),
+            _ => self.rng.random_range(0.8..3.0),
+        };
+        mm_s(km_h) / self.machine.tick_mm()
+    }
+
+    /// The operator clears what is latched, and starts.
+    fn start_again(&mut self) {
+        if self.weeder.state() == State::Work {
+            return;
+        }
+        self.weeder.clear();
+        if self.weeder.start(false).is_err() || self.weeder.state() != State::Work {
+            self.tally.violated(self.time_s(), "the machine does not start when it is told to");
+        }
+    }
+
+    fn readings(&self) -> Readings {
+        let now = Instant::new(FIRST_STEPS.wrapping_add((self.turns * 250) as u32));
+        Readings {
+            jumps: self.jumps,
+            stack_free: self.stack_free,
+            ..Readings::new(now, Position::new(self.count as i32))
+        }
+    }
+
+    /// A turn of the loop.
+    fn turn(&mut self, ground: &Ground) {
+        self.turns += 1;
+        let from = self.place.floor() as i64;
+        self.place += self.speed * TURN_S;
+        let to = self.place.floor() as i64;
+        self.tally.metres += (to - from).abs() as f64 * self.machine.tick_mm() / 1000.0;
+        let direction = (to - from).signum();
+        for step in 1..=(to - from).abs() {
+            let place = from + step * direction;
+            let counted = match (self.silent_turns, self.one_channel_lives) {
+                (0, _) => direction,
+                (_, true) => 1 - 2 * (place & 1),
+                (_, false) => 0,
+            };
+            self.count += counted;
+            self.lost_ticks += direction - counted;
+            let broken = ground.is_broken(place);
+            if broken != self.broken {
+                self.edge(broken);
+            }
+        }
+        if self.silent_turns > 0 {
+            self.silent_turns -= 1;
+            // The measured speed was wrong, and with it the leads: a swing may be late by that.
+            self.blind_until_turn = self.turns + self.swing_ms() as u64 + SPEED_SETTLES_TURNS;
+        }
+        self.weeder.step(self.readings());
+        if !self.weeder.tool_out() {
+            self.tally.weeded_metres += (to - from).abs() as f64 * self.machine.tick_mm() / 1000.0;
+        }
+        self.stack_free = 300;
+        self.listen(ground);
+        self.judge(ground, to - self.distance());
+    }
+
+    fn edge(&mut self, broken: bool) {
+        self.broken = broken;
+        self.weeder.beam_edge(Position::new(self.count as i32), broken);
+    }
+
+    /// Takes what the machine tells.
+    fn listen(&mut self, ground: &Ground) {
+        while let Some(event) = self.weeder.next_event() {
+            match event {
+                Event::Alarm { alarm, .. } => {
+                    count(&mut self.tally.alarms, &name(alarm.text().bytes()));
+                    self.see_anew();
+                }
+                Event::Warning(warning) => count(&mut self.tally.warnings, &name(warning.text().bytes())),
+                Event::Object { vote, leading, plan, .. } if vote.class == Class::Weed => {
+                    let behind = i64::from((leading - Position::new(self.count as i32)).0);
+                    let place = self.place as i64 + behind;
+                    let margin = self.weeder.settings().ticks(Setting::MarginMm);
+                    let object = place - EDGE_TICKS..place + i64::from(plan.hold.0 - 2 * margin.0) + EDGE_TICKS;
+                    for (plant, excuse) in ground.plants.iter().zip(&mut self.excused) {
+                        excuse.mistaken |= plant.start < object.end && object.start < plant.end;
+                    }
+                }
+                _ => {}
+            }
+        }
+    }
+
+    /// From here on only ground counts that the beam sees anew. If the count was wrong until now, the tool is on its way out
+    /// from where it should not have been.
+    fn see_anew(&mut self) {
+        if self.lost_ticks.abs() >= BLIND_TICKS {
+            self.blind_until_turn = self.blind_until_turn.max(self.turns + self.swing_ms() as u64);
+        }
+        self.lost_ticks = 0;
+    }
+
+    fn swing_ms(&self) -> f64 {
+        self.machine.servo.dead_time_ms + self.machine.servo.travel_ms
+    }
+
+    /// Whether the tool, which stands at a place of the row, does harm there.
+    fn judge(&mut self, ground: &Ground, tool: i64) {
+        let out = self.weeder.tool_out();
+        if !out && self.weeder.state() != State::Work {
+            self.tally.violated(self.time_s(), format_args!("the tool is in the row in {:?}", self.weeder.state()));
+        }
+        let (dead, swing) = (self.machine.servo.dead_time_ms, self.swing_ms());
+        let told_ms = self.told_turns as f64;
+        let clear = if self.tool_out {
+            told_ms >= swing || (self.was_clear && told_ms < swing)
+        } else {
+            self.was_clear && told_ms < dead
+        };
+        if out != self.tool_out {
+            // A tool that had not begun to move is still where it was.
+            (self.was_clear, self.tool_out, self.told_turns) = (clear, out, 0);
+        } else {
+            self.told_turns += 1;
+        }
+        let first = ground.plants.partition_point(|plant| plant.end <= tool);
+        let Some((plant, excuse)) = ground.plants.get(first).zip(self.excused.get_mut(first)) else { return };
+        if !plant.contains(&tool) {
+            return;
+        }
+        excuse.passed = true;
+        if clear {
+            return;
+        }
+        excuse.harmed = true;
+        excuse.blind |= self.lost_ticks.abs() >= BLIND_TICKS || self.turns <= self.blind_until_turn;
+        // Rolled back onto ground that it has not seen since it woke up: there is no margin before what it does not know.
+        excuse.blind |= out && self.weeder.unseen_mm() > 0;
+        if !excuse.mistaken && !excuse.blind {
+            let state = self.weeder.state();
+            let (time_s, told, row) = (self.time_s(), self.told_turns, self.tally.rows);
+            let (fault, fault_turn) = self.last_fault;
+            let ago_s = (self.turns - fault_turn) as f64 * TURN_S;
+            self.tally.violated(
+                time_s,
+                format_args!(
+                    "a plant was harmed at tick {tool} of row {row}, in {state:?}, {told} ms after the last order, \
+                     {ago_s:.3} s after {fault}"
+                ),
+            );
+        }
+    }
+
+    /// Something goes wrong.
+    fn fail(&mut self, ground: &Ground) {
+        let fault = match self.rng.random_range(0..9) {
+            0 => {
+                for _ in 0..self.rng.random_range(1..40) {
+                    self.edge(!self.broken);
+                    self.edge(!self.broken);
+                }
+                "dust"
+            }
+            1 => {
+                self.silent_turns = self.rng.random_range(5..600);
+                self.one_channel_lives = self.rng.random();
+                if self.one_channel_lives { "dead_channel" } else { "silent_encoder" }
+            }
+            2 => {
+                self.jumps = self.jumps.wrapping_add(self.rng.random_range(1..60));
+                "encoder_jumps"
+            }
+            3 => {
+                self.broken = ground.is_broken(self.place as i64);
+                self.weeder.beam_edges_lost(self.broken);
+                "lost_edges"
+            }
+            4 => {
+                self.stack_free = 20;
+                "low_stack"
+            }
+            5 => {
+                let cause =
+                    [Cause::PowerOn, Cause::BrownOut, Cause::Watchdog, Cause::LoopStalled][self.rng.random_range(0..4)];
+                self.reset(cause);
+                "reset"
+            }
+            6 => {
+                self.lose_power_in_a_save();
+                "power_lost_in_a_save"
+            }
+            7 => {
+                let address = self.rng.random_range(0..control::memory::SIZE);
+                let byte = self.rng.random();
+                self.memories[self.rng.random_range(0..2)].0.borrow_mut().bytes[address] = byte;
+                self.reset(Cause::PowerOn);
+                "spoiled_eeprom"
+            }
+            _ => {
+                self.noise();
+                "console_noise"
+            }
+        };
+        self.last_fault = (fault, self.turns);
+        count(&mut self.tally.faults, fault);
+    }
+
+    /// The chip starts anew.
+    fn reset(&mut self, cause: Cause) {
+        self.memories.iter().for_each(Shared::recover);
+        self.weeder = wake_up(&self.memories, self.readings(), self.broken, cause);
+        self.see_anew();
+        if let State::Alarm(alarm) = self.weeder.state() {
+            count(&mut self.tally.alarms, &name(alarm.text().bytes()));
+        }
+        self.line = LineBuffer::new();
+        count(&mut self.tally.resets, &name(cause.text().bytes()));
+        if !self.weeder.tool_out() || self.weeder.state() == State::Work {
+            self.tally.violated(self.time_s(), "the machine woke up with the tool in the row");
+        }
+    }
+
+    /// The operator saves, and the power goes away at one of the bytes.
+    fn lose_power_in_a_save(&mut self) {
+        self.weeder.hold();
+        self.weeder.clear();
+        let old = self.saved();
+        let no_plant_m = self.rng.random_range(1..8);
+        if self.weeder.set(Setting::NoPlantM, no_plant_m).is_err() || self.weeder.save().is_err() {
+            self.tally.violated(self.time_s(), "a machine in HOLD does not save");
+        }
+        let new = self.weeder.settings().clone();
+        let bytes = self.rng.random_range(0..=COPY);
+        self.memories[0].0.borrow_mut().lose_power_after(bytes);
+        while !self.weeder.carry_on() {}
+        self.reset(Cause::BrownOut);
+        let found = self.saved();
+        if found.as_ref() != Some(&new) && (found != old || bytes == COPY) {
+            let time_s = self.time_s();
+            self.tally.violated(time_s, format_args!("a save cut short after {bytes} bytes left {found:?}"));
+        }
+    }
+
+    /// The settings as the memory has them.
+    fn saved(&self) -> Option<Settings> {
+        SavedSettings::new(self.memories[0].clone()).load()
+    }
+
+    /// Bytes by chance come along the line, and questions among them.
+    fn noise(&mut self) {
+        for _ in 0..self.rng.random_range(1..300) {
+            let byte = match self.rng.random_range(0..4) {
+                0 => b'\n',
+                _ => self.rng.random(),
+            };
+            self.type_byte(byte);
+        }
+        b"\nstatus\nget\ndump\nexamples\n".iter().for_each(|&byte| self.type_byte(byte));
+    }
+
+    fn type_byte(&mut self, byte: u8) {
+        if let Some(command) = self.line.take(byte) {
+            let mut answer = reply::answer(command, &mut self.weeder);
+            while !answer.is_done() {
+                let mut line = Line::new();
+                answer.write_line(&self.weeder, &mut line);
+                line.for_each(drop);
+            }
+        }
+    }
+}
+
+fn wake_up(memories: &[Shared; 2], readings: Readings, beam_broken: bool, cause: Cause) -> Weeder {
+    let nearest = Nearest::new(&EXAMPLES[..], memories[1].clone());
+    let mut weeder = Controller::new(nearest, memories[0].clone(), WakeUp { readings, beam_broken, cause });
+    weeder.tell_events(true);
+    weeder
+}
+
+fn name(bytes: impl Iterator<Item = u8>) -> String {
+    bytes.map(char::from).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Six minutes of work without faults by a machine that was told its leads wrongly.
+    fn with_leads(lead_out_ms: u16, lead_in_ms: u16) -> Tally {
+        let mut field = Field::new(1, Machine::default());
+        field.weeder.clear();
+        field.weeder.set(Setting::LeadInMs, lead_in_ms).expect("in HOLD");
+        field.weeder.set(Setting::LeadOutMs, lead_out_ms).expect("in HOLD");
+        field.weeder.save().expect("in HOLD");
+        while !field.weeder.carry_on() {}
+        field.work_until(360_000, 0.0, &mut |_| {}).expect("rows grow")
+    }
+
+    #[test]
+    fn a_tool_that_is_told_too_late_is_seen_to_harm_a_plant() {
+        let tally = with_leads(0, 0);
+        assert!(tally.harmed > 0 && tally.violations[0].contains("a plant was harmed"), "{tally}");
+    }
+
+    #[test]
+    fn a_tool_that_is_told_in_time_harms_none_and_weeds() {
+        let tally = with_leads(180, 40);
+        assert!(tally.harmed == 0 && tally.blind == 0 && tally.violations.is_empty(), "{tally}");
+        assert!(tally.plants > 200 && tally.weeded_metres > 0.3 * tally.metres, "{tally}");
+    }
+}

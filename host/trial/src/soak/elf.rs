@@ -1,0 +1,291 @@
+//! Minutes of the real ELF on the virtual Uno: short rows, with a fault somewhere in each.
+//!
+//! After a reset the firmware is in HOLD, and the operator lets it roll to the end of the row: from there on nothing may be
+//! harmed. Rows whose encoder was made to lie are held only against their alarms.
+
+use super::{Plan, SoakError, Tally, count};
+use crate::console::ask;
+use crate::run::{TrialError, boot, set_up};
+use field::machine::{Machine, cycle_at, time_at_s};
+use field::motion::mm_s;
+use field::planting::Planting;
+use field::trial::Trial;
+use field::verdict::{Timing, Verdict, judge};
+use field::wiring;
+use rand::{Rng, RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use signal::{CYCLES_PER_SECOND, PinChange, Pulse};
+use std::path::Path;
+use uno::{Uno, UnoError};
+
+/// The rows.
+const PLANTING: Planting = Planting {
+    plants: 8,
+    spacing_mm: 500.0,
+    spacing_scatter_mm: 40.0,
+    canopy_mm: 150.0,
+    canopy_scatter_mm: 25.0,
+    weeds: 2,
+    ragged: false,
+};
+
+/// The longest time from a reset until the tool is out: the firmware starts, and the servo swings.
+const RESTART_S: f64 = 0.7;
+
+/// Longest time from a reset to the greeting.
+const GREETING_CYCLES: u64 = CYCLES_PER_SECOND;
+
+/// What goes wrong in a row.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Fault {
+    Reset,
+    BrownOut,
+    PowerCut,
+    SerialNoise,
+    Dust,
+    EncoderJumps,
+    DeadEncoder,
+    SpoiledEeprom,
+}
+
+impl Fault {
+    const ALL: [Self; 8] = [
+        Self::Reset,
+        Self::BrownOut,
+        Self::PowerCut,
+        Self::SerialNoise,
+        Self::Dust,
+        Self::EncoderJumps,
+        Self::DeadEncoder,
+        Self::SpoiledEeprom,
+    ];
+
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Reset => "reset",
+            Self::BrownOut => "brown_out",
+            Self::PowerCut => "power_cut",
+            Self::SerialNoise => "serial_noise",
+            Self::Dust => "dust",
+            Self::EncoderJumps => "encoder_jumps",
+            Self::DeadEncoder => "dead_encoder",
+            Self::SpoiledEeprom => "spoiled_eeprom",
+        }
+    }
+}
+
+/// Works for so many simulated minutes with the firmware at `elf`; `progress` is told the share done, from 0 to 1.
+///
+/// # Errors
+/// Where a row does not grow or the firmware does not answer.
+pub fn minutes(plan: Plan, minutes: f64, elf: &Path, mut progress: impl FnMut(f64)) -> Result<Tally, SoakError> {
+    let mut rng = ChaCha8Rng::seed_from_u64(plan.seed);
+    let mut tally = Tally::default();
+    let seconds = minutes * 60.0;
+    while tally.seconds < seconds && tally.violations.is_empty() {
+        work(&mut rng, plan, elf, &mut tally)?;
+        progress(tally.seconds / seconds);
+    }
+    Ok(tally)
+}
+
+/// Works a row with a new Uno, which keeps what the simulation remembers short.
+fn work(rng: &mut ChaCha8Rng, plan: Plan, elf: &Path, tally: &mut Tally) -> Result<(), SoakError> {
+    let row = PLANTING.grow(rng.random())?;
+    let trial = Trial::at_speed(row, Machine::default(), Timing::default(), mm_s(rng.random_range(1.0..3.0)));
+    let (machine, motion) = (trial.machine, &trial.motion);
+    // A fault for the time that a row takes, as often as there are to be.
+    let fails = rng.random_bool((plan.faults_an_hour * motion.duration_s() / 3600.0).min(1.0));
+    let fault = fails.then(|| Fault::ALL[rng.random_range(0..Fault::ALL.len())]);
+    if let Some(fault) = fault {
+        count(&mut tally.faults, fault.name());
+    }
+
+    let beam = machine.beam_before(&trial.row, motion);
+    let mut uno = boot(elf, &[beam]).map_err(TrialError::from)?;
+    set_up(&trial, &mut uno).map_err(TrialError::from)?;
+    if fault == Some(Fault::SpoiledEeprom) {
+        uno = restart_with_spoiled_eeprom(rng, uno, elf, tally)?;
+        set_up(&trial, &mut uno).map_err(TrialError::from)?;
+    }
+    for command in ["events on", "start"] {
+        ask(&mut uno, command).map_err(TrialError::from)?;
+    }
+    uno.run_for_ms(50).map_err(TrialError::from)?;
+
+    let start_cycle = uno.cycle();
+    let fails_at_s = rng.random_range(0.2..0.9) * motion.duration_s();
+    let fails_at = cycle_at(start_cycle, fails_at_s);
+    let mut changes = machine.pin_changes(&trial.row, motion, start_cycle);
+    match fault {
+        Some(Fault::Dust) => add_dust(rng, &mut changes, fails_at),
+        Some(Fault::EncoderJumps) => jump(rng, &mut changes, fails_at),
+        Some(Fault::DeadEncoder) => changes.retain(|change| change.cycle < fails_at || !is_encoder(change)),
+        _ => {}
+    }
+    uno.drive(changes);
+    uno.run_until(fails_at).map_err(TrialError::from)?;
+    match fault {
+        Some(Fault::Reset) => uno.reset(),
+        Some(Fault::BrownOut) => uno.brown_out(),
+        Some(Fault::PowerCut) => uno.power_cycle_to_noise(rng.random()),
+        Some(Fault::SerialNoise) => {
+            let mut noise = [0; 500];
+            rng.fill_bytes(&mut noise);
+            // What would stop the machine is no noise, but a command.
+            uno.send(b"\n#");
+            uno.send(&noise.map(|byte| if byte == b'\n' || byte == b'\r' { b'#' } else { byte }));
+            uno.send(b"\nstatus\nget\n");
+        }
+        _ => {}
+    }
+    uno.run_until(cycle_at(start_cycle, motion.duration_s())).map_err(TrialError::from)?;
+    uno.run_for_ms(200).map_err(TrialError::from)?;
+    let heard = uno.received();
+
+    let began_s = tally.seconds;
+    tally.seconds += motion.duration_s();
+    tally.metres += (motion.end_mm() - motion.start_mm()).abs() / 1000.0;
+    tally.rows += 1;
+    for line in heard.lines() {
+        let named = |event: &str| line.strip_prefix(event)?.split_whitespace().next();
+        if let Some(alarm) = named("alarm name=") {
+            count(&mut tally.alarms, alarm);
+        }
+        if let Some(warning) = named("warning name=") {
+            count(&mut tally.warnings, warning);
+        }
+        if let Some((_, cause)) = line.split_once("reset by ") {
+            count(&mut tally.resets, cause.split(',').next().unwrap_or(cause));
+        }
+    }
+    let was_reset = matches!(fault, Some(Fault::Reset | Fault::BrownOut | Fault::PowerCut));
+    if was_reset != !uno.resets().iter().all(|reset| reset.cycle < start_cycle) {
+        tally.violated(began_s + fails_at_s, format_args!("{fault:?} and resets {:?}", uno.resets()));
+    }
+
+    let pulses: Vec<Pulse> = uno.servo_pulses();
+    if was_reset {
+        still_out(&pulses, fails_at, began_s + fails_at_s, tally);
+    }
+    let judgement = judge(&trial.row, &machine, motion, trial.timing, &pulses, start_cycle);
+    let span = trial.row.span_mm();
+    tally.weeded_metres += judgement.weeded_share * (span.end - span.start) / 1000.0;
+    for outcome in &judgement.plants {
+        tally.plants += 1;
+        if outcome.verdict != Verdict::Damaged {
+            continue;
+        }
+        let span = outcome.plant.span_mm();
+        let reached =
+            motion.times_within_s(&(span.start + machine.beam_to_tool_mm..span.end + machine.beam_to_tool_mm));
+        let answers_in_s = match fault {
+            _ if was_reset => RESTART_S,
+            _ => 0.0,
+        };
+        let is_unanswered =
+            |times: &std::ops::Range<f64>| times.start < fails_at_s + answers_in_s && times.end > fails_at_s;
+        if fault == Some(Fault::EncoderJumps) || answers_in_s > 0.0 && reached.iter().any(is_unanswered) {
+            tally.blind += 1;
+        } else if heard.lines().any(|line| line.starts_with("weed ") && is_of(line, &span, &trial)) {
+            tally.mistaken += 1;
+        } else {
+            tally.harmed += 1;
+            tally.violated(
+                began_s,
+                format_args!(
+                    "a plant was harmed with {fault:?} at {fails_at_s:.3} s, at most {:.0} mm/s: {outcome:?}",
+                    motion.top_speed_mm_s()
+                ),
+            );
+        }
+    }
+    Ok(())
+}
+
+/// Whether an event's position lies in a plant: the firmware counts from where the motion began.
+fn is_of(line: &str, span_mm: &std::ops::Range<f64>, trial: &Trial) -> bool {
+    let ticks = line.split_whitespace().find_map(|word| word.strip_prefix("pos=")?.parse::<f64>().ok());
+    ticks.is_some_and(|ticks| {
+        let place_mm = trial.motion.start_mm() + ticks * trial.machine.tick_mm();
+        (span_mm.start - 10.0..span_mm.end + 10.0).contains(&place_mm)
+    })
+}
+
+/// After a reset no pulse has the tool in the row.
+fn still_out(pulses: &[Pulse], since: u64, time_s: f64, tally: &mut Tally) {
+    // The pulse that was on its way may end.
+    let after = pulses.iter().filter(|pulse| pulse.rise > since + CYCLES_PER_SECOND / 1000);
+    if let Some(pulse) = after.into_iter().find(|pulse| (pulse.width_us() - 2000.0).abs() > 2.0) {
+        let late_s = time_at_s(since, pulse.rise);
+        tally.violated(time_s, format_args!("{late_s:.3} s after a reset the servo has {} us", pulse.width_us()));
+    }
+}
+
+/// Saves, spoils some bytes, and powers the Uno up anew with them.
+fn restart_with_spoiled_eeprom(
+    rng: &mut ChaCha8Rng,
+    mut uno: Uno,
+    elf: &Path,
+    tally: &mut Tally,
+) -> Result<Uno, SoakError> {
+    ask(&mut uno, "save").map_err(TrialError::from)?;
+    let mut eeprom = uno.eeprom();
+    for _ in 0..rng.random_range(1..20) {
+        let address = rng.random_range(0..eeprom.len());
+        eeprom[address] = rng.random();
+    }
+    let mut uno = Uno::boot_with_eeprom(elf, &eeprom).map_err(TrialError::from)?.wired(&wiring::WIRES);
+    let greeting: Result<String, UnoError> = uno.run_until_serial("commands\r\n", GREETING_CYCLES);
+    let greeting = greeting.map_err(TrialError::from)?;
+    if greeting.contains("settings_lost") {
+        count(&mut tally.alarms, "settings_lost");
+    }
+    if !greeting.contains("tool out") {
+        tally.violated(tally.seconds, format_args!("with spoiled bytes it wakes up by {greeting:?}"));
+    }
+    ask(&mut uno, "clear").map_err(TrialError::from)?;
+    Ok(uno)
+}
+
+/// The beam flickers for a while: each flicker begins and ends with the level that was there.
+fn add_dust(rng: &mut ChaCha8Rng, changes: &mut Vec<PinChange>, from: u64) {
+    let until = from + rng.random_range(CYCLES_PER_SECOND / 50..CYCLES_PER_SECOND / 4);
+    let level_at = |changes: &[PinChange], cycle: u64| {
+        changes
+            .iter()
+            .rev()
+            .find(|change| change.pin == wiring::BEAM && change.cycle <= cycle)
+            .is_none_or(|change| change.high)
+    };
+    let mut dust = Vec::new();
+    let mut cycle = from;
+    while cycle < until {
+        let length = CYCLES_PER_SECOND / 500;
+        let is_steady = !changes.iter().any(|c| c.pin == wiring::BEAM && (cycle..=cycle + length).contains(&c.cycle));
+        if is_steady {
+            let high = level_at(changes, cycle);
+            dust.push(PinChange { cycle, pin: wiring::BEAM, high: !high });
+            dust.push(PinChange { cycle: cycle + length, pin: wiring::BEAM, high });
+        }
+        cycle += rng.random_range(2..6) * length;
+    }
+    changes.extend(dust);
+    changes.sort_by_key(|change| change.cycle);
+}
+
+/// Both channels change at once, some thirty times.
+fn jump(rng: &mut ChaCha8Rng, changes: &mut [PinChange], from: u64) {
+    let mut left = rng.random_range(10..60);
+    for place in 1..changes.len() {
+        let (before, change) = (changes[place - 1], changes[place]);
+        if left > 0 && change.cycle > from && is_encoder(&before) && is_encoder(&change) && place % 2 == 0 {
+            changes[place].cycle = before.cycle;
+            left -= 1;
+        }
+    }
+}
+
+const fn is_encoder(change: &PinChange) -> bool {
+    matches!(change.pin, wiring::ENCODER_A | wiring::ENCODER_B)
+}

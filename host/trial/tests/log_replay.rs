@@ -1,0 +1,236 @@
+//! A log of the real firmware weeding a row, and the same decisions again on the host.
+
+use field::machine::Machine;
+use field::motion::Motion;
+use field::planting::Planting;
+use field::row::{Row, Thing};
+use link::log::{self, Entry, Kind, LogWriter};
+use link::replay::{Replayed, replay};
+use link::session::{Happening, Session};
+use link::{Link, LinkError, Status};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::time::{Duration, Instant};
+use trial::{UnoPort, firmware};
+
+/// Plants and a tall weed.
+fn row() -> Row {
+    let things = vec![
+        Thing::plant(600.0, 150.0),
+        Thing::weed(900.0, 15.0),
+        Thing::plant(1200.0, 140.0),
+        Thing::plant(1700.0, 160.0),
+        Thing::plant(2300.0, 150.0),
+    ];
+    Row::new(things).expect("plants and a weed are a row")
+}
+
+/// The log of a session in which the machine rolls along the row, and was told to start by these commands. The link, the settings
+/// and the start take their time.
+fn logged(row: &Row, motion: &Motion, commands: &[&str]) -> Vec<Entry> {
+    logged_from(row, motion, commands, 16_000_000)
+}
+
+/// As [`logged`], of a machine that sets off so many cycles after it was switched on, whether or not the session has begun.
+fn logged_from(row: &Row, motion: &Motion, commands: &[&str], sets_off: u64) -> Vec<Entry> {
+    let machine = Machine::default();
+    let ticks = machine.ticks(motion, motion.duration_s());
+    let mut uno = trial::boot(&firmware::build().expect("the firmware builds"), &[machine.beam_before(row, motion)])
+        .expect("the firmware wakes up");
+    let changes = machine.pin_changes(row, motion, uno.cycle() + sets_off);
+    uno.drive(changes);
+    let mut uno = Some(uno);
+    let open = move || match uno.take() {
+        Some(uno) => Link::over(UnoPort::new(uno), false),
+        None => Err(LinkError::Absent("it is gone".to_owned())),
+    };
+    let mut session = Session::open(open).expect("the firmware answers");
+    for command in commands {
+        assert!(session.command(command), "{command}");
+    }
+    let folder = tempfile::tempdir().expect("there is room for a log");
+    let path = folder.path().join("log.csv");
+    let mut log = LogWriter::open(&path).expect("the log can be written");
+    let mut now = Instant::now();
+    let mut standing = 0;
+    // A second after the machine has come to the end of its way, by the status ten times a second.
+    while standing < 10 {
+        for happening in session.turn(now) {
+            assert!(!matches!(happening, Happening::Lost(_)), "{happening:?}");
+            if let Happening::Status(status, _) = &happening {
+                let is_there = i64::from(status.position) > ticks - 10;
+                standing = if is_there { standing + 1 } else { 0 };
+            }
+            log.write(&happening).expect("the log can be written");
+        }
+        now += Duration::from_millis(20);
+    }
+    log::read(&path).expect("the log is one")
+}
+
+#[track_caller]
+fn assert_same(log: &[Entry], swings: usize) -> Replayed {
+    let replayed = replay(log).expect("the log can be replayed");
+    assert_eq!(replayed.difference, None, "{replayed:#?}");
+    assert_eq!((replayed.objects, replayed.notes.len()), (5, 0), "{replayed:#?}");
+    assert!(replayed.swings >= swings, "{replayed:#?}");
+    replayed
+}
+
+#[test]
+fn a_row_at_a_steady_speed_is_decided_the_same_on_the_host() {
+    let motion = Motion::steady(0.0, 500.0, 500.0, 3200.0).change_speed(0.0, 500.0);
+    let log = logged(&row(), &motion, &["start"]);
+    let replayed = assert_same(&log, 9);
+    assert!(replayed.farthest_swing <= 12, "{replayed:?}");
+
+    // What was tampered with is found, at its line.
+    let mut tampered = log.clone();
+    let place = tampered.iter().rposition(|entry| entry.text.starts_with("swing tool=out")).expect("a swing");
+    tampered[place].text = "swing tool=out pos=1".to_owned();
+    let difference = replay(&tampered).expect("it can be replayed").difference.expect("they differ");
+    assert_eq!(difference.line, Some(log[place].number), "{difference}");
+    assert!(
+        difference.to_string().contains("the log has `swing tool=out pos=1`, the replay `swing tool="),
+        "{difference}"
+    );
+
+    // With another lead the tool would have left elsewhere.
+    let mut tampered = log.clone();
+    let lead = tampered.iter_mut().find(|entry| entry.text.starts_with("lead_out_ms=")).expect("a lead");
+    lead.text = "lead_out_ms=80".to_owned();
+    assert!(replay(&tampered).expect("it can be replayed").difference.is_some());
+
+    // A weed that the log calls a plant.
+    let mut tampered = log;
+    let weed = tampered.iter_mut().find(|entry| entry.text.starts_with("weed pos=")).expect("a weed");
+    weed.text = weed.text.replace("weed", "plant");
+    let difference = replay(&tampered).expect("it can be replayed").difference.expect("they differ");
+    assert!(difference.to_string().contains("the replay `weed pos="), "{difference}");
+}
+
+#[test]
+fn a_row_with_changes_of_speed_and_a_stop_is_decided_the_same_on_the_host() {
+    let motion = Motion::steady(0.0, 500.0, 300.0, 900.0)
+        .change_speed(650.0, 400.0)
+        .roll_to(1800.0)
+        .change_speed(0.0, 600.0)
+        .change_speed(400.0, 500.0)
+        .roll_to(3200.0)
+        .change_speed(0.0, 500.0);
+    assert_same(&logged(&row(), &motion, &["start"]), 9);
+}
+
+/// Rows by chance, at speeds of which half lie where one speed class ends and the next begins, and sessions that begin before the
+/// machine sets off, while it gains its speed, and while it rolls past plants.
+#[test]
+fn rows_by_chance_are_decided_the_same_on_the_host_whenever_the_session_begins() {
+    let mut objects = 0;
+    for seed in 0..ROWS {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let planting = Planting {
+            plants: 5,
+            spacing_mm: rng.random_range(300.0..600.0),
+            canopy_mm: rng.random_range(80.0..160.0),
+            weeds: rng.random_range(0..4),
+            ragged: rng.random(),
+            ..Planting::default()
+        };
+        let row = planting.grow_with_room(seed).expect("there is room");
+        let edge = [347.5, 486.5, 625.5][rng.random_range(0..3)] + rng.random_range(-6.0..6.0);
+        let speed_mm_s = if rng.random() { edge } else { rng.random_range(250.0..900.0) };
+        let start_mm = rng.random_range(-250.0..100.0);
+        let end_mm = row.span_mm().end + 900.0;
+        let motion = Motion::steady(start_mm, 800.0, speed_mm_s, end_mm).change_speed(0.0, 1500.0);
+        let commands: &[&str] = [&["start"][..], &["start now"], &["clear", "start now"]][rng.random_range(0..3)];
+        let log = logged_from(&row, &motion, commands, rng.random_range(0..24_000_000));
+        let replayed = replay(&log).expect("the log can be replayed");
+        assert_eq!(replayed.difference, None, "seed {seed}, {commands:?}: {replayed:#?}\n{log:#?}");
+        objects += replayed.objects;
+    }
+    assert!(objects as u64 > 3 * ROWS, "{objects}");
+}
+
+/// How many rows by chance are rolled along.
+const ROWS: u64 = 24;
+
+#[test]
+fn start_now_over_unseen_ground_is_known_from_start() {
+    let motion = Motion::steady(0.0, 500.0, 500.0, 3200.0).change_speed(0.0, 500.0);
+    assert_same(&logged(&row(), &motion, &["start now"]), 9);
+}
+
+#[test]
+fn an_alarm_of_the_beam_is_raised_again_and_what_is_left_of_the_object_is_cut() {
+    let things = vec![Thing::plant(600.0, 150.0), Thing::plant(1500.0, 700.0), Thing::plant(2300.0, 150.0)];
+    let row = Row::new(things).expect("plants are a row");
+    let motion = Motion::steady(0.0, 500.0, 500.0, 3200.0).change_speed(0.0, 500.0);
+    let log = logged(&row, &motion, &["start"]);
+    assert!(log.iter().any(|entry| entry.text.starts_with("alarm name=beam_blocked")), "{log:#?}");
+    let replayed = replay(&log).expect("the log can be replayed");
+    assert_eq!(replayed.difference, None, "{replayed:#?}");
+    assert_eq!((replayed.objects, replayed.alarms), (3, 1), "{replayed:#?}");
+}
+
+#[test]
+fn an_alarm_that_the_log_cannot_explain_is_given() {
+    let motion = Motion::steady(0.0, 500.0, 500.0, 3200.0).change_speed(0.0, 500.0);
+    let mut log = logged(&row(), &motion, &["start"]);
+    // The weed and the gap behind it have passed.
+    let weed = log.iter().position(|entry| entry.text.starts_with("weed pos=")).expect("a weed");
+    let later = log.iter().enumerate().skip(weed).filter(|(_, entry)| entry.kind == Kind::Status).nth(2);
+    let (place, status) = later.map(|(place, entry)| (place, Status::parse(&entry.text))).expect("it rolls on");
+    let position = status.expect("a status").position;
+    let alarm = |text: String| Entry { text, kind: Kind::Event, ..log[place].clone() };
+    let alarms =
+        [alarm(format!("alarm name=encoder_jumps code=23 pos={position}")), alarm("state is=alarm".to_owned())];
+    log.splice(place + 1..place + 1, alarms);
+    // From there on the log has the tool swing, and the replay keeps it out.
+    let difference = replay(&log).expect("the log can be replayed").difference.expect("they differ");
+    assert!(difference.to_string().contains("the replay none"), "{difference}");
+}
+
+#[test]
+fn a_log_without_a_machine_or_with_a_line_that_cannot_be_is_refused() {
+    let entry = |kind, text: &str| Entry { number: 7, time_ms: 0, kind, text: text.to_owned() };
+    assert!(replay(&[]).unwrap_err().to_string().starts_with("the log has no machine in it"));
+    for (kind, text, wrong) in [
+        (Kind::Setting, "k=99", "line 7 of the log: `k=99` is out of range"),
+        (Kind::Setting, "wheel=4", "`wheel=4` is no setting of this version"),
+        (Kind::Example, "field 3 tree 1 2 3 4 5", "is no example"),
+        (Kind::Status, "state=asleep", "is no status"),
+        (Kind::Event, "swing tool=up", "is no event"),
+    ] {
+        let error = replay(&[entry(Kind::Connected, "0.1.0"), entry(kind, text)]).unwrap_err().to_string();
+        assert!(error.contains(wrong), "{error}");
+    }
+    let far = "state=work tool=in pos=2000000000 speed_mm_s=1 windows=0 unseen_mm=0";
+    let near = "state=work tool=in pos=0 speed_mm_s=1 windows=0 unseen_mm=0";
+    let log = [entry(Kind::Connected, "0.1.0"), entry(Kind::Status, near), entry(Kind::Status, far)];
+    assert!(replay(&log).unwrap_err().to_string().contains("the machine cannot have come so far"));
+}
+
+#[test]
+fn numbers_that_no_machine_gives_are_replayed_or_refused() {
+    let entry = |kind, text: &str| Entry { number: 7, time_ms: u64::MAX, kind, text: text.to_owned() };
+    for [one, other] in [[i32::MIN, i32::MAX], [i32::MAX, i32::MIN], [0, i32::MIN]] {
+        let status =
+            |number: i32| format!("state=work tool=in pos={number} speed_mm_s={number} windows=1 unseen_mm={number}");
+        let plant = format!("plant pos={one} votes=3 spacing={one} delay={one} hold={other} actuation={one}");
+        let (swing, alarm) =
+            (format!("swing tool=out pos={other}"), format!("alarm name=beam_blocked code=11 pos={one}"));
+        let log = [
+            entry(Kind::Connected, "0.1.0"),
+            entry(Kind::Status, &status(one)),
+            entry(Kind::Event, &plant),
+            entry(Kind::Event, &swing),
+            entry(Kind::Event, &alarm),
+            entry(Kind::Event, "state is=work"),
+            entry(Kind::Status, &status(one)),
+        ];
+        assert!(replay(&log).expect("it stands still").difference.is_some(), "{one} {other}");
+        let jump = [&log[..2], &[entry(Kind::Status, &status(other))]].concat();
+        // From the greatest place to the least is one step.
+        assert_eq!(replay(&jump).is_err(), one == 0, "{one} {other}");
+    }
+}

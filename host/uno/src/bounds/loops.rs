@@ -1,0 +1,41 @@
+//! How often loops turn, as their sources say it.
+//!
+//! A loop says it by a record in the ELF's section `.loop_bounds`, which takes no flash: an address inside the loop, and how
+//! often the program comes by it at most each time that the loop is come to, 4 bytes each. Assembly inside the loop writes it, in C
+//! and in Rust alike:
+//!
+//! ```text
+//! 1: .pushsection .loop_bounds, "", @progbits
+//!    .long 1b, 8
+//!    .popsection
+//! ```
+//!
+//! The compiler keeps such a record in its loop, and writes it twice where it makes two loops of one. The record is taken for
+//! the innermost loop around its address, and only where no turn can go round it; so a record that has come to lie elsewhere
+//! bounds nothing. That the number itself is right is the source's word, which a run in the simulator can refute.
+
+use super::BoundsError;
+use super::cycles::Turns;
+use crate::elf::ImageError;
+use object::read::elf::ElfFile32;
+use object::{LittleEndian, Object, ObjectSection};
+use std::path::Path;
+
+/// The section.
+const SECTION: &str = ".loop_bounds";
+
+/// The records of an ELF.
+pub(super) fn stated(elf: &Path) -> Result<Turns, BoundsError> {
+    let bytes = std::fs::read(elf).map_err(|source| ImageError::Read { path: elf.into(), source })?;
+    let not_elf = |reason| ImageError::NotElf { path: elf.into(), reason };
+    let file: ElfFile32<LittleEndian> = ElfFile32::parse(&*bytes).map_err(not_elf)?;
+    let Some(section) = file.section_by_name(SECTION) else { return Ok(Turns::new()) };
+    let mut turns = Turns::new();
+    for record in section.data().map_err(not_elf)?.chunks_exact(8) {
+        let word = |at: usize| record[at..].first_chunk().map_or(0, |bytes| u32::from_le_bytes(*bytes));
+        let (address, stated) = (word(0), u64::from(word(4)));
+        // Of two for the same place the larger one holds for both.
+        turns.entry(address).and_modify(|turns| *turns = stated.max(*turns)).or_insert(stated);
+    }
+    Ok(turns)
+}

@@ -1,0 +1,397 @@
+//! Recordings of real signals: what a logic analyser saw on some pins, from its VCD file.
+//!
+//! A [`Capture`] is the recording as levels on the Uno's pins, in cycles, whatever unit the file counts in. Channels are chosen
+//! by the names that the analyser's software gave them. Nothing is filtered or repaired: a level that the file leaves open is an
+//! error, and what the signal means is for the firmware to say.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, ErrorKind, Read};
+use std::path::{Path, PathBuf};
+
+use vcd::{Command, IdCode, Parser, Scope, ScopeItem, TimescaleUnit, Value, Var};
+
+use signal::{CYCLES_PER_SECOND, Pin, PinChange};
+
+/// Why a recording cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum CaptureError {
+    /// The file could not be read.
+    #[error("the recording {path} could not be read")]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What went wrong; for a file that is no VCD, with the line.
+        source: std::io::Error,
+    },
+    /// The file does not say what its times count.
+    #[error("{path} has no $timescale: export the recording as VCD once more")]
+    NoTimescale {
+        /// The file.
+        path: PathBuf,
+    },
+    /// There is no channel of that name.
+    #[error("{path} has no channel `{name}`; it has {}", known.join(", "))]
+    UnknownChannel {
+        /// The file.
+        path: PathBuf,
+        /// The name asked for.
+        name: String,
+        /// The names there are.
+        known: Vec<String>,
+    },
+    /// Several channels have that name.
+    #[error("{path} has several channels `{name}`: write one of {}", known.join(", "))]
+    AmbiguousChannel {
+        /// The file.
+        path: PathBuf,
+        /// The name asked for.
+        name: String,
+        /// Their full names.
+        known: Vec<String>,
+    },
+    /// One channel was asked for twice.
+    #[error("channel `{name}` is given for two signals: each needs its own")]
+    SharedChannel {
+        /// The name.
+        name: String,
+    },
+    /// The channel is more than one wire.
+    #[error("channel `{name}` of {path} is {width} bits wide: a single wire is needed")]
+    NotOneWire {
+        /// The file.
+        path: PathBuf,
+        /// The channel.
+        name: String,
+        /// Its width in bits.
+        width: u32,
+    },
+    /// The channel is neither high nor low.
+    #[error("channel `{name}` of {path} is `{value}` at line {line}: only 0 and 1 are levels")]
+    NoLevel {
+        /// The file.
+        path: PathBuf,
+        /// The channel.
+        name: String,
+        /// What the file says.
+        value: String,
+        /// Where.
+        line: u64,
+    },
+    /// The times do not rise.
+    #[error("{path} goes back in time at line {line}")]
+    BackInTime {
+        /// The file.
+        path: PathBuf,
+        /// Where.
+        line: u64,
+    },
+    /// The recording goes on for too long.
+    #[error("{path} goes on beyond {MOST_HOURS} h at line {line}: cut the recording, or look at its $timescale")]
+    TooLong {
+        /// The file.
+        path: PathBuf,
+        /// Where.
+        line: u64,
+    },
+    /// The channel has no level at all.
+    #[error("{path} holds no samples of channel `{name}`")]
+    NoSamples {
+        /// The file.
+        path: PathBuf,
+        /// The channel.
+        name: String,
+    },
+}
+
+/// Longest recording, in hours. Nobody waits for the firmware to play a longer one.
+const MOST_HOURS: u64 = 24;
+
+/// Most scopes within each other. An analyser makes one or two, and each takes of the reader's stack.
+const MOST_SCOPES: usize = 50;
+
+/// Longest head of a file, in which its channels are declared.
+const MOST_HEAD_BYTES: u64 = 1 << 20;
+
+/// A recording, as levels on the Uno's pins.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Capture {
+    /// The levels, sorted by cycle from the recording's time 0. Each channel's first is the level that it began with; from then
+    /// on each is an edge.
+    pub changes: Vec<PinChange>,
+}
+
+/// A channel that is being read.
+struct Channel {
+    pin: Pin,
+    name: String,
+    level: Option<bool>,
+}
+
+impl Capture {
+    /// Reads the recording at `path`. `channels` says by which channel of the file a pin is known; a name that stands in several
+    /// scopes is written `scope.name`.
+    ///
+    /// # Errors
+    ///
+    /// Where the file is no VCD, has no such channels, or leaves their levels open.
+    pub fn read(path: &Path, channels: &[(Pin, &str)]) -> Result<Capture, CaptureError> {
+        let file = File::open(path).map_err(|source| CaptureError::Read { path: path.into(), source })?;
+        Capture::parse(path, BufReader::new(file), channels)
+    }
+
+    fn parse(path: &Path, file: impl BufRead, channels: &[(Pin, &str)]) -> Result<Capture, CaptureError> {
+        let read_error = |source| CaptureError::Read { path: path.into(), source };
+        let mut file = file;
+        let head = head(&mut file).map_err(read_error)?;
+        let mut parser = Parser::new(head.chain(file));
+        let header = parser.parse_header().map_err(read_error)?;
+        let timescale = header.timescale.ok_or_else(|| CaptureError::NoTimescale { path: path.into() })?;
+
+        let mut known = Vec::new();
+        list_channels("", &header.items, &mut known);
+        let mut wires = BTreeMap::new();
+        for &(pin, name) in channels {
+            let channel = Channel { pin, name: name.to_owned(), level: None };
+            if wires.insert(find_channel(path, name, &known)?, channel).is_some() {
+                return Err(CaptureError::SharedChannel { name: name.to_owned() });
+            }
+        }
+
+        let mut changes = Vec::new();
+        let mut time = 0;
+        while let Some(command) = parser.next().transpose().map_err(read_error)? {
+            match command {
+                Command::Timestamp(later) if later < time => {
+                    return Err(CaptureError::BackInTime { path: path.into(), line: parser.line() });
+                }
+                Command::Timestamp(later) => time = later,
+                Command::ChangeScalar(wire, value) => {
+                    let Some(channel) = wires.get_mut(&wire) else { continue };
+                    let high = match value {
+                        Value::V0 => false,
+                        Value::V1 => true,
+                        Value::X | Value::Z => {
+                            return Err(CaptureError::NoLevel {
+                                path: path.into(),
+                                name: channel.name.clone(),
+                                value: value.to_string(),
+                                line: parser.line(),
+                            });
+                        }
+                    };
+                    if channel.level.replace(high) != Some(high) {
+                        let cycle = to_cycles(time, timescale);
+                        if cycle > MOST_HOURS * 3600 * CYCLES_PER_SECOND {
+                            return Err(CaptureError::TooLong { path: path.into(), line: parser.line() });
+                        }
+                        changes.push(PinChange { cycle, pin: channel.pin, high });
+                    }
+                }
+                _ => {}
+            }
+        }
+        match wires.into_values().find(|channel| channel.level.is_none()) {
+            Some(Channel { name, .. }) => Err(CaptureError::NoSamples { path: path.into(), name }),
+            None => Ok(Capture { changes }),
+        }
+    }
+
+    /// The recording's levels with its first one at `cycle`.
+    pub fn starting_at(&self, cycle: u64) -> impl Iterator<Item = PinChange> {
+        let first = self.changes.first().map_or(0, |change| change.cycle);
+        self.changes.iter().map(move |change| PinChange { cycle: change.cycle - first + cycle, ..*change })
+    }
+}
+
+/// The file's head, up to where its channels are declared.
+fn head(file: &mut impl BufRead) -> io::Result<io::Cursor<Vec<u8>>> {
+    let wrong = |problem: String| Err(io::Error::new(ErrorKind::InvalidData, problem));
+    let (mut head, mut scopes) = (Vec::new(), 0_usize);
+    let mut rest = file.take(MOST_HEAD_BYTES);
+    loop {
+        let start = head.len();
+        if rest.read_until(b'\n', &mut head)? == 0 {
+            break;
+        }
+        let words = head[start..].split(u8::is_ascii_whitespace);
+        for word in words {
+            match word {
+                b"$scope" => scopes += 1,
+                b"$upscope" => scopes = scopes.saturating_sub(1),
+                b"$enddefinitions" => return Ok(io::Cursor::new(head)),
+                _ => {}
+            }
+            if scopes > MOST_SCOPES {
+                return wrong(format!("more than {MOST_SCOPES} scopes stand within each other"));
+            }
+        }
+    }
+    // What is shorter is for the reader to judge.
+    if rest.limit() == 0 {
+        wrong("no $enddefinitions stands in its first MiB".to_owned())
+    } else {
+        Ok(io::Cursor::new(head))
+    }
+}
+
+/// The nearest cycle to a time of the file.
+fn to_cycles(time: u64, (count, unit): (u32, TimescaleUnit)) -> u64 {
+    let units = u128::from(time) * u128::from(count) * u128::from(CYCLES_PER_SECOND);
+    let divisor = u128::from(unit.divisor());
+    u64::try_from((units + divisor / 2) / divisor).unwrap_or(u64::MAX)
+}
+
+/// Every channel with the scopes it stands in, as `scope.name`.
+fn list_channels<'a>(scope: &str, items: &'a [ScopeItem], known: &mut Vec<(String, &'a Var)>) {
+    for item in items {
+        match item {
+            ScopeItem::Var(channel) => known.push((format!("{scope}{}", channel.reference), channel)),
+            ScopeItem::Scope(Scope { identifier, items, .. }) => {
+                list_channels(&format!("{scope}{identifier}."), items, known);
+            }
+            _ => {}
+        }
+    }
+}
+
+/// The wire of the channel `name`.
+fn find_channel(path: &Path, name: &str, known: &[(String, &Var)]) -> Result<IdCode, CaptureError> {
+    let matching: Vec<_> =
+        known.iter().filter(|(full_name, channel)| full_name == name || channel.reference == name).collect();
+    match matching[..] {
+        [(_, channel)] if channel.size == 1 => Ok(channel.code),
+        [(_, channel)] => {
+            Err(CaptureError::NotOneWire { path: path.into(), name: name.to_owned(), width: channel.size })
+        }
+        [] => Err(CaptureError::UnknownChannel {
+            path: path.into(),
+            name: name.to_owned(),
+            known: known.iter().map(|(_, channel)| format!("`{}`", channel.reference)).collect(),
+        }),
+        _ => Err(CaptureError::AmbiguousChannel {
+            path: path.into(),
+            name: name.to_owned(),
+            known: matching.iter().map(|(full_name, _)| format!("`{full_name}`")).collect(),
+        }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use signal::Wire;
+
+    const CHANNELS: [(Pin, &str); 2] = [(Pin::D2, "A"), (Pin::D3, "B")];
+
+    fn recording(timescale: &str, samples: &str) -> String {
+        format!(
+            "$timescale {timescale} $end\n$scope module analyser $end\n$var wire 1 ! A $end\n$var wire 1 \" B $end\n\
+             $var wire 8 # bus $end\n$upscope $end\n$enddefinitions $end\n{samples}\n"
+        )
+    }
+
+    fn parse(file: &str, channels: &[(Pin, &str)]) -> Result<Vec<(u64, Pin, bool)>, String> {
+        Capture::parse(Path::new("row.vcd"), file.as_bytes(), channels)
+            .map(|capture| capture.changes.iter().map(|change| (change.cycle, change.pin, change.high)).collect())
+            .map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn times_become_cycles_whatever_the_unit() {
+        let (a, b) = (Pin::D2, Pin::D3);
+        for (timescale, time) in [("1 us", 1000), ("10 us", 100), ("1 ms", 1), ("100 ps", 10_000_000)] {
+            let file = recording(timescale, &format!("#0 0! 1\" #{time} 1! 1\" b101 # #{} 0\"", 3 * time));
+            let expected = [(0, a, false), (0, b, true), (16_000, a, true), (48_000, b, false)];
+            assert_eq!(parse(&file, &CHANNELS).unwrap(), expected, "{timescale}");
+        }
+    }
+
+    #[test]
+    fn a_time_between_two_cycles_goes_to_the_nearest() {
+        let file = recording("1 ns", "#0 0! 0\" #31 1! #32 0! #94 1!");
+        let cycles: Vec<u64> = parse(&file, &CHANNELS).unwrap().iter().map(|change| change.0).collect();
+        assert_eq!(cycles, [0, 0, 0, 1, 2]);
+    }
+
+    #[test]
+    fn a_bad_choice_of_channels_is_told_what_there_is() {
+        let file = recording("1 us", "#0 0! 0\"");
+        let error = |channels: &[(Pin, &str)]| parse(&file, channels).unwrap_err();
+        let with_b = |b| [CHANNELS[0], (Pin::D3, b)];
+        let unknown = error(&with_b("C"));
+        assert_eq!(unknown, "row.vcd has no channel `C`; it has `A`, `B`, `bus`");
+        assert!(error(&with_b("bus")).contains("8 bits wide"));
+        assert!(error(&with_b("A")).contains("given for two signals"));
+        assert!(error(&[CHANNELS[0], CHANNELS[1], (Pin::D8, "B")]).contains("given for two signals"));
+        assert!(parse(&file, &[(Pin::D2, "analyser.A"), CHANNELS[1]]).is_ok());
+    }
+
+    #[test]
+    fn a_name_in_two_scopes_must_be_written_in_full() {
+        let file = recording("1 us", "#0 0! 0\" 1$")
+            .replace("$enddefinitions", "$scope module other $end $var wire 1 $ A $end $upscope $end $enddefinitions");
+        assert_eq!(
+            parse(&file, &CHANNELS).unwrap_err(),
+            "row.vcd has several channels `A`: write one of `analyser.A`, `other.A`"
+        );
+        let chosen = parse(&file, &[(Pin::D2, "other.A"), CHANNELS[1]]).unwrap();
+        assert!(chosen.contains(&(0, Pin::D2, true)));
+    }
+
+    #[test]
+    fn a_recording_that_leaves_levels_open_is_refused() {
+        let error = |file: &str| parse(file, &CHANNELS).unwrap_err();
+        let open = error(&recording("1 us", "#0 0! 0\"\n#5 x!"));
+        assert!(open.contains("channel `A` of row.vcd is `x` at line 9"), "{open}");
+        assert!(error(&recording("1 us", "#0 0!")).contains("no samples of channel `B`"));
+        assert!(error(&recording("1 us", "#5 0! 0\" #4 1!")).contains("back in time"));
+        assert!(error(&recording("1 us", "").replace("$timescale 1 us $end", "")).contains("no $timescale"));
+        assert!(error("").contains("row.vcd could not be read"));
+        assert!(error("position_mm,width_mm,kind\n").contains("row.vcd could not be read"));
+    }
+
+    #[test]
+    fn a_recording_that_would_never_end_or_is_nested_without_end_is_refused() {
+        let endless = parse(&recording("1 s", "#0 0! 0\"\n#18446744073709551615 1!"), &CHANNELS).unwrap_err();
+        assert!(endless.contains("row.vcd goes on beyond 24 h at line 9"), "{endless}");
+        let nested = "$timescale 1 us $end\n".to_owned() + &"$scope module a $end\n".repeat(100_000);
+        let error = Capture::parse(Path::new("row.vcd"), nested.as_bytes(), &CHANNELS).unwrap_err();
+        assert!(std::error::Error::source(&error).unwrap().to_string().contains("more than 50 scopes"), "{error}");
+        let error = Capture::parse(Path::new("row.vcd"), vec![b' '; 2 << 20].as_slice(), &CHANNELS).unwrap_err();
+        assert!(std::error::Error::source(&error).unwrap().to_string().contains("no $enddefinitions"), "{error}");
+    }
+
+    #[test]
+    fn a_recording_can_be_moved_to_a_later_start() {
+        let changes = [40, 56, 90].map(|cycle| PinChange { cycle, pin: Pin::D2, high: cycle == 56 });
+        let capture = Capture { changes: changes.to_vec() };
+        let moved: Vec<u64> = capture.starting_at(1000).map(|change| change.cycle).collect();
+        assert_eq!(moved, [1000, 1016, 1050]);
+    }
+
+    #[test]
+    fn a_waveform_reads_back_to_the_very_cycles() {
+        let wires = [
+            Wire { pin: Pin::D2, name: "encoder_a", high_at_rest: false },
+            Wire { pin: Pin::D3, name: "encoder_b", high_at_rest: false },
+            Wire { pin: Pin::D8, name: "beam", high_at_rest: true },
+        ];
+        let mut written = Vec::new();
+        for count in 1..500_u64 {
+            written.push(PinChange {
+                cycle: count * count * 7919,
+                pin: [Pin::D2, Pin::D3, Pin::D8][count as usize % 3],
+                // The beam begins high, the encoder low.
+                high: (count.div_ceil(3) % 2 == 1) != (count % 3 == 2),
+            });
+        }
+        let path = std::env::temp_dir().join(format!("weeder-waveform-{}.vcd", std::process::id()));
+        crate::waveform::write(&path, &wires, written.iter().rev().copied()).unwrap();
+        let read = Capture::read(&path, &wires.map(|wire| (wire.pin, wire.name)));
+        std::fs::remove_file(&path).unwrap();
+
+        let at_rest = wires.map(|wire| PinChange { cycle: 0, pin: wire.pin, high: wire.high_at_rest });
+        assert_eq!(read.unwrap().changes, [&at_rest[..], &written].concat());
+    }
+}

@@ -1,0 +1,588 @@
+//! The ATmega328P on simavr: the one place that calls C. What C calls back is in [`super::recorder`].
+//!
+//! [`Core`] owns a simavr instance and the [`Recorder`] that simavr's callbacks write to, and offers the rest of
+//! [`super`] safe calls: one step, levels in, edges and bytes out. It knows pins by port and bit, cycles and bytes, and
+//! nothing of queues or of a terminal's pace; those are [`super::Uno`]'s.
+//!
+//! # Memory
+//!
+//! Two allocations exist a chip: simavr's `avr_t`, made by `avr_make_mcu_by_name`, and the recorder, a leaked box. Both are
+//! freed by `Drop` and by nothing else. simavr holds the recorder's address as its callbacks' parameter, and calls them only
+//! from inside the functions that this file calls; none of those calls is made while a reference into the recorder or
+//! into `avr_t` is alive. simavr keeps no state outside `avr_t` but its logger, which is never replaced here, so
+//! chips in several threads do not meet.
+
+use std::ffi::{CStr, c_void};
+use std::ptr::{self, NonNull};
+
+use simavr_ffi as simavr;
+
+use super::eeprom::{self, Eeprom};
+use super::interrupts::{InterruptRecorder, InterruptStatistics, Place};
+use super::recorder::{Recorder, cycles_per_byte, on_interrupt, on_output, on_reset, on_timer_output, on_transmit};
+use super::timer::{self, Timer1};
+use super::turns::{TurnRecorder, Turns};
+use super::{Reset, ResetCause};
+use crate::elf::{EEPROM_BYTES, FLASH_BYTES};
+use signal::{CYCLES_PER_SECOND, Pin};
+
+unsafe extern "C" {
+    /// Runs the next instruction. It stands in sim_core.h, which simavr-ffi leaves out of its bindings.
+    fn avr_run_one(avr: *mut simavr::avr_t) -> simavr::avr_flashaddr_t;
+}
+
+/// The chip's name for simavr.
+const CHIP: &CStr = c"atmega328p";
+
+/// Highest interrupt vector of the ATmega328P (data sheet, table 12-6, counted from 0).
+const LAST_VECTOR: u8 = 25;
+
+/// Cycles that the core stays halted when an interrupt wakes it (data sheet, section 7.7.1).
+const WAKE_UP_CYCLES: u64 = 4;
+
+/// First and last address of SRAM in the data space (data sheet, figure 8-3).
+pub(super) const SRAM_START: u16 = 0x0100;
+const SRAM_END: u16 = 0x08FF;
+
+/// What SRAM holds at power-up, where nothing else is asked for. A real chip's content is random; a byte that is not zero
+/// catches those who count on it, and shows how deep the stack has been.
+const SRAM_AT_POWER_UP: u8 = 0xC5;
+
+/// Complete bytes that the receiver keeps: two in its buffer and one in the shift register (data sheet, USART0, receiver error flags).
+const RECEIVER_BYTES: u16 = 3;
+
+// Registers by their address in the data space (data sheet, register summary).
+const MCUSR: u16 = 0x54;
+pub(super) const UCSR0A: u16 = 0xC0;
+pub(super) const UCSR0B: u16 = 0xC1;
+
+/// MCUSR: the cause was the reset pin, or too low a supply voltage (data sheet, 11.9.1).
+const EXTRF: u8 = 1 << 1;
+const BORF: u8 = 1 << 2;
+/// UCSR0A: a byte waits.
+const RXC0: u8 = 1 << 7;
+/// UCSR0A: bytes were lost.
+const DOR0: u8 = 1 << 3;
+/// UCSR0B: the receiver is on.
+const RXEN0: u8 = 1 << 4;
+
+/// The instruction `wdr`, which feeds the watchdog.
+const WDR: u16 = 0x95A8;
+
+/// The instruction `cli`, which turns interrupts off.
+const CLI: u16 = 0x94F8;
+
+/// Cycles of a jump to itself (`rjmp`).
+const LOOP_CYCLES: u64 = 2;
+
+/// A four letter request code of simavr (`AVR_IOCTL_DEF`).
+const fn request(name: &[u8; 4]) -> u32 {
+    u32::from_be_bytes(*name)
+}
+
+/// What stopped a chip.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Stop {
+    /// It met an instruction that does not exist, or ran past the end of its flash.
+    Crashed,
+    /// It sleeps with interrupts off: nothing can wake it.
+    Halted,
+}
+
+/// An ATmega328P.
+pub(super) struct Core {
+    chip: NonNull<simavr::avr_t>,
+    recorder: NonNull<Recorder>,
+    input: NonNull<simavr::avr_irq_t>,
+    /// Levels that the inputs are held at from outside, by port (B, D) and bit.
+    held: [Held; 2],
+    /// The last step left the chip asleep.
+    asleep: bool,
+    /// Address in flash at which the main program loops for ever.
+    stalled_at: Option<u32>,
+}
+
+#[derive(Clone, Copy, Default)]
+struct Held {
+    mask: u8,
+    levels: u8,
+}
+
+// SAFETY: a chip touches nothing but its own two allocations (see the module's text) and is tied to no thread; `Core` has no
+// shared access that changes it, so moving it moves the only user.
+unsafe impl Send for Core {}
+
+impl Core {
+    /// A chip that has just been powered up, at `cycle`, with `flash` (from address 0) and `eeprom` (from address 0) in it.
+    /// Both must fit, which [`crate::elf::Image`] and [`super::Uno`] see to. It starts at `reset_address` in flash, now and
+    /// after every reset.
+    pub(super) fn new(flash: &[u8], eeprom: &[u8], reset_address: u16, cycle: u64) -> Core {
+        // SAFETY: the name is a C string that lives for ever. The chip is known to every simavr, so a null pointer means
+        // that memory ran out.
+        let chip =
+            NonNull::new(unsafe { simavr::avr_make_mcu_by_name(CHIP.as_ptr()) }).expect("simavr knows the ATmega328P");
+        let avr = chip.as_ptr();
+
+        // SAFETY: `avr` was just made and nothing else has its address. `avr_init` is called once, with the clock set as it
+        // asks. `data` and `flash` are then simavr's, of `ramend + 1` and `flashend + 1` bytes, and `flash` fits.
+        unsafe {
+            (*avr).frequency = CYCLES_PER_SECOND as u32;
+            simavr::avr_init(avr);
+            ptr::copy_nonoverlapping(flash.as_ptr(), (*avr).flash, flash.len());
+            (*avr).codeend = flash.len() as u32;
+            (*avr).reset_pc = reset_address.into();
+            (*avr).pc = reset_address.into();
+            let sram = (*avr).data.add(SRAM_START.into());
+            ptr::write_bytes(sram, SRAM_AT_POWER_UP, (SRAM_END - SRAM_START + 1).into());
+            (*avr).cycle = cycle;
+        }
+
+        let uart = find_uart(chip);
+        let recorder = NonNull::from(Box::leak(Box::new(Recorder {
+            chip: avr,
+            uart: uart.as_ptr(),
+            // SAFETY: `avr` was initialised above.
+            timer: unsafe { Timer1::of(avr) },
+            // SAFETY: as above.
+            eeprom: unsafe { Eeprom::of(avr) },
+            servo_high: false,
+            led_high: false,
+            changes: Vec::new(),
+            received: Vec::new(),
+            resets: Vec::new(),
+            interrupts: InterruptRecorder::default(),
+            turns: TurnRecorder::default(),
+            reset_at: None,
+        })));
+        let parameter = recorder.as_ptr().cast::<c_void>();
+
+        // SAFETY: `avr` and `uart` are valid and initialised. Each `avr_io_getirq` names a peripheral that the chip has, and
+        // simavr ignores a null for a vector that it lacks. The callbacks get the recorder's address, which stays valid until
+        // `Drop` has ended the chip.
+        let input = unsafe {
+            (*avr).custom.data = parameter;
+            (*avr).reset = Some(on_reset);
+            (*uart.as_ptr()).flags = 0;
+            for pin in super::OUTPUTS {
+                let irq = pin_irq(avr, pin);
+                simavr::avr_irq_register_notify(irq, Some(on_output), parameter);
+            }
+            let output_a = simavr::avr_io_getirq(avr, request(b"tmr1"), simavr::TIMER_IRQ_OUT_COMP as i32);
+            simavr::avr_irq_register_notify(output_a, Some(on_timer_output), parameter);
+            timer::take_over_writes(recorder);
+            eeprom::take_over_writes(recorder);
+            for vector in 1..=LAST_VECTOR {
+                let irq = simavr::avr_get_interrupt_irq(avr, vector);
+                if !irq.is_null() {
+                    let running = irq.add(simavr::AVR_INT_IRQ_RUNNING as usize);
+                    simavr::avr_irq_register_notify(running, Some(on_interrupt), parameter);
+                }
+            }
+            let output = simavr::avr_io_getirq(avr, request(b"uar0"), simavr::UART_IRQ_OUTPUT as i32);
+            simavr::avr_irq_register_notify(output, Some(on_transmit), parameter);
+            simavr::avr_io_getirq(avr, request(b"uar0"), simavr::UART_IRQ_INPUT as i32)
+        };
+
+        let mut core = Core {
+            chip,
+            recorder,
+            input: NonNull::new(input).expect("the ATmega328P has a UART"),
+            held: [Held::default(); 2],
+            asleep: false,
+            stalled_at: None,
+        };
+        core.set_eeprom(eeprom);
+        core
+    }
+
+    /// Cycles since the first power-up.
+    pub(super) fn cycle(&self) -> u64 {
+        // SAFETY: the chip is valid for as long as `self` is, and simavr is not running.
+        unsafe { (*self.chip.as_ptr()).cycle }
+    }
+
+    /// Address of the next instruction, in bytes.
+    pub(super) fn program_counter(&self) -> u32 {
+        // SAFETY: as in `cycle`.
+        unsafe { (*self.chip.as_ptr()).pc }
+    }
+
+    /// What the callbacks have seen.
+    pub(super) fn recorder(&self) -> &Recorder {
+        // SAFETY: the recorder is valid for as long as `self` is, and simavr, its only other user, runs only in methods
+        // that borrow `self` mutably.
+        unsafe { self.recorder.as_ref() }
+    }
+
+    /// What the callbacks have seen, to take it out.
+    pub(super) fn recorder_mut(&mut self) -> &mut Recorder {
+        // SAFETY: as in `recorder`.
+        unsafe { self.recorder.as_mut() }
+    }
+
+    /// Starts the interrupts' statistics afresh.
+    pub(super) fn measure_interrupts(&mut self) {
+        self.recorder_mut().interrupts.turn_on();
+    }
+
+    /// The interrupts' statistics since [`Core::measure_interrupts`].
+    pub(super) fn interrupt_statistics(&self) -> Option<&InterruptStatistics> {
+        self.recorder().interrupts.statistics()
+    }
+
+    /// Starts the count of the main loop's turns afresh.
+    pub(super) fn measure_turns(&mut self) {
+        self.recorder_mut().turns.turn_on();
+    }
+
+    /// The main loop's turns since [`Core::measure_turns`].
+    pub(super) fn turns(&self) -> Option<&Turns> {
+        self.recorder().turns.turns()
+    }
+
+    /// Whether an interrupt's handler runs.
+    pub(super) fn is_in_handler(&self) -> bool {
+        // SAFETY: as in `cycle`.
+        unsafe { (*self.chip.as_ptr()).interrupts.running_ptr > 0 }
+    }
+
+    /// Where the program stands.
+    pub(super) fn place(&self) -> Place {
+        match self.next_instruction() {
+            _ if self.is_in_handler() => Place::InHandler,
+            CLI => Place::BeforeCriticalSection,
+            _ => Place::InMain,
+        }
+    }
+
+    /// Has the main program jump to where it is, for ever; handlers go on. No handler may be running.
+    pub(super) fn stall(&mut self) {
+        self.stalled_at = Some(self.program_counter());
+    }
+
+    /// Serves a pending interrupt, runs an instruction or sleeps, and lets the peripherals catch up. Several instructions
+    /// may run in one step, but never past `until`, except by the length of the last one.
+    pub(super) fn step(&mut self, until: u64) -> Result<(), Stop> {
+        let avr = self.chip.as_ptr();
+        let uart = self.recorder().uart;
+        let measuring = self.interrupt_statistics().is_some();
+        let counting_turns = self.turns().is_some();
+        let one_by_one = measuring || counting_turns || self.stalled_at.is_some();
+        // SAFETY: the chip is valid, this is the only place that runs it, and no reference into it or into the recorder is alive
+        // while it does. This is `avr_callback_run_raw` without its two waits on the host's clock.
+        unsafe {
+            if self.asleep && (*avr).state as u32 == simavr::cpu_Running {
+                (*avr).cycle += WAKE_UP_CYCLES;
+            }
+            hand_over_received(avr, uart);
+            if (*avr).interrupt_state != 0 {
+                simavr::avr_service_interrupts(avr);
+            }
+            // Where every instruction must be seen, the limit is the shortest possible.
+            let limit = match one_by_one {
+                true => 1,
+                false => until.saturating_sub((*avr).cycle).max(1),
+            };
+            (*avr).run_cycle_limit = limit;
+            (*avr).run_cycle_count = (*avr).run_cycle_count.min(limit);
+
+            if (*avr).state as u32 == simavr::cpu_Running {
+                if counting_turns && self.next_instruction() == WDR {
+                    self.recorder_mut().turns.watchdog_is_fed((*avr).cycle);
+                }
+                if self.stalled_at == Some((*avr).pc) && !self.is_in_handler() {
+                    (*avr).cycle += LOOP_CYCLES;
+                } else {
+                    (*avr).pc = avr_run_one(avr);
+                }
+            }
+            let until_next_timer = simavr::avr_cycle_timer_process(avr);
+            match (*avr).state as u32 {
+                simavr::cpu_Running => self.asleep = false,
+                simavr::cpu_Sleeping if (*avr).sreg[simavr::S_I as usize] == 0 => {
+                    return Err(Stop::Halted);
+                }
+                simavr::cpu_Sleeping => {
+                    self.asleep = true;
+                    let rest = until.saturating_sub((*avr).cycle);
+                    (*avr).cycle += until_next_timer.min(rest).max(1);
+                }
+                _ => return Err(Stop::Crashed),
+            }
+        }
+        self.finish_reset(ResetCause::Watchdog);
+        if measuring {
+            let cycle = self.cycle();
+            // SAFETY: as in `cycle`.
+            let enabled = unsafe { (*avr).sreg[simavr::S_I as usize] != 0 };
+            self.recorder_mut().interrupts.interrupts_enabled(enabled, cycle);
+        }
+        Ok(())
+    }
+
+    /// Pulls the reset pin low for a moment.
+    pub(super) fn reset(&mut self) {
+        self.reset_by(EXTRF, ResetCause::External);
+    }
+
+    /// Lets the supply sag for a moment, too low to run and high enough for SRAM. The byte that was being written to the EEPROM
+    /// is torn.
+    pub(super) fn brown_out(&mut self) {
+        let eeprom = self.eeprom();
+        self.set_eeprom(&eeprom);
+        self.reset_by(BORF, ResetCause::BrownOut);
+    }
+
+    fn reset_by(&mut self, flag: u8, cause: ResetCause) {
+        let avr = self.chip.as_ptr();
+        // SAFETY: as in `step`; MCUSR is an address inside `data`, and simavr keeps its bits over a reset.
+        unsafe {
+            *(*avr).data.add(MCUSR.into()) |= flag;
+            simavr::avr_reset(avr);
+        }
+        self.finish_reset(cause);
+    }
+
+    /// The instruction that comes next, as far as it is one word.
+    fn next_instruction(&self) -> u16 {
+        // SAFETY: as in `cycle`; simavr's flash has room behind its last word, and the program counter lies inside it, or the
+        // chip has crashed before.
+        unsafe {
+            let avr = self.chip.as_ptr();
+            let word = (*avr).flash.add((*avr).pc as usize);
+            u16::from_le_bytes([*word, *word.add(1)])
+        }
+    }
+
+    /// Takes over from the chip that has lost its power: what was recorded, and the levels at its pins.
+    pub(super) fn take_over(&mut self, before: &mut Core) {
+        let old = before.recorder_mut();
+        let new = self.recorder_mut();
+        new.changes = std::mem::take(&mut old.changes);
+        new.received = std::mem::take(&mut old.received);
+        new.resets = std::mem::take(&mut old.resets);
+        new.interrupts = std::mem::take(&mut old.interrupts);
+        new.interrupts.reset();
+        new.turns = std::mem::take(&mut old.turns);
+        new.turns.reset();
+        self.held = before.held;
+        self.hold_inputs();
+    }
+
+    /// Records that power has gone: the outputs fall.
+    pub(super) fn lose_power(&mut self) {
+        let cycle = self.cycle();
+        let recorder = self.recorder_mut();
+        recorder.record_level(Pin::D9, false, cycle);
+        recorder.record_level(Pin::D13, false, cycle);
+        recorder.resets.push(Reset { cycle, cause: ResetCause::PowerOn });
+    }
+
+    /// Sets right what simavr leaves behind a reset: its clock at 0, and the inputs' levels forgotten.
+    fn finish_reset(&mut self, cause: ResetCause) {
+        let Some(cycle) = self.recorder_mut().reset_at.take() else {
+            return;
+        };
+        self.asleep = false;
+        self.stalled_at = None;
+        // SAFETY: as in `cycle`. The watchdog's timer, the only one that can run now, was set from this cycle.
+        unsafe { (*self.chip.as_ptr()).cycle = cycle };
+        let recorder = self.recorder_mut();
+        recorder.timer.stop();
+        recorder.record_level(Pin::D9, false, cycle);
+        recorder.record_level(Pin::D13, false, cycle);
+        recorder.interrupts.reset();
+        recorder.turns.reset();
+        recorder.eeprom.reset();
+        recorder.resets.push(Reset { cycle, cause });
+        self.hold_inputs();
+    }
+
+    /// Puts the levels that the inputs are held at on a chip that has just started.
+    fn hold_inputs(&mut self) {
+        for pin in Pin::ALL.into_iter().filter(|&pin| !super::is_output(pin)) {
+            let (port, bit) = pin.port_and_bit();
+            let held = self.held[port_index(port)];
+            if held.mask & (1 << bit) != 0 {
+                self.set_input(pin, held.levels & (1 << bit) != 0);
+            }
+        }
+    }
+
+    /// Holds an input pin at a level from now on.
+    pub(super) fn set_input(&mut self, pin: Pin, high: bool) {
+        let (port, bit) = pin.port_and_bit();
+        let held = &mut self.held[port_index(port)];
+        held.mask |= 1 << bit;
+        held.levels = held.levels & !(1 << bit) | u8::from(high) << bit;
+        let mut external = simavr::avr_ioport_external_t {
+            _bitfield_align_1: [],
+            _bitfield_1: simavr::avr_ioport_external_t::new_bitfield_1(
+                port.into(),
+                held.mask.into(),
+                held.levels.into(),
+            ),
+            __bindgen_padding_0: [0; 5],
+        };
+        let avr = self.chip.as_ptr();
+        // SAFETY: as in `step`; `external` is what this request takes, and simavr copies it.
+        unsafe {
+            // Told so, simavr raises the pin to this level, not to its pull-up's, when the firmware writes the port.
+            let set_external = request(&[b'i', b'o', b'p', port as u8]);
+            simavr::avr_ioctl(avr, set_external, (&raw mut external).cast());
+            simavr::avr_raise_irq(pin_irq(avr, pin), high.into());
+        }
+    }
+
+    /// Gives the receiver a byte whose stop bit has just ended. Returns whether it had room.
+    pub(super) fn receive(&mut self, byte: u8) -> bool {
+        let uart = self.recorder().uart;
+        let avr = self.chip.as_ptr();
+        // SAFETY: as in `step`; `uart` is part of the chip, and the registers are addresses inside `data`.
+        unsafe {
+            let fifo = &(*uart).input;
+            let waiting = fifo.write.wrapping_sub(fifo.read) % fifo.buffer.len() as u16;
+            let on = *(*avr).data.add(UCSR0B.into()) & RXEN0 != 0;
+            if on && waiting >= RECEIVER_BYTES {
+                *(*avr).data.add(UCSR0A.into()) |= DOR0;
+                return false;
+            }
+            // simavr would raise the flag a whole byte later; it is due now.
+            (*uart).cycles_per_byte = 1;
+            simavr::avr_raise_irq(self.input.as_ptr(), byte.into());
+            (*uart).cycles_per_byte = cycles_per_byte(avr);
+        }
+        true
+    }
+
+    /// Gives the receiver a byte without regard to the line's pace or the receiver's room.
+    pub(super) fn flood(&mut self, byte: u8) {
+        // SAFETY: as in `step`.
+        unsafe { simavr::avr_raise_irq(self.input.as_ptr(), byte.into()) };
+    }
+
+    /// The EEPROM's content, as it is left where power goes now.
+    pub(super) fn eeprom(&self) -> Vec<u8> {
+        let mut content = vec![0; EEPROM_BYTES];
+        let mut description =
+            simavr::avr_eeprom_desc_t { ee: content.as_mut_ptr(), offset: 0, size: EEPROM_BYTES as u32 };
+        // SAFETY: `description` names a buffer of the size it gives, and simavr copies into it.
+        unsafe { simavr::avr_ioctl(self.chip.as_ptr(), request(b"eegp"), (&raw mut description).cast()) };
+        if let Some(torn) = self.recorder().eeprom.torn_byte(self.cycle()) {
+            content[torn.address] |= torn.ones;
+        }
+        content
+    }
+
+    /// All of the flash, as the firmware or its bootloader has left it.
+    pub(super) fn flash(&self) -> &[u8] {
+        // SAFETY: simavr owns `flash`, of `flashend + 1` bytes, and changes it only in methods that borrow `self` mutably.
+        unsafe { std::slice::from_raw_parts((*self.chip.as_ptr()).flash, FLASH_BYTES) }
+    }
+
+    /// Cycles of a byte on the serial line, as the chip's UART is set up.
+    pub(super) fn byte_cycles(&self) -> u64 {
+        // SAFETY: as in `cycle`.
+        unsafe { cycles_per_byte(self.chip.as_ptr()) }
+    }
+
+    fn set_eeprom(&mut self, content: &[u8]) {
+        let mut content = content.to_vec();
+        let mut description =
+            simavr::avr_eeprom_desc_t { ee: content.as_mut_ptr(), offset: 0, size: content.len() as u32 };
+        // SAFETY: as in `eeprom`; simavr copies out of it, and refuses what is empty or too long.
+        unsafe { simavr::avr_ioctl(self.chip.as_ptr(), request(b"eesp"), (&raw mut description).cast()) };
+    }
+
+    /// `length` bytes of SRAM from `address`; what lies outside is left out.
+    pub(super) fn sram(&self, address: u16, length: u16) -> &[u8] {
+        let start = address.clamp(SRAM_START, SRAM_END + 1);
+        let end = address.saturating_add(length).clamp(start, SRAM_END + 1);
+        // SAFETY: start and end lie inside `data`, which simavr owns and changes only in methods that borrow `self` mutably.
+        unsafe {
+            let data = (*self.chip.as_ptr()).data;
+            std::slice::from_raw_parts(data.add(start.into()), (end - start).into())
+        }
+    }
+
+    /// Puts bytes into SRAM from `address`; they must fit.
+    pub(super) fn set_sram(&mut self, address: u16, bytes: &[u8]) {
+        assert!(self.sram(address, bytes.len() as u16).len() == bytes.len(), "SRAM is from 0x0100 to 0x08ff");
+        // SAFETY: as in `step`; the bytes fit into SRAM, which lies inside `data`.
+        unsafe {
+            let sram = (*self.chip.as_ptr()).data.add(address.into());
+            ptr::copy_nonoverlapping(bytes.as_ptr(), sram, bytes.len());
+        }
+    }
+
+    /// All of SRAM.
+    pub(super) const SRAM_BYTES: usize = (SRAM_END - SRAM_START + 1) as usize;
+
+    /// The most bytes that the stack has taken, where `static_bytes` of SRAM lie below it for good. Below it SRAM still holds
+    /// one and the same byte, from power-up or from a firmware that painted it at its start. Bytes that were reserved
+    /// but never written are not seen.
+    pub(super) fn deepest_stack(&self, static_bytes: u16) -> usize {
+        let start = SRAM_START.saturating_add(static_bytes);
+        let above = self.sram(start, (SRAM_END + 1).saturating_sub(start));
+        let untouched = above.iter().take_while(|&&byte| byte == above[0]).count();
+        above.len() - untouched
+    }
+}
+
+impl Drop for Core {
+    fn drop(&mut self) {
+        // SAFETY: both were allocated in `new`, the chip by simavr's malloc, which leaves freeing `avr_t` itself to its
+        // maker; nobody uses them after this.
+        unsafe {
+            simavr::avr_terminate(self.chip.as_ptr());
+            libc::free(self.chip.as_ptr().cast());
+            drop(Box::from_raw(self.recorder.as_ptr()));
+        }
+    }
+}
+
+/// simavr's line of a pin.
+///
+/// # Safety
+///
+/// `avr` must be an initialised chip.
+unsafe fn pin_irq(avr: *mut simavr::avr_t, pin: Pin) -> *mut simavr::avr_irq_t {
+    let (port, bit) = pin.port_and_bit();
+    // SAFETY: the caller vouches for `avr`.
+    unsafe { simavr::avr_io_getirq(avr, request(&[b'i', b'o', b'g', port as u8]), bit.into()) }
+}
+
+fn port_index(port: char) -> usize {
+    usize::from(port == 'D')
+}
+
+/// The UART in the chip's list of peripherals.
+fn find_uart(chip: NonNull<simavr::avr_t>) -> NonNull<simavr::avr_uart_t> {
+    // SAFETY: the chip is initialised: its peripherals form a list that ends in null, each with a C string for its kind.
+    // Every peripheral begins with its `avr_io_t`, and only the UART is called so.
+    unsafe {
+        let mut peripheral = (*chip.as_ptr()).io_port;
+        while !peripheral.is_null() && CStr::from_ptr((*peripheral).kind) != c"uart" {
+            peripheral = (*peripheral).next;
+        }
+        NonNull::new(peripheral.cast()).expect("the ATmega328P has a UART")
+    }
+}
+
+/// Keeps the receiver's interrupt asked for while bytes wait in it, as the chip does; simavr asks once a byte's time, and
+/// holds back a firmware that reads faster.
+///
+/// # Safety
+///
+/// `avr` must be an initialised chip, and `uart` its UART.
+unsafe fn hand_over_received(avr: *mut simavr::avr_t, uart: *mut simavr::avr_uart_t) {
+    // SAFETY: the caller vouches for both; UCSR0A is an address inside `data`.
+    unsafe {
+        if (*uart).input.read != (*uart).input.write {
+            (*uart).rx_cnt = 0;
+            if *(*avr).data.add(UCSR0A.into()) & RXC0 != 0 && (*uart).rxc.pending() == 0 {
+                simavr::avr_raise_interrupt(avr, &raw mut (*uart).rxc);
+            }
+        }
+    }
+}

@@ -1,0 +1,126 @@
+//! The EEPROM's time: a byte takes 3.4 ms to write, and is undefined when power goes meanwhile.
+//!
+//! simavr stores a byte the moment it is asked to. Its writer of EECR is replaced by one that lets simavr store it, and then
+//! keeps EEPE set for as long as the chip does (data sheet, 8.4.2); until then EECR takes no other order. A reset lets the
+//! write under way finish (8.4.3). Where power goes, [`TornByte`] says what is left.
+//!
+//! Only writes that erase first are timed (EEPM 00), and the core is not halted for the few cycles after an order.
+
+use std::ffi::c_void;
+use std::ptr::NonNull;
+
+use simavr_ffi as simavr;
+
+use super::recorder::Recorder;
+use super::timer::{FIRST_IO, Writer};
+use signal::CYCLES_PER_SECOND;
+
+/// Cycles of a write (data sheet, table 8-1): the first half erases the byte, the second writes it.
+pub(super) const WRITE_CYCLES: u64 = CYCLES_PER_SECOND * 34 / 10_000;
+
+// Registers by their address in the data space (data sheet, register summary).
+const EECR: u16 = 0x3F;
+const EEARL: u16 = 0x41;
+const EEARH: u16 = 0x42;
+
+/// EECR: read, write, and allow the next write.
+const EERE: u8 = 1 << 0;
+const EEPE: u8 = 1 << 1;
+const EEMPE: u8 = 1 << 2;
+
+/// Bits that a write leaves erased when power goes in its second half. The chip does not say which; what counts is that the
+/// byte is neither the old one nor the new one.
+const STILL_ERASED: u8 = 0b0101_0101;
+
+/// The EEPROM's writer, and the write under way.
+pub(super) struct Eeprom {
+    writer: Writer,
+    write: Option<Write>,
+}
+
+#[derive(Clone, Copy)]
+struct Write {
+    address: usize,
+    begun: u64,
+}
+
+/// A byte whose write was cut off.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct TornByte {
+    /// Its address.
+    pub(super) address: usize,
+    /// Bits that are set in it whatever was to be written: all of them while it is being erased.
+    pub(super) ones: u8,
+}
+
+impl Eeprom {
+    /// Finds a chip's EEPROM.
+    ///
+    /// # Safety
+    ///
+    /// `avr` must be an initialised chip whose writers have not been taken over.
+    pub(super) unsafe fn of(avr: *mut simavr::avr_t) -> Eeprom {
+        // SAFETY: the caller vouches for `avr`.
+        Eeprom { writer: unsafe { Writer::of(avr, EECR) }, write: None }
+    }
+
+    /// What is left of the byte that is being written, where power goes at `cycle`.
+    pub(super) fn torn_byte(&self, cycle: u64) -> Option<TornByte> {
+        let Write { address, begun } = self.write?;
+        let ones = if cycle - begun < WRITE_CYCLES / 2 { 0xFF } else { STILL_ERASED };
+        Some(TornByte { address, ones })
+    }
+
+    /// A reset: the write under way finishes, and EECR is as at power-up.
+    pub(super) fn reset(&mut self) {
+        self.write = None;
+    }
+}
+
+/// Puts this file's writer of EECR in the place of simavr's.
+///
+/// # Safety
+///
+/// The recorder's chip must be initialised, and call nothing once the recorder is gone.
+pub(super) unsafe fn take_over_writes(recorder: NonNull<Recorder>) {
+    // SAFETY: the caller vouches for the recorder and its chip; the address is that of an I/O register.
+    unsafe {
+        let writer = &mut (*recorder.as_ref().chip).io[usize::from(EECR - FIRST_IO)].w;
+        writer.c = Some(on_control_write);
+        writer.param = recorder.as_ptr().cast();
+    }
+}
+
+/// simavr's callback for a write of EECR.
+unsafe extern "C" fn on_control_write(avr: *mut simavr::avr_t, register: u16, value: u8, recorder: *mut c_void) {
+    // SAFETY: `recorder` is what `take_over_writes` registered, alive and not borrowed, and `avr` its chip; the registers are
+    // addresses inside `data`.
+    unsafe {
+        let eeprom = &raw mut (*recorder.cast::<Recorder>()).eeprom;
+        let control = (*avr).data.add(register.into());
+        if (*eeprom).write.is_some() {
+            *control = value & !(EERE | EEMPE) | EEPE;
+            return;
+        }
+        let writes = *control & EEMPE != 0 && value & EEPE != 0;
+        let writer = (*eeprom).writer;
+        writer.write(avr, register, value);
+        if writes {
+            let address = u16::from_le_bytes([*(*avr).data.add(EEARL.into()), *(*avr).data.add(EEARH.into())]);
+            (*eeprom).write = Some(Write { address: address.into(), begun: (*avr).cycle });
+            *control |= EEPE;
+            simavr::avr_cycle_timer_register(avr, WRITE_CYCLES, Some(on_written), recorder);
+        }
+    }
+}
+
+/// simavr's callback at the end of a write.
+unsafe extern "C" fn on_written(avr: *mut simavr::avr_t, _: u64, recorder: *mut c_void) -> u64 {
+    // SAFETY: as in `on_control_write`.
+    unsafe {
+        (*recorder.cast::<Recorder>()).eeprom.write = None;
+        *(*avr).data.add(EECR.into()) &= !EEPE;
+    }
+    // No second time.
+    0
+}

@@ -1,0 +1,217 @@
+//! The firmware as a file: what an ELF holds.
+//!
+//! [`Image`] is an ELF taken apart as a programmer would: what goes into flash and EEPROM, how much memory it takes, and where
+//! its symbols lie. Nothing here builds the firmware, and nothing runs it; [`Uno`](crate::Uno) does.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+use object::read::elf::{ElfFile32, ProgramHeader};
+use object::{Architecture, LittleEndian, Object, ObjectSection, ObjectSymbol, SectionFlags, SymbolKind, elf};
+
+/// Flash of the ATmega328P in bytes (data sheet, section 8.2).
+pub const FLASH_BYTES: usize = 32 * 1024;
+
+/// EEPROM of the ATmega328P in bytes (data sheet, section 8.4).
+pub const EEPROM_BYTES: usize = 1024;
+
+/// Where AVR ELF files place SRAM, EEPROM and what follows it in their single address space.
+const SRAM_ORIGIN: u64 = 0x80_0000;
+const EEPROM_ORIGIN: u64 = 0x81_0000;
+const FUSES_ORIGIN: u64 = 0x82_0000;
+
+/// Memory that a firmware takes, in bytes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Size {
+    /// Flash: code, constants, and the first values of variables (.text, .data).
+    pub flash: u64,
+    /// SRAM that is taken for good (.data, .bss, .noinit); the stack comes on top.
+    pub sram: u64,
+}
+
+impl Size {
+    /// The memory that the ELF at `path` takes, whether or not the chip has it.
+    ///
+    /// # Errors
+    ///
+    /// Where the file cannot be read or is no ELF for AVR.
+    pub fn read(path: &Path) -> Result<Size, ImageError> {
+        let bytes = read_bytes(path)?;
+        parse(path, &bytes).map(|file| size(&file))
+    }
+}
+
+/// Why an ELF could not be read.
+#[derive(Debug, thiserror::Error)]
+pub enum ImageError {
+    /// The file could not be read.
+    #[error("{path} could not be read")]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// The operating system's answer.
+        source: std::io::Error,
+    },
+    /// The file is no ELF, or a broken one.
+    #[error("{path} is not a readable ELF file ({reason}): `cargo firmware` makes one")]
+    NotElf {
+        /// The file.
+        path: PathBuf,
+        /// What was wrong with it.
+        reason: object::Error,
+    },
+    /// The file was made for another processor.
+    #[error("{path} was made for {architecture:?}: an ELF for AVR is needed, `cargo firmware` makes one")]
+    NotAvr {
+        /// The file.
+        path: PathBuf,
+        /// What it was made for.
+        architecture: Architecture,
+    },
+    /// The file holds more than the chip does.
+    #[error("{path} has {end} bytes for the {memory}: the ATmega328P holds {limit}")]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// Which memory.
+        memory: &'static str,
+        /// Address behind the last byte.
+        end: u64,
+        /// The memory's size.
+        limit: usize,
+    },
+}
+
+/// A variable's place in SRAM.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Variable {
+    /// Address in the data space.
+    pub address: u16,
+    /// Size in bytes.
+    pub size: u16,
+}
+
+/// What an ELF holds for the chip; by default nothing.
+#[derive(Clone, Debug, Default)]
+pub struct Image {
+    /// Flash from address 0 to the last byte used.
+    pub flash: Vec<u8>,
+    /// EEPROM from address 0 to the last byte given; usually empty.
+    pub eeprom: Vec<u8>,
+    /// Memory taken.
+    pub size: Size,
+    /// Variables in SRAM by their symbol's name.
+    pub variables: HashMap<String, Variable>,
+    /// Addresses of functions in flash, in bytes, by their symbol's name.
+    pub functions: HashMap<String, u32>,
+}
+
+impl Image {
+    /// Reads the ELF at `path`.
+    ///
+    /// # Errors
+    ///
+    /// Where the file cannot be read, is no ELF for AVR, or holds more than the ATmega328P does.
+    pub fn read(path: &Path) -> Result<Image, ImageError> {
+        let bytes = read_bytes(path)?;
+        let file = parse(path, &bytes)?;
+        let mut flash = Vec::new();
+        let mut eeprom = Vec::new();
+        for header in file.elf_program_headers() {
+            let content = header.data(LittleEndian, &*bytes).unwrap_or_default();
+            if header.p_type(LittleEndian) != elf::PT_LOAD || content.is_empty() {
+                continue;
+            }
+            // The physical address: for .data that is where its first values lie in flash.
+            let (memory, name, start, limit) = match u64::from(header.p_paddr(LittleEndian)) {
+                address @ ..SRAM_ORIGIN => (&mut flash, "flash", address, FLASH_BYTES),
+                address @ EEPROM_ORIGIN..FUSES_ORIGIN => (&mut eeprom, "EEPROM", address - EEPROM_ORIGIN, EEPROM_BYTES),
+                // Fuses and lock bits are not part of what runs.
+                _ => continue,
+            };
+            let end = start + content.len() as u64;
+            if end > limit as u64 {
+                return Err(ImageError::TooLarge { path: path.into(), memory: name, end, limit });
+            }
+            let (start, end) = (start as usize, end as usize);
+            if memory.len() < end {
+                // Erased flash and EEPROM read as 0xFF.
+                memory.resize(end, 0xFF);
+            }
+            memory[start..end].copy_from_slice(content);
+        }
+
+        Ok(Image { flash, eeprom, size: size(&file), variables: variables(&file), functions: functions(&file) })
+    }
+}
+
+fn read_bytes(path: &Path) -> Result<Vec<u8>, ImageError> {
+    std::fs::read(path).map_err(|source| ImageError::Read { path: path.into(), source })
+}
+
+/// Takes the content of the file at `path` for an ELF for AVR.
+fn parse<'data>(path: &Path, bytes: &'data [u8]) -> Result<ElfFile32<'data, LittleEndian>, ImageError> {
+    let not_elf = |reason| ImageError::NotElf { path: path.into(), reason };
+    let architecture = object::File::parse(bytes).map_err(not_elf)?.architecture();
+    if architecture != Architecture::Avr {
+        return Err(ImageError::NotAvr { path: path.into(), architecture });
+    }
+    ElfFile32::parse(bytes).map_err(not_elf)
+}
+
+fn size(file: &ElfFile32<LittleEndian>) -> Size {
+    let mut size = Size { flash: 0, sram: 0 };
+    for section in file.sections() {
+        let SectionFlags::Elf { sh_flags, .. } = section.flags() else {
+            continue;
+        };
+        if !sh_flags.contains(elf::SHF_ALLOC) {
+            continue;
+        }
+        // First values have a place in flash; what a start-up code leaves alone (.noinit) may have some in the file and none there.
+        let is_loaded = file.elf_program_headers().iter().any(|header| {
+            let (start, length) = (header.p_vaddr(LittleEndian), header.p_filesz(LittleEndian));
+            let in_flash = u64::from(header.p_paddr(LittleEndian)) < SRAM_ORIGIN;
+            in_flash && (start..start + length).contains(&(section.address() as u32))
+        });
+        match section.address() {
+            ..SRAM_ORIGIN => size.flash += section.size(),
+            SRAM_ORIGIN..EEPROM_ORIGIN => {
+                size.sram += section.size();
+                if is_loaded {
+                    size.flash += section.size();
+                }
+            }
+            _ => {}
+        }
+    }
+    size
+}
+
+fn variables(file: &ElfFile32<LittleEndian>) -> HashMap<String, Variable> {
+    file.symbols()
+        .filter(|symbol| (SRAM_ORIGIN..EEPROM_ORIGIN).contains(&symbol.address()))
+        .filter_map(|symbol| {
+            let variable = Variable {
+                address: u16::try_from(symbol.address() - SRAM_ORIGIN).ok()?,
+                size: u16::try_from(symbol.size()).ok()?,
+            };
+            Some((name(&symbol)?, variable))
+        })
+        .collect()
+}
+
+fn functions(file: &ElfFile32<LittleEndian>) -> HashMap<String, u32> {
+    file.symbols()
+        .filter(|symbol| symbol.kind() == SymbolKind::Text)
+        .filter_map(|symbol| Some((name(&symbol)?, u32::try_from(symbol.address()).ok()?)))
+        .collect()
+}
+
+/// A symbol's name as its source has it: a Rust path from the crate on, without the compiler's numbers.
+fn name<'data>(symbol: &impl ObjectSymbol<'data>) -> Option<String> {
+    // A local variable's symbol may carry a number behind its mangled name.
+    let mangled = symbol.name().ok()?;
+    let (mangled, _) = mangled.split_once('.').unwrap_or((mangled, ""));
+    Some(format!("{:#}", rustc_demangle::demangle(mangled)))
+}

@@ -1,0 +1,287 @@
+//! Intel HEX, the files that the Arduino tools take: the firmware as one, and a bootloader out of one, or compiled here.
+//!
+//! A bootloader stands at the end of the flash and is started first by every reset; it writes a new firmware where it is sent
+//! one in time, and otherwise starts the one that is there. Its place says how much flash is left for the firmware.
+//! Nothing here runs one: [`crate`] does.
+
+use crate::elf::{FLASH_BYTES, Image, ImageError};
+use files::whole_file;
+use ihex::{Reader, ReaderError, Record};
+use std::io;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use thiserror::Error;
+
+/// Sizes in bytes that the fuses can give the boot section (data sheet, table 27-7).
+const BOOT_SECTION_BYTES: [usize; 4] = [512, 1024, 2048, 4096];
+
+/// Optiboot's source, as Debian's arduino-core-avr brings it along.
+const OPTIBOOT_SOURCE: &str = "/usr/share/arduino/hardware/arduino/avr/bootloaders/optiboot/optiboot.c";
+
+/// Where Optiboot begins: it has the smallest boot section.
+const OPTIBOOT_START: u16 = 0x7E00;
+
+/// Bytes of data in a line, as most tools write them.
+const LINE_BYTES: usize = 16;
+
+/// What is wrong with a file, or with a firmware beside a bootloader.
+#[derive(Debug, Error)]
+pub enum HexError {
+    /// The file could not be read or written.
+    #[error("{path} cannot be {done}")]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// `read` or `written`.
+        done: &'static str,
+        /// The operating system's answer.
+        source: io::Error,
+    },
+    /// The file is not Intel HEX.
+    #[error("{path} is no Intel HEX file: {reason}; take a bootloader's .hex, such as ATmegaBOOT_168_atmega328.hex")]
+    NotHex {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: ReaderError,
+    },
+    /// The file's data do not lie where a bootloader does.
+    #[error(
+        "{path} is no bootloader for the ATmega328P: it fills flash from {start:#06x} to {end:#06x}, and should begin at \
+         0x7000, 0x7800, 0x7c00 or 0x7e00 and end by 0x8000"
+    )]
+    NotABootloader {
+        /// The file.
+        path: PathBuf,
+        /// Address of its first byte.
+        start: usize,
+        /// Address behind its last byte.
+        end: usize,
+    },
+    /// The file has no data.
+    #[error("{0} is empty: take a bootloader's .hex, such as ATmegaBOOT_168_atmega328.hex")]
+    Empty(PathBuf),
+    /// Optiboot could not be compiled.
+    #[error("optiboot cannot be compiled ({0}): ./setup.sh installs avr-gcc and {OPTIBOOT_SOURCE}")]
+    NotCompiled(String),
+    /// What was compiled is no ELF that could be read.
+    #[error(transparent)]
+    Image(#[from] ImageError),
+    /// The firmware is too long to stand before the bootloader.
+    #[error("the firmware takes {bytes} bytes of flash: the bootloader leaves {available}")]
+    NoRoom {
+        /// The firmware's size.
+        bytes: usize,
+        /// What there is.
+        available: usize,
+    },
+}
+
+/// A bootloader for the ATmega328P.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Bootloader {
+    start: u16,
+    code: Vec<u8>,
+}
+
+impl Bootloader {
+    /// Reads a bootloader's Intel HEX file.
+    ///
+    /// # Errors
+    /// Where it cannot be read, is not Intel HEX, or does not lie in the chip's boot section.
+    pub fn read(path: &Path) -> Result<Bootloader, HexError> {
+        let text = std::fs::read_to_string(path).map_err(|source| HexError::File {
+            path: path.into(),
+            done: "read",
+            source,
+        })?;
+        let pieces = pieces(&text).map_err(|reason| HexError::NotHex { path: path.into(), reason })?;
+        let start = pieces.iter().map(|(address, _)| *address).min();
+        let start = start.ok_or_else(|| HexError::Empty(path.into()))?;
+        let end = pieces.iter().map(|(address, bytes)| address + bytes.len()).max().unwrap_or(start);
+        let fits = end <= FLASH_BYTES && BOOT_SECTION_BYTES.contains(&FLASH_BYTES.wrapping_sub(start));
+        let Some(start_address) = u16::try_from(start).ok().filter(|_| fits) else {
+            return Err(HexError::NotABootloader { path: path.into(), start, end });
+        };
+        let mut code = vec![0xFF; end - start];
+        for (address, bytes) in pieces {
+            code[address - start..][..bytes.len()].copy_from_slice(&bytes);
+        }
+        Ok(Bootloader { start: start_address, code })
+    }
+
+    /// Compiles Optiboot, the Uno's own bootloader. The file of it that Debian has ready is longer than its boot section.
+    ///
+    /// # Errors
+    /// Where avr-gcc or the source is missing.
+    pub fn optiboot() -> Result<Bootloader, HexError> {
+        let not_compiled = |reason: &dyn ToString| HexError::NotCompiled(reason.to_string());
+        let elf = tempfile::NamedTempFile::new().map_err(|error| not_compiled(&error))?;
+        let status = Command::new("avr-gcc")
+            .args(["-mmcu=atmega328p", "-DF_CPU=16000000L", "-DBAUD_RATE=115200", "-w", "-Os", "-mrelax", "-nostdlib"])
+            .args(["-fno-split-wide-types", "-fno-inline-small-functions", "-nostartfiles"])
+            .arg(format!("-Wl,--section-start=.text={OPTIBOOT_START:#x}"))
+            .arg("-o")
+            .args([elf.path(), Path::new(OPTIBOOT_SOURCE)])
+            .stdin(Stdio::null())
+            .status()
+            .map_err(|error| not_compiled(&error))?;
+        if !status.success() {
+            return Err(not_compiled(&status));
+        }
+        let code = Image::read(elf.path())?.flash.split_off(OPTIBOOT_START.into());
+        Ok(Bootloader { start: OPTIBOOT_START, code })
+    }
+
+    /// Address of its first byte in flash, from which a reset starts it: the number of bytes that it leaves to the firmware.
+    pub fn start(&self) -> u16 {
+        self.start
+    }
+
+    /// All that goes into flash: the firmware, then erased flash, then the bootloader.
+    ///
+    /// # Errors
+    /// Where the firmware reaches into the bootloader.
+    pub fn behind(&self, firmware: &[u8]) -> Result<Vec<u8>, HexError> {
+        check_room(firmware.len(), self.start.into())?;
+        let mut flash = firmware.to_vec();
+        flash.resize(self.start.into(), 0xFF);
+        flash.extend_from_slice(&self.code);
+        Ok(flash)
+    }
+}
+
+/// Checks that a firmware of so many bytes fits into the flash that a bootloader leaves.
+///
+/// # Errors
+/// Where it does not.
+pub fn check_room(bytes: usize, available: usize) -> Result<(), HexError> {
+    if bytes <= available { Ok(()) } else { Err(HexError::NoRoom { bytes, available }) }
+}
+
+/// Writes what goes into flash from address 0 on as an Intel HEX file.
+///
+/// # Errors
+/// Where the file cannot be written.
+///
+/// # Panics
+/// Where `flash` is longer than the ATmega328P's.
+pub fn write(path: &Path, flash: &[u8]) -> Result<(), HexError> {
+    let text = text(flash);
+    whole_file::write(path, |to| to.write_all(text.as_bytes())).map_err(|source| HexError::File {
+        path: path.into(),
+        done: "written",
+        source,
+    })
+}
+
+/// What goes into flash from address 0 on as Intel HEX.
+///
+/// # Panics
+/// Where `flash` is longer than the ATmega328P's.
+pub fn text(flash: &[u8]) -> String {
+    assert!(flash.len() <= FLASH_BYTES, "the ATmega328P holds {FLASH_BYTES} bytes");
+    let lines = flash.chunks(LINE_BYTES).zip((0..).step_by(LINE_BYTES));
+    let mut records: Vec<Record> =
+        lines.map(|(bytes, offset)| Record::Data { offset, value: bytes.to_vec() }).collect();
+    records.push(Record::EndOfFile);
+    let text = ihex::create_object_file_representation(&records).expect("short lines and one end make a file");
+    text + "\n"
+}
+
+/// The file's stretches of data, each with its address.
+fn pieces(text: &str) -> Result<Vec<(usize, Vec<u8>)>, ReaderError> {
+    let mut base = 0;
+    let mut pieces = Vec::new();
+    for record in Reader::new(text) {
+        match record? {
+            Record::Data { offset, value } => pieces.push((base + usize::from(offset), value)),
+            Record::ExtendedSegmentAddress(segment) => base = usize::from(segment) << 4,
+            Record::ExtendedLinearAddress(upper) => base = usize::from(upper) << 16,
+            // Where a processor of Intel's would start.
+            Record::StartSegmentAddress { .. } | Record::StartLinearAddress(_) | Record::EndOfFile => {}
+        }
+    }
+    Ok(pieces)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A file with these bytes from an address on.
+    fn file(address: u16, bytes: &[u8]) -> tempfile::NamedTempFile {
+        let records = [Record::Data { offset: address, value: bytes.to_vec() }, Record::EndOfFile];
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), ihex::create_object_file_representation(&records).unwrap()).unwrap();
+        file
+    }
+
+    #[test]
+    fn a_bootloader_stands_at_its_address_behind_the_firmware() {
+        let bootloader = Bootloader::read(file(0x7800, &[1, 2, 3]).path()).unwrap();
+        assert_eq!(bootloader.start(), 0x7800);
+        let flash = bootloader.behind(&[9, 8]).unwrap();
+        assert_eq!(flash.len(), 0x7803);
+        assert_eq!((&flash[..3], &flash[0x77FF..]), (&[9, 8, 0xFF][..], &[0xFF, 1, 2, 3][..]));
+    }
+
+    #[test]
+    fn optiboot_is_compiled_into_the_smallest_boot_section() {
+        let optiboot = Bootloader::optiboot().unwrap();
+        assert_eq!(optiboot.start(), 0x7E00);
+        assert!(optiboot.code.len() <= 512, "{} bytes", optiboot.code.len());
+    }
+
+    #[test]
+    fn a_firmware_may_reach_up_to_the_bootloader_and_no_further() {
+        let bootloader = Bootloader::read(file(0x7E00, &[1]).path()).unwrap();
+        assert!(bootloader.behind(&[0; 32_256]).is_ok());
+        let error = bootloader.behind(&[0; 32_257]).unwrap_err().to_string();
+        assert_eq!(error, "the firmware takes 32257 bytes of flash: the bootloader leaves 32256");
+    }
+
+    #[test]
+    fn a_file_that_lies_elsewhere_is_no_bootloader() {
+        for address in [0, 0x7900] {
+            let error = Bootloader::read(file(address, &[1]).path()).unwrap_err().to_string();
+            assert!(error.contains("is no bootloader for the ATmega328P"), "{error}");
+        }
+        let error = Bootloader::read(file(0x7E00, &[1; 255]).path()).map(|bootloader| bootloader.start());
+        assert_eq!(error.unwrap(), 0x7E00);
+        let path = tempfile::NamedTempFile::new().unwrap();
+        let records: Vec<Record> = (0..33)
+            .map(|line| Record::Data { offset: 0x7E00 + line * 16, value: vec![0; 16] })
+            .chain([Record::EndOfFile])
+            .collect();
+        std::fs::write(path.path(), ihex::create_object_file_representation(&records).unwrap()).unwrap();
+        let error = Bootloader::read(path.path()).unwrap_err().to_string();
+        assert!(error.contains("from 0x7e00 to 0x8010"), "{error}");
+    }
+
+    #[test]
+    fn other_files_are_named_with_what_is_wrong() {
+        let path = tempfile::NamedTempFile::new().unwrap();
+        let error = Bootloader::read(path.path()).unwrap_err().to_string();
+        assert!(error.contains("is empty"), "{error}");
+        std::fs::write(path.path(), "no hex\n").unwrap();
+        let error = Bootloader::read(path.path()).unwrap_err().to_string();
+        assert!(error.contains("is no Intel HEX file"), "{error}");
+        let error = Bootloader::read(Path::new("no-such.hex")).unwrap_err().to_string();
+        assert!(error.starts_with("no-such.hex cannot be read"), "{error}");
+    }
+
+    #[test]
+    fn what_is_written_reads_back() {
+        let path = tempfile::NamedTempFile::new().unwrap();
+        let flash: Vec<u8> = (0..=255).cycle().take(1000).collect();
+        write(path.path(), &flash).unwrap();
+        let text = std::fs::read_to_string(path.path()).unwrap();
+        let mut read = Vec::new();
+        for (address, bytes) in pieces(&text).unwrap() {
+            assert_eq!(address, read.len());
+            read.extend(bytes);
+        }
+        assert_eq!(read, flash);
+    }
+}

@@ -1,0 +1,216 @@
+//! Timer1's output A, which drives the servo, where simavr differs from the chip: the pin, OCR1A and TCNT1.
+//!
+//! simavr's writers of OCR1A and TCNT1 are replaced. In fast PWM a new OCR1A only changes what the next bottom plans (data
+//! sheet, 16.9.3), and TCNT1 moves the counter: simavr's own writer does it, but exactly, with the pins disconnected and with the
+//! compare value that the running period began with. In other modes simavr's writers do their work alone.
+//!
+//! The pin's level is the timer's while the two are connected (data sheet, 16.8), whatever stands in PORTB: simavr copies the
+//! level into PORTB, and a firmware that writes back what it read there before an edge would take the edge back.
+//!
+//! Only the non-inverting output A is dealt with. A counter that is set above its top starts at the bottom, as simavr does it.
+
+use std::ffi::c_void;
+use std::ptr::NonNull;
+
+use simavr_ffi as simavr;
+
+use super::recorder::Recorder;
+use signal::Pin;
+
+// Registers by their address in the data space (data sheet, register summary).
+const DDRB: u16 = 0x24;
+const TCCR1A: u16 = 0x80;
+const TCCR1B: u16 = 0x81;
+const TCNT1L: u16 = 0x84;
+const TCNT1H: u16 = 0x85;
+const OCR1AL: u16 = 0x88;
+const OCR1AH: u16 = 0x89;
+
+/// TCCR1A: what output A is connected to; 0 is PORTB.
+const COM1A: u8 = 0b11 << 6;
+/// TCCR1A: the same of both outputs.
+const COM1: u8 = 0b1111 << 4;
+/// TCCR1B: the clock; 0 is none, and above [`LAST_PRESCALER`] it comes from a pin.
+const CS1: u8 = 0b111;
+const LAST_PRESCALER: u8 = 5;
+
+/// Address of the first I/O register, from which simavr counts them.
+pub(super) const FIRST_IO: u16 = 0x20;
+
+/// simavr's function for writes of a register, and its parameter.
+#[derive(Clone, Copy)]
+pub(super) struct Writer {
+    function: simavr::avr_io_write_t,
+    parameter: *mut c_void,
+}
+
+impl Writer {
+    /// # Safety
+    ///
+    /// `avr` must be an initialised chip, and `register` an I/O register.
+    pub(super) unsafe fn of(avr: *mut simavr::avr_t, register: u16) -> Writer {
+        // SAFETY: the caller vouches for both.
+        let write = unsafe { &(*avr).io[usize::from(register - FIRST_IO)].w };
+        Writer { function: write.c, parameter: write.param }
+    }
+
+    /// # Safety
+    ///
+    /// `avr` must be the chip that this writer is of.
+    pub(super) unsafe fn write(self, avr: *mut simavr::avr_t, register: u16, value: u8) {
+        if let Some(function) = self.function {
+            // SAFETY: the caller vouches for `avr`; function and parameter are simavr's own pair.
+            unsafe { function(avr, register, value, self.parameter) };
+        }
+    }
+}
+
+/// Timer1 of a chip.
+pub(super) struct Timer1 {
+    timer: NonNull<simavr::avr_timer_t>,
+    compare_writer: Writer,
+    counter_writer: Writer,
+    output_high: bool,
+    /// Cycles from the running period's bottom to the match of output A; 0 where there is none.
+    running_compare_cycles: u64,
+}
+
+impl Timer1 {
+    /// Finds a chip's Timer1.
+    ///
+    /// # Safety
+    ///
+    /// `avr` must be an initialised chip that outlives the result, and whose writers have not been taken over.
+    pub(super) unsafe fn of(avr: *mut simavr::avr_t) -> Timer1 {
+        // SAFETY: the caller vouches for `avr`.
+        let (compare_writer, counter_writer) = unsafe { (Writer::of(avr, OCR1AL), Writer::of(avr, TCNT1L)) };
+        Timer1 {
+            // The parameter of simavr's writer of TCNT1 is the timer.
+            timer: NonNull::new(counter_writer.parameter.cast()).expect("the ATmega328P has a Timer1"),
+            compare_writer,
+            counter_writer,
+            output_high: false,
+            running_compare_cycles: 0,
+        }
+    }
+
+    /// Takes a level of output A. In fast PWM it rises at the bottom, where OCR1A's buffer takes effect.
+    pub(super) fn output_becomes(&mut self, high: bool) {
+        self.output_high = high;
+        if high {
+            // SAFETY: the timer lives as long as its chip, which outlives `self`, and simavr does not change it meanwhile.
+            self.running_compare_cycles = unsafe { (*self.timer.as_ptr()).comp[0].comp_cycles };
+        }
+    }
+
+    /// Level of the servo's pin, whose bit of PORTB is `port_high`.
+    ///
+    /// # Safety
+    ///
+    /// `avr` must be this timer's chip.
+    pub(super) unsafe fn pin_is_high(&self, avr: *mut simavr::avr_t, port_high: bool) -> bool {
+        // SAFETY: the caller vouches for `avr`; both are addresses inside `data`.
+        let (direction, control) = unsafe { (*(*avr).data.add(DDRB.into()), *(*avr).data.add(TCCR1A.into())) };
+        let is_output = direction & 1 << Pin::D9.port_and_bit().1 != 0;
+        let is_connected = control & COM1A != 0;
+        is_output && if is_connected { self.output_high } else { port_high }
+    }
+
+    /// Stops the timer, as a reset does; simavr's reset leaves its mode and its period.
+    pub(super) fn stop(&mut self) {
+        self.output_high = false;
+        // SAFETY: as in `output_becomes`; nothing else refers to the timer.
+        let timer = unsafe { self.timer.as_mut() };
+        timer.mode = timer.wgm_op[0];
+        timer.wgm_op_mode_kind = timer.mode.kind() as i32;
+        timer.cs_div_value = 0;
+        timer.tov_cycles = 0;
+        timer.tov_top = 0;
+    }
+
+    /// Whether the timer runs from the chip's clock, in fast PWM with a top that is not OCR1A.
+    ///
+    /// # Safety
+    ///
+    /// `avr` must be this timer's chip.
+    unsafe fn is_buffered(&self, avr: *mut simavr::avr_t) -> bool {
+        // SAFETY: the caller vouches for `avr`, and with it for the timer; TCCR1B is an address inside `data`.
+        let (timer, control) = unsafe { (self.timer.as_ref(), *(*avr).data.add(TCCR1B.into())) };
+        (1..=LAST_PRESCALER).contains(&(control & CS1))
+            && timer.wgm_op_mode_kind == simavr::avr_timer_wgm_fast_pwm as i32
+            && timer.mode.top() != simavr::avr_timer_wgm_reg_ocra
+    }
+}
+
+/// Puts this file's writers of OCR1A and TCNT1 in the place of simavr's.
+///
+/// # Safety
+///
+/// The recorder's chip must be initialised, and call nothing once the recorder is gone.
+pub(super) unsafe fn take_over_writes(recorder: NonNull<Recorder>) {
+    // SAFETY: the caller vouches for the recorder and its chip; the addresses are those of I/O registers.
+    unsafe {
+        let io = &mut (*recorder.as_ref().chip).io;
+        io[usize::from(OCR1AL - FIRST_IO)].w.c = Some(on_compare_write);
+        io[usize::from(OCR1AL - FIRST_IO)].w.param = recorder.as_ptr().cast();
+        io[usize::from(TCNT1L - FIRST_IO)].w.c = Some(on_counter_write);
+        io[usize::from(TCNT1L - FIRST_IO)].w.param = recorder.as_ptr().cast();
+    }
+}
+
+/// simavr's callback for a write of OCR1A's low byte; the high byte is in its register.
+unsafe extern "C" fn on_compare_write(avr: *mut simavr::avr_t, register: u16, low: u8, recorder: *mut c_void) {
+    // SAFETY: `recorder` is what `take_over_writes` registered, alive and not borrowed, and `avr` its chip. simavr's writer may
+    // call back, so no reference into the recorder is kept over the call.
+    unsafe {
+        let recorder = recorder.cast::<Recorder>();
+        if !(*recorder).timer.is_buffered(avr) {
+            let writer = (*recorder).timer.compare_writer;
+            return writer.write(avr, register, low);
+        }
+        *(*avr).data.add(register.into()) = low;
+        let compare = u16::from_le_bytes([low, *(*avr).data.add(OCR1AH.into())]);
+        let timer = (*recorder).timer.timer.as_mut();
+        // The match of the running period is planned already; this is what the next bottom plans by.
+        timer.comp[0].comp_cycles = match compare <= timer.tov_top {
+            true => u64::from(timer.cs_div_value) * (u64::from(compare) + 1),
+            false => 0,
+        };
+    }
+}
+
+/// simavr's callback for a write of TCNT1's low byte; the high byte is in its register.
+unsafe extern "C" fn on_counter_write(avr: *mut simavr::avr_t, register: u16, low: u8, recorder: *mut c_void) {
+    // SAFETY: as in `on_compare_write`.
+    unsafe {
+        let recorder = recorder.cast::<Recorder>();
+        let writer = (*recorder).timer.counter_writer;
+        if !(*recorder).timer.is_buffered(avr) {
+            return writer.write(avr, register, low);
+        }
+        let timer = (*recorder).timer.timer.as_ptr();
+        let control = (*avr).data.add(TCCR1A.into());
+        let counter = u16::from_le_bytes([low, *(*avr).data.add(TCNT1H.into())]);
+        let prescaler = u64::from((*timer).cs_div_value);
+        let (cycle, top, next_compare_cycles, connections) =
+            ((*avr).cycle, (*timer).tov_top, (*timer).comp[0].comp_cycles, *control);
+
+        // The prescaler runs on, so that the counter has had its new value since the last timer clock.
+        let since_clock = cycle.wrapping_sub((*timer).tov_base) % prescaler;
+        (*avr).cycle = cycle - since_clock;
+        // simavr divides the period by the top, which is a clock short of it.
+        (*timer).tov_top = top.saturating_add(1);
+        // A match in the clock after the write is blocked (data sheet, 16.7.2), and a lower one is past.
+        let running = (*recorder).timer.running_compare_cycles;
+        let is_ahead = running > prescaler * (u64::from(counter) + 1);
+        (*timer).comp[0].comp_cycles = if is_ahead { running } else { 0 };
+        *control = connections & !COM1;
+        writer.write(avr, register, low);
+
+        *control = connections;
+        (*timer).comp[0].comp_cycles = next_compare_cycles;
+        (*timer).tov_top = top;
+        (*avr).cycle = cycle;
+        (*avr).run_cycle_count = (*avr).run_cycle_count.saturating_sub(since_clock).max(1);
+    }
+}

@@ -1,0 +1,106 @@
+//! Waveform files: what happened on the Uno's pins, as a VCD for PulseView or GTKWave.
+//!
+//! One file holds every wire by its name ([`Wire::name`]), inputs and outputs together. The file counts in
+//! 100 ps, of which a cycle of 62.5 ns is exactly 625, so that [`crate::capture`] reads back the very cycles.
+
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use vcd::{SimulationCommand, TimescaleUnit, Writer};
+
+use files::whole_file;
+use signal::{CYCLES_PER_SECOND, PinChange, Wire};
+
+/// The file's unit of time: 100 ps.
+const UNITS: (u32, TimescaleUnit) = (100, TimescaleUnit::PS);
+
+/// Units of time a cycle.
+const UNITS_PER_CYCLE: u64 = 10_000_000_000 / CYCLES_PER_SECOND;
+
+/// A waveform file that could not be written.
+#[derive(Debug, thiserror::Error)]
+#[error("the waveform {path} could not be written")]
+pub struct WaveformError {
+    /// The file.
+    pub path: PathBuf,
+    /// The operating system's answer.
+    pub source: io::Error,
+}
+
+/// Writes `changes`, in any order, to a VCD file at `path`. Each wire starts at rest; what changes on other pins is left out.
+///
+/// # Errors
+///
+/// Where the file cannot be written.
+pub fn write(path: &Path, wires: &[Wire], changes: impl IntoIterator<Item = PinChange>) -> Result<(), WaveformError> {
+    whole_file::write(path, |to| write_to(to, wires, changes))
+        .map_err(|source| WaveformError { path: path.into(), source })
+}
+
+/// As [`write`], to whatever takes bytes.
+///
+/// # Errors
+///
+/// Those of the writer.
+pub fn write_to(file: impl Write, wires: &[Wire], changes: impl IntoIterator<Item = PinChange>) -> io::Result<()> {
+    let mut changes: Vec<PinChange> = changes.into_iter().collect();
+    changes.sort_by_key(|change| change.cycle);
+    let mut writer = Writer::new(file);
+    writer.timescale(UNITS.0, UNITS.1)?;
+    writer.add_module("uno")?;
+    let mut codes = Vec::new();
+    for wire in wires {
+        codes.push((wire, writer.add_wire(1, wire.name)?));
+    }
+    writer.upscope()?;
+    writer.enddefinitions()?;
+
+    writer.timestamp(0)?;
+    writer.begin(SimulationCommand::Dumpvars)?;
+    for &(wire, code) in &codes {
+        writer.change_scalar(code, wire.high_at_rest)?;
+    }
+    writer.end()?;
+
+    let mut now = 0;
+    for change in changes {
+        if change.cycle != now {
+            now = change.cycle;
+            writer.timestamp(now * UNITS_PER_CYCLE)?;
+        }
+        for &(wire, code) in &codes {
+            if wire.pin == change.pin {
+                writer.change_scalar(code, change.high)?;
+            }
+        }
+    }
+    writer.flush()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use signal::Pin;
+
+    #[test]
+    fn a_cycle_is_a_whole_number_of_the_units() {
+        assert_eq!(UNITS_PER_CYCLE * CYCLES_PER_SECOND, UNITS.1.divisor() / u64::from(UNITS.0));
+    }
+
+    #[test]
+    fn the_file_says_each_pin_by_name_and_each_edge_once() {
+        let mut file = Vec::new();
+        let wires = [
+            Wire { pin: Pin::D8, name: "beam", high_at_rest: true },
+            Wire { pin: Pin::D9, name: "servo", high_at_rest: false },
+        ];
+        let changes = [(8, true), (24_008, false)].map(|(cycle, high)| PinChange { cycle, pin: Pin::D9, high });
+        write_to(&mut file, &wires, changes).unwrap();
+        let file = String::from_utf8(file).unwrap();
+        assert!(file.contains("$timescale 100 ps $end"), "{file}");
+        for wire in wires {
+            assert!(file.contains(&format!(" {} $end", wire.name)), "{file}");
+        }
+        assert!(file.ends_with("#5000\n1\"\n#15005000\n0\"\n"), "{file}");
+    }
+}

@@ -1,0 +1,392 @@
+//! What is proved of small programs in assembly, whose stack and cycles can be counted by hand.
+
+use std::io::Write;
+use std::process::{Command, Stdio};
+use uno::bounds::{Bounds, BoundsError, Budgets, Input, prove};
+
+/// Assembles a program for the ATmega328P and proves its bounds. It begins at `start`; `handler` is INT0's, where there is one,
+/// and `other` Timer0's. A vector that is not used leads to the reset, as avr-libc has it.
+fn try_to_prove(program: &str, input: Option<&Input>) -> Result<Bounds, BoundsError> {
+    let used = |label: &str| if program.contains(&format!("{label}:")) { label.to_owned() } else { "0".to_owned() };
+    let vectors: String = (0..26)
+        .map(|vector| match vector {
+            0 => "jmp start\n".to_owned(),
+            1 => format!("jmp {}\n", used("handler")),
+            16 => format!("jmp {}\n", used("other")),
+            _ => "jmp 0\n".to_owned(),
+        })
+        .collect();
+    let functions: String = (program.lines())
+        .filter_map(|line| line.trim().strip_suffix(':'))
+        .filter(|label| label.parse::<u8>().is_err())
+        .map(|label| format!(".type {label}, @function\n"))
+        .collect();
+    let elf = tempfile::NamedTempFile::new().expect("there is room for a file");
+    let mut gcc = Command::new("avr-gcc")
+        .args(["-mmcu=atmega328p", "-nostdlib", "-x", "assembler", "-", "-o"])
+        .arg(elf.path())
+        .stdin(Stdio::piped())
+        .spawn()
+        .unwrap_or_else(|error| panic!("avr-gcc could not be started ({error}): run ./setup.sh"));
+    let mut source = gcc.stdin.take().expect("it was asked for");
+    writeln!(source, "{functions}{vectors}{program}").expect("avr-gcc reads");
+    drop(source);
+    assert!(gcc.wait().expect("avr-gcc ends").success(), "{program}");
+    prove(elf.path(), input)
+}
+
+#[track_caller]
+fn proved(program: &str) -> Bounds {
+    try_to_prove(program, None).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// The refusal of a program, which has to say this.
+#[track_caller]
+fn assert_refused(program: &str, words: &str) {
+    let error = try_to_prove(program, None).expect_err("it has no bounds").to_string();
+    assert!(error.contains(words), "{error}");
+}
+
+#[test]
+fn a_stack_is_what_is_pushed_and_called_on_the_deepest_path() {
+    let bounds = proved(
+        "start:
+            rcall flat
+            rcall one
+            rjmp start
+        one:
+            push r2
+            rcall two
+            pop r2
+            ret
+        two:
+            push r3
+            push r4
+            pop r4
+            pop r3
+            ret
+        flat:
+            ret",
+    );
+    // Two calls, and three bytes pushed.
+    assert_eq!(bounds.stack_bytes, 7);
+    let frames: Vec<_> = bounds.stack.iter().map(|frame| (frame.function.as_str(), frame.bytes)).collect();
+    assert_eq!(frames, [("reset", 2), ("one", 3), ("two", 2)]);
+}
+
+#[test]
+fn a_jump_into_another_function_is_its_call_at_the_end() {
+    let bounds = proved(
+        "start:\n rcall one\n rjmp start\none:\n push r2\n pop r2\n rjmp two\ntwo:\n push r2\n push r3\n pop r3\n pop r2\n ret",
+    );
+    assert_eq!(bounds.stack_bytes, 4);
+}
+
+#[test]
+fn of_two_paths_that_push_the_deeper_counts() {
+    let bounds = proved(
+        "start:
+            sbrc r24, 0
+            rjmp 1f
+            push r2
+            pop r2
+            rjmp start
+        1:
+            push r2
+            push r3
+            push r4
+            pop r4
+            pop r3
+            pop r2
+            rjmp start",
+    );
+    assert_eq!(bounds.stack_bytes, 3);
+}
+
+#[test]
+fn a_frame_is_made_by_arithmetic_on_the_stack_pointer() {
+    // 300 bytes by two subtractions, as compilers make large frames.
+    let frame = |size: u16, inner: &str| {
+        format!(
+            "in r28, 0x3d\n in r29, 0x3e\n subi r28, lo8({size})\n sbci r29, hi8({size})\n in r0, 0x3f\n cli\n out 0x3e, r29\n \
+             out 0x3f, r0\n out 0x3d, r28\n {inner}\n subi r28, lo8(-{size})\n sbci r29, hi8(-{size})\n in r0, 0x3f\n cli\n \
+             out 0x3e, r29\n out 0x3f, r0\n out 0x3d, r28\n"
+        )
+    };
+    let large = frame(300, "rcall leaf");
+    let bounds = proved(&format!(
+        "start:\n sei\n1: rcall one\n rjmp 1b\none:\n push r28\n push r29\n {large} pop r29\n pop r28\n ret\nleaf:\n ret"
+    ));
+    assert_eq!(bounds.stack_bytes, 2 + 2 + 300 + 2);
+    // `out SPH` and `out SREG` behind `cli`; the instruction in front of them and the one behind join in.
+    assert_eq!((bounds.critical_section_cycles, bounds.closed_cycles), (2, 4));
+}
+
+#[test]
+fn a_function_that_spoils_the_frame_s_pointer_leaves_the_stack_unknown() {
+    assert_refused(
+        "start:\n in r28, 0x3d\n in r29, 0x3e\n rcall spoils\n out 0x3e, r29\n out 0x3d, r28\n rjmp start\nspoils:\n ldi r28, 1\n ret",
+        "start sets the stack pointer to what cannot be followed",
+    );
+}
+
+#[test]
+fn a_handler_comes_in_where_the_stack_is_deepest_with_interrupts_on() {
+    let handler = "handler:\n push r2\n pop r2\n reti";
+    let on = proved(&format!("start:\n sei\n1: push r2\n push r3\n pop r3\n pop r2\n rjmp 1b\n{handler}"));
+    assert_eq!(on.stack_bytes, 2 + 2 + 1);
+    // The deepest place has them off: none comes in there, but one does right before.
+    let off =
+        proved(&format!("start:\n sei\n1: push r2\n cli\n push r3\n pop r3\n sei\n nop\n pop r2\n rjmp 1b\n{handler}"));
+    assert_eq!(off.stack_bytes, 1 + 2 + 1);
+}
+
+#[test]
+fn a_handler_s_time_is_its_longest_path_with_response_and_return() {
+    let bounds = proved(
+        "start:
+            sei
+        1:  rjmp 1b
+        handler:
+            push r24
+            in r24, 0x3f
+            out 0x1e, r24
+            sbic 0x09, 2
+            rjmp 2f
+            lds r24, 0x0100
+            inc r24
+            sts 0x0100, r24
+        2:
+            in r24, 0x1e
+            out 0x3f, r24
+            pop r24
+            reti",
+    );
+    // Response 4, jmp 3; push 2, in, out; sbic skips the jump 2; lds 2, inc 1, sts 2; in, out, pop 2, reti 4.
+    assert_eq!(bounds.handlers.len(), 1, "the vectors that lead to the reset are not used");
+    assert_eq!(bounds.handlers[0].cycles, Some(4 + 3 + 4 + 2 + 5 + 8));
+    assert_eq!(bounds.handlers[0].function, "handler");
+    assert_eq!(bounds.handlers[0].stack_bytes, 3);
+}
+
+#[test]
+fn a_handler_that_jumps_away_for_ever_counts_for_the_stack_and_not_for_the_time() {
+    let bounds = proved(
+        "start:\n sei\n1: rjmp 1b\nhandler:\n sbrc r2, 0\n jmp stalled\n reti\nstalled:\n push r2\n push r3\n rcall waits\nwaits:\n rjmp waits",
+    );
+    // Response 4, jmp 3, sbrc over two words 3, reti 4.
+    assert_eq!(bounds.handlers[0].cycles, Some(14));
+    assert_eq!(bounds.handlers[0].stack_bytes, 2 + 2 + 2);
+}
+
+#[test]
+fn a_nested_critical_section_ends_with_the_outer_one() {
+    let bounds = proved(
+        "start:
+            sei
+        1:  in r18, 0x3f
+            cli
+            rcall inner
+            out 0x3f, r18
+            nop
+            rcall inner
+            rjmp 1b
+        inner:
+            in r19, 0x3f
+            cli
+            nop
+            out 0x3f, r19
+            ret",
+    );
+    // rcall 3, in, cli, nop, out, ret 4, out.
+    assert_eq!(bounds.critical_section_cycles, 3 + 4 + 4 + 1);
+    // `cli` in front of it, `nop` behind it.
+    assert_eq!(bounds.closed_cycles, 1 + 12 + 1);
+}
+
+#[test]
+fn an_instruction_between_two_critical_sections_lets_nothing_in() {
+    let apart = proved("start:\n sei\n1: cli\n nop\n sei\n nop\n cli\n nop\n sei\n rjmp 1b");
+    assert_eq!((apart.critical_section_cycles, apart.closed_cycles), (2, 1 + 2 + 2));
+    // The instruction behind the first `sei` is the second `cli`: both sections are one to whoever waits.
+    let joined = proved("start:\n sei\n1: nop\n cli\n nop\n sei\n cli\n nop\n sei\n rjmp 1b");
+    assert_eq!((joined.critical_section_cycles, joined.closed_cycles), (2, 1 + 2 + 1 + 2 + 2));
+}
+
+#[test]
+fn a_path_that_waits_for_the_reset_is_no_critical_section() {
+    let bounds =
+        proved("start:\n sei\n1: sbrc r2, 0\n rcall gives_up\n cli\n sei\n rjmp 1b\ngives_up:\n cli\n2: wdr\n rjmp 2b");
+    assert_eq!(bounds.critical_section_cycles, 1);
+}
+
+/// INT0's input: one handler reads PIND, and two edges between its looks are told apart.
+const INPUT: fn() -> Input = || Input { vectors: [1].into(), port: 0x29, edges_between_looks: 2 };
+
+#[test]
+fn an_edge_waits_for_the_other_handler_for_a_critical_section_and_for_the_way_to_the_look() {
+    let program = "start:
+            sei
+        1:  nop
+            cli
+            nop
+            nop
+            sei
+            rjmp 1b
+        handler:
+            in r2, 0x09
+            nop
+            reti
+        other:
+            lds r3, 0x0100
+            reti";
+    let edges = try_to_prove(program, Some(&INPUT())).expect("it has bounds").edges.expect("they were asked for");
+    // Synchroniser 3; the other handler 4 + 3 + 2 + 4; cli, nop, nop, sei, rjmp 2; response 4, jmp 3, in 1.
+    assert_eq!(edges.wait_cycles, 3 + 13 + 6 + 8);
+    assert_eq!(edges.never_lost_per_s, 2 * 16_000_000 / 30);
+}
+
+#[test]
+fn an_edge_that_a_handler_does_not_look_at_once_has_no_bound() {
+    let main = "start:\n sei\n1: rjmp 1b\n";
+    let refused = |handler: &str| {
+        try_to_prove(&format!("{main}{handler}"), Some(&INPUT())).expect_err("it has no bound").to_string()
+    };
+    for handler in
+        ["handler:\n reti", "handler:\n in r2, 9\n in r3, 9\n reti", "handler:\n sbrc r2, 0\n in r3, 9\n reti", ""]
+    {
+        assert!(refused(handler).contains("does not read the port at 0x29 exactly once"), "{handler}");
+    }
+    let second = Input { vectors: [16].into(), ..INPUT() };
+    let program = format!("{main}handler:\n reti\nother:\n in r2, 9\n reti");
+    let error = try_to_prove(&program, Some(&second)).expect_err("INT0 goes before it").to_string();
+    assert!(error.contains("vector 1 goes before vector 16"), "{error}");
+}
+
+#[test]
+fn recursion_is_refused_with_its_circle() {
+    assert_refused(
+        "start:\n rcall one\n rjmp start\none:\n rcall two\n ret\ntwo:\n rcall one\n ret",
+        "one, which calls two, which calls one calls itself",
+    );
+}
+
+#[test]
+fn what_is_called_by_an_address_is_refused() {
+    assert_refused("start:\n icall\n rjmp start", "start calls or jumps to an address that it works out");
+    assert_refused("start:\n ijmp", "start calls or jumps to an address that it works out");
+    assert_refused(
+        "start:\n rcall one\n rjmp start\none:\n push r2\n push r3\n ret",
+        "one returns with a stack that is not as it found it",
+    );
+}
+
+#[test]
+fn a_stack_that_grows_in_a_loop_is_refused() {
+    assert_refused("start:\n push r2\n rjmp start", "puts more onto the stack in every turn of a loop");
+    assert_refused("start:\n rcall 1f\n1: rjmp start", "puts more onto the stack in every turn of a loop");
+    assert_refused("start:\n pop r2\n rjmp start", "takes more from the stack than it has put there");
+}
+
+#[test]
+fn a_handler_that_lets_others_in_is_refused() {
+    let main = "start:\n sei\n1: rjmp 1b\n";
+    assert_refused(&format!("{main}handler:\n sei\n nop\n reti"), "the handler of vector 1 turns interrupts on");
+    assert_refused(
+        &format!("{main}handler:\n rcall opens\n reti\nopens:\n sei\n ret"),
+        "the handler of vector 1 turns interrupts on",
+    );
+    assert_refused(
+        &format!("{main}handler:\n lds r2, 0x0100\n out 0x3f, r2\n reti"),
+        "a value that is not a saved SREG",
+    );
+    assert_refused(&format!("{main}handler:\n ret"), "ends a handler by `ret`");
+}
+
+#[test]
+fn a_loop_in_a_handler_or_in_a_critical_section_has_to_have_a_bound() {
+    let looping = "1: dec r24\n brne 1b\n";
+    assert_refused(
+        &format!("start:\n sei\n2: rjmp 2b\nhandler:\n {looping} reti"),
+        "the handler of vector 1 has a loop without a bound",
+    );
+    assert_refused(
+        &format!("start:\n sei\n2: cli\n {looping} sei\n rjmp 2b"),
+        "a stretch without interrupts has a loop without a bound",
+    );
+    // The start-up code may take its time before it turns interrupts on.
+    proved(&format!("start:\n {looping} sei\n2: rjmp 2b"));
+}
+
+/// A record that says how often the program comes by the place right behind it.
+fn at_most(turns: u32) -> String {
+    format!("7: .pushsection .loop_bounds, \"\", @progbits\n .long 7b, {turns}\n .popsection\n")
+}
+
+#[test]
+fn a_loop_that_says_how_often_it_turns_takes_so_many_turns_and_the_way_out() {
+    let handler = |body: &str| format!("start:\n sei\n2: rjmp 2b\nhandler:\n ldi r24, 8\n{body} reti");
+    let cycles = |body: &str| proved(&handler(body)).handlers[0].cycles.expect("it returns");
+    // Response 4, jmp 3, ldi 1, reti 4; eight turns of dec 1 and brne 2, and one more up to the way out, 2.
+    assert_eq!(cycles(&format!("1:\n {} dec r24\n brne 1b\n", at_most(8))), 12 + 8 * 3 + 2);
+    // Three turns of ldi 1, of the inner loop's eight with their way out, and of dec 1 and brne 2; the last one's way out is 1 shorter.
+    let inner = format!("3:\n {} dec r25\n brne 3b\n", at_most(8));
+    let outer = format!("1: ldi r25, 8\n {inner} {} dec r24\n brne 1b\n", at_most(3));
+    assert_eq!(cycles(&outer), 12 + 3 * (1 + 26 + 3) + (1 + 26 + 2));
+}
+
+#[test]
+fn a_record_that_a_turn_can_go_round_bounds_nothing() {
+    let main = "start:\n sei\n2: rjmp 2b\n";
+    let round = format!("1: sbrs r2, 0\n rjmp 3f\n {} nop\n3: dec r24\n brne 1b\n", at_most(8));
+    assert_refused(&format!("{main}handler:\n {round} reti"), "the handler of vector 1 has a loop without a bound");
+    // The inner loop's record says nothing of the outer one.
+    let outer = format!("1: ldi r25, 8\n3:\n {} dec r25\n brne 3b\n dec r24\n brne 1b\n", at_most(8));
+    assert_refused(&format!("{main}handler:\n {outer} reti"), "the handler of vector 1 has a loop without a bound");
+}
+
+#[test]
+fn a_turn_of_the_loop_that_feeds_the_watchdog_has_a_bound_once_every_loop_in_it_has() {
+    let program = |record: &str| {
+        format!(
+            "start:\n sei\n1: wdr\n ldi r24, 8\n rcall waits\n rjmp 1b\nwaits:\n3:\n {record} dec r24\n brne 3b\n ret"
+        )
+    };
+    let turn = proved(&program("")).turn.expect("the watchdog is fed");
+    assert_eq!((turn.cycles, turn.without_bound.len()), (None, 1));
+    assert_eq!(turn.without_bound[0].1, "waits");
+    // wdr 1, ldi 1, rcall 3, eight turns and the way out, ret 4, rjmp 2.
+    let turn = proved(&program(&at_most(8))).turn.expect("the watchdog is fed");
+    assert_eq!(turn.cycles, Some(1 + 1 + 3 + 26 + 4 + 2));
+    assert_eq!(proved("start:\n rjmp start").turn, None);
+}
+
+#[test]
+fn words_that_are_no_instructions_are_refused() {
+    assert_refused("start:\n .word 0xFFFF", "start comes to 0x0068, where there is no instruction");
+    assert_refused("start:\n sei\n1: sleep\n rjmp 1b", "`sleep`");
+}
+
+#[test]
+fn a_bound_over_its_budget_is_told_and_so_is_a_rate_under_it() {
+    let budgets = |stack: u64, rate: u64| {
+        let file = tempfile::NamedTempFile::new().expect("there is room for a file");
+        let text = format!(
+            "stack_bytes = {stack}\nhandler_cycles = 14\ncritical_section_cycles = 0\nloops_without_bound = 0\n\
+             never_lost_per_s = {rate}\n[input]\nvectors = [1]\nport = 0x29\nedges_between_looks = 2\n"
+        );
+        std::fs::write(file.path(), text).expect("it can be written");
+        Budgets::read(file.path()).expect("it is whole")
+    };
+    // A push and an interrupt: 3 bytes of stack. Response 4, jmp 3, in 1, nop 1, reti 4: 13 cycles.
+    let program = "start:\n sei\n1: wdr\n push r2\n pop r2\n rjmp 1b\nhandler:\n in r2, 9\n nop\n reti";
+    let bounds = try_to_prove(program, Some(&INPUT())).expect("it has bounds");
+    let rate = bounds.edges.as_ref().expect("they were asked for").never_lost_per_s;
+    let over = |budgets: Budgets| -> Vec<&str> {
+        budgets.hold(&bounds).iter().filter(|held| !held.keeps).map(|held| held.name).collect()
+    };
+    assert_eq!(over(budgets(3, rate)), [""; 0]);
+    assert_eq!(over(budgets(2, rate + 1)), ["stack_bytes", "never_lost_per_s"]);
+    let error = Budgets::read("no-such.toml".as_ref()).expect_err("there is none").to_string();
+    assert!(error.starts_with("no-such.toml: "), "{error}");
+}
