@@ -58,12 +58,15 @@ if ! command -v rustup >/dev/null; then
     exit 1
 fi
 channel=$(sed -n 's/^channel = "\(.*\)"$/\1/p' rust-toolchain.toml)
+target=$(sed -n 's/^targets = \["\(.*\)"\]$/\1/p' rust-toolchain.toml)
 installed=$(rustup component list --installed --toolchain "$channel" 2>/dev/null || true)
-if grep -q '^rust-src' <<<"$installed" && grep -q '^rustfmt' <<<"$installed" && grep -q '^clippy' <<<"$installed"; then
+is_there() { grep -q "^$1" <<<"$installed"; }
+if is_there rust-src && is_there rustfmt && is_there clippy && is_there "rust-std-$target"; then
     echo "Rust: $channel is there."
 else
     echo "Rust: installing $channel"
-    rustup toolchain install "$channel" --profile minimal --component rust-src --component rustfmt --component clippy
+    rustup toolchain install "$channel" --profile minimal --target "$target" \
+        --component rust-src --component rustfmt --component clippy
 fi
 
 if [ "${1-}" = page ]; then

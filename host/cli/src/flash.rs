@@ -7,7 +7,8 @@ use std::collections::HashSet;
 use std::io::{self, Read, Write};
 use std::path::{self, Path, PathBuf};
 use std::process::{Command, Stdio};
-use uno::elf::{self, Image};
+use trial::firmware;
+use uno::elf::Image;
 use uno::hex;
 
 /// What the user asks of flashing.

@@ -5,7 +5,8 @@ use crate::output::say;
 use anyhow::Result;
 use clap::Args;
 use std::path::PathBuf;
-use uno::elf::{self, Image};
+use trial::firmware;
+use uno::elf::Image;
 use uno::hex;
 
 /// What the user asks of the file.

@@ -1,6 +1,6 @@
 //! What the `weeder` command says to input that is wrong. None of these runs the firmware.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Output};
 
 /// Runs `weeder` with these arguments.

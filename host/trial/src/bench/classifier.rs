@@ -1,6 +1,6 @@
 //! The classifier alone: cycles of a classification, from the bench's ELF.
 //!
-//! The bench (`bench/` in the workspace) raises D13 around each call that it measures: the cycles between the edges are
+//! The bench (`knn/bench/` in the workspace) raises D13 around each call that it measures: the cycles between the edges are
 //! exact. It also compares every answer of the search in flash with a plain search's, and no figure is given where
 //! they differ.
 
