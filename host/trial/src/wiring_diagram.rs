@@ -5,8 +5,7 @@
 //! pixels; what is drawn of a part is what one has to know to wire it, not what it looks like.
 
 use drawing::{INK, Legend, PALE_INK, document, line, paper, rectangle, swatch, tenth, words};
-use field::wiring;
-use field::wiring::{CONNECTIONS, Contact, PullUp};
+use field::wiring::{self, CONNECTIONS, Contact, PullUp};
 use signal::Pin;
 use svg::Document;
 use svg::node::element::{Circle, Group, Path, Rectangle, Text};

@@ -2,7 +2,7 @@
 //!
 //! A bootloader stands at the end of the flash and is started first by every reset; it writes a new firmware where it is sent
 //! one in time, and otherwise starts the one that is there. Its place says how much flash is left for the firmware.
-//! Nothing here runs one: [`crate`] does.
+//! Nothing here runs one: [`Uno`](crate::Uno) does.
 
 use crate::elf::{FLASH_BYTES, Image, ImageError};
 use files::whole_file;

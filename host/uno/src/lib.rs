@@ -1,13 +1,13 @@
 //! The virtual Uno: an ATmega328P at 16 MHz that runs a firmware's real ELF, on simavr.
 //!
-//! It is of use to any firmware for an Uno: it knows pins by their number on the board, and nothing of what is wired to them. [`elf`] and
-//! [`hex`] read and write the files, [`bounds`] proves what a firmware can need at most, [`waveform`] writes down what was on
-//! the pins and [`capture`] reads a recording of them, [`pty`] is a serial port that other programs open. Of outputs D9 and
-//! D13 are recorded; D2 to D13 but for those are inputs; A0 to A5 are not there.
+//! It is of use to any firmware for an Uno: it knows pins by their number on the board, and nothing of what is wired to them. D9 and
+//! D13 are recorded as outputs, the other pins from D2 on are inputs, and A0 to A5 are not there. [`elf`] and [`hex`] read and
+//! write the files, [`bounds`] proves what a firmware can need at most, [`waveform`] writes down what was on the pins,
+//! [`capture`] reads a recording of them, and [`pty`] is a serial port that other programs open.
 //!
-//! [`Uno::boot`] powers it up, [`Uno::wired`] says what is at its pins. [`Uno::set`] and [`Uno::drive`] put levels on its inputs, [`Uno::send`] types into its serial
-//! line, [`Uno::run_until`] lets its clock run; [`Uno::changes`], [`Uno::servo_pulses`] and [`Uno::received`] say what it did. Time
-//! is the chip's own cycle count since the first power-up and goes on over resets; the host's clock plays no part. Every
+//! [`Uno::boot`] powers it up, [`Uno::wired`] says what is at its pins. [`Uno::set`] and [`Uno::drive`] put levels on its inputs,
+//! [`Uno::send`] types into its serial line, [`Uno::run_until`] lets its clock run; [`Uno::changes`], [`Uno::servo_pulses`] and
+//! [`Uno::received`] say what it did. Time is the chip's own cycle count since the first power-up and goes on over resets; the host's clock plays no part. Every
 //! Uno is by itself, so that several can run in parallel threads.
 //!
 //! # What is set right against simavr
@@ -76,7 +76,7 @@ use rand_chacha::ChaCha8Rng;
 use std::collections::VecDeque;
 use std::path::Path;
 
-/// The serial line's bits in a second, both ways (README, serial monitor).
+/// Bits in a second at which a terminal sends, until it is told to follow the chip.
 pub const BAUD: u64 = 115_200;
 
 /// Cycles of a byte that a terminal sends: a start bit, eight data bits and a stop bit.
