@@ -4,7 +4,7 @@
 // The firmware's HEX comes from `cargo firmware`, which has to be run first; WEEDER_HEX names another HEX file.
 
 import { execFileSync } from "node:child_process";
-import { existsSync, mkdirSync, readdirSync, rmSync } from "node:fs";
+import { existsSync, mkdirSync, readdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { join, resolve } from "node:path";
 import { fileURLToPath } from "node:url";
 import { build } from "esbuild";
@@ -25,13 +25,24 @@ function firmware() {
     return "build/weeder.hex";
 }
 
+/** What the manual's table says of alarms and warnings, as a file. */
+function faults() {
+    const rows = readFileSync("../docs/faults.md", "utf8").matchAll(
+        /^\| (?:(\d-\d) )?\| `(\w+)`[^|]*\| ([^|]*) \| [^|]* \| ([^|]*) \|$/gm,
+    );
+    const faults = [...rows].map(([, code = "", name, cause, advice]) => ({ code, name, cause, advice }));
+    mkdirSync("build", { recursive: true });
+    writeFileSync("build/faults.json", JSON.stringify(faults));
+    return "build/faults.json";
+}
+
 /** @type {import("esbuild").BuildOptions} */
 const common = {
     bundle: true,
     target: "es2022",
     // avr8js as modules also for node: its other form looks each function up anew at every call, and takes twice the time.
     mainFields: ["module", "main"],
-    alias: { "weeder.hex": resolve(firmware()) },
+    alias: { "weeder.hex": resolve(firmware()), "faults.json": resolve(faults()) },
     loader: { ".hex": "text" },
 };
 

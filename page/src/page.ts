@@ -1,9 +1,15 @@
-// The page: connects the operator's controls, the drawing and the console to a trial, and lets its time pass.
+// The page: three things to do, and what they share. The panel that stands beside the row in "Try it" is the one that works
+// with a real Uno; it is only connected to another.
 
 import hex from "weeder.hex";
-import { Console } from "./console.ts";
+import { Parts } from "./dom.ts";
+import { Flasher } from "./flasher/flasher.ts";
+import type { Wire } from "./link/session.ts";
+import { Connection } from "./panel/connection.ts";
+import { Panel } from "./panel/panel.ts";
 import { Drawing } from "./try/drawing.ts";
 import { Trial } from "./try/trial.ts";
+import { CYCLES_PER_SECOND } from "./uno/uno.ts";
 
 /** Share of a frame's time that the chip may take: the rest is for the picture, and for the operator's clicks. */
 const CHIP_SHARE = 0.75;
@@ -11,6 +17,8 @@ const CHIP_SHARE = 0.75;
 const LONGEST_FRAME_S = 0.1;
 /** Time over which the pace is measured. */
 const PACE_S = 1;
+/** The things to do, by their sections and the address behind #. */
+const VIEWS = ["try", "work", "flash"] as const;
 
 function find<Kind extends Element>(id: string, kind: new () => Kind): Kind {
     const element = document.getElementById(id);
@@ -18,28 +26,62 @@ function find<Kind extends Element>(id: string, kind: new () => Kind): Kind {
     return element;
 }
 
+/** Puts a text where another was. */
+function write(id: string, text: string): void {
+    const element = find(id, HTMLElement);
+    if (element.textContent !== text) element.textContent = text;
+}
+
 const trial = new Trial(hex, Date.now());
 const drawing = new Drawing(find("drawing", SVGSVGElement), trial);
-const machineConsole = new Console(
-    trial.uno,
-    find("said", HTMLElement),
-    find("line", HTMLFormElement),
-    find("typed", HTMLInputElement),
-);
+const trialPanel = new Panel(find("try-panel", HTMLElement), "try");
+const wire: Wire = {
+    onText: () => {},
+    onEnd: () => {},
+    send: (text) => trial.uno.send(text),
+    close: async () => {},
+};
+trial.onText = (text) => wire.onText(text);
+/** The chip's time: a trial that is slow, or stands still, keeps nobody waiting in vain. */
+const trialMs = () => (trial.uno.cycle / CYCLES_PER_SECOND) * 1000;
+trialPanel.connect(wire, trialMs(), true);
+trialPanel.onHappening = (happening) => {
+    trial.take(happening);
+    // A board without settings says so: its own are right for this machine.
+    if (happening.is === "started" && happening.line.includes("settings_lost")) settleAt = "connected";
+    if (happening.is !== settleAt) return;
+    settleAt = undefined;
+    for (const command of ["save", "clear"]) trialPanel.ask(command).catch(() => {});
+};
+/** What is waited for before the settings are saved. */
+let settleAt: "connected" | undefined;
 
-trial.onText = (text) => {
-    for (const line of machineConsole.hear(text)) {
-        trial.take(line);
-        if (line.includes(" reset by ")) greet(line);
-    }
+const workPanel = new Panel(find("work-panel", HTMLElement), "work");
+const connection = new Connection(new Parts(find("connection", HTMLElement)), workPanel);
+const flasher = new Flasher(find("flash", HTMLElement), hex);
+flasher.onBegin = (port) => connection.release(port);
+flasher.onWork = (port) => {
+    location.hash = "#work";
+    void connection.connect(port);
 };
 
-/** What an operator types to a machine that has just started. */
-function greet(greeting: string): void {
-    machineConsole.type("events on");
-    // A board without settings says so: its own are right for this machine.
-    if (greeting.includes("settings_lost")) for (const command of ["save", "clear"]) machineConsole.type(command);
+/** Shows what is chosen. */
+function choose(): void {
+    const chosen = VIEWS.find((view) => `#${view}` === location.hash) ?? "try";
+    for (const view of VIEWS) find(view, HTMLElement).hidden = view !== chosen;
+    for (const link of document.querySelectorAll("nav a"))
+        link.ariaCurrent = link.getAttribute("href") === `#${chosen}` ? "page" : null;
 }
+globalThis.addEventListener("hashchange", choose);
+choose();
+
+/** Light or dark as the system has it, or light where the sun shines on it. */
+const light = find("light", HTMLButtonElement);
+light.addEventListener("click", () => {
+    const on = light.ariaPressed !== "true";
+    light.ariaPressed = String(on);
+    document.documentElement.classList.toggle("light", on);
+});
 
 /** Shows a slider's value beside it, and does with it what it is for, now and whenever it is moved. */
 function slider(id: string, shown: (value: number) => string, use: (value: number) => void): void {
@@ -88,39 +130,25 @@ slider(
     (slip) => `${slip} %`,
     (slip) => trial.slipBy(slip / 100),
 );
-toggle("work", (on) => trial.work(on));
+toggle("switch", (on) => trial.work(on));
 toggle("torn", (on) => trial.machine.tearBeamWire(on));
 toggle("dead", (on) => trial.machine.killEncoder(on));
 button("brown-out", () => trial.uno.reset("brown-out"));
 button("press-reset", () => trial.uno.reset("external"));
-button("clear", () => machineConsole.type("clear"));
 
 const time = find("time", HTMLSelectElement);
-const work = find("work", HTMLInputElement);
+const workSwitch = find("switch", HTMLInputElement);
 const lamp = find("lamp", HTMLElement);
-const alarm = find("alarm", HTMLElement);
 const hint = find("hint", HTMLElement);
 
-/** Puts a text where another was. */
-function write(id: string, text: string): void {
-    const element = find(id, HTMLElement);
-    if (element.textContent !== text) element.textContent = text;
-}
-
-function show(): void {
+function showTrial(): void {
     const { machine } = trial;
-    write("state", trial.state);
-    write("tool", machine.isWeeding ? "in the row" : machine.isClear ? "out" : "swings");
-    write("rolls", `${(machine.motion.speedMmS(machine.timeS()) * 0.0036).toFixed(1)} km/h`);
-    write("rolled", `${(machine.placeMm / 1000).toFixed(2)} m`);
+    write("true-tool", machine.isWeeding ? "in the row" : machine.isClear ? "out" : "swings");
     lamp.classList.toggle("lit", trial.isLampLit);
     lamp.ariaLabel = trial.isLampLit ? "status lamp, lit" : "status lamp, dark";
-    alarm.hidden = trial.alarm === undefined;
-    const { name = "", code = "" } = trial.alarm ?? {};
-    write("alarm-name", `Alarm ${[...code].join("-")} ${name}`);
-    hint.hidden = !(work.checked && trial.state !== "work");
+    hint.hidden = !(workSwitch.checked && trialPanel.machine.mode !== "work");
     drawing.draw(trial);
-    machineConsole.show();
+    trialPanel.show();
 }
 
 /** How much time passed, on the chip and outside, since the pace was last shown. */
@@ -130,13 +158,17 @@ let lastMs = performance.now();
 function frame(nowMs: number): void {
     const outsideS = Math.min(Math.max((nowMs - lastMs) / 1000, 0), LONGEST_FRAME_S);
     lastMs = nowMs;
-    passed.chipS += trial.advance(outsideS * Number(time.value), outsideS * 1000 * CHIP_SHARE);
-    passed.outsideS += outsideS;
-    if (passed.outsideS > PACE_S) {
-        write("pace", `${(passed.chipS / passed.outsideS).toFixed(2)} x`);
-        passed.chipS = passed.outsideS = 0;
-    }
-    show();
+    // A trial that nobody looks at stands still.
+    if (!find("try", HTMLElement).hidden) {
+        passed.chipS += trial.advance(outsideS * Number(time.value), outsideS * 1000 * CHIP_SHARE);
+        passed.outsideS += outsideS;
+        if (passed.outsideS > PACE_S) {
+            write("pace", `${(passed.chipS / passed.outsideS).toFixed(2)} x`);
+            passed.chipS = passed.outsideS = 0;
+        }
+        trialPanel.turn(trialMs());
+        showTrial();
+    } else if (!find("work", HTMLElement).hidden) workPanel.show();
     requestAnimationFrame(frame);
 }
 

@@ -3,11 +3,12 @@
 // `advance` lets time pass. What the operator does, to the machine or to the row, he may do between two calls. What
 // became of a plant is not said here: `onStep` is where somebody can look on who judges it.
 
+import type { Seen } from "../link/grammar.ts";
+import type { Happening } from "../link/session.ts";
 import { Machine, PIN } from "../row/machine.ts";
 import { Motion, mmS } from "../row/motion.ts";
 import { chance, PLANTING, type Planting, Row, sow } from "../row/row.ts";
 import { CYCLES_PER_SECOND, Uno } from "../uno/uno.ts";
-import { told } from "./told.ts";
 
 /** Ground that lies sown ahead of the beam. */
 const SOWN_AHEAD_MM = 2000;
@@ -40,9 +41,6 @@ export class Trial {
     onStep: (machine: Machine) => void = () => {};
     /** What the firmware sends. */
     onText: (text: string) => void = () => {};
-    /** What the firmware says of itself. */
-    state = "";
-    alarm: { readonly name: string; readonly code: string } | undefined;
     windows: Window[] = [];
     track: TrackPoint[] = [];
     readonly #random: () => number;
@@ -101,46 +99,29 @@ export class Trial {
         return { alongMm: this.machine.toolMm, acrossMm: this.machine.acrossMm };
     }
 
-    /** Takes note of a line that the firmware has said. */
-    take(line: string): void {
-        const event = told(line);
-        switch (event?.is) {
-            case "started":
-                this.#zero = this.machine.ticks;
-                this.windows = [];
-                this.alarm = undefined;
-                this.state = /state (\w+)/.exec(line)?.[1] ?? "";
-                // The greeting has no code.
-                if (this.state === "alarm") this.alarm = { name: /alarm (\w+)/.exec(line)?.[1] ?? "", code: "" };
-                break;
-            case "state":
-                this.state = event.state;
-                if (event.state !== "alarm") this.alarm = undefined;
-                break;
-            case "alarm":
-                this.state = "alarm";
-                this.alarm = event;
-                this.windows = [];
-                break;
-            case "plant":
-            case "unknown":
-                this.windows.push(this.#window(event.pos, event.delay, event.hold));
-                break;
-            default:
+    /** Takes note of what has happened at the console. */
+    take(happening: Happening): void {
+        if (happening.is === "started") {
+            this.#zero = this.machine.ticks;
+            this.windows = [];
         }
+        if (happening.is !== "told") return;
+        const { said } = happening;
+        if (said.is === "alarm") this.windows = [];
+        if (said.is === "object" && said.seen.class !== "weed") this.windows.push(this.#window(said.seen));
     }
 
     /**
      * The ground of a window. The paper's delay and hold are counted from the moment at which the leading edge is in the
      * beam, when the tool is beamToToolMm behind it. Counts become ground as the machine rolls now.
      */
-    #window(pos: number, delay: number, hold: number): Window {
+    #window({ position, delay, hold }: Seen): Window {
         const { machine } = this;
         const { motion, tickMm, dimensions } = machine;
         const timeS = machine.timeS();
         const slipped = motion.groundMmAMm(timeS);
         const ground = (count: number) => machine.placeMm + (count + this.#zero - machine.ticks) * tickMm * slipped;
-        const startMm = ground(pos + delay) - dimensions.beamToToolMm;
+        const startMm = ground(position + delay) - dimensions.beamToToolMm;
         return { startMm, endMm: startMm + hold * tickMm * slipped };
     }
 

@@ -58,3 +58,8 @@ export function readHex(text: string, size: number): Uint8Array {
     }
     throw new HexError("the HEX file has no end: load it anew");
 }
+
+/** How many bytes of a flash a firmware takes: behind them it is erased. */
+export function usedBytes(flash: Uint8Array): number {
+    return flash.findLastIndex((byte) => byte !== 0xff) + 1;
+}

@@ -1,0 +1,10 @@
+// What build.mjs puts in: the firmware, and what the manual says of alarms and warnings.
+declare module "weeder.hex" {
+    const hex: string;
+    export default hex;
+}
+
+declare module "faults.json" {
+    const faults: { code: string; name: string; cause: string; advice: string }[];
+    export default faults;
+}

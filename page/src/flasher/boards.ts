@@ -1,0 +1,17 @@
+// The boards that can be flashed, which differ in their bootloader alone.
+
+export interface Board {
+    readonly id: string;
+    readonly name: string;
+    /** The bootloader's rate in bits a second, and the flash that it leaves to the firmware, of 32 KiB. */
+    readonly baud: number;
+    readonly roomBytes: number;
+    /** Whether its bootloader is the one that came before optiboot. */
+    readonly isOld: boolean;
+}
+
+export const BOARDS: readonly Board[] = [
+    { id: "uno", name: "Arduino Uno", baud: 115_200, roomBytes: 32_256, isOld: false },
+    { id: "nano", name: "Arduino Nano", baud: 115_200, roomBytes: 32_256, isOld: false },
+    { id: "old", name: "Nano or Duemilanove, old bootloader", baud: 57_600, roomBytes: 30_720, isOld: true },
+];

@@ -1,0 +1,189 @@
+// The language of the Uno's bootloader, STK500 version 1, as far as flashing needs it (Atmel's application note AVR061).
+//
+// A command ends in CRC_EOP, its answer begins with INSYNC and ends in OK. The bootloader listens for a second or two after
+// a reset. Addresses are in words. Optiboot and its predecessor erase each page as they write it.
+
+import { type PortError, type SerialLine, wait } from "../link/serial.ts";
+import type { Board } from "./boards.ts";
+
+/** What is wrong with the flashing, and what to do. */
+export class FlashError extends Error {}
+
+/** How far it is. */
+export interface Progress {
+    readonly phase: "waiting" | "writing" | "verifying";
+    /** From 0 to 1. */
+    readonly share: number;
+}
+
+const CRC_EOP = 0x20;
+const INSYNC = 0x14;
+const OK = 0x10;
+const GET_SYNC = 0x30;
+const ENTER_PROGRAMMING = 0x50;
+const LEAVE_PROGRAMMING = 0x51;
+const LOAD_ADDRESS = 0x55;
+const PROGRAM_PAGE = 0x64;
+const READ_PAGE = 0x74;
+const READ_SIGNATURE = 0x75;
+const FLASH = "F".charCodeAt(0);
+
+/** Bytes of a page of flash (data sheet, table 27-13). */
+export const PAGE_BYTES = 128;
+
+/** Who answers: an ATmega328P, and chips that are taken for one. */
+const SIGNATURE = "1e950f";
+const OTHERS: Readonly<Record<string, string>> = {
+    "1e9514": "an ATmega328 without P",
+    "1e9516": "an ATmega328PB",
+    "1e9406": "an ATmega168",
+    "1e940b": "an ATmega168P",
+    "1e9587": "an ATmega32U4, as on a Leonardo or Micro",
+    "1e9801": "an ATmega2560, as on a Mega",
+};
+
+/** Longest time that an answer takes: a page is written in 10 ms, and sent in 27 at 57600 baud. */
+const ANSWER_MS = 1000;
+/** Time between two calls for the bootloader, and calls after a reset: the old one blinks for a second before it listens. */
+const CALL_MS = 150;
+const CALLS = 12;
+/** How often the board is reset for it. */
+const RESETS = 2;
+
+export class Bootloader {
+    readonly #line: SerialLine;
+    readonly #board: Board;
+    #received: number[] = [];
+    #gone: PortError | undefined;
+    #arrived = () => {};
+
+    constructor(line: SerialLine, board: Board) {
+        this.#line = line;
+        this.#board = board;
+        line.onBytes = (bytes) => {
+            // What a device pours out that is no bootloader needs no end.
+            if (this.#received.length < 4096) this.#received.push(...bytes);
+            this.#arrived();
+        };
+        line.onEnd = (why) => {
+            this.#gone = why;
+            this.#arrived();
+        };
+    }
+
+    /** Writes a firmware and reads it back. Throws a FlashError, or a PortError where the line is gone. */
+    async flash(image: Uint8Array, onProgress: (progress: Progress) => void): Promise<void> {
+        onProgress({ phase: "waiting", share: 0 });
+        await this.#call();
+        await this.#expectChip();
+        await this.#command([ENTER_PROGRAMMING], 0);
+        for (let at = 0; at < image.length; at += PAGE_BYTES) {
+            onProgress({ phase: "writing", share: at / image.length });
+            await this.#load(at);
+            const page = image.subarray(at, at + PAGE_BYTES);
+            await this.#command([PROGRAM_PAGE, 0, page.length, FLASH, ...page], 0);
+        }
+        for (let at = 0; at < image.length; at += PAGE_BYTES) {
+            onProgress({ phase: "verifying", share: at / image.length });
+            await this.#load(at);
+            const page = image.subarray(at, at + PAGE_BYTES);
+            const found = await this.#command([READ_PAGE, 0, page.length, FLASH], page.length);
+            const wrong = page.findIndex((byte, index) => byte !== found[index]);
+            if (wrong >= 0)
+                throw new FlashError(
+                    `byte ${at + wrong} reads back as ${found[wrong]}, and ${page[wrong]} was written: flash it again; ` +
+                        "where it stays so, see to the cable and the supply, else the chip's flash is worn out",
+                );
+        }
+        onProgress({ phase: "verifying", share: 1 });
+        await this.#command([LEAVE_PROGRAMMING], 0);
+    }
+
+    /** Resets the board until its bootloader answers. */
+    async #call(): Promise<void> {
+        const heard: number[] = [];
+        for (let reset = 0; reset < RESETS; reset++) {
+            this.#received = [];
+            await this.#line.reset();
+            for (let call = 0; call < CALLS; call++) {
+                heard.push(...this.#received.splice(0));
+                await this.#line.write(Uint8Array.of(GET_SYNC, CRC_EOP));
+                const answer = await this.#take(2, CALL_MS);
+                if (answer?.[0] === INSYNC && answer[1] === OK) {
+                    // Calls that it has not answered yet.
+                    await wait(CALL_MS);
+                    this.#received = [];
+                    return;
+                }
+                heard.push(...(answer ?? []));
+            }
+        }
+        throw new FlashError(this.#whoIsThere(String.fromCharCode(...heard, ...this.#received)));
+    }
+
+    /** Why no bootloader answered, and what to do. */
+    #whoIsThere(heard: string): string {
+        const { baud, isOld } = this.#board;
+        const other = isOld
+            ? "\u201cArduino Uno\u201d or \u201cArduino Nano\u201d"
+            : "the board with the old bootloader";
+        const text = heard.replaceAll(/[^ -~]+/g, " ").trim();
+        if (text.includes("weeder "))
+            return (
+                "the weeder's firmware answers, and no bootloader: the reset did not reach it, or the board has none. " +
+                `Choose ${other}, or press the board's reset at the moment at which you press the button here. ` +
+                "A board without a bootloader is given one by the Arduino IDE and a programmer."
+            );
+        if (text.length > 8 && text.length * 2 > heard.length)
+            return `something else answers at this port: \u201c${text.slice(0, 60)}\u201d. Choose the Uno's port; where it is the Uno's, choose ${other}.`;
+        return (
+            `no bootloader answers at ${baud} baud. Try ${other}; pull D0 and D1 free of other devices; ` +
+            "see that it is the Uno's port that was chosen. A board without a bootloader is given one by the Arduino IDE and a programmer."
+        );
+    }
+
+    async #expectChip(): Promise<void> {
+        const signature = await this.#command([READ_SIGNATURE], 3);
+        const found = signature.map((byte) => byte.toString(16).padStart(2, "0")).join("");
+        if (found === SIGNATURE) return;
+        const chip = OTHERS[found] ?? `a chip that calls itself ${found}`;
+        throw new FlashError(
+            `this board has ${chip}, and the firmware is for the Uno's ATmega328P: nothing was written. Choose an Uno's port.`,
+        );
+    }
+
+    async #load(at: number): Promise<void> {
+        const words = at / 2;
+        await this.#command([LOAD_ADDRESS, words % 256, Math.floor(words / 256)], 0);
+    }
+
+    /** Sends a command and gives back what its answer carries. */
+    async #command(bytes: number[], answerBytes: number): Promise<number[]> {
+        this.#received = [];
+        await this.#line.write(Uint8Array.of(...bytes, CRC_EOP));
+        const answer = await this.#take(answerBytes + 2, ANSWER_MS);
+        if (answer?.[0] === INSYNC && answer.at(-1) === OK) return answer.slice(1, -1);
+        throw new FlashError(
+            "the bootloader fell silent on the way: flash it again; nothing is lost by that. Where it stays so, try another cable, " +
+                "and pull D0 and D1 free of other devices",
+        );
+    }
+
+    /** So many bytes as they come; nothing where they do not come in time. */
+    async #take(count: number, ms: number): Promise<number[] | undefined> {
+        const by = performance.now() + ms;
+        for (;;) {
+            if (this.#received.length >= count) return this.#received.splice(0, count);
+            if (this.#gone) throw this.#gone;
+            const left = by - performance.now();
+            if (left <= 0) return undefined;
+            await new Promise<void>((done) => {
+                const timer = setTimeout(done, left);
+                this.#arrived = () => {
+                    clearTimeout(timer);
+                    done();
+                };
+            });
+        }
+    }
+}

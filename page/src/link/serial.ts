@@ -1,0 +1,177 @@
+// A serial port of the browser (Web Serial), as a line of bytes: open, listen, write, pull the Uno's reset, close.
+//
+// Every failure says its cause and the way out. The browser does not tell a port that is busy from one that may not be
+// opened: both are said then. What comes garbled is lost by the port and ends nothing; a pulled cable does.
+
+import type { Wire } from "./session.ts";
+
+/** What is wrong with a port, and what to do. */
+export class PortError extends Error {}
+
+/** For how long DTR and RTS are let go of, so that the board's capacitor sees an edge, and the wait behind it. */
+const RESET_MS = 250;
+const AFTER_RESET_MS = 50;
+
+/** What can be said where the cable was pulled. */
+const GONE = "the port is gone: its cable was pulled, or the Uno lost its power; plug it in again";
+
+/** Why this browser offers no serial port here, and the way that works; nothing where it does. */
+export function whyNoSerial(): string | undefined {
+    if (globalThis.isSecureContext === false)
+        return (
+            "This page came over plain http, and over that a browser gives no page a serial port. " +
+            "Open the page's folder on the computer that has the Uno at its USB port, or serve it by https or from localhost."
+        );
+    if (!("serial" in navigator))
+        return (
+            "This browser has no Web Serial. Chrome, Edge and Opera have it on a computer: open the page in one of them. " +
+            "Without one, avrdude writes the HEX, and any serial monitor at 115200 baud talks to the machine."
+        );
+    return undefined;
+}
+
+/** Asks the operator for a port; nothing where he chose none. */
+export async function choosePort(): Promise<SerialPort | undefined> {
+    try {
+        return await navigator.serial.requestPort();
+    } catch (error) {
+        if (error instanceof DOMException && error.name === "NotFoundError") return undefined;
+        if (error instanceof DOMException && error.name === "SecurityError")
+            throw new PortError("the browser forbids this page its serial ports: allow them in the site's settings");
+        throw error;
+    }
+}
+
+/** What to say where nobody chose a port. */
+export const NO_PORT_CHOSEN =
+    "No port was chosen. Where the list has no Uno: plug it in, by a cable that carries data and not power alone.";
+
+function whyNotOpened(error: unknown): PortError {
+    const { name, message } = error instanceof Error ? error : { name: "", message: String(error) };
+    if (name === "InvalidStateError")
+        return new PortError("this page has the port open already: disconnect there, then try again");
+    if (name !== "NetworkError")
+        return new PortError(`the port cannot be opened: the browser says \u201c${message}\u201d`);
+    const isLinux = /Linux/.test(navigator.userAgent) && !/Android/.test(navigator.userAgent);
+    return new PortError(
+        "the port cannot be opened. Either another program or another tab has it: close the serial monitor, the Arduino IDE, " +
+            "or whatever else talks to the Uno. " +
+            (isLinux
+                ? "Or you may not open it: `sudo usermod -aG dialout $USER`, then log in anew. "
+                : "Or its driver hangs: ") +
+            "Then pull the cable, plug it in again and choose the port anew.",
+    );
+}
+
+export class SerialLine {
+    onBytes: (bytes: Uint8Array) => void = () => {};
+    /** The line is gone, and why; never called after `close`. */
+    onEnd: (why: PortError) => void = () => {};
+    readonly #port: SerialPort;
+    readonly #writer: WritableStreamDefaultWriter<Uint8Array>;
+    readonly #listening: Promise<void>;
+    #reader: ReadableStreamDefaultReader<Uint8Array> | undefined;
+    #isClosing = false;
+    #closed: Promise<void> | undefined;
+
+    /** Opens a port. Throws a PortError. */
+    static async open(port: SerialPort, baudRate: number): Promise<SerialLine> {
+        try {
+            await port.open({ baudRate, bufferSize: 4096 });
+        } catch (error) {
+            throw whyNotOpened(error);
+        }
+        return new SerialLine(port);
+    }
+
+    private constructor(port: SerialPort) {
+        this.#port = port;
+        if (!port.writable) throw new PortError(GONE);
+        this.#writer = port.writable.getWriter();
+        this.#listening = this.#listen();
+    }
+
+    /** Writes bytes, behind those that were written before. Throws a PortError where the line is gone. */
+    async write(bytes: Uint8Array): Promise<void> {
+        try {
+            await this.#writer.write(bytes);
+        } catch {
+            this.#lose();
+            throw new PortError(GONE);
+        }
+    }
+
+    /** Resets the board, as opening its port does: its bootloader runs then. */
+    async reset(): Promise<void> {
+        const set = async (level: boolean) =>
+            // A port without these lines, as a pseudo terminal is, has to be reset by hand.
+            this.#port.setSignals({ dataTerminalReady: level, requestToSend: level }).catch(() => {});
+        await set(false);
+        await wait(RESET_MS);
+        await set(true);
+        await wait(AFTER_RESET_MS);
+    }
+
+    /** Lets go of the port, so that it can be opened again. */
+    close(): Promise<void> {
+        this.#closed ??= this.#close();
+        return this.#closed;
+    }
+
+    async #close(): Promise<void> {
+        this.#isClosing = true;
+        // What a line that is gone says to these is known.
+        const ignore = () => {};
+        await this.#reader?.cancel().catch(ignore);
+        await this.#listening;
+        this.#writer.releaseLock();
+        await this.#port.close().catch(ignore);
+    }
+
+    async #listen(): Promise<void> {
+        // A framing error ends a stream, and the port has another one then; none where it is gone.
+        while (this.#port.readable && !this.#isClosing) {
+            const reader: ReadableStreamDefaultReader<Uint8Array> = this.#port.readable.getReader();
+            this.#reader = reader;
+            try {
+                for (;;) {
+                    const { value, done } = await reader.read();
+                    if (done) break;
+                    this.onBytes(value);
+                }
+            } catch {
+                // Said by `readable`, as above.
+            } finally {
+                reader.releaseLock();
+                this.#reader = undefined;
+            }
+        }
+        if (!this.#isClosing) this.#lose();
+    }
+
+    #lose(): void {
+        if (this.#isClosing) return;
+        this.#isClosing = true;
+        this.onEnd(new PortError(GONE));
+    }
+}
+
+/** A serial line as a session's wire. */
+export function wireOf(line: SerialLine): Wire {
+    const encoder = new TextEncoder();
+    const wire: Wire = {
+        onText: () => {},
+        onEnd: () => {},
+        // A line that is gone has said so.
+        send: (text) => void line.write(encoder.encode(text)).catch(() => {}),
+        close: () => line.close(),
+    };
+    // A byte is a character: noise is nobody's UTF-8.
+    line.onBytes = (bytes) => wire.onText(String.fromCharCode(...bytes));
+    line.onEnd = ({ message }) => wire.onEnd(message);
+    return wire;
+}
+
+export function wait(ms: number): Promise<void> {
+    return new Promise((done) => setTimeout(done, ms));
+}

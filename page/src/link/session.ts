@@ -1,0 +1,274 @@
+// A session with a machine at the other end of a wire: types commands one at a time, knows whose answer comes, asks for
+// the status in between, and tells what happened.
+//
+// It has no clock of its own: `turn` is called over and over with the wire's time, which for the page's own Uno is the
+// chip's. After every start of the Uno it asks who is there, for settings and examples, and turns the events on. `hold` waits
+// for nobody. A wire that ended ends its session.
+
+import { isTold, read, type Said, type Setting, type Status } from "./grammar.ts";
+import { LineReader } from "./lines.ts";
+
+/** A serial line to a machine. */
+export interface Wire {
+    /** Hears what comes. */
+    onText: (text: string) => void;
+    /** The line is gone, and why; never called after `close`. */
+    onEnd: (why: string) => void;
+    send(text: string): void;
+    close(): Promise<void>;
+}
+
+/** Time between two questions for the status. */
+const POLL_MS = 100;
+/** Time after which an answer is given up: the longest, all examples, takes less than a second. */
+const PATIENCE_MS = 2000;
+/** Time in which the greeting comes after a reset, behind a bootloader: the old ones wait for two seconds. */
+const BOOT_MS = 3000;
+/** How often the firmware's name is asked for again. */
+const TRIES = 1;
+
+/** Something that happened. */
+export type Happening =
+    /** The firmware has started, and says why. */
+    | { is: "started"; line: string }
+    /** The machine is there, and has shown its settings and examples. */
+    | { is: "connected"; version: string; settings: readonly Setting[]; examples: readonly string[] }
+    /** The machine is gone: for good, or until it has started anew. */
+    | { is: "lost"; why: string; forGood: boolean }
+    | { is: "status"; status: Status; line: string }
+    /** The machine told something by itself. */
+    | { is: "told"; said: Said; line: string }
+    | { is: "command"; line: string }
+    | { is: "answer"; line: string }
+    | { is: "settings"; settings: Setting[] }
+    /** What the settings are, by their names. */
+    | { is: "help"; help: Map<string, string> };
+
+/** The machine refused a command: what was wrong, and what would be right. */
+export class Refused extends Error {}
+
+/** There is no machine that answers, and what to do. */
+export class NoMachine extends Error {}
+
+interface Question {
+    readonly command: string;
+    /** Whether the operator asked it. */
+    readonly isTyped: boolean;
+    readonly since: number;
+    readonly answer: string[];
+    readonly done: (answer: string[]) => void;
+    readonly failed: (error: Error) => void;
+}
+
+export class Session {
+    onHappening: (happening: Happening) => void = () => {};
+    /** Whether the machine is there and has said what it is. */
+    isReady = false;
+    readonly #wire: Wire;
+    readonly #lines = new LineReader();
+    /** What was typed and is not answered yet, in the order of the answers. */
+    #asked: Question[] = [];
+    #waiting: Question[] = [];
+    #now = 0;
+    #pollAt = Number.POSITIVE_INFINITY;
+    #ended = false;
+    /** Until when a greeting is waited for. */
+    #greetingBy: number;
+    /** Something that has come and is no weeder's. */
+    #strange = "";
+
+    /** `resets` says whether opening the wire resets the Uno. */
+    constructor(wire: Wire, now: number, resets: boolean) {
+        this.#wire = wire;
+        this.#now = now;
+        this.#greetingBy = resets ? now + BOOT_MS : now;
+        wire.onText = (text) => this.#hear(text);
+        wire.onEnd = (why) => this.#end(why);
+    }
+
+    /** Types a command for the operator when those before it are answered, and gives back its answer without the `ok`. */
+    ask(command: string): Promise<string[]> {
+        return this.#ask(command, true);
+    }
+
+    /** Has the machine hold, before whatever waits: that is dropped. */
+    hold(): void {
+        for (const { failed } of this.#waiting.splice(0)) failed(new Refused("hold came first, so this was not sent"));
+        if (this.#ended) return;
+        const nothing = () => {};
+        this.#send({ command: "hold", isTyped: true, since: this.#now, answer: [], done: nothing, failed: nothing });
+    }
+
+    /** Goes on, at a time. */
+    turn(now: number): void {
+        this.#now = now;
+        if (this.#ended) return;
+        if (now >= this.#greetingBy) {
+            this.#greetingBy = Number.POSITIVE_INFINITY;
+            void this.#begin();
+        }
+        const [oldest] = this.#asked;
+        if (oldest && now - oldest.since > PATIENCE_MS) this.#giveUp(oldest);
+        if (this.#asked.length > 0) return;
+        if (this.#waiting.length === 0 && now >= this.#pollAt) {
+            this.#pollAt = now + POLL_MS;
+            void this.#ask("status", false).catch(() => {});
+        }
+        const next = this.#waiting.shift();
+        if (next) this.#send({ ...next, since: now });
+    }
+
+    /** Ends it, and lets go of the wire, as does a session that ends by itself. */
+    async close(): Promise<void> {
+        this.#end("No machine is connected.");
+        await this.#wire.close();
+    }
+
+    #ask(command: string, isTyped: boolean): Promise<string[]> {
+        return new Promise((done, failed) => {
+            if (this.#ended) failed(new NoMachine("no machine is connected"));
+            else this.#waiting.push({ command, isTyped, since: this.#now, answer: [], done, failed });
+        });
+    }
+
+    #send(question: Question): void {
+        this.#asked.push(question);
+        if (question.isTyped) this.onHappening({ is: "command", line: question.command });
+        this.#wire.send(`${question.command}\n`);
+    }
+
+    /** Asks who is there. */
+    async #begin(): Promise<void> {
+        this.isReady = false;
+        this.#pollAt = Number.POSITIVE_INFINITY;
+        try {
+            const version = await this.#version();
+            const settings = await this.#settings();
+            const examples = await this.#ask("examples", false);
+            await this.#ask("events on", false);
+            this.isReady = true;
+            this.#strange = "";
+            this.onHappening({ is: "connected", version, settings, examples });
+            this.#pollAt = this.#now;
+            await this.#ask("status", false);
+            const help = new Map<string, string>();
+            for (const { name } of settings)
+                for (const line of await this.#ask(`help ${name}`, false)) {
+                    const said = read(line);
+                    if (said.is === "help") help.set(said.name, said.help);
+                }
+            this.onHappening({ is: "help", help });
+        } catch (error) {
+            // A reset begins anew by itself.
+            if (error instanceof Restarted || this.#ended) return;
+            this.#end(error instanceof Error ? error.message : String(error));
+        }
+    }
+
+    async #version(): Promise<string> {
+        // Whatever was typed before ends here, and its answer is nobody's.
+        this.#wire.send("\n");
+        for (let tries = 0; ; tries++)
+            try {
+                for (const line of await this.#ask("version", false)) {
+                    const said = read(line);
+                    if (said.is === "version") return said.version;
+                }
+                throw new NoMachine(this.#whoIsThere());
+            } catch (error) {
+                if (error instanceof Restarted || this.#ended || tries === TRIES) throw error;
+            }
+    }
+
+    async #settings(): Promise<Setting[]> {
+        const settings = (await this.#ask("get", false))
+            .map(read)
+            .flatMap((said) => (said.is === "setting" ? [said.setting] : []));
+        if (settings.length === 0)
+            throw new NoMachine("the firmware shows no settings: flash this page's, and try again");
+        return settings;
+    }
+
+    #giveUp(question: Question): void {
+        this.#asked.shift();
+        const error = new NoMachine(this.#whoIsThere());
+        question.failed(error);
+        if (this.isReady) this.#end(error.message);
+    }
+
+    /** Why no good answer came, and what to do. */
+    #whoIsThere(): string {
+        const strange = [...this.#strange];
+        const unreadable = strange.filter((character) => character === "\u{fffd}").length;
+        if (strange.length === 0)
+            return "nothing answers at this port: choose another, or press the Uno's reset; a new board is to be flashed first";
+        if (unreadable * 4 > strange.length)
+            return "what comes from this port is no text: choose another; on an Uno see that D0 and D1 are free, and flash it anew";
+        return `it is not the weeder's firmware that answers, but \u201c${this.#strange.trim().slice(0, 60)}\u201d: choose another port, or flash this one`;
+    }
+
+    #hear(text: string): void {
+        for (const line of this.#lines.take(text)) this.#take(line);
+    }
+
+    #take(line: string): void {
+        if (this.#ended) return;
+        const said = read(line);
+        if (said.is === "greeting") {
+            this.#restart(line);
+            return;
+        }
+        if (isTold(said)) {
+            this.onHappening({ is: "told", said, line });
+            if (said.is === "calibrated" && said.isSet) void this.#readSettings();
+            return;
+        }
+        const [question] = this.#asked;
+        if (!question || !this.isReady) this.#strange = `${this.#strange} ${line}`.slice(-200);
+        if (!question) return;
+        if (question.isTyped) this.onHappening({ is: "answer", line });
+        if (said.is !== "end") {
+            question.answer.push(line);
+            if (said.is === "status") this.onHappening({ is: "status", status: said.status, line });
+            return;
+        }
+        this.#asked.shift();
+        if (said.error !== undefined) question.failed(new Refused(said.error));
+        else {
+            question.done(question.answer);
+            if (question.isTyped && /^\s*(set|defaults|revert|calibrate|save)\b/.test(question.command))
+                void this.#readSettings();
+            if (question.isTyped && /^\s*events\b/.test(question.command))
+                // The page lives on them.
+                void this.#ask("events on", false).catch(() => {});
+        }
+    }
+
+    /** The Uno has started: nothing that was typed will be answered. */
+    #restart(greeting: string): void {
+        const [asked, waiting] = [this.#asked.splice(0), this.#waiting.splice(0)];
+        if (this.isReady) this.onHappening({ is: "lost", why: "the Uno was reset", forGood: false });
+        this.onHappening({ is: "started", line: greeting });
+        for (const { failed } of [...asked, ...waiting]) failed(new Restarted("the Uno was reset while it was asked"));
+        this.isReady = false;
+        this.#greetingBy = this.#now;
+    }
+
+    async #readSettings(): Promise<void> {
+        const settings = await this.#settings().catch(() => undefined);
+        if (settings) this.onHappening({ is: "settings", settings });
+    }
+
+    #end(why: string): void {
+        if (this.#ended) return;
+        this.#ended = true;
+        this.isReady = false;
+        const error = new NoMachine(why);
+        for (const { failed } of [...this.#asked.splice(0), ...this.#waiting.splice(0)]) failed(error);
+        this.onHappening({ is: "lost", why, forGood: true });
+        void this.#wire.close();
+    }
+}
+
+/** The Uno started anew while it was asked. */
+class Restarted extends Error {}

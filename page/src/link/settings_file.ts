@@ -1,0 +1,49 @@
+// Settings as the TOML file that `weeder settings` reads and writes: help, range and unit stand above each value. What a file
+// does not name is left alone. Of TOML, a file may have what a settings file needs: a key and its value, and comments.
+
+import type { Setting } from "./grammar.ts";
+
+/** What is wrong with a settings file, and what would be right. */
+export class SettingsFileError extends Error {}
+
+/** What a setting may be. */
+export function range({ isSwitched, least, greatest, unit, default: usual }: Setting): string {
+    if (isSwitched) return `true or false, default ${usual === 1}`;
+    return `${least} to ${greatest}${unit && ` ${unit}`}, default ${usual}`;
+}
+
+/** The file that says all these settings. */
+export function write(settings: readonly Setting[], help: ReadonlyMap<string, string>): string {
+    const head =
+        "# Settings of a weeder. `weeder settings push` sends them to the machine, `weeder settings diff` compares.\n" +
+        "# What is not named here is left as it is.\n";
+    const entries = settings.map((setting) => {
+        const value = setting.isSwitched ? setting.value === 1 : setting.value;
+        return `\n# ${help.get(setting.name) ?? ""}\n# ${range(setting)}\n${setting.name} = ${value}\n`;
+    });
+    return head + entries.join("");
+}
+
+/** The values that a file names, by the names of settings. Throws a SettingsFileError. */
+export function parse(text: string, settings: readonly Setting[]): Map<string, number> {
+    const values = new Map<string, number>();
+    for (const [index, line] of text.split(/\r?\n/).entries()) {
+        if (/^\s*(#.*)?$/.test(line)) continue;
+        const refuse = (problem: string) => new SettingsFileError(`line ${index + 1} of the file: ${problem}`);
+        const [, name = "", word = ""] = /^\s*(\w+)\s*=\s*([^\s#]+)\s*(?:#.*)?$/.exec(line) ?? [];
+        if (name === "") throw refuse("it has to be a setting's name, =, and its value");
+        const setting = settings.find((setting) => setting.name === name);
+        if (!setting)
+            throw refuse(`there is no setting ${name}: there are ${settings.map(({ name }) => name).join(", ")}`);
+        if (values.has(name)) throw refuse(`${name} stands there twice`);
+        const value = setting.isSwitched ? ["false", "true"].indexOf(word) : /^\d+$/.test(word) ? Number(word) : -1;
+        if (value < setting.least || value > setting.greatest)
+            throw refuse(
+                `${name} is ${word}: it has to be ${setting.isSwitched ? "" : "a whole number, "}${range(setting)}`,
+            );
+        values.set(name, value);
+    }
+    if (values.size === 0)
+        throw new SettingsFileError("the file names no setting: is it one that `weeder settings pull` has written?");
+    return values;
+}

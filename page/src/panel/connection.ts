@@ -1,0 +1,108 @@
+// The real Uno at the browser's serial port: connected by a button, let go of by one, and taken up again where its cable was
+// pulled and plugged in.
+
+import type { Parts } from "../dom.ts";
+import { choosePort, NO_PORT_CHOSEN, PortError, SerialLine, whyNoSerial, wireOf } from "../link/serial.ts";
+import type { Panel } from "./panel.ts";
+
+/** The firmware's rate. */
+const BAUD = 115_200;
+/** Time between two turns. */
+const TURN_MS = 20;
+
+export class Connection {
+    readonly #parts: Parts;
+    readonly #panel: Panel;
+    #port: SerialPort | undefined;
+    /** Whether the port is open. */
+    #isOpen = false;
+    #isBusy = false;
+
+    constructor(parts: Parts, panel: Panel) {
+        [this.#parts, this.#panel] = [parts, panel];
+        parts.button("connect", () => void this.#choose());
+        parts.button("disconnect", () => void this.disconnect());
+        const why = whyNoSerial();
+        parts.html("no-serial").hidden = why === undefined;
+        parts.write("no-serial", why ?? "");
+        parts.get("connect", HTMLButtonElement).disabled = why !== undefined;
+        if (why !== undefined) return;
+        navigator.serial.addEventListener("connect", ({ target }) => {
+            if (this.#port && !this.#isOpen && (target === this.#port || isAlike(target, this.#port)))
+                void this.connect(target as SerialPort);
+        });
+        panel.onHappening = (happening) => {
+            if (happening.is !== "lost" || !happening.forGood) return;
+            this.#isOpen = false;
+            this.#show();
+        };
+        setInterval(() => panel.turn(performance.now()), TURN_MS);
+        this.#show();
+    }
+
+    /** Whether a machine may be there. */
+    get isOpen(): boolean {
+        return this.#isOpen;
+    }
+
+    /** Opens a port and talks to the machine behind it. */
+    async connect(port: SerialPort): Promise<void> {
+        if (this.#isBusy) return;
+        this.#isBusy = true;
+        try {
+            await this.disconnect();
+            const line = await SerialLine.open(port, BAUD);
+            [this.#port, this.#isOpen] = [port, true];
+            this.#panel.connect(wireOf(line), performance.now(), true);
+            this.#say("");
+        } catch (error) {
+            if (!(error instanceof PortError)) throw error;
+            this.#say(`Not connected: ${error.message}`);
+        } finally {
+            this.#isBusy = false;
+            this.#show();
+        }
+    }
+
+    /** Lets go of the port. */
+    async disconnect(): Promise<void> {
+        this.#port = undefined;
+        if (!this.#isOpen) return;
+        this.#isOpen = false;
+        await this.#panel.disconnect();
+        this.#show();
+    }
+
+    /** Lets go of this port, where it is the one. */
+    async release(port: SerialPort): Promise<void> {
+        if (port === this.#port) await this.disconnect();
+    }
+
+    async #choose(): Promise<void> {
+        try {
+            const port = await choosePort();
+            if (port) await this.connect(port);
+            else this.#say(NO_PORT_CHOSEN);
+        } catch (error) {
+            if (!(error instanceof PortError)) throw error;
+            this.#say(`Not connected: ${error.message}`);
+        }
+    }
+
+    #say(text: string): void {
+        this.#parts.write("connection-said", text.replaceAll("`", ""));
+    }
+
+    #show(): void {
+        this.#parts.html("connect").hidden = this.#isOpen;
+        this.#parts.html("connect-hint").hidden = this.#isOpen;
+        this.#parts.html("disconnect").hidden = !this.#isOpen;
+    }
+}
+
+/** Whether two ports have the same kind of board: a browser may give one that was pulled another object. */
+function isAlike(one: EventTarget | null, other: SerialPort): boolean {
+    if (!one || !("getInfo" in one)) return false;
+    const [a, b] = [(one as SerialPort).getInfo(), other.getInfo()];
+    return a.usbVendorId !== undefined && a.usbVendorId === b.usbVendorId && a.usbProductId === b.usbProductId;
+}

@@ -1,0 +1,55 @@
+// The console: what was typed and what the machine said, line by line, and a line to type to it. It knows nothing of what
+// the words mean.
+
+import { make, type Parts } from "../dom.ts";
+
+/** Lines that are kept. */
+const LINES = 500;
+
+/** Distance from the end, in pixels, up to which the console still follows what is said. */
+const AT_THE_END = 8;
+
+export class Console {
+    readonly #said: HTMLElement;
+    readonly #typed: string[] = [];
+    /** Which of the typed lines the arrow keys are at. */
+    #recalled = 0;
+    #waiting: HTMLElement[] = [];
+
+    /** `type` types a line to the machine. */
+    constructor(parts: Parts, type: (line: string) => void) {
+        this.#said = parts.html("said");
+        const input = parts.get("typed", HTMLInputElement);
+        parts.get("line", HTMLFormElement).addEventListener("submit", (event) => {
+            event.preventDefault();
+            const line = input.value.trim();
+            input.value = "";
+            if (line === "") return;
+            this.#recalled = this.#typed.push(line);
+            type(line);
+        });
+        input.addEventListener("keydown", (event) => {
+            const by = { ArrowUp: -1, ArrowDown: 1 }[event.key];
+            if (by === undefined) return;
+            event.preventDefault();
+            this.#recalled = Math.min(Math.max(this.#recalled + by, 0), this.#typed.length);
+            input.value = this.#typed[this.#recalled] ?? "";
+        });
+    }
+
+    /** Adds a line, of which kind. */
+    add(line: string, kind: "typed" | "error" | "note" | ""): void {
+        this.#waiting.push(make("div", kind, line));
+        if (this.#waiting.length > LINES) this.#waiting.shift();
+    }
+
+    /** Shows what has come since the last time. */
+    show(): void {
+        if (this.#waiting.length === 0) return;
+        const said = this.#said;
+        const follows = said.scrollHeight - said.scrollTop - said.clientHeight < AT_THE_END;
+        said.append(...this.#waiting.splice(0));
+        while (said.childElementCount > LINES) said.firstElementChild?.remove();
+        if (follows) said.scrollTop = said.scrollHeight;
+    }
+}

@@ -1,0 +1,92 @@
+// Teaching: what the last object was, said by two buttons; and the examples that the machine was taught.
+
+import { make, type Parts } from "../dom.ts";
+import { read } from "../link/grammar.ts";
+import { Refused } from "../link/session.ts";
+import type { Machine } from "./machine.ts";
+import type { Ask } from "./panel.ts";
+
+/** Places for examples from the field. */
+const PLACES = 32;
+
+type Label = "plant" | "weed";
+
+export class Examples {
+    readonly #parts: Parts;
+    readonly #machine: Machine;
+    readonly #ask: Ask;
+    /** The label that was refused, and can be insisted on. */
+    #refused: Label | undefined;
+
+    constructor(parts: Parts, machine: Machine, ask: Ask) {
+        [this.#parts, this.#machine, this.#ask] = [parts, machine, ask];
+        parts.button("teach-plant", () => void this.#teach("plant", ""));
+        parts.button("teach-weed", () => void this.#teach("weed", ""));
+        parts.button("teach-force", () => this.#refused && void this.#teach(this.#refused, " force"));
+        parts.button("examples-read", () => void this.#read());
+        parts.button("examples-forget", () => void this.#forget("all"));
+    }
+
+    /** Shows the last object. */
+    show(): void {
+        const [last] = this.#machine.objects;
+        const widthMm = last && Math.round(this.#machine.widthMm(last));
+        this.#parts.write(
+            "last-object",
+            last
+                ? `Last: ${last.class}, ${widthMm} mm wide, ${last.votes} ${last.votes === 1 ? "vote" : "votes"}`
+                : "Nothing was seen yet",
+        );
+    }
+
+    /** Shows the examples as they are known. */
+    showExamples(): void {
+        const field = this.#machine.examples
+            .map(read)
+            .flatMap((said) => (said.is === "example" && said.fromField ? [said] : []));
+        this.#parts.write("examples-count", `${field.length} of ${PLACES} places are taken.`);
+        this.#parts.html("examples-list").replaceChildren(
+            ...field.map(({ number, label }) => {
+                const forget = make("button", "", "Forget");
+                forget.type = "button";
+                forget.ariaLabel = `Forget example ${number}`;
+                forget.addEventListener("click", () => void this.#forget(String(number)));
+                return make("li", "", make("span", "", `${number}: ${label}`), forget);
+            }),
+        );
+        this.#parts.get("examples-forget", HTMLButtonElement).disabled = field.length === 0;
+    }
+
+    async #teach(label: Label, force: string): Promise<void> {
+        this.#refused = undefined;
+        try {
+            await this.#ask(`label ${label}${force}`);
+            this.#say(`Taught: it was a ${label}.`);
+            await this.#read();
+        } catch (error) {
+            this.#say(error instanceof Error ? error.message : String(error));
+            if (error instanceof Refused && error.message.includes("force")) this.#refused = label;
+        }
+        const insist = this.#parts.get("teach-force", HTMLButtonElement);
+        insist.hidden = this.#refused === undefined;
+        insist.textContent = `It is a ${this.#refused ?? label}`;
+    }
+
+    async #forget(which: string): Promise<void> {
+        try {
+            await this.#ask(`forget ${which}`);
+            await this.#read();
+        } catch (error) {
+            this.#say(error instanceof Error ? error.message : String(error));
+        }
+    }
+
+    async #read(): Promise<void> {
+        this.#machine.examples = await this.#ask("examples");
+        this.showExamples();
+    }
+
+    #say(text: string): void {
+        this.#parts.write("teach-said", text);
+    }
+}

@@ -1,0 +1,136 @@
+// The flasher in a real browser: it puts the HEX on a virtual Uno through that one's own bootloader, and says what is wrong where
+// it cannot.
+
+import assert from "node:assert/strict";
+import test, { after, before } from "node:test";
+import type { Browser, Page } from "playwright-core";
+import { close, inspect, launch, open, PHONE } from "./browser.ts";
+import { type Device, Foreign, VirtualUno } from "./ports.ts";
+
+const OPTIBOOT = ["--bootloader", "optiboot"];
+const OLD = ["--bootloader", "/usr/share/arduino/hardware/arduino/avr/bootloaders/atmega/ATmegaBOOT_168_atmega328.hex"];
+
+let browser: Browser;
+
+before(async () => {
+    browser = await launch();
+});
+
+after(() => browser?.close());
+
+/** Presses the button and waits until it can be pressed again; what is said then. */
+async function flash(page: Page): Promise<string> {
+    const button = page.getByRole("button", { name: "Flash it" });
+    await button.click();
+    await page.locator("[data-part=flash-said]:not(:empty)").waitFor();
+    return (await page.locator("[data-part=flash-said]").textContent()) ?? "";
+}
+
+/** What is said where these devices are flashed, one after the other. */
+async function said(device: Device): Promise<string> {
+    const opened = await open(browser, "flash", undefined, [device]);
+    const text = await flash(opened.page);
+    assert.match(text, /^Not flashed: .*\.$/);
+    assert(await opened.page.getByRole("button", { name: "Flash it" }).isEnabled());
+    await close(opened);
+    return text;
+}
+
+test("an Uno with an empty flash is flashed through its bootloader, and is worked with then", async () => {
+    const uno = await VirtualUno.start(...OPTIBOOT);
+    const opened = await open(browser, "flash", PHONE, [uno]);
+    const { page } = opened;
+    const flashing = flash(page);
+    await page.locator("[data-part=phase]", { hasText: /Writing: [1-9]\d* %/ }).waitFor();
+    await inspect(page, "phone-flashing");
+    assert.match(await flashing, /^Done: \d{5} bytes were written and read back in [\d.]+ s\.$/);
+    await inspect(page, "phone-flashed");
+    await page.getByRole("button", { name: "Work with it" }).click();
+    await page.locator("#work-panel [data-part=alarm-name]", { hasText: "5-1 settings_lost" }).waitFor();
+    await close(opened);
+    await uno.stop();
+});
+
+test("an old bootloader is flashed at its own rate, and its fault is told", async () => {
+    const uno = await VirtualUno.start(...OLD);
+    const opened = await open(browser, "flash", undefined, [uno]);
+    await opened.page.getByLabel("Board").selectOption({ label: "Nano or Duemilanove, old bootloader" });
+    assert.match(await flash(opened.page), /^Done: .* signal until power is taken away/);
+    await close(opened);
+    await uno.stop();
+});
+
+test("a cable that is pulled while it is flashed is told, and the same board is flashed when it is back", async () => {
+    const uno = await VirtualUno.start(...OPTIBOOT);
+    const opened = await open(browser, "flash", undefined, [uno]);
+    uno.pullAfterBytes = 5000;
+    assert.match(await flash(opened.page), /^Not flashed: the port is gone: .*plug it in again, and flash it again/);
+    uno.plugIn();
+    await opened.page.getByRole("button", { name: "Flash it" }).click();
+    await opened.page.locator("[data-part=flash-said]", { hasText: "Done" }).waitFor();
+    await close(opened);
+    await uno.stop();
+});
+
+test("a device that babbles is told from an Uno by what it says", async () => {
+    const text = await said(new Foreign(() => [], "$GPGGA,123519,4807.038,N,01131.000,E\r\n"));
+    assert.match(text, /something else answers at this port: \u201c\$GPGGA,123519/);
+});
+
+test("a port at which nothing answers is told with what to try", async () => {
+    assert.match(await said(new Foreign(() => [])), /no bootloader answers at 115200 baud.*old bootloader.*D0 and D1/);
+});
+
+test("the firmware without a bootloader is known by its greeting", async () => {
+    const text = await said(new Foreign(() => [], "weeder 0.1.0, reset by power_on, state hold, tool out\r\n"));
+    assert.match(text, /the weeder's firmware answers, and no bootloader.*press the board's reset/);
+});
+
+test("another chip is named, and nothing is written to it", async () => {
+    const commands: number[] = [];
+    const mega = new Foreign(([command = 0]) => {
+        commands.push(command);
+        return command === 0x75 ? [0x14, 0x1e, 0x98, 0x01, 0x10] : [0x14, 0x10];
+    });
+    assert.match(await said(mega), /this board has an ATmega2560, as on a Mega, .*nothing was written/);
+    assert.deepEqual(
+        commands.filter((command) => command !== 0x30 && command !== 0x75),
+        [],
+    );
+});
+
+test("a byte that reads back wrong is told", async () => {
+    const worn = new Foreign(([command = 0]) => {
+        if (command === 0x75) return [0x14, 0x1e, 0x95, 0x0f, 0x10];
+        return command === 0x74 ? [0x14, ...new Array(128).fill(0), 0x10] : [0x14, 0x10];
+    });
+    assert.match(await said(worn), /byte \d+ reads back as 0, and \d+ was written: flash it again/);
+});
+
+test("a port that cannot be opened is told with both causes, as the browser tells neither", async () => {
+    const refuses = { name: "NetworkError", message: "Failed to open serial port." };
+    const text = await said(new Foreign(() => [], "", refuses));
+    assert.match(text, /another program or another tab has it: close the serial monitor.*usermod -aG dialout/);
+});
+
+test("where no port is chosen, the way to one is told", async () => {
+    const opened = await open(browser, "flash", undefined, []);
+    assert.match(await flash(opened.page), /No port was chosen.*a cable that carries data/);
+    await close(opened);
+});
+
+test("a browser without Web Serial is told so, with the HEX and the command that works there", async () => {
+    const page = await browser.newPage({ viewport: PHONE });
+    await page.addInitScript(() => {
+        // As in Firefox and Safari.
+        Reflect.deleteProperty(Navigator.prototype, "serial");
+    });
+    await page.goto(new URL("dist/index.html#flash", `file://${process.cwd()}/`).href);
+    await page.getByText("This browser has no Web Serial.").first().waitFor();
+    assert(await page.getByRole("button", { name: "Flash it" }).isDisabled());
+    const download = page.waitForEvent("download");
+    await page.getByRole("button", { name: "Save the HEX as a file" }).click();
+    assert.equal((await download).suggestedFilename(), "weeder.hex");
+    await inspect(page, "phone-no-serial");
+    await page.close();
+});

@@ -1,0 +1,272 @@
+// Serial ports for the page: what stands in `navigator.serial`'s place, and the devices at their other ends.
+//
+// The page's side behaves as Chromium's: one opening at a time, streams that fail when the device is lost, `readable` null from
+// then on. Its bytes go through the browser's driver to a device in this process: the virtual Uno's pseudo terminal, or something
+// that is no Uno.
+
+import { type ChildProcess, spawn } from "node:child_process";
+import { closeSync, constants, existsSync, mkdtempSync, openSync, readSync, rmSync, writeSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join, resolve } from "node:path";
+import { setTimeout as wait } from "node:timers/promises";
+import type { Page } from "playwright-core";
+
+/** What is at the other end of a port. */
+export interface Device {
+    /** Why it cannot be opened: the browser's error, by name and message. */
+    readonly refuses?: { name: string; message: string };
+    open(): void;
+    /** The modem lines were let go of and taken again: an Uno is reset by that. */
+    reset(): void;
+    write(bytes: Uint8Array): void;
+    /** What has come since the last time; nothing where the device is gone. */
+    read(): Uint8Array | undefined;
+    close(): void;
+}
+
+/** Time between two looks at a device. */
+const LOOK_MS = 2;
+
+/** The virtual Uno, `weeder virtual-uno`, at its pseudo terminal. */
+export class VirtualUno implements Device {
+    readonly path: string;
+    /** Bytes that the page has written to it, after which the cable is pulled. */
+    pullAfterBytes = Number.POSITIVE_INFINITY;
+    written = 0;
+    readonly #folder: string;
+    readonly #process: ChildProcess;
+    #fd: number | undefined;
+    #isPulled = false;
+
+    private constructor(folder: string, process: ChildProcess) {
+        this.#folder = folder;
+        this.#process = process;
+        this.path = join(folder, "uno");
+    }
+
+    /** Starts one, with further options. */
+    static async start(...options: string[]): Promise<VirtualUno> {
+        const weeder = process.env.WEEDER ?? resolve("../target/debug/weeder");
+        if (!existsSync(weeder))
+            throw new Error(`${weeder} is not there: \`cargo build -p weeder-cli\` makes it, or name it in WEEDER`);
+        const folder = mkdtempSync(join(tmpdir(), "weeder-page-"));
+        const child = spawn(weeder, ["virtual-uno", "--link", join(folder, "uno"), ...options], {
+            stdio: ["ignore", "ignore", "pipe"],
+        });
+        let said = "";
+        child.stderr?.on("data", (text) => {
+            said += text;
+        });
+        const uno = new VirtualUno(folder, child);
+        for (let waited = 0; !existsSync(uno.path); waited += 50) {
+            if (child.exitCode !== null || waited > 60_000) throw new Error(`the virtual Uno does not start: ${said}`);
+            await wait(50);
+        }
+        return uno;
+    }
+
+    open(): void {
+        this.#fd = openSync(this.path, constants.O_RDWR | constants.O_NOCTTY | constants.O_NONBLOCK);
+    }
+
+    reset(): void {
+        // A pseudo terminal has no modem lines: opening it is what resets.
+        this.close();
+        this.open();
+    }
+
+    write(bytes: Uint8Array): void {
+        this.written += bytes.length;
+        if (this.written > this.pullAfterBytes) this.pull();
+        if (this.#fd !== undefined) writeSync(this.#fd, bytes);
+    }
+
+    read(): Uint8Array | undefined {
+        if (this.#isPulled) return undefined;
+        const buffer = new Uint8Array(4096);
+        try {
+            return buffer.subarray(0, this.#fd === undefined ? 0 : readSync(this.#fd, buffer));
+        } catch (error) {
+            if ((error as NodeJS.ErrnoException).code === "EAGAIN") return new Uint8Array();
+            throw error;
+        }
+    }
+
+    close(): void {
+        if (this.#fd !== undefined) closeSync(this.#fd);
+        this.#fd = undefined;
+    }
+
+    /** Pulls its cable. */
+    pull(): void {
+        this.#isPulled = true;
+        this.close();
+    }
+
+    /** Plugs it in again. */
+    plugIn(): void {
+        this.#isPulled = false;
+        this.pullAfterBytes = Number.POSITIVE_INFINITY;
+    }
+
+    async stop(): Promise<void> {
+        this.close();
+        const ended = new Promise((done) => this.#process.once("exit", done));
+        this.#process.kill();
+        await ended;
+        rmSync(this.#folder, { recursive: true });
+    }
+}
+
+/** Something that is no Uno: answers what it is sent by bytes of its own, and pours out others by itself. */
+export class Foreign implements Device {
+    readonly refuses?: { name: string; message: string };
+    readonly #answer: (bytes: Uint8Array) => number[];
+    readonly #babble: string;
+    #waiting: number[] = [];
+
+    constructor(answer: (bytes: Uint8Array) => number[], babble = "", refuses?: { name: string; message: string }) {
+        this.#answer = answer;
+        this.#babble = babble;
+        if (refuses) this.refuses = refuses;
+    }
+
+    open(): void {}
+    reset(): void {}
+    close(): void {}
+
+    write(bytes: Uint8Array): void {
+        this.#waiting.push(...this.#answer(bytes), ...Buffer.from(this.#babble));
+    }
+
+    read(): Uint8Array {
+        return Uint8Array.from(this.#waiting.splice(0));
+    }
+}
+
+/** Puts ports with these devices in `navigator.serial`'s place, from which the operator chooses one after the other. */
+export async function offerPorts(page: Page, devices: Device[]): Promise<void> {
+    const device = (index: number) => {
+        const device = devices[index];
+        if (!device) throw new Error(`there is no port ${index}`);
+        return device;
+    };
+    await page.exposeFunction("deviceOpen", (index: number) => {
+        const { refuses } = device(index);
+        if (!refuses) device(index).open();
+        return refuses;
+    });
+    await page.exposeFunction("deviceReset", (index: number) => device(index).reset());
+    await page.exposeFunction("deviceClose", (index: number) => device(index).close());
+    await page.exposeFunction("deviceWrite", (index: number, bytes: number[]) =>
+        device(index).write(Uint8Array.from(bytes)),
+    );
+    // Waits a while for something to come; nothing where the device is gone.
+    await page.exposeFunction("deviceRead", async (index: number) => {
+        for (let looks = 0; ; looks++) {
+            const bytes = device(index).read();
+            if (!bytes) return null;
+            if (bytes.length > 0 || looks > 50) return [...bytes];
+            await wait(LOOK_MS);
+        }
+    });
+    await page.addInitScript(putPorts, devices.length);
+}
+
+/** What `exposeFunction` puts into the page. */
+interface Bridge {
+    deviceOpen(index: number): Promise<{ name: string; message: string } | undefined>;
+    deviceReset(index: number): Promise<void>;
+    deviceClose(index: number): Promise<void>;
+    deviceWrite(index: number, bytes: number[]): Promise<void>;
+    deviceRead(index: number): Promise<number[] | null>;
+}
+
+/** Runs in the page, before its own code, and is sent there as text: it uses nothing from outside. */
+function putPorts(count: number): void {
+    const bridge = globalThis as unknown as Bridge;
+
+    class Port extends EventTarget {
+        readable: ReadableStream<Uint8Array> | null = null;
+        writable: WritableStream<Uint8Array> | null = null;
+        #isOpen = false;
+        #lines = false;
+        readonly #index: number;
+
+        constructor(index: number) {
+            super();
+            this.#index = index;
+        }
+
+        getInfo() {
+            return { usbVendorId: 0x2341, usbProductId: 0x43 };
+        }
+
+        async open({ baudRate }: { baudRate: number }) {
+            if (!(baudRate > 0)) throw new TypeError("Requested baud rate must be greater than zero");
+            if (this.#isOpen) throw new DOMException("The port is already open.", "InvalidStateError");
+            const refuses = await bridge.deviceOpen(this.#index);
+            if (refuses) throw new DOMException(refuses.message, refuses.name);
+            this.#isOpen = true;
+            this.#listen();
+            this.writable = new WritableStream({
+                write: async (bytes) => {
+                    if (!this.#isOpen) throw new DOMException("The device has been lost.", "NetworkError");
+                    await bridge.deviceWrite(this.#index, [...bytes]);
+                },
+            });
+        }
+
+        #listen() {
+            this.readable = new ReadableStream({
+                pull: async (controller) => {
+                    for (;;) {
+                        const bytes = await bridge.deviceRead(this.#index);
+                        if (!this.#isOpen) return;
+                        if (bytes === null) {
+                            this.#isOpen = false;
+                            this.readable = null;
+                            this.writable = null;
+                            controller.error(new DOMException("The device has been lost.", "NetworkError"));
+                            return;
+                        }
+                        if (bytes.length === 0) continue;
+                        controller.enqueue(Uint8Array.from(bytes));
+                        return;
+                    }
+                },
+                cancel: () => {
+                    if (this.#isOpen) this.#listen();
+                },
+            });
+        }
+
+        async setSignals({ dataTerminalReady = false }) {
+            if (!this.#isOpen) throw new DOMException("The port is closed.", "InvalidStateError");
+            if (dataTerminalReady && !this.#lines) await bridge.deviceReset(this.#index);
+            this.#lines = dataTerminalReady;
+        }
+
+        async close() {
+            if (this.readable?.locked || this.writable?.locked) throw new TypeError("Cannot close a locked stream");
+            this.#isOpen = false;
+            this.readable = null;
+            this.writable = null;
+            await bridge.deviceClose(this.#index);
+        }
+    }
+
+    class Ports extends EventTarget {
+        readonly ports = Array.from({ length: count }, (_, index) => new Port(index));
+        /** How often the operator has chosen. */
+        chosen = 0;
+
+        async requestPort() {
+            const port = this.ports[this.chosen++ % (count || 1)];
+            if (!port) throw new DOMException("No port selected by the user.", "NotFoundError");
+            return port;
+        }
+    }
+
+    Object.defineProperty(navigator, "serial", { value: new Ports() });
+}
