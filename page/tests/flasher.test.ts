@@ -36,8 +36,8 @@ async function said(device: Device): Promise<string> {
     return text;
 }
 
-test("an Uno with an empty flash is flashed through its bootloader, and is worked with then", async () => {
-    const uno = await VirtualUno.start(...OPTIBOOT);
+test("an Uno with an empty flash is flashed through its bootloader, and is worked with then", async (test) => {
+    const uno = await VirtualUno.start(test, ...OPTIBOOT);
     const opened = await open(browser, "flash", PHONE, [uno]);
     const { page } = opened;
     const flashing = flash(page);
@@ -48,20 +48,18 @@ test("an Uno with an empty flash is flashed through its bootloader, and is worke
     await page.getByRole("button", { name: "Work with it" }).click();
     await page.locator("#work-panel [data-part=alarm-name]", { hasText: "5-1 settings_lost" }).waitFor();
     await close(opened);
-    await uno.stop();
 });
 
-test("an old bootloader is flashed at its own rate, and its fault is told", async () => {
-    const uno = await VirtualUno.start(...OLD);
+test("an old bootloader is flashed at its own rate, and its fault is told", async (test) => {
+    const uno = await VirtualUno.start(test, ...OLD);
     const opened = await open(browser, "flash", undefined, [uno]);
     await opened.page.getByLabel("Board").selectOption({ label: "Nano or Duemilanove, old bootloader" });
     assert.match(await flash(opened.page), /^Done: .* signal until power is taken away/);
     await close(opened);
-    await uno.stop();
 });
 
-test("a cable that is pulled while it is flashed is told, and the same board is flashed when it is back", async () => {
-    const uno = await VirtualUno.start(...OPTIBOOT);
+test("a cable that is pulled while it is flashed is told, and the same board is flashed when it is back", async (test) => {
+    const uno = await VirtualUno.start(test, ...OPTIBOOT);
     const opened = await open(browser, "flash", undefined, [uno]);
     uno.pullAfterBytes = 5000;
     assert.match(await flash(opened.page), /^Not flashed: the port is gone: .*plug it in again, and flash it again/);
@@ -69,7 +67,6 @@ test("a cable that is pulled while it is flashed is told, and the same board is 
     await opened.page.getByRole("button", { name: "Flash it" }).click();
     await opened.page.locator("[data-part=flash-said]", { hasText: "Done" }).waitFor();
     await close(opened);
-    await uno.stop();
 });
 
 test("a device that babbles is told from an Uno by what it says", async () => {
@@ -126,7 +123,7 @@ test("a browser without Web Serial is told so, with the HEX and the command that
         Reflect.deleteProperty(Navigator.prototype, "serial");
     });
     await page.goto(new URL("dist/index.html#flash", `file://${process.cwd()}/`).href);
-    await page.getByText("This browser has no Web Serial.").first().waitFor();
+    await page.locator("#flash").getByText("This browser has no Web Serial.").waitFor();
     assert(await page.getByRole("button", { name: "Flash it" }).isDisabled());
     const download = page.waitForEvent("download");
     await page.getByRole("button", { name: "Save the HEX as a file" }).click();

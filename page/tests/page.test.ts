@@ -1,58 +1,32 @@
-// The page in a real browser, headless Chromium: it weeds a row with the real firmware, and shows faults that are made.
-//
-// CHROMIUM names the browser where it is not Debian's. Screenshots go to build/screenshots, phone and desk, light and dark.
+// "Try it" in a real browser: the real firmware weeds a row in the page, and shows faults that are made on the same panel that
+// works with a real Uno.
 
 import assert from "node:assert/strict";
-import { resolve } from "node:path";
 import test, { after, before } from "node:test";
-import { pathToFileURL } from "node:url";
-import { type Browser, chromium, type Page } from "playwright-core";
-import type { Trial } from "../src/try/trial.ts";
+import type { Browser, Page } from "playwright-core";
+import { close, DESK, inspect, launch, type Opened, open, PHONE } from "./browser.ts";
 
-/** What the page leaves for tests, and what this test leaves there. */
+/** What this test leaves in the page. */
 declare global {
-    var trial: Trial;
     var touched: number[];
 }
-
-/** The longest that anything on the page may take: CI's machines are slow, and share their cores. */
-const PATIENCE_MS = 60_000;
 
 let browser: Browser;
 
 before(async () => {
-    browser = await chromium.launch({
-        executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
-        args: [
-            "--headless",
-            "--no-sandbox",
-            "--disable-gpu",
-            "--disable-background-networking",
-            "--disable-component-update",
-            "--disable-sync",
-            "--no-first-run",
-        ],
-    });
+    browser = await launch();
 });
 
 after(() => browser?.close());
 
-/** Opens the page from the disk, as somebody without a network does. What goes wrong in it is kept. */
-async function open(viewport = { width: 1440, height: 900 }): Promise<{ page: Page; errors: string[] }> {
-    const page = await browser.newPage({ viewport });
-    page.setDefaultTimeout(PATIENCE_MS);
-    const errors: string[] = [];
-    page.on("pageerror", (error) => errors.push(String(error)));
-    page.on("console", (message) => {
-        if (message.type() === "error") errors.push(message.text());
-    });
-    page.on("request", (request) => {
-        if (!request.url().startsWith("file:")) errors.push(`asks for ${request.url()}`);
-    });
-    await page.goto(pathToFileURL(resolve("dist/index.html")).href);
-    await pass(page, 0.5);
-    await page.locator("#state", { hasText: "hold" }).waitFor();
-    return { page, errors };
+const part = (page: Page, name: string) => page.locator(`#try-panel [data-part="${name}"]`);
+
+/** Opens "Try it", and waits until the machine holds. */
+async function tryIt(viewport = DESK): Promise<Opened> {
+    const opened = await open(browser, "try", viewport);
+    await pass(opened.page, 0.5);
+    await part(opened.page, "state").filter({ hasText: "hold" }).waitFor();
+    return opened;
 }
 
 /** Lets time pass in the page until the tool has come to a place along the row, as fast as this machine can. */
@@ -67,14 +41,15 @@ async function pass(page: Page, seconds: number): Promise<void> {
 
 /** Types a command and waits for what the machine says to it. */
 async function type(page: Page, command: string, answer: RegExp): Promise<void> {
-    await page.getByLabel("Type to the machine").fill(command);
-    await page.getByRole("button", { name: "Send" }).click();
+    await part(page, "typed").fill(command);
+    await page.locator("#try-panel").getByRole("button", { name: "Send" }).click();
     await pass(page, 0.2);
-    await page.locator("#said div", { hasText: answer }).last().waitFor();
+    await part(page, "said").locator("div", { hasText: answer }).last().waitFor();
 }
 
 test("the page weeds a row with the real firmware, and no canopy is reached", async () => {
-    const { page, errors } = await open();
+    const opened = await tryIt();
+    const { page } = opened;
     await page.evaluate(() => {
         globalThis.touched = [];
         globalThis.trial.onStep = ({ row, toolMm, isClear }) => {
@@ -86,7 +61,7 @@ test("the page weeds a row with the real firmware, and no canopy is reached", as
     });
     await page.getByLabel("Work switch").check();
     await pass(page, 0.2);
-    await page.locator("#state", { hasText: "work" }).waitFor();
+    await part(page, "state").filter({ hasText: "work" }).waitFor();
     await rollTo(page, 4000);
     const { touched, passed, worked, shapes, free } = await page.evaluate(() => ({
         touched: globalThis.touched,
@@ -114,53 +89,62 @@ test("the page weeds a row with the real firmware, and no canopy is reached", as
     assert(free >= 4, `${free} windows lie round their plants`);
     assert(shapes >= 2, `${shapes} plants are drawn`);
     await type(page, "status", /state=work tool=(in|out) /);
-    assert.deepEqual(errors, []);
-    await page.close();
+    await close(opened);
 });
 
 test("a fault that is made by a click takes the tool out, and its alarm shows until it is cleared", async () => {
-    const { page, errors } = await open();
+    const opened = await tryIt();
+    const { page } = opened;
     await page.getByLabel("Work switch").check();
     await rollTo(page, 900);
     await page.getByLabel("Kill the encoder").check();
     await pass(page, 5);
     await page.getByRole("alert").filter({ hasText: "encoder_silent" }).waitFor();
-    await page.locator("#tool", { hasText: "out" }).waitFor();
+    await part(page, "alarm-advice").filter({ hasText: "See to the encoder's coupling" }).waitFor();
+    await page.locator("#true-tool", { hasText: "out" }).waitFor();
     await page.getByLabel("Kill the encoder").uncheck();
-    await page.getByRole("button", { name: "Clear the alarm" }).click();
-    await pass(page, 0.2);
-    await page.locator("#alarm").waitFor({ state: "hidden" });
-    assert.deepEqual(errors, []);
-    await page.close();
+    await part(page, "clear").click();
+    await part(page, "alarm").waitFor({ state: "hidden" });
+    await close(opened);
 });
 
 test("a setting that is saved is there after the supply has sagged", async () => {
-    const { page, errors } = await open();
+    const opened = await tryIt();
+    const { page } = opened;
     await type(page, "set margin_mm 70", /^ok$/);
     await type(page, "save", /^ok$/);
     await page.getByRole("button", { name: "Let the supply sag" }).click();
     await pass(page, 0.5);
-    await page.locator("#said div", { hasText: /reset by brown_out, state hold/ }).waitFor();
+    await part(page, "said")
+        .locator("div", { hasText: /reset by brown_out, state hold/ })
+        .waitFor();
     await type(page, "get margin_mm", /^margin_mm=70/);
-    assert.deepEqual(errors, []);
-    await page.close();
+    await close(opened);
 });
 
-for (const [device, width, height] of [
-    ["phone", 390, 844],
-    ["desk", 1440, 900],
+test("HOLD takes the tool out at once, whatever else waits for its answer", async () => {
+    const opened = await tryIt();
+    const { page } = opened;
+    await page.getByLabel("Work switch").check();
+    await part(page, "state").filter({ hasText: "work" }).waitFor();
+    await rollTo(page, 900);
+    await part(page, "typed").fill("examples");
+    await page.locator("#try-panel").getByRole("button", { name: "Send" }).click();
+    await part(page, "hold").click();
+    await part(page, "state").filter({ hasText: "hold" }).waitFor();
+    await page.locator("#true-tool", { hasText: "out" }).waitFor();
+    await close(opened);
+});
+
+for (const [device, viewport] of [
+    ["phone", PHONE],
+    ["desk", DESK],
 ] as const) {
     test(`on a ${device} nothing is wider than the screen, light or dark`, async () => {
-        const { page, errors } = await open({ width, height });
-        await page.getByLabel("Work switch").check();
-        await rollTo(page, 1500);
-        for (const colorScheme of ["light", "dark"] as const) {
-            await page.emulateMedia({ colorScheme });
-            const wide = await page.evaluate(() => document.documentElement.scrollWidth);
-            assert(wide <= width, `${wide} of ${width} pixels`);
-            await page.screenshot({ path: `build/screenshots/${device}-${colorScheme}.png` });
-        }
-        assert.deepEqual(errors, []);
-        await page.close();
+        const opened = await tryIt(viewport);
+        await opened.page.getByLabel("Work switch").check();
+        await rollTo(opened.page, 1500);
+        await inspect(opened.page, `${device}-try`);
+        await close(opened);
     });
 }

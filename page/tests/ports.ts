@@ -8,6 +8,7 @@ import { type ChildProcess, spawn } from "node:child_process";
 import { closeSync, constants, existsSync, mkdtempSync, openSync, readSync, rmSync, writeSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
+import type { TestContext } from "node:test";
 import { setTimeout as wait } from "node:timers/promises";
 import type { Page } from "playwright-core";
 
@@ -44,8 +45,8 @@ export class VirtualUno implements Device {
         this.path = join(folder, "uno");
     }
 
-    /** Starts one, with further options. */
-    static async start(...options: string[]): Promise<VirtualUno> {
+    /** Starts one for a test, at whose end it stops, with further options. */
+    static async start(test: TestContext, ...options: string[]): Promise<VirtualUno> {
         const weeder = process.env.WEEDER ?? resolve("../target/debug/weeder");
         if (!existsSync(weeder))
             throw new Error(`${weeder} is not there: \`cargo build -p weeder-cli\` makes it, or name it in WEEDER`);
@@ -58,6 +59,7 @@ export class VirtualUno implements Device {
             said += text;
         });
         const uno = new VirtualUno(folder, child);
+        test.after(() => uno.#stop());
         for (let waited = 0; !existsSync(uno.path); waited += 50) {
             if (child.exitCode !== null || waited > 60_000) throw new Error(`the virtual Uno does not start: ${said}`);
             await wait(50);
@@ -109,11 +111,13 @@ export class VirtualUno implements Device {
         this.pullAfterBytes = Number.POSITIVE_INFINITY;
     }
 
-    async stop(): Promise<void> {
+    async #stop(): Promise<void> {
         this.close();
-        const ended = new Promise((done) => this.#process.once("exit", done));
-        this.#process.kill();
-        await ended;
+        if (this.#process.exitCode === null) {
+            const ended = new Promise((done) => this.#process.once("exit", done));
+            this.#process.kill();
+            await ended;
+        }
         rmSync(this.#folder, { recursive: true });
     }
 }

@@ -32,8 +32,10 @@ export class Connection {
                 void this.connect(target as SerialPort);
         });
         panel.onHappening = (happening) => {
+            if (happening.is === "connected") this.#say(`weeder ${happening.version}`);
             if (happening.is !== "lost" || !happening.forGood) return;
             this.#isOpen = false;
+            this.#say("");
             this.#show();
         };
         setInterval(() => panel.turn(performance.now()), TURN_MS);
@@ -54,7 +56,7 @@ export class Connection {
             const line = await SerialLine.open(port, BAUD);
             [this.#port, this.#isOpen] = [port, true];
             this.#panel.connect(wireOf(line), performance.now(), true);
-            this.#say("");
+            this.#say("Waiting for its answer.");
         } catch (error) {
             if (!(error instanceof PortError)) throw error;
             this.#say(`Not connected: ${error.message}`);

@@ -38,7 +38,7 @@ export class Console {
     }
 
     /** Adds a line, of which kind. */
-    add(line: string, kind: "typed" | "error" | "note" | ""): void {
+    add(line: string, kind: "typed" | "error" | "happened" | ""): void {
         this.#waiting.push(make("div", kind, line));
         if (this.#waiting.length > LINES) this.#waiting.shift();
     }

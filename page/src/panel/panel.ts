@@ -95,7 +95,7 @@ export class Panel {
         parts.root.dataset.state = machine.stateWord.replace(" ", "-");
         parts.write("state", machine.stateWord);
         parts.write("why", machine.why);
-        parts.write("speed", machine.status ? `${(machine.status.speedMmS * 0.0036).toFixed(1)} km/h` : "-");
+        parts.write("speed", machine.status ? (machine.status.speedMmS * 0.0036).toFixed(1) : "-");
         parts.write("tool", machine.version === undefined ? "-" : machine.toolOut ? "out" : "in the row");
         parts.write(
             "place",
@@ -126,10 +126,10 @@ export class Panel {
         this.#log.add(happening, this.#now);
         switch (happening.is) {
             case "started":
-                this.#console.add(happening.line, "note");
+                this.#console.add(happening.line, "happened");
                 break;
             case "connected":
-                this.#console.add(`connected to weeder ${happening.version}`, "note");
+                this.#console.add(`connected to weeder ${happening.version}`, "happened");
                 this.#parts.write("drive-said", "");
                 this.#showConnected();
                 this.#settings.show();
@@ -137,7 +137,7 @@ export class Panel {
                 this.#examples.showExamples();
                 break;
             case "lost":
-                this.#console.add(happening.why, "note");
+                this.#console.add(happening.why, "happened");
                 this.#showConnected();
                 break;
             case "settings":

@@ -57,7 +57,7 @@ export function drawStrip(svg: SVGSVGElement, machine: Machine, nowMs: number): 
             class: "strip-note",
             x,
             y: height * 0.95,
-            "font-size": height * 0.26,
+            "font-size": height * 0.2,
             "text-anchor": anchor,
         });
         note.textContent = words;

@@ -64,7 +64,7 @@ export class Drawing {
     readonly #beam = make("line", { class: "beam-line", y1: -ACROSS_MM.out + 30, y2: ACROSS_MM.other - 10 });
     readonly #arm = make("line", { class: "arm" });
     readonly #blade = make("rect", { class: "blade", rx: 6 });
-    readonly #angle = make("text", { class: "note", "text-anchor": "middle" });
+    readonly #angle = make("text", { class: "drawn-note", "text-anchor": "middle" });
     readonly #shapes = new Map<number, SVGElement>();
     readonly #specksShown = new Map<number, SVGElement>();
 

@@ -1,0 +1,269 @@
+// The panel of a real Uno in a real browser: a virtual Uno behind a serial port, with a machine that rolls along a row.
+
+import assert from "node:assert/strict";
+import { execFileSync } from "node:child_process";
+import { mkdirSync, readFileSync, writeFileSync } from "node:fs";
+import { resolve } from "node:path";
+import test, { after, before, type TestContext } from "node:test";
+import type { Browser, Page } from "playwright-core";
+import { close, DESK, inspect, launch, type Opened, open, PHONE } from "./browser.ts";
+import { type Device, Foreign, VirtualUno } from "./ports.ts";
+
+const FIRMWARE = resolve("../target/avr-none/firmware/weeder-firmware.elf");
+const WEEDER = process.env.WEEDER ?? resolve("../target/debug/weeder");
+
+let browser: Browser;
+
+before(async () => {
+    browser = await launch();
+    mkdirSync("build/files", { recursive: true });
+});
+
+after(() => browser?.close());
+
+const part = (page: Page, name: string) => page.locator(`#work-panel [data-part="${name}"]`);
+
+/** Opens the panel and connects it to a device. */
+async function connect(device: Device, viewport = DESK): Promise<Opened> {
+    const opened = await open(browser, "work", viewport, [device]);
+    await opened.page.getByRole("button", { name: "Connect an Uno" }).click();
+    return opened;
+}
+
+/** The panel of a virtual Uno whose settings are saved, and whose machine rolls. */
+async function atHold(test: TestContext, viewport = DESK): Promise<Opened & { uno: VirtualUno }> {
+    const uno = await VirtualUno.start(test, "--elf", FIRMWARE);
+    const opened = await connect(uno, viewport);
+    await type(opened.page, "save");
+    await part(opened.page, "clear").click();
+    await part(opened.page, "state").filter({ hasText: "hold" }).waitFor();
+    return { ...opened, uno };
+}
+
+/** Types a command, and waits for its `ok`. */
+async function type(page: Page, command: string): Promise<void> {
+    const said = part(page, "said");
+    await page.getByRole("tab", { name: "Console" }).click();
+    const before = await said.locator("div", { hasText: /^ok$/ }).count();
+    await part(page, "typed").fill(command);
+    await page.locator("#work-panel").getByRole("button", { name: "Send" }).click();
+    await said.locator("div", { hasText: /^ok$/ }).nth(before).waitFor();
+}
+
+test("a new board shows its alarm with what to do, works, and holds, and all of that is on a phone's screen", async (test) => {
+    const uno = await VirtualUno.start(test, "--elf", FIRMWARE);
+    const opened = await connect(uno, PHONE);
+    const { page } = opened;
+    await part(page, "alarm-name").filter({ hasText: "Alarm 5-1 settings_lost" }).waitFor();
+    assert.match(
+        (await part(page, "alarm-advice").textContent()) ?? "",
+        /^Check get, set what differs, save, clear\.$/,
+    );
+    await inspect(page, "phone-alarm");
+    await assertOnOneScreen(page, ["state", "why", "alarm-advice", "clear", "strip", "speed", "hold", "start"]);
+    await part(page, "start").click();
+    await part(page, "drive-said").filter({ hasText: "An alarm is latched" }).waitFor();
+    await type(page, "save");
+    await part(page, "clear").click();
+    await part(page, "state").filter({ hasText: "hold" }).waitFor();
+    await part(page, "start").click();
+    await part(page, "state").filter({ hasText: "work" }).waitFor();
+    await part(page, "why")
+        .filter({ hasText: /weeds\.$/ })
+        .waitFor();
+    await part(page, "last-object")
+        .filter({ hasText: /plant, 1\d\d mm wide, \d vote/ })
+        .waitFor();
+    await part(page, "why").filter({ hasText: "A plant is at the tool" }).waitFor();
+    assert((await page.locator("#work-panel .strip-canopy").count()) > 0, "a window is drawn");
+    assert.match((await part(page, "speed").textContent()) ?? "", /^2\.[3-7]$/);
+    await page.evaluate(() => globalThis.scrollTo(0, 0));
+    await inspect(page, "phone-work");
+    await assertOnOneScreen(page, [
+        "state",
+        "why",
+        "strip",
+        "speed",
+        "place",
+        "teach-plant",
+        "teach-weed",
+        "hold",
+        "start",
+    ]);
+    await part(page, "hold").click();
+    await part(page, "state").filter({ hasText: "hold" }).waitFor();
+    await close(opened);
+});
+
+test("the log of a row at work is replayed by weeder without a difference", async (test) => {
+    const { page, errors } = await atHold(test);
+    await part(page, "start").click();
+    for (const object of [1, 2, 3])
+        await part(page, "said")
+            .getByText(/^(plant|unknown) pos=/)
+            .nth(object)
+            .waitFor();
+    await part(page, "hold").click();
+    await part(page, "state").filter({ hasText: "hold" }).waitFor();
+    const download = page.waitForEvent("download");
+    await part(page, "log-save").click();
+    await (await download).saveAs("build/files/log.csv");
+    const replayed = execFileSync(WEEDER, ["replay", "build/files/log.csv"], { encoding: "utf8" });
+    assert.match(replayed, /^The same: [3-9]\d* objects, 0 alarms and [1-9]\d* swings/);
+    await close({ page, errors });
+});
+
+/** Holds that these parts are on the screen as it is, and that what can be pressed is as large as a thumb. */
+async function assertOnOneScreen(page: Page, names: string[]): Promise<void> {
+    for (const name of names) {
+        const box = await part(page, name).boundingBox();
+        assert(box && box.y >= 0 && box.y + box.height <= PHONE.height, `${name} is at ${JSON.stringify(box)}`);
+        const isButton = await part(page, name).evaluate((element) => element instanceof HTMLButtonElement);
+        if (isButton) assert(box.height >= 44 && box.width >= 44, `${name} is ${box.width} x ${box.height}`);
+    }
+}
+
+test("a setting that is sent is saved, and there after a reset", async (test) => {
+    const { page, errors } = await atHold(test);
+    await page.getByRole("tab", { name: "Settings" }).click();
+    const margin = page.locator("#work-panel [data-setting=margin_mm]");
+    await page
+        .getByText(/ground that the tool leaves alone on both sides of a canopy \(0 to 200 mm, default 50\)/)
+        .waitFor();
+    await margin.fill("70");
+    await page.getByRole("button", { name: "Send 1 change and save" }).click();
+    await part(page, "settings-said").filter({ hasText: "Saved" }).waitFor();
+    await inspect(page, "desk-settings");
+    await page.getByRole("button", { name: "Disconnect" }).click();
+    await part(page, "state").filter({ hasText: "no machine" }).waitFor();
+    await page.getByRole("button", { name: "Connect an Uno" }).click();
+    await part(page, "state").filter({ hasText: "hold" }).waitFor();
+    assert.equal(await margin.inputValue(), "70");
+    await close({ page, errors });
+});
+
+test("a value that cannot be is refused beside its field, in the machine's words", async (test) => {
+    const { page, errors } = await atHold(test);
+    await page.getByRole("tab", { name: "Settings" }).click();
+    await page.locator("#work-panel [data-setting=k]").fill("99");
+    await page.getByRole("button", { name: "Send 1 change and save" }).click();
+    await page.locator("#work-panel .problem", { hasText: "k takes a whole number from 1 to 15" }).waitFor();
+    await part(page, "settings-said").filter({ hasText: "1 of 1 were refused, and nothing is saved" }).waitFor();
+    await close({ page, errors });
+});
+
+test("settings go to a file that weeder reads, and come from one, whatever the order", async (test) => {
+    const { page, errors } = await atHold(test);
+    await page.getByRole("tab", { name: "Settings" }).click();
+    // What the settings are comes behind the settings.
+    await page.getByText(/X, how far the beam stands/).waitFor();
+    const download = page.waitForEvent("download");
+    await page.getByRole("button", { name: "To a file" }).click();
+    await (await download).saveAs("build/files/machine.toml");
+    const text = readFileSync("build/files/machine.toml", "utf8");
+    assert.match(text, /\n# diameter of the ground wheel\n# 200 to 800 mm, default 400\nwheel_mm = 400\n/);
+    // A lead that only a beam farther ahead allows stands before it.
+    writeFileSync(
+        "build/files/other.toml",
+        "# mine\nlead_out_ms = 400\nbeam_to_tool_mm = 900 # far\nend_switch = false\n",
+    );
+    await part(page, "settings-file").setInputFiles("build/files/other.toml");
+    await part(page, "settings-said").filter({ hasText: "2 differ from the machine's" }).waitFor();
+    await page.getByRole("button", { name: "Send 2 changes and save" }).click();
+    await part(page, "settings-said").filter({ hasText: "Saved" }).waitFor();
+    writeFileSync("build/files/wrong.toml", "k = 3\nwheel = 400\n");
+    await part(page, "settings-file").setInputFiles("build/files/wrong.toml");
+    await part(page, "settings-said")
+        .filter({ hasText: "wrong.toml, line 2 of the file: there is no setting wheel" })
+        .waitFor();
+    await close({ page, errors });
+});
+
+test("a cable that is pulled at work is told, and the machine is there again when it is back", async (test) => {
+    const { page, errors, uno } = await atHold(test);
+    await part(page, "start").click();
+    await part(page, "state").filter({ hasText: "work" }).waitFor();
+    uno.pull();
+    await part(page, "state").filter({ hasText: "no machine" }).waitFor();
+    await part(page, "why")
+        .filter({ hasText: /the port is gone: its cable was pulled.*plug it in again/ })
+        .waitFor();
+    assert(await part(page, "start").isDisabled());
+    await inspect(page, "desk-pulled");
+    uno.plugIn();
+    await page.evaluate(() => {
+        const { serial } = navigator as unknown as { serial: { ports: SerialPort[] } & EventTarget };
+        const event = new Event("connect");
+        Object.defineProperty(event, "target", { value: serial.ports[0] });
+        serial.dispatchEvent(event);
+    });
+    await part(page, "state").filter({ hasText: "hold" }).waitFor();
+    await close({ page, errors });
+});
+
+test("a device that is no weeder is told by what it says, and the port is let go of", async () => {
+    const opened = await connect(new Foreign(() => [], "$GPGGA,123519,4807.038,N\r\n"));
+    await part(opened.page, "why")
+        .filter({ hasText: "it is not the weeder's firmware that answers, but \u201c$GPGGA" })
+        .waitFor();
+    await opened.page.getByRole("button", { name: "Connect an Uno" }).waitFor();
+    await close(opened);
+});
+
+test("a port that another program has is told with the way out", async () => {
+    const refuses = { name: "NetworkError", message: "Failed to open serial port." };
+    const opened = await connect(new Foreign(() => [], "", refuses));
+    await opened.page.getByText(/Not connected: .*close the serial monitor/).waitFor();
+    await close(opened);
+});
+
+test("the wheel is calibrated over a measured stretch, and the servo by eye", async (test) => {
+    const { page, errors } = await atHold(test, PHONE);
+    await page.getByRole("tab", { name: "Calibrate" }).click();
+    await part(page, "wheel-end").click();
+    await part(page, "wheel-said").filter({ hasText: "calibrate start first, then roll" }).waitFor();
+    await part(page, "wheel-begin").click();
+    await part(page, "wheel-rolled")
+        .filter({ hasText: /^1\.\d\d m/ })
+        .waitFor();
+    await part(page, "wheel-mm").fill("5000");
+    await part(page, "wheel-end").click();
+    await part(page, "wheel-said").filter({ hasText: "look again, or add force" }).waitFor();
+    await part(page, "wheel-force").click();
+    await part(page, "wheel-said")
+        .filter({ hasText: /^\d+ encoder counts a metre/ })
+        .waitFor();
+    // That was no 5 m: a wheel like that makes every canopy too wide.
+    await type(page, "set ticks_per_m 0");
+    await page.getByRole("tab", { name: "Calibrate" }).click();
+    await part(page, "servo-in").click();
+    await part(page, "servo-said").filter({ hasText: "The tool has 1500 us." }).waitFor();
+    await part(page, "servo-more").click();
+    await part(page, "servo-said").filter({ hasText: "The tool has 1510 us." }).waitFor();
+    await part(page, "servo-in-is").click();
+    await part(page, "servo-said").filter({ hasText: "1510 us is the tool in the row now" }).waitFor();
+    await part(page, "servo-time").click();
+    await part(page, "servo-said").filter({ hasText: "Put in what you saw" }).waitFor();
+    await part(page, "lead_out_ms").fill("150");
+    await part(page, "servo-leads").click();
+    await part(page, "servo-said").filter({ hasText: "Both leads are set" }).waitFor();
+    await inspect(page, "phone-calibrate");
+    await part(page, "servo-save").click();
+    await part(page, "servo-said").filter({ hasText: "Saved." }).waitFor();
+    await close({ page, errors });
+});
+
+test("an object is taught by a button, and one that the built-in examples know better is insisted on", async (test) => {
+    const { page, errors } = await atHold(test, PHONE);
+    await page.getByRole("tab", { name: "Taught" }).click();
+    await part(page, "examples-count").filter({ hasText: "0 of 32" }).waitFor();
+    await part(page, "last-object").filter({ hasText: "Last: plant" }).waitFor();
+    await part(page, "teach-weed").click();
+    await part(page, "teach-said").filter({ hasText: "the built-in examples say plant, look again" }).waitFor();
+    await inspect(page, "phone-teach");
+    await page.getByRole("button", { name: "It is a weed" }).click();
+    await part(page, "examples-count").filter({ hasText: "1 of 32" }).waitFor();
+    await page.getByRole("button", { name: "Forget example 0" }).click();
+    await part(page, "examples-count").filter({ hasText: "0 of 32" }).waitFor();
+    await close({ page, errors });
+});
