@@ -58,7 +58,7 @@ let settleAt: "connected" | undefined;
 
 const workPanel = new Panel(find("work-panel", HTMLElement), "work");
 const connection = new Connection(new Parts(find("connection", HTMLElement)), workPanel);
-const flasher = new Flasher(find("flash", HTMLElement), hex);
+const flasher = new Flasher(find("view-flash", HTMLElement), hex);
 flasher.onBegin = (port) => connection.release(port);
 flasher.onWork = (port) => {
     location.hash = "#work";
@@ -68,7 +68,7 @@ flasher.onWork = (port) => {
 /** Shows what is chosen. */
 function choose(): void {
     const chosen = VIEWS.find((view) => `#${view}` === location.hash) ?? "try";
-    for (const view of VIEWS) find(view, HTMLElement).hidden = view !== chosen;
+    for (const view of VIEWS) find(`view-${view}`, HTMLElement).hidden = view !== chosen;
     for (const link of document.querySelectorAll("nav a"))
         link.ariaCurrent = link.getAttribute("href") === `#${chosen}` ? "page" : null;
 }
@@ -159,7 +159,7 @@ function frame(nowMs: number): void {
     const outsideS = Math.min(Math.max((nowMs - lastMs) / 1000, 0), LONGEST_FRAME_S);
     lastMs = nowMs;
     // A trial that nobody looks at stands still.
-    if (!find("try", HTMLElement).hidden) {
+    if (!find("view-try", HTMLElement).hidden) {
         passed.chipS += trial.advance(outsideS * Number(time.value), outsideS * 1000 * CHIP_SHARE);
         passed.outsideS += outsideS;
         if (passed.outsideS > PACE_S) {
@@ -168,7 +168,7 @@ function frame(nowMs: number): void {
         }
         trialPanel.turn(trialMs());
         showTrial();
-    } else if (!find("work", HTMLElement).hidden) workPanel.show();
+    } else if (!find("view-work", HTMLElement).hidden) workPanel.show();
     requestAnimationFrame(frame);
 }
 

@@ -31,6 +31,8 @@ export function launch(): Promise<Browser> {
         executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
         args: [
             "--headless",
+            // A name that is not this computer's own, as another one in the network has it.
+            "--host-resolver-rules=MAP weeder.test 127.0.0.1",
             "--no-sandbox",
             "--disable-gpu",
             "--disable-background-networking",

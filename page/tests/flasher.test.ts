@@ -2,6 +2,10 @@
 // it cannot.
 
 import assert from "node:assert/strict";
+import { readFileSync } from "node:fs";
+import { createServer } from "node:http";
+import type { AddressInfo } from "node:net";
+import { basename, extname, join } from "node:path";
 import test, { after, before } from "node:test";
 import type { Browser, Page } from "playwright-core";
 import { close, inspect, launch, open, PHONE } from "./browser.ts";
@@ -43,7 +47,9 @@ test("an Uno with an empty flash is flashed through its bootloader, and is worke
     const flashing = flash(page);
     await page.locator("[data-part=phase]", { hasText: /Writing: [1-9]\d* %/ }).waitFor();
     await inspect(page, "phone-flashing");
-    assert.match(await flashing, /^Done: \d{5} bytes were written and read back in [\d.]+ s\.$/);
+    const done = await flashing;
+    assert.match(done, /^Done: \d{5} bytes were written and read back in [\d.]+ s\.$/);
+    test.diagnostic(done);
     await inspect(page, "phone-flashed");
     await page.getByRole("button", { name: "Work with it" }).click();
     await page.locator("#work-panel [data-part=alarm-name]", { hasText: "5-1 settings_lost" }).waitFor();
@@ -66,6 +72,15 @@ test("a cable that is pulled while it is flashed is told, and the same board is 
     uno.plugIn();
     await opened.page.getByRole("button", { name: "Flash it" }).click();
     await opened.page.locator("[data-part=flash-said]", { hasText: "Done" }).waitFor();
+    await close(opened);
+});
+
+test("a byte that is lost on the way is sent again", async (test) => {
+    const uno = await VirtualUno.start(test, ...OPTIBOOT);
+    const opened = await open(browser, "flash", undefined, [uno]);
+    uno.loseBytes = [3000, 9000];
+    assert.match(await flash(opened.page), /^Done: /);
+    assert.deepEqual(uno.loseBytes, []);
     await close(opened);
 });
 
@@ -123,11 +138,31 @@ test("a browser without Web Serial is told so, with the HEX and the command that
         Reflect.deleteProperty(Navigator.prototype, "serial");
     });
     await page.goto(new URL("dist/index.html#flash", `file://${process.cwd()}/`).href);
-    await page.locator("#flash").getByText("This browser has no Web Serial.").waitFor();
+    await page.locator("#view-flash").getByText("This browser has no Web Serial.").waitFor();
     assert(await page.getByRole("button", { name: "Flash it" }).isDisabled());
     const download = page.waitForEvent("download");
     await page.getByRole("button", { name: "Save the HEX as a file" }).click();
     assert.equal((await download).suggestedFilename(), "weeder.hex");
     await inspect(page, "phone-no-serial");
+    await page.close();
+});
+
+test("over plain http from another computer the page says why there is no port, and where there is one", async (test) => {
+    const server = createServer((request, response) => {
+        const name = basename(request.url ?? "") || "index.html";
+        const type = { ".css": "text/css", ".html": "text/html", ".js": "text/javascript" }[extname(name)];
+        response.writeHead(200, { "content-type": type }).end(readFileSync(join("dist", name)));
+    });
+    await new Promise<void>((done) => server.listen(0, "127.0.0.1", done));
+    test.after(() => server.close());
+    const { port } = server.address() as AddressInfo;
+    const page = await browser.newPage({ viewport: PHONE });
+    await page.goto(`http://weeder.test:${port}/#work`);
+    await page
+        .locator("#view-work")
+        .getByText(/plain http.* Open the page's folder on the computer that has the Uno/)
+        .waitFor();
+    assert(await page.getByRole("button", { name: "Connect an Uno" }).isDisabled());
+    await inspect(page, "phone-plain-http");
     await page.close();
 });

@@ -33,7 +33,9 @@ export class VirtualUno implements Device {
     readonly path: string;
     /** Bytes that the page has written to it, after which the cable is pulled. */
     pullAfterBytes = Number.POSITIVE_INFINITY;
-    written = 0;
+    /** Bytes, counted from the first, that are lost on their way to it. */
+    loseBytes: number[] = [];
+    #written = 0;
     readonly #folder: string;
     readonly #process: ChildProcess;
     #fd: number | undefined;
@@ -78,9 +80,13 @@ export class VirtualUno implements Device {
     }
 
     write(bytes: Uint8Array): void {
-        this.written += bytes.length;
-        if (this.written > this.pullAfterBytes) this.pull();
-        if (this.#fd !== undefined) writeSync(this.#fd, bytes);
+        const before = this.#written;
+        this.#written += bytes.length;
+        if (this.#written > this.pullAfterBytes) this.pull();
+        const lost = this.loseBytes.filter((place) => place < this.#written);
+        this.loseBytes = this.loseBytes.filter((place) => place >= this.#written);
+        const kept = bytes.filter((_, index) => !lost.includes(before + index));
+        if (this.#fd !== undefined) writeSync(this.#fd, kept);
     }
 
     read(): Uint8Array | undefined {

@@ -69,8 +69,8 @@ export class Flasher {
             );
             this.#parts.html("to-work").hidden = false;
         } catch (error) {
+            this.#say("failed", `Not flashed: ${error instanceof Error ? error.message : error}.`);
             if (!(error instanceof PortError || error instanceof FlashError)) throw error;
-            this.#say("failed", `Not flashed: ${error.message}.`);
         } finally {
             this.#isBusy = false;
             flash.disabled = false;

@@ -47,8 +47,9 @@ const ANSWER_MS = 1000;
 /** Time between two calls for the bootloader, and calls after a reset: the old one blinks for a second before it listens. */
 const CALL_MS = 150;
 const CALLS = 12;
-/** How often the board is reset for it. */
+/** How often the board is reset for it, and how often a page is tried. */
 const RESETS = 2;
+const TRIES = 3;
 
 export class Bootloader {
     readonly #line: SerialLine;
@@ -79,15 +80,19 @@ export class Bootloader {
         await this.#command([ENTER_PROGRAMMING], 0);
         for (let at = 0; at < image.length; at += PAGE_BYTES) {
             onProgress({ phase: "writing", share: at / image.length });
-            await this.#load(at);
             const page = image.subarray(at, at + PAGE_BYTES);
-            await this.#command([PROGRAM_PAGE, 0, page.length, FLASH, ...page], 0);
+            await this.#patiently(async () => {
+                await this.#load(at);
+                await this.#command([PROGRAM_PAGE, 0, page.length, FLASH, ...page], 0);
+            });
         }
         for (let at = 0; at < image.length; at += PAGE_BYTES) {
             onProgress({ phase: "verifying", share: at / image.length });
-            await this.#load(at);
             const page = image.subarray(at, at + PAGE_BYTES);
-            const found = await this.#command([READ_PAGE, 0, page.length, FLASH], page.length);
+            const found = await this.#patiently(async () => {
+                await this.#load(at);
+                return this.#command([READ_PAGE, 0, page.length, FLASH], page.length);
+            });
             const wrong = page.findIndex((byte, index) => byte !== found[index]);
             if (wrong >= 0)
                 throw new FlashError(
@@ -106,19 +111,44 @@ export class Bootloader {
             this.#received = [];
             await this.#line.reset();
             for (let call = 0; call < CALLS; call++) {
-                heard.push(...this.#received.splice(0));
-                await this.#line.write(Uint8Array.of(GET_SYNC, CRC_EOP));
-                const answer = await this.#take(2, CALL_MS);
-                if (answer?.[0] === INSYNC && answer[1] === OK) {
-                    // Calls that it has not answered yet.
-                    await wait(CALL_MS);
-                    this.#received = [];
-                    return;
-                }
-                heard.push(...(answer ?? []));
+                heard.push(...this.#received);
+                if ((await this.#hears(heard)) && (await this.#isQuiet()) && (await this.#hears(heard))) return;
             }
         }
         throw new FlashError(this.#whoIsThere(String.fromCharCode(...heard, ...this.#received)));
+    }
+
+    /** Whether the bootloader answers a call. What comes instead is added to what was heard. */
+    async #hears(heard: number[]): Promise<boolean> {
+        this.#received = [];
+        await this.#line.write(Uint8Array.of(GET_SYNC, CRC_EOP));
+        const answer = await this.#take(2, CALL_MS);
+        if (answer?.[0] === INSYNC && answer[1] === OK) return true;
+        heard.push(...(answer ?? []));
+        return false;
+    }
+
+    /** Waits until all calls are answered that came before, and whether that has an end. */
+    async #isQuiet(): Promise<boolean> {
+        for (let waits = 0; waits < CALLS; waits++) {
+            this.#received = [];
+            await wait(CALL_MS);
+            if (this.#received.length === 0) return true;
+        }
+        return false;
+    }
+
+    /** Does something that can be done again, and does it again where a byte was lost on the way. */
+    async #patiently<Result>(work: () => Promise<Result>): Promise<Result> {
+        for (let tries = 1; ; tries++)
+            try {
+                return await work();
+            } catch (error) {
+                if (!(error instanceof FlashError) || tries === TRIES) throw error;
+                // Optiboot leaves for the firmware when it does not understand.
+                await this.#call();
+                await this.#command([ENTER_PROGRAMMING], 0);
+            }
     }
 
     /** Why no bootloader answered, and what to do. */

@@ -17,6 +17,8 @@ export class Connection {
     /** Whether the port is open. */
     #isOpen = false;
     #isBusy = false;
+    /** Keeps a phone's screen lit while a machine is there. */
+    #light: WakeLockSentinel | undefined;
 
     constructor(parts: Parts, panel: Panel) {
         [this.#parts, this.#panel] = [parts, panel];
@@ -38,6 +40,8 @@ export class Connection {
             this.#say("");
             this.#show();
         };
+        // A page that was out of sight has lost it.
+        document.addEventListener("visibilitychange", () => void this.#stayLit());
         setInterval(() => panel.turn(performance.now()), TURN_MS);
         this.#show();
     }
@@ -80,6 +84,12 @@ export class Connection {
         if (port === this.#port) await this.disconnect();
     }
 
+    async #stayLit(): Promise<void> {
+        await this.#light?.release();
+        // What has no such thing, or little power left, may go dark.
+        this.#light = this.#isOpen ? await navigator.wakeLock?.request("screen").catch(() => undefined) : undefined;
+    }
+
     async #choose(): Promise<void> {
         try {
             const port = await choosePort();
@@ -96,6 +106,7 @@ export class Connection {
     }
 
     #show(): void {
+        void this.#stayLit();
         this.#parts.html("connect").hidden = this.#isOpen;
         this.#parts.html("connect-hint").hidden = this.#isOpen;
         this.#parts.html("disconnect").hidden = !this.#isOpen;
