@@ -105,7 +105,7 @@ function button(id: string, use: () => void): void {
     find(id, HTMLButtonElement).addEventListener("click", use);
 }
 
-find("controls", HTMLFormElement).reset();
+for (const form of ["drive", "bench"]) find(form, HTMLFormElement).reset();
 slider(
     "speed",
     (speed) => `${speed.toFixed(1)} km/h`,

@@ -186,7 +186,10 @@ test("a cable that is pulled at work is told, and the machine is there again whe
     uno.pull();
     await part(page, "state").filter({ hasText: "no machine" }).waitFor();
     await part(page, "why")
-        .filter({ hasText: /the port is gone: its cable was pulled.*plug it in again/ })
+        .filter({
+            hasText:
+                /The port is gone: its cable was pulled.*plug it in again.*weeds on: its work switch takes the tool out/,
+        })
         .waitFor();
     assert(await part(page, "start").isDisabled());
     await inspect(page, "desk-pulled");
@@ -204,7 +207,7 @@ test("a cable that is pulled at work is told, and the machine is there again whe
 test("a device that is no weeder is told by what it says, and the port is let go of", async () => {
     const opened = await connect(new Foreign(() => [], "$GPGGA,123519,4807.038,N\r\n"));
     await part(opened.page, "why")
-        .filter({ hasText: "it is not the weeder's firmware that answers, but \u201c$GPGGA" })
+        .filter({ hasText: "It is not the weeder's firmware that answers, but \u201c$GPGGA" })
         .waitFor();
     await opened.page.getByRole("button", { name: "Connect an Uno" }).waitFor();
     await close(opened);

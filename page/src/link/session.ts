@@ -33,8 +33,8 @@ export type Happening =
     | { is: "started"; line: string }
     /** The machine is there, and has shown its settings and examples. */
     | { is: "connected"; version: string; settings: readonly Setting[]; examples: readonly string[] }
-    /** The machine is gone: for good, or until it has started anew. */
-    | { is: "lost"; why: string; forGood: boolean }
+    /** The machine is gone: for good, because the operator wanted it or not, or until it has started anew. */
+    | { is: "lost"; why: string; forGood: boolean; isWanted: boolean }
     | { is: "status"; status: Status; line: string }
     /** The machine told something by itself. */
     | { is: "told"; said: Said; line: string }
@@ -120,7 +120,7 @@ export class Session {
 
     /** Ends it, and lets go of the wire, as does a session that ends by itself. */
     async close(): Promise<void> {
-        this.#end("No machine is connected.");
+        this.#end("No machine is connected.", true);
         await this.#wire.close();
     }
 
@@ -247,7 +247,7 @@ export class Session {
     /** The Uno has started: nothing that was typed will be answered. */
     #restart(greeting: string): void {
         const [asked, waiting] = [this.#asked.splice(0), this.#waiting.splice(0)];
-        if (this.isReady) this.onHappening({ is: "lost", why: "the Uno was reset", forGood: false });
+        if (this.isReady) this.onHappening({ is: "lost", why: "the Uno was reset", forGood: false, isWanted: false });
         this.onHappening({ is: "started", line: greeting });
         for (const { failed } of [...asked, ...waiting]) failed(new Restarted("the Uno was reset while it was asked"));
         this.isReady = false;
@@ -259,13 +259,13 @@ export class Session {
         if (settings) this.onHappening({ is: "settings", settings });
     }
 
-    #end(why: string): void {
+    #end(why: string, isWanted = false): void {
         if (this.#ended) return;
         this.#ended = true;
         this.isReady = false;
         const error = new NoMachine(why);
         for (const { failed } of [...this.#asked.splice(0), ...this.#waiting.splice(0)]) failed(error);
-        this.onHappening({ is: "lost", why, forGood: true });
+        this.onHappening({ is: "lost", why, forGood: true, isWanted });
         void this.#wire.close();
     }
 }

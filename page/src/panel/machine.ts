@@ -64,7 +64,10 @@ export class Machine {
                 break;
             case "lost":
                 this.version = undefined;
-                this.lost = happening.why;
+                this.lost = sentence(happening.why);
+                // Whoever is at the machine has to know where HOLD is now.
+                if (happening.forGood && !happening.isWanted && this.mode === "work")
+                    this.lost += " A machine with power of its own weeds on: its work switch takes the tool out.";
                 [this.alarm, this.warning, this.status] = [undefined, undefined, undefined];
                 break;
             case "settings":
@@ -163,4 +166,10 @@ export class Machine {
             reason === "unseen_ground" && this.status ? ` ${(this.status.unseenMm / 1000).toFixed(2)} m to go.` : "";
         return `The tool is out. ${REASONS[reason] ?? `The machine says: ${reason}.`}${toGo}`;
     }
+}
+
+/** A text as a sentence, its commands as they are typed. */
+export function sentence(text: string): string {
+    const plain = text.replaceAll("`", "");
+    return `${plain.charAt(0).toUpperCase()}${plain.slice(1)}${/[.!?]$/.test(plain) ? "" : "."}`;
 }

@@ -9,7 +9,7 @@ import { type Happening, NoMachine, Session, type Wire } from "../link/session.t
 import { Calibration } from "./calibration.ts";
 import { Console } from "./console.ts";
 import { Examples } from "./examples.ts";
-import { fault, Machine } from "./machine.ts";
+import { fault, Machine, sentence } from "./machine.ts";
 import { SettingsForm } from "./settings.ts";
 import { drawStrip } from "./strip.ts";
 
@@ -204,10 +204,4 @@ export class Panel {
         }
         choose("console");
     }
-}
-
-/** A text as a sentence, its commands as they are. */
-function sentence(text: string): string {
-    const plain = text.replaceAll("`", "");
-    return `${plain.charAt(0).toUpperCase()}${plain.slice(1)}${/[.!?]$/.test(plain) ? "" : "."}`;
 }
