@@ -37,7 +37,7 @@ pub fn write(path: &Path, wires: &[Wire], changes: impl IntoIterator<Item = PinC
         .map_err(|source| WaveformError { path: path.into(), source })
 }
 
-/// As [`write`], to whatever takes bytes.
+/// As [`write()`], to whatever takes bytes.
 ///
 /// # Errors
 ///
