@@ -45,8 +45,8 @@ const STEADY: Short = 59;
 /// What a turn of the loop at either end may add to a time: 1 ms, or the turn and a step where it is longer.
 const TURN: Short = 4;
 
-const fn grace(turn: Short) -> Short {
-    if turn < TURN { TURN } else { turn.saturating_add(1) }
+const fn grace(turn: Short) -> u16 {
+    if turn < TURN { TURN as u16 } else { turn as u16 + 1 }
 }
 
 /// Silences in steady rolling that are an alarm, where none is farther behind the other than so many times the progress, 10 m. A
@@ -75,12 +75,12 @@ const fn shortened(time: u16) -> Short {
 
 /// Whether progress that takes `time` is more than unsteady beside one that takes `steady`.
 const fn is_gap(time: Short, steady: Short, turn: Short) -> bool {
-    time > (steady + steady / 4).saturating_add(grace(turn))
+    time as u16 > (steady + steady / 4) as u16 + grace(turn)
 }
 
 /// Whether no machine can have braked so hard that progress takes `time` behind one that took `steady`.
 const fn is_silence(time: Short, steady: Short, turn: Short) -> bool {
-    time > (2 * steady + steady / 2).saturating_add(grace(turn).saturating_mul(2))
+    time as u16 > (2 * steady + steady / 2) as u16 + 2 * grace(turn)
 }
 
 /// Watches the encoder.
@@ -223,7 +223,8 @@ impl EncoderMonitor {
         if !self.stands {
             return None;
         }
-        self.breaks = self.breaks.saturating_add(1);
+        // Behind the alarm nobody counts on before the machine has rolled.
+        self.breaks += u8::from(self.breaks < BREAKS);
         (self.breaks >= BREAKS).then_some(Alarm::EncoderSilent)
     }
 
@@ -267,7 +268,7 @@ impl BeamMonitor {
         if now.coarse().since(self.since) >= FLICKER_PERIOD {
             *self = Self::new(now);
         }
-        self.edges = self.edges.saturating_add(1);
+        self.edges += u8::from(self.edges <= FLICKER_EDGES);
         (self.edges > FLICKER_EDGES).then_some(Alarm::BeamFlickers)
     }
 }

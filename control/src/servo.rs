@@ -10,9 +10,9 @@ pub type HalfMicros = u16;
 /// The frame's length: 20 ms, the customary 50 Hz.
 pub const FRAME: HalfMicros = 40_000;
 
-/// So close to its end that a frame is left to end by itself: 10 us, more than the loop takes from reading the timer to
+/// So close to its end that a frame is left to end by itself: 20 us, more than the loop takes from reading the timer to
 /// setting it.
-const END: HalfMicros = FRAME - 20;
+const END: HalfMicros = FRAME - 40;
 
 /// A pulse width given in microseconds.
 pub const fn from_us(microseconds: u16) -> HalfMicros {
@@ -33,10 +33,9 @@ pub enum Action {
 /// What to do about a new pulse width, `since_rise` after the last pulse of `width` began, with a servo that needs
 /// `gap_ms` between pulses. A gap of 0 asks for fixed frames: none is cut short.
 pub const fn action(since_rise: HalfMicros, width: HalfMicros, gap_ms: u8) -> Action {
-    let gap = from_us(1000).saturating_mul(gap_ms as u16);
     if since_rise >= END {
         Action::Change
-    } else if since_rise < width.saturating_add(gap) {
+    } else if since_rise < width || (since_rise - width) / from_us(1000) < gap_ms as u16 {
         Action::Wait
     } else if gap_ms == 0 {
         Action::Change

@@ -1,6 +1,6 @@
 //! What the operator may ask of the machine, by switch or console, and why it may refuse.
 
-use super::{Controller, State, faults::Limits};
+use super::{Controller, State, count, faults::Limits};
 use crate::{
     calibration::Unfit,
     classifier::{Class, Classifier, Full, label},
@@ -217,6 +217,6 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// Counts a line that was not understood.
     pub fn count_mistake(&mut self) {
-        self.mistakes = self.mistakes.saturating_add(1);
+        count(&mut self.mistakes);
     }
 }

@@ -1,6 +1,6 @@
 //! Faults and warnings: what the readings show that the machine cannot work with, and what the operator should know.
 
-use super::{Controller, Readings, bench::Bench};
+use super::{Controller, Readings, bench::Bench, count};
 use crate::{
     alarm::{Alarm, Warning},
     classifier::Classifier,
@@ -90,7 +90,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             // An eighth of the lead is what the speed may waver by.
             let lead_ms = u32::from(self.settings.get(Setting::LeadOutMs));
             if self.readings.now - self.told_at < Interval::from_ms(lead_ms - lead_ms / 8) {
-                self.late = self.late.saturating_add(1);
+                count(&mut self.late);
                 self.tell(Event::Warning(Warning::LateCommand));
             }
         }
