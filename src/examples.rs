@@ -86,8 +86,10 @@ impl Examples<{ features::COUNT }> for InFlash {
         let table = self.0.as_ptr();
         let mut search = Search { next: table.cast::<Row>() as u16, end: 0 };
         search.end = search.next + size_of::<Row>() as u16 * table.len() as u16;
-        while let Some(neighbour) = search.next_level(query, nearest) {
-            level(neighbour);
+        while let Some(label) = search.next_level(query, nearest) {
+            if let Some(farthest) = nearest.first() {
+                level(farthest.with_label(label));
+            }
         }
     }
 }
@@ -99,9 +101,10 @@ struct Search {
 }
 
 impl Search {
-    /// Has the examples join the nearest up to one that is `level`, see [`Neighbour::join`]; returns that one.
+    /// Has the examples join the nearest up to one that is `level`, see [`Neighbour::join`]; returns the label of that one,
+    /// which is as far as the farthest.
     #[inline(always)]
-    fn next_level(&mut self, query: &[u8; features::COUNT], nearest: &mut [Neighbour]) -> Option<Neighbour> {
+    fn next_level(&mut self, query: &[u8; features::COUNT], nearest: &mut [Neighbour]) -> Option<u8> {
         /// A feature: its difference, squared, joins the sum. Out of reach, the next example has its turn.
         macro_rules! feature {
             ($query:literal) => {
@@ -129,7 +132,7 @@ impl Search {
         let farthest = nearest.first()?.key();
         // What a sum begins with: the complement of the farthest's distance.
         let [_, start_low, start_middle, start_high] = (!farthest).to_le_bytes();
-        let (label, low, middle, high): (u8, u8, u8, u8);
+        let (label, high): (u8, u8);
         // SAFETY: the loop reads flash from `next` to `end` and nothing else, both of them a row's start or the table's end
         // (`keep_nearest` makes them, and each turn takes `next` one row on). Of SRAM it reads and writes the places of
         // `nearest`, of which there is a first one: it stops at the last of them, or of the first
@@ -222,8 +225,6 @@ impl Search {
                 "or   r0, r16",
                 "or   r0, r17",
                 "breq 8b",
-                "com  {low}",
-                "com  r16",
                 "com  r17",
                 "mov  {label}, {old_label}",
                 "9:",
@@ -245,8 +246,8 @@ impl Search {
                 nearest = in(reg_iw) nearest.as_mut_ptr(),
                 places = in(reg) nearest.len() as u8,
                 label = out(reg) label,
-                low = out(reg) low,
-                out("r16") middle,
+                low = out(reg) _,
+                out("r16") _,
                 out("r17") high,
                 byte = out(reg) _,
                 second = out(reg) _,
@@ -257,6 +258,6 @@ impl Search {
                 options(nostack),
             );
         }
-        (high != NONE).then(|| Neighbour::from_key(u32::from_le_bytes([label, low, middle, high])))
+        (high != NONE).then_some(label)
     }
 }

@@ -100,7 +100,7 @@ fn run(typed: &mut LineBuffer) -> ! {
 
         // A turn has little time for the console: some bytes, or one thing that takes longer than a byte does. One in which an object
         // was judged has none.
-        let bytes = if controller.take_judged() { 0 } else { CONSOLE_BYTES };
+        let bytes = if orders.has_judged { 0 } else { CONSOLE_BYTES };
         for _ in 0..bytes {
             if serial.room() > 0
                 && let Some(byte) = console.next_byte()

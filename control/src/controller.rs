@@ -99,6 +99,8 @@ pub struct Orders {
     pub pulse_out: HalfMicros,
     /// The shortest gap between servo pulses in milliseconds; 0 for fixed frames.
     pub gap_ms: u8,
+    /// Whether an object was judged since the last step: that is enough for a turn of the loop.
+    pub has_judged: bool,
 }
 
 /// An object as it was judged: what its features follow from, in less room than they take.
@@ -150,7 +152,7 @@ pub struct Controller<C, M> {
     awaits_ground: bool,
     /// Times that it came sooner than the tool could be out.
     late: u16,
-    /// Whether an object was judged since this was last asked.
+    /// Whether an object was judged since the last step.
     has_judged: bool,
     /// Lines that were not understood, or came with a hole in them.
     mistakes: u16,
@@ -280,9 +282,6 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         let doubted = self.odometer.read(readings.position, readings.jumps, self.believes_jumps());
         let position = self.odometer.place(readings.position);
         self.readings.position = position;
-        if self.settings_changed {
-            self.follow_settings();
-        }
         if let Some(speed) = self.meter.read(readings.now, position) {
             self.ground.lead(&self.settings, speed);
         }
@@ -294,6 +293,10 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         }
         if let Some(object) = self.ground.roll_to(position) {
             self.judge(object);
+        }
+        // Either takes half of what a turn may take.
+        if self.settings_changed && !self.has_judged {
+            self.follow_settings();
         }
         if let Some(alarm) = self.fault(doubted) {
             self.raise(alarm);
@@ -309,6 +312,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             (self.pulse, self.told_at) = (orders.pulse, readings.now);
         }
         self.warn();
+        self.has_judged = false;
         orders
     }
 
@@ -320,6 +324,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             pulse: if let Bench::ByHand(pulse) = self.bench { pulse } else { pulse_of(pulse) },
             pulse_out: pulse_of(Setting::ServoOutUs),
             gap_ms: self.settings.get(Setting::ServoGapMs) as u8,
+            has_judged: self.has_judged,
         }
     }
 

@@ -10,9 +10,8 @@ pub type HalfMicros = u16;
 /// The frame's length: 20 ms, the customary 50 Hz.
 pub const FRAME: HalfMicros = 40_000;
 
-/// So close to its end that a frame is left to end by itself: 20 us, more than the loop takes from reading the timer to
-/// setting it.
-const END: HalfMicros = FRAME - 40;
+/// So close to its end that a frame is left to end by itself: 10 us.
+const END: HalfMicros = FRAME - 20;
 
 /// A pulse width given in microseconds.
 pub const fn from_us(microseconds: u16) -> HalfMicros {

@@ -20,11 +20,11 @@ impl Neighbour {
         Self(distance << 8 | label as u32)
     }
 
-    /// The neighbour with this [`key`](Self::key).
+    /// A neighbour of another class that is as far.
     #[inline]
     #[must_use]
-    pub const fn from_key(key: u32) -> Self {
-        Self(key)
+    pub const fn with_label(self, label: u8) -> Self {
+        Self(self.0 & !0xFF | label as u32)
     }
 
     /// The distance in the upper 24 bits, the label in the lower 8.

@@ -145,7 +145,8 @@ impl FeatureScale {
         if value <= self.offset {
             return 0;
         }
-        let steps = value.abs_diff(self.offset) >> self.shift;
+        // Above the offset, the wrapped difference is the true one.
+        let steps = (value as u32).wrapping_sub(self.offset as u32) >> self.shift;
         // 511 steps of the smallest factor, 128, are already 255: holding the steps to 16 bits changes nothing, and
         // the product of two 16-bit numbers fits 32 bits.
         let steps = if steps > u16::MAX as u32 { u16::MAX as u32 } else { steps };

@@ -147,11 +147,6 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         self.warned
     }
 
-    /// Whether an object was judged since this was last asked: that is enough for a turn of the loop.
-    pub fn take_judged(&mut self) -> bool {
-        core::mem::take(&mut self.has_judged)
-    }
-
     /// The next event to be told.
     #[inline(never)]
     pub fn next_event(&mut self) -> Option<Event> {
