@@ -184,8 +184,10 @@ impl<M: Memory> Examples<{ features::COUNT }> for FieldExamples<M> {
         nearest: &mut [Neighbour],
         level: &mut impl FnMut(Neighbour),
     ) {
-        for example in (0..CAPACITY).filter_map(|slot| self.slot(slot)) {
-            example.neighbour_of(query).join(nearest, level);
+        for (number, &slot) in (0..).zip(&self.slots) {
+            if slot == Slot::Held {
+                example_in(self.read(number)).neighbour_of(query).join(nearest, level);
+            }
         }
     }
 }

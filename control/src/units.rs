@@ -187,6 +187,7 @@ impl Instant {
     }
 
     /// The moment in coarse steps.
+    #[inline(never)]
     pub const fn coarse(self) -> Coarse {
         Coarse((self.0 >> 4) as u16)
     }
