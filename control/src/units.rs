@@ -158,11 +158,13 @@ impl Grain {
     }
 
     /// A distance in units, which is to be less than 13 m.
+    #[inline(never)]
     pub const fn length(self, distance: Ticks) -> Length {
         Length((distance.0 >> self.shift) as i16)
     }
 
     /// A distance in ticks.
+    #[inline(never)]
     pub const fn ticks(self, length: Length) -> Ticks {
         Ticks((length.0 as i32) << self.shift)
     }
@@ -258,6 +260,12 @@ impl Add<Interval> for Instant {
 pub struct TicksPerSecond(pub i32);
 
 impl TicksPerSecond {
+    /// Whether the machine rolls faster than that many ticks a second, forward or back.
+    #[inline(never)]
+    pub fn is_beyond(self, limit: u16) -> bool {
+        self.0.unsigned_abs() > limit.into()
+    }
+
     /// How far the machine rolls at this speed, in so many milliseconds.
     ///
     /// Right while speed times milliseconds stays below 2^31: up to 2.1 million ticks a second over a whole second.

@@ -22,8 +22,8 @@ const PROGRESS: Length = Length(4);
 /// What the machine is not to go beyond, in ticks of the present wheel.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Limits {
-    /// In ticks a second.
-    top_speed: i32,
+    /// In ticks a second, 60,000 at the most.
+    top_speed: u16,
     /// Zero for none.
     no_plant: Ticks,
 }
@@ -34,7 +34,7 @@ impl Limits {
     pub(super) fn of(settings: &Settings) -> Self {
         let wheel = settings.wheel();
         Self {
-            top_speed: wheel.ticks(settings.get(Setting::TopSpeedMmS)).0,
+            top_speed: wheel.ticks(settings.get(Setting::TopSpeedMmS)).0 as u16,
             no_plant: Ticks(wheel.ticks(1000).0 * i32::from(settings.get(Setting::NoPlantM))),
         }
     }
@@ -60,7 +60,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         if self.ground.is_blocked() {
             return Some(Alarm::BeamBlocked);
         }
-        if working && self.meter.speed().0.abs() > self.limits.top_speed {
+        if working && self.meter.speed().is_beyond(self.limits.top_speed) {
             return Some(Alarm::TooFast);
         }
         if working && self.ground.rolled_back_too_far() {

@@ -14,7 +14,7 @@ use crate::{
 };
 
 /// A wheel whose edges come less than 50 us apart, in ticks a second: faster than any weeder with an encoder of 0.2 mm or more.
-const FAST: i32 = 20_000;
+const FAST: u16 = 20_000;
 
 /// Time between two points of a plotter's curves.
 const PLOT_PERIOD: u16 = Coarse::steps_in_ms(50);
@@ -76,7 +76,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// Whether the wheel turns so fast that an edge may be missed, and both channels may have changed at once.
     pub fn believes_jumps(&self) -> bool {
-        self.meter.speed().0.abs() > FAST
+        self.meter.speed().is_beyond(FAST)
     }
 
     /// Whether the beam is broken.
