@@ -132,11 +132,10 @@ fn search<const FEATURES: usize, const CLASSES: usize>(
         level.vote(neighbour.label());
     }
     let Level { votes, unknown: false, .. } = level else { return Err(ClassifyError::UnknownLabel) };
-    let mut most = votes[0];
-    let (mut label, mut tie) = (0, false);
-    for (class, &votes) in (1..).zip(&votes[1..]) {
+    let (mut label, mut most, mut tie) = (0, 0, false);
+    for (class, &votes) in votes.iter().enumerate() {
         if votes > most {
-            (label, most, tie) = (class, votes, false);
+            (label, most, tie) = (class as u8, votes, false);
         } else if votes == most {
             tie = true;
         }
