@@ -3,35 +3,32 @@
 //! Encoder (D2, D3) and beam (D8) belong to their interrupts, D9 to the servo's timer, D0 and D1 to the USART. The
 //! encoder's and the beam's pull-ups stand outside, on the board; only the switches use those inside the chip.
 
-use avr_device::atmega328p::{PORTB, PORTD, portb, portd};
+use avr_device::atmega328p::{PORTB, PORTD, portb};
 use core::convert::Infallible;
 use embedded_hal::digital::{ErrorType, InputPin, OutputPin, PinState};
 
 /// The status LED on D13 (PB5), lit when high.
 pub struct Lamp<'a>(&'a portb::RegisterBlock);
 
-/// A switch that pulls its pin to ground when it is closed.
-pub struct Switch<'a> {
-    port: &'a portd::RegisterBlock,
-    mask: u8,
-}
+/// A switch that pulls its pin of port D to ground when it is closed. The type says which bit it is, and not a number in the loop's
+/// frame: the pin is then read in place.
+pub struct Switch<'a, const BIT: u8>(&'a PORTD);
 
 /// The pins, set up.
 pub struct Pins<'a> {
     /// The status LED, dark.
     pub lamp: Lamp<'a>,
     /// The work switch on D4 (PD4), low = work.
-    pub work_switch: Switch<'a>,
+    pub work_switch: Switch<'a, 4>,
     /// The end switch on D5 (PD5), low = the tool is out.
-    pub end_switch: Switch<'a>,
+    pub end_switch: Switch<'a, 5>,
 }
 
 /// Sets the pins up.
 pub fn pins<'a>(port_b: &'a PORTB, port_d: &'a PORTD) -> Pins<'a> {
     port_b.ddrb().modify(|_, w| w.pb5().set_bit());
     port_d.portd().modify(|_, w| w.pd4().set_bit().pd5().set_bit());
-    let switch = |mask| Switch { port: port_d, mask };
-    Pins { lamp: Lamp(port_b), work_switch: switch(1 << 4), end_switch: switch(1 << 5) }
+    Pins { lamp: Lamp(port_b), work_switch: Switch(port_d), end_switch: Switch(port_d) }
 }
 
 impl ErrorType for Lamp<'_> {
@@ -57,16 +54,16 @@ impl OutputPin for Lamp<'_> {
     }
 }
 
-impl ErrorType for Switch<'_> {
+impl<const BIT: u8> ErrorType for Switch<'_, BIT> {
     type Error = Infallible;
 }
 
-impl InputPin for Switch<'_> {
+impl<const BIT: u8> InputPin for Switch<'_, BIT> {
     fn is_high(&mut self) -> Result<bool, Infallible> {
         self.is_low().map(|low| !low)
     }
 
     fn is_low(&mut self) -> Result<bool, Infallible> {
-        Ok(self.port.pind().read().bits() & self.mask == 0)
+        Ok(self.0.pind().read().bits() & (1 << BIT) == 0)
     }
 }
