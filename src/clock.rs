@@ -31,7 +31,7 @@ impl Clock {
         let (high, low, steps, flags) = interrupt::free(|_| {
             (OVERFLOWS_HIGH.get(), OVERFLOWS_LOW.get(), self.0.tcnt0().read().bits(), self.0.tifr0().read())
         });
-        let instant = u32::from(high) << 16 | u32::from(low) << 8 | u32::from(steps);
+        let instant = u32::from(high) << 16 | u32::from(u16::from_le_bytes([steps, low]));
         // An overflow that happened in there waits for its interrupt; it belongs to the count when the steps were read
         // after it, which a small number tells.
         let is_pending = flags.tov0().bit_is_set() && steps < 128;
