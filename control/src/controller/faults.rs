@@ -11,7 +11,7 @@ use crate::{
 };
 
 /// What the end switch may take longer than the lead: a servo frame, the contacts' bouncing, and some patience.
-const END_SWITCH_GRACE_MS: u32 = 100;
+const END_SWITCH_GRACE_MS: u16 = 100;
 
 /// Free bytes of stack below which the machine does not work on: two interrupts' worth.
 const STACK_RESERVE: u16 = 48;
@@ -67,17 +67,22 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             return Some(Alarm::RolledBackTooFar);
         }
         self.end_switch.read(now, end_switch_on);
-        let swing = Interval::from_ms(u32::from(self.settings.get(Setting::LeadOutMs)) + END_SWITCH_GRACE_MS);
         if self.settings.get(Setting::EndSwitch) != 0
             && !matches!(self.bench, Bench::ByHand(_) | Bench::Swings(_))
             && self.end_switch.is_on() != self.tool_out
             // What was done by hand has ended just now, and the tool is yet to be told.
             && self.orders().pulse == self.pulse
-            && now - self.told_at > swing
+            && self.was_told_for(self.settings.get(Setting::LeadOutMs) + END_SWITCH_GRACE_MS)
         {
             return Some(Alarm::ToolStuck);
         }
         (stack_free < STACK_RESERVE).then_some(Alarm::StackLow)
+    }
+
+    /// Whether the servo was told its pulse so long ago.
+    #[inline(never)]
+    fn was_told_for(&self, milliseconds: u16) -> bool {
+        self.readings.now - self.told_at >= Interval::from_ms(milliseconds.into())
     }
 
     /// Tells what the operator should know, once.
@@ -88,8 +93,8 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         if self.awaits_ground && self.ground.is_closed_at_tool() {
             self.awaits_ground = false;
             // An eighth of the lead is what the speed may waver by.
-            let lead_ms = u32::from(self.settings.get(Setting::LeadOutMs));
-            if self.readings.now - self.told_at < Interval::from_ms(lead_ms - lead_ms / 8) {
+            let lead_ms = self.settings.get(Setting::LeadOutMs);
+            if !self.was_told_for(lead_ms - lead_ms / 8) {
                 count(&mut self.late);
                 self.tell(Event::Warning(Warning::LateCommand));
             }
