@@ -137,8 +137,8 @@ fn no_turn_takes_more_than_a_millisecond_whatever_is_typed_and_told() {
     println!("{} of {TURN} cycles: {}", worst.0, worst.1);
 }
 
-/// A turn that judges an object, at most: where what follows from a setting is worked out in the same turn, that is the longest.
-const JUDGING: u64 = TURN + TURN * 5 / 8;
+/// A turn on the move, at most: one that judges an object, or reads a line while the speed changes, is the longest.
+const JUDGING: u64 = TURN + TURN * 3 / 16;
 
 #[test]
 fn no_turn_takes_much_more_than_a_millisecond_while_a_row_rolls_by() {
