@@ -1,11 +1,13 @@
 //! What once fell, by name: the very lines and rolls that showed it, and their like on both sides, held against the model.
 
-use crate::{
-    drive::Drive,
-    walk::{Beginning, Happening, Walk},
-};
+use crate::decisions::Decisions;
 use control::{alarm::Alarm, controller::State};
-use proptest::test_runner::TestCaseError;
+use walks::{
+    Failure, drive,
+    walk::{Happening, Walk},
+};
+
+type Drive = drive::Drive<Decisions>;
 
 /// Two plants, and bare ground behind them.
 const PLANTS: [(u32, u32); 3] = [(300, 150), (350, 150), (9000, 0)];
@@ -16,22 +18,9 @@ const ROW: [(u32, u32); 1] = [(450, 150)];
 /// Faster than 600 mm/s, so that there is an alarm, and to a stop.
 const TOO_FAST: &str = "roll 60 mm at 694 mm/s\nstand for 800 ms";
 
-/// What a line says: `roll 450 mm at 556 mm/s`, `roll back ...`, `stand for 100 ms`, or what is typed.
-fn happening(line: &str) -> Happening {
-    let numbers: Vec<i32> = line.split(' ').filter_map(|word| word.parse().ok()).collect();
-    match (line.split(' ').next(), &numbers[..]) {
-        (Some("roll"), &[mm, mm_s]) if line.starts_with("roll back") => Happening::Roll { mm: -mm, mm_s: -mm_s },
-        (Some("roll"), &[mm, mm_s]) => Happening::Roll { mm, mm_s },
-        (Some("stand"), &[ms]) => Happening::Stand { ms: ms as u32 },
-        _ => Happening::Type(line.to_owned()),
-    }
-}
-
 /// A machine that gains and loses speed as a person pushes it, on a row.
 fn walk(row: &[(u32, u32)], lines: &str) -> Walk {
-    let beginning = Beginning { count: 0, steps: 0, turn_us: 1000, reads_first: true, mm_s2: 3000 };
-    let happenings = lines.lines().map(str::trim).filter(|line| !line.is_empty()).map(happening).collect();
-    Walk { beginning, row: row.to_vec(), happenings }
+    Walk::written(row, lines)
 }
 
 /// Goes the walk, checked after each step; returns the machine.
@@ -41,7 +30,7 @@ fn go(walk: &Walk) -> Drive {
         walk.happenings.iter().try_for_each(|happening| drive.happen(happening))?;
         Ok(drive)
     });
-    gone.unwrap_or_else(|failure: TestCaseError| panic!("{failure}\n{walk:?}"))
+    gone.unwrap_or_else(|failure: Failure| panic!("{failure}\n{walk:?}"))
 }
 
 #[test]
@@ -136,7 +125,7 @@ fn leads_near_each_other_give_one_swing_each_way_a_window_at_every_speed() {
                  roll {} mm at {mm_s} mm/s",
                 mm_s * 2 + 2500
             );
-            swings += go(&walk(&[(450, 150), (700, 150), (60, 90)], &lines)).steady_swings;
+            swings += go(&walk(&[(450, 150), (700, 150), (60, 90)], &lines)).steady_swings();
         }
     }
     assert!(swings > 10_000, "{swings} swings were looked at");

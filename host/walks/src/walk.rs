@@ -12,7 +12,9 @@ pub const TICKS_A_MM: f64 = 1.909_86;
 pub struct Beginning {
     /// What the counters of way and time show.
     pub count: i32,
+    /// As `count`, in the clock's steps.
     pub steps: u32,
+    /// A turn of the loop, after which the machine is looked at.
     pub turn_us: u64,
     /// Whether each reading is from before the edges that come with it.
     pub reads_first: bool,
@@ -27,48 +29,67 @@ pub enum Happening {
     Type(String),
     /// The machine rolls so far, back where that is negative, and goes on at this speed.
     Roll {
+        /// How far.
         mm: i32,
+        /// How fast.
         mm_s: i32,
     },
+    /// The machine stands.
     Stand {
+        /// How long.
         ms: u32,
     },
     /// The wheel trembles on an edge.
     Tremble {
+        /// Ticks to and fro.
         times: u32,
     },
+    /// The work switch is thrown.
     Switch {
+        /// To where.
         on: bool,
     },
     /// Leaves, or light between them, come and go in the beam at one place.
     Dust {
+        /// How often.
         times: u32,
     },
     /// The next edges of the beam get lost.
     LoseEdges {
+        /// For how long.
         turns: u32,
     },
     /// The encoder says nothing, while the machine rolls on.
     Silence {
+        /// How long.
         ms: u32,
     },
     /// Both channels of the encoder change at once.
     Spike {
+        /// What that adds to the count.
         ticks: i32,
+        /// How often, a turn apart.
         times: u32,
     },
+    /// The machine is reset.
     Reset(Cause),
     /// A line is typed, and after so many turns of the loop the power goes away; a byte that is being written becomes anything.
     CutPower {
+        /// What is typed.
         line: &'static str,
+        /// How long the machine has for it.
         turns: u32,
+        /// What becomes of the byte.
         byte: u8,
     },
+    /// The stack reaches nearly down to the variables.
     LowerStack {
+        /// For how long.
         turns: u32,
     },
     /// The end switch no longer follows the tool, or does again.
     StickTool {
+        /// Which of them.
         stuck: bool,
     },
 }
@@ -100,19 +121,40 @@ impl fmt::Display for Happening {
 /// A walk.
 #[derive(Clone)]
 pub struct Walk {
+    /// Where it begins.
     pub beginning: Beginning,
     /// Clear ground and ground with something on it, in turn, in millimetres; behind the last it begins again.
     pub row: Vec<(u32, u32)>,
+    /// What happens, in this order.
     pub happenings: Vec<Happening>,
 }
 
 impl Walk {
+    /// A walk over a row, as written down: a line for each thing that is typed or rolled, by a machine that gains and loses speed as a
+    /// person pushes it.
+    pub fn written(row: &[(u32, u32)], lines: &str) -> Self {
+        let beginning = Beginning { count: 0, steps: 0, turn_us: 1000, reads_first: true, mm_s2: 3000 };
+        let happenings = lines.lines().map(str::trim).filter(|line| !line.is_empty()).map(happening).collect();
+        Self { beginning, row: row.to_vec(), happenings }
+    }
+
     /// For each tick of the row whether something stands there.
     pub fn levels(&self) -> Vec<bool> {
         let ticks = |mm: u32| (f64::from(mm) * TICKS_A_MM) as usize;
         let levels =
             |&(gap, thing)| std::iter::repeat_n(false, ticks(gap)).chain(std::iter::repeat_n(true, ticks(thing)));
         self.row.iter().flat_map(levels).collect()
+    }
+}
+
+/// What a line says: `roll 450 mm at 556 mm/s`, `roll back ...`, `stand for 100 ms`, or what is typed.
+fn happening(line: &str) -> Happening {
+    let numbers: Vec<i32> = line.split(' ').filter_map(|word| word.parse().ok()).collect();
+    match (line.split(' ').next(), &numbers[..]) {
+        (Some("roll"), &[mm, mm_s]) if line.starts_with("roll back") => Happening::Roll { mm: -mm, mm_s: -mm_s },
+        (Some("roll"), &[mm, mm_s]) => Happening::Roll { mm, mm_s },
+        (Some("stand"), &[ms]) => Happening::Stand { ms: ms as u32 },
+        _ => Happening::Type(line.to_owned()),
     }
 }
 
@@ -317,15 +359,15 @@ fn walks(happenings: BoxedStrategy<Vec<Happening>>) -> BoxedStrategy<Walk> {
         .boxed()
 }
 
-/// Walks on which anything happens.
-pub fn wild() -> BoxedStrategy<Walk> {
-    walks(prop::collection::vec(happenings(), 1..30).prop_map(|some| some.into_iter().flatten().collect()).boxed())
+/// Walks on which anything happens, so many times at the most.
+pub fn wild(happen: usize) -> BoxedStrategy<Walk> {
+    walks(prop::collection::vec(happenings(), 1..happen).prop_map(|some| some.into_iter().flatten().collect()).boxed())
 }
 
-/// Walks of a machine that was set up by somebody, works, and is rolled steadily, forward and back.
-pub fn calm() -> BoxedStrategy<Walk> {
-    let rolls = prop_oneof![5 => roll(60..1400, 500..5000), 1 => roll(-800..-60, 100..3000)];
-    let happenings = (prop::collection::vec(setting(), 0..5), prop::collection::vec(rolls, 1..8));
+/// Walks of a machine that was set up by somebody, works, and is rolled steadily, forward and back, so many times at the most.
+pub fn calm(rolls: usize) -> BoxedStrategy<Walk> {
+    let rolled = prop_oneof![5 => roll(60..1400, 500..5000), 1 => roll(-800..-60, 100..3000)];
+    let happenings = (prop::collection::vec(setting(), 0..5), prop::collection::vec(rolled, 1..rolls));
     walks(
         happenings
             .prop_map(|(settings, rolls)| {

@@ -39,8 +39,12 @@ pub struct Model {
     runs: Vec<Run>,
     /// Gaps that belong to a canopy, each with the frontier from which on it was set.
     merge_gaps: Vec<(i64, i64)>,
+    /// An object no longer than this may have been taken for a weed, and nobody has said so.
+    narrow: i64,
     /// What every place may be off by: the steps in which the machine remembers the ground, and the turn of the loop.
     slack: i64,
+    /// As much of it as the grain of that memory, and the turn, make.
+    grain_slack: i64,
     /// Whether the encoder's count has gone wrong.
     pub is_shifted: bool,
 }
@@ -56,7 +60,9 @@ impl Model {
             is_growing: false,
             runs: Vec::new(),
             merge_gaps: Vec::new(),
+            narrow: 0,
             slack: 0,
+            grain_slack: 0,
             is_shifted: false,
         };
         model.touch(0);
@@ -74,10 +80,22 @@ impl Model {
             self.begin_anew(self.frontier - 8 * metre);
         }
         let grain = 1 + metre / 2400;
-        self.slack = self.slack.max(2 + 2 * grain);
+        let slack = 2 + 2 * grain;
+        self.slack += (slack - self.grain_slack).max(0);
+        self.grain_slack = self.grain_slack.max(slack);
         if self.merge_gaps.last().is_none_or(|&(_, gap)| gap != merge_gap) {
             self.merge_gaps.push((self.frontier, merge_gap));
         }
+    }
+
+    /// The machine's places may be off by so many ticks more.
+    pub fn loosen(&mut self, ticks: i64) {
+        self.slack += ticks;
+    }
+
+    /// Of an object no longer than this the machine may make a weed without anybody being told.
+    pub fn leave_narrow(&mut self, ticks: i64) {
+        self.narrow = self.narrow.max(ticks);
     }
 
     /// What lies ahead of a place is seen anew.
@@ -193,7 +211,11 @@ impl Model {
     pub fn canopy_between(&self, near: i64, far: i64, margin: i64) -> Option<Run> {
         let first = self.runs.partition_point(|run| run.trailing + margin < near);
         let mut near_by = self.runs[first..].iter().take_while(|run| run.leading - margin <= far);
-        near_by.find(|run| self.bounds(run, margin).is_some_and(|(from, to)| from <= far && to >= near)).copied()
+        let is_closed = |run: &&Run| {
+            let meets = self.bounds(run, margin).is_some_and(|(from, to)| from <= far && to >= near);
+            meets && (self.narrow == 0 || self.is_wide(run))
+        };
+        near_by.find(is_closed).copied()
     }
 
     /// As [`canopy_between`](Self::canopy_between), where all of the ground is closed by canopies and their margins.
@@ -206,6 +228,21 @@ impl Model {
             }
             near = to + 1;
         }
+    }
+
+    /// Whether a run belongs to an object that is too wide for a weed: with the runs so near to it that they are of the same one.
+    fn is_wide(&self, run: &Run) -> bool {
+        let place = self.runs.partition_point(|other| other.leading < run.leading);
+        let gap = |first: usize, next: usize| {
+            let shortest = self.merge_gaps_since(self.runs[first].leading).min().unwrap_or(0);
+            let blur = self.runs[first].blur.max(self.runs[next].blur);
+            let is_same = self.runs[next].leading - self.runs[first].trailing < shortest - self.slack - 2 * blur;
+            is_same && !self.runs[first].is_free && !self.runs[next].is_free
+        };
+        let first = (1..=place).rev().find(|&next| !gap(next - 1, next)).unwrap_or(0);
+        let last = (place..self.runs.len() - 1).find(|&first| !gap(first, first + 1)).unwrap_or(self.runs.len() - 1);
+        let blur = self.runs[first..=last].iter().map(|run| run.blur).max().unwrap_or(0);
+        self.runs[last].trailing - self.runs[first].leading > self.narrow + self.slack + 2 * blur
     }
 
     /// The ground around a run that is closed for sure; none where the tool may work, or the machine may have seen nothing.

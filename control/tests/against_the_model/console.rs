@@ -1,0 +1,72 @@
+//! The console as the firmware's main loop has it: a line is carried out once the one before it has been answered.
+
+use crate::decisions::Weeder;
+use control::{
+    console::LineBuffer,
+    line::Line,
+    reply::{self, Answer, LINE},
+};
+use proptest::prelude::*;
+use std::collections::VecDeque;
+use walks::machine::Checked;
+
+/// The console.
+#[derive(Debug)]
+pub struct Console {
+    line: LineBuffer,
+    answer: Answer,
+    /// Bytes on their way, and the lines that they make.
+    typed: VecDeque<u8>,
+    lines: VecDeque<String>,
+}
+
+impl Console {
+    pub fn new() -> Self {
+        Self { line: LineBuffer::new(), answer: Answer::Greeting, typed: VecDeque::new(), lines: VecDeque::new() }
+    }
+
+    /// Puts a line onto the wire, or several.
+    pub fn put(&mut self, text: &str, lines: &[String]) {
+        self.typed.extend(text.bytes().chain(*b"\n"));
+        self.lines.extend(lines.iter().cloned());
+    }
+
+    /// Has the machine carry out a line that has come, if there is one.
+    pub fn carry_out(&mut self, machine: &mut Weeder) -> Option<String> {
+        while self.answer.is_done()
+            && let Some(byte) = self.typed.pop_front()
+        {
+            if let Some(command) = self.line.take(byte) {
+                self.answer = reply::answer(command, machine);
+                return Some(self.lines.pop_front().unwrap_or_default());
+            }
+        }
+        None
+    }
+
+    /// Writes what there is room for.
+    pub fn write(&mut self, machine: &mut Weeder) -> Result<String, TestCaseError> {
+        let mut line = Line::new();
+        if !machine.carry_on() {
+        } else if !self.answer.is_done() {
+            self.answer.write_line(machine, &mut line);
+        } else if let Some(event) = machine.next_event() {
+            reply::write_event(&event, &mut line);
+        } else if let Some(plot) = machine.next_plot() {
+            reply::write_plot(machine, plot, &mut line);
+        }
+        let written: String = line.map(char::from).collect();
+        check_length(&written)?;
+        Ok(written)
+    }
+
+    /// Whether everything that was typed has been answered.
+    pub fn is_done(&self) -> bool {
+        self.typed.is_empty() && self.answer.is_done()
+    }
+}
+
+fn check_length(written: &str) -> Checked {
+    prop_assert!(written.len() <= LINE, "{written:?} is too long a line");
+    Ok(())
+}

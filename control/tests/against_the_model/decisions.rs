@@ -1,0 +1,254 @@
+//! The decisions as a machine that is driven: the controller with a classifier that goes by the width alone, its console and an
+//! EEPROM, and nothing of a chip.
+
+use crate::{
+    console::Console,
+    eeprom::{Eeprom, Half},
+};
+use control::{
+    classifier::{Class, Classifier, Full, Listed, Nearest, Vote},
+    controller::{Controller, Orders, Readings, Reason, State, WakeUp},
+    examples::EXAMPLES,
+    features::Features,
+    quadrature::Odometer,
+    reset::Cause,
+    servo,
+    settings::{Setting, Settings},
+    units::{Instant, Interval, Position},
+};
+use knn::Example;
+use proptest::prelude::*;
+use std::{cell::Cell, rc::Rc};
+use walks::{
+    machine::{Attended, Checked, Machine, World},
+    walk::Beginning,
+};
+
+/// Narrower than this is a weed.
+const PLANT_MM: i16 = 60;
+
+/// What the features add to a width, in millimetres.
+const MARGINS_MM: i16 = 100;
+
+/// Takes for a weed what is narrow, and for a plant what is not, but keeps examples as the firmware does.
+#[derive(Debug)]
+pub struct ByWidth {
+    nearest: Nearest<&'static [Example<5>], Half>,
+    /// The width of what was last taken for a weed, in millimetres.
+    weed: Rc<Cell<Option<i16>>>,
+}
+
+impl Classifier for ByWidth {
+    fn wake_up(&mut self) {
+        self.nearest.wake_up();
+    }
+
+    fn classify(&self, features: &Features, _: u8) -> Vote {
+        let width_mm = features.hold_mm - MARGINS_MM;
+        if width_mm >= PLANT_MM {
+            return Vote { class: Class::Plant, votes: 1 };
+        }
+        self.weed.set(Some(width_mm));
+        Vote { class: Class::Weed, votes: 1 }
+    }
+
+    fn built_in_class(&self, _: &Features) -> Class {
+        Class::Unknown
+    }
+
+    fn teach(&mut self, features: &Features, label: u8) -> Result<(), Full> {
+        self.nearest.teach(features, label)
+    }
+
+    fn forget(&mut self, number: u8) -> bool {
+        self.nearest.forget(number)
+    }
+
+    fn listed(&self, place: u8) -> Option<(Listed, u8)> {
+        self.nearest.listed(place)
+    }
+
+    fn spoiled(&self) -> u8 {
+        self.nearest.spoiled()
+    }
+
+    fn carry_on(&mut self) -> bool {
+        self.nearest.carry_on()
+    }
+}
+
+/// The controller of such a machine.
+pub type Weeder = Controller<ByWidth, Half>;
+
+/// The machine, see the module's words.
+#[derive(Debug)]
+pub struct Decisions {
+    odometer: Odometer,
+    weeder: Weeder,
+    orders: Orders,
+    console: Console,
+    /// What it has just taken for a weed.
+    weed: Rc<Cell<Option<i16>>>,
+    eeprom: Eeprom,
+    /// What the clock showed in the beginning.
+    steps: u32,
+    /// Whether each reading is from before the edges that come with it.
+    reads_first: bool,
+}
+
+fn wake(eeprom: &Eeprom, weed: &Rc<Cell<Option<i16>>>, wake_up: WakeUp) -> Weeder {
+    let [for_settings, for_examples] = eeprom.halves();
+    let classifier = ByWidth { nearest: Nearest::asleep(&EXAMPLES[..], for_examples), weed: Rc::clone(weed) };
+    Controller::new(classifier, for_settings, wake_up)
+}
+
+fn readings(steps: u32, world: &World) -> Readings {
+    let now = Instant::new(steps) + Interval::from_steps((world.time_us / 4) as u32);
+    Readings {
+        switch_on: world.switch_on,
+        jumps: world.jumps,
+        stack_free: if world.stack_is_low { 40 } else { 300 },
+        end_switch_on: world.end_switch_on,
+        ..Readings::new(now, Position::new(world.count as i32))
+    }
+}
+
+/// The count nearest to `count`, without its wrapping, that a position stands for.
+fn unwrapped(count: i64, position: Position) -> i64 {
+    count + i64::from((position - Position::new(count as i32)).0)
+}
+
+impl Machine for Decisions {
+    const IS_OPEN: bool = true;
+    const NARROW_MM: u16 = 0;
+    const LATENESS_US: u64 = 0;
+
+    fn new(beginning: &Beginning, world: &World) -> Result<Self, TestCaseError> {
+        let (eeprom, weed) = (Eeprom::new(), Rc::default());
+        let readings = readings(beginning.steps, world);
+        let weeder = wake(&eeprom, &weed, WakeUp { readings, beam_broken: world.broken, cause: Cause::PowerOn });
+        Ok(Self {
+            odometer: Odometer::new(readings.position, world.jumps),
+            orders: weeder.orders(),
+            weeder,
+            console: Console::new(),
+            weed,
+            eeprom,
+            steps: beginning.steps,
+            reads_first: beginning.reads_first,
+        })
+    }
+
+    fn count(&mut self, _: &World) {}
+
+    fn spike(&mut self, world: &mut World, ticks: i32) -> i64 {
+        world.count += i64::from(ticks);
+        world.jumps = world.jumps.wrapping_add(1);
+        0
+    }
+
+    fn beam_edge(&mut self, world: &World) {
+        self.weeder.beam_edge(Position::new(world.count as i32), world.broken);
+    }
+
+    fn lose_edges(&mut self, world: &World) -> Checked {
+        self.weeder.beam_edges_lost(world.broken);
+        Ok(())
+    }
+
+    fn place(&self, count: i64) -> i64 {
+        unwrapped(count, self.odometer.place(Position::new(count as i32)))
+    }
+
+    fn turn(&mut self, before: &World, now: &World) -> Result<i64, TestCaseError> {
+        let readings = readings(self.steps, if self.reads_first { before } else { now });
+        self.odometer.read(readings.position, readings.jumps, self.weeder.believes_jumps());
+        let place = unwrapped(now.count, self.odometer.place(readings.position));
+        self.orders = self.weeder.step(readings);
+        Ok(place)
+    }
+
+    fn check_pulse(&self, is_tried: bool) -> Checked {
+        let pulse_of = |setting| servo::from_us(self.weeder.settings().get(setting));
+        let (inside, outside) = (pulse_of(Setting::ServoInUs), pulse_of(Setting::ServoOutUs));
+        let Orders { pulse, pulse_out, .. } = self.orders;
+        prop_assert_eq!(pulse_out, outside);
+        let (state, out) = (self.weeder.state(), self.weeder.tool_out());
+        if state == State::Work {
+            prop_assert_eq!(pulse, if out { outside } else { inside });
+        } else if matches!(state, State::Alarm(_)) || !is_tried {
+            prop_assert!(out && pulse == outside, "the tool is in the row in {state:?}");
+        }
+        Ok(())
+    }
+
+    fn take_weed(&mut self) -> Option<i16> {
+        self.weed.take()
+    }
+
+    fn settings(&self) -> &Settings {
+        self.weeder.settings()
+    }
+
+    fn settings_are_in_doubt(&self) -> bool {
+        false
+    }
+
+    fn state(&self) -> State {
+        self.weeder.state()
+    }
+
+    fn reason(&self) -> Option<Reason> {
+        self.weeder.reason()
+    }
+
+    fn unseen_mm(&self) -> i16 {
+        self.weeder.unseen_mm()
+    }
+
+    fn tool_out(&self) -> bool {
+        self.weeder.tool_out()
+    }
+
+    fn is_sent_out(&self) -> bool {
+        self.orders.pulse == self.orders.pulse_out
+    }
+
+    fn put(&mut self, text: &str, lines: &[String]) {
+        self.console.put(text, lines);
+    }
+
+    fn attend(&mut self) -> Result<Attended, TestCaseError> {
+        let begun = self.console.carry_out(&mut self.weeder);
+        let written = self.console.write(&mut self.weeder)?;
+        Ok(Attended { begun, written: written.lines().map(|line| line.trim_end().to_owned()).collect() })
+    }
+
+    fn is_done(&self) -> bool {
+        self.console.is_done()
+    }
+
+    fn examples(&self) -> Vec<Listed> {
+        from_the_field(self.weeder.classifier())
+    }
+
+    fn reset(&mut self, cause: Cause, torn: Option<u8>, world: &World) -> Checked {
+        match torn {
+            Some(byte) => self.eeprom.lose_power(byte),
+            None => self.eeprom.reset(),
+        }
+        self.console = Console::new();
+        let readings = readings(self.steps, world);
+        self.weeder = wake(&self.eeprom, &self.weed, WakeUp { readings, beam_broken: world.broken, cause });
+        self.orders = self.weeder.orders();
+        prop_assert!(self.weeder.tool_out() && self.is_sent_out());
+        self.odometer = Odometer::new(readings.position, world.jumps);
+        Ok(())
+    }
+}
+
+/// The examples that were taught.
+fn from_the_field(classifier: &impl Classifier) -> Vec<Listed> {
+    let all = std::iter::successors(classifier.listed(0), |&(_, next)| classifier.listed(next));
+    all.map(|(listed, _)| listed).filter(|listed| listed.from_field).collect()
+}

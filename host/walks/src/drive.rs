@@ -1,0 +1,691 @@
+//! A machine on a row that never ends, with the model beside it; every turn is checked.
+//!
+//! The ground is counted in ticks of the encoder. What the machine is, the decisions alone or the firmware in an Uno, is behind the
+//! trait [`Machine`]. What can be seen only in the decisions is checked only there.
+
+use crate::{
+    machine::{Attended, Checked, Machine, World},
+    model::{Model, Run},
+    speeds::Speeds,
+    walk::{Beginning, Happening, TICKS_A_MM, Walk},
+};
+use control::{
+    alarm::Alarm,
+    classifier::Listed,
+    controller::{Reason, State},
+    reset::Cause,
+    settings::{Setting, Settings},
+    units::Grain,
+};
+use proptest::prelude::*;
+
+/// The grain of the measured speed: that of a tick in 10 ms, twice.
+const GRAIN_OF_SPEED: f64 = 200.0;
+
+/// At a steady speed, the measured one is right after this time, if it is no slower than this.
+const STEADY_US: u64 = 1_200_000;
+const STEADY_SPEED: f64 = 60.0;
+
+/// The end switch follows the tool by this.
+const SWITCH_DELAY_US: u64 = 60_000;
+
+/// So many ticks behind the row, no monitor counts what stood there.
+const BEHIND_THE_ROW: i64 = 500;
+
+/// Turns in which every line is answered, whatever is still to be written to the EEPROM.
+const PATIENCE: u32 = 20_000;
+
+/// As a machine that is not open is asked for its state on the way back to work.
+const ASKED_EVERY_US: u64 = 300_000;
+
+/// Edges of dust that are more than the machine can take at once.
+const TOO_MANY: u32 = 40;
+
+/// Where the tool is while the machine rolls between two speeds, in ticks a second.
+#[derive(Clone, Copy, Debug)]
+struct Place {
+    tool: i64,
+    slowest: f64,
+    fastest: f64,
+}
+
+/// The machine on its way, see the module's words.
+#[derive(Debug)]
+pub struct Drive<M> {
+    machine: M,
+    /// The line that it is answering.
+    current: String,
+    /// The last lines that it wrote.
+    written: Vec<String>,
+    /// What is kept for sure, and what is being written.
+    saved: Option<Settings>,
+    saving: Option<Settings>,
+    taught: Vec<Listed>,
+    model: Model,
+    beginning: Beginning,
+    row: Vec<bool>,
+    /// From which tick of it on it is bare; the farthest that the beam has come to.
+    bare_from: i64,
+    farthest: i64,
+    /// What the sensors show.
+    world: World,
+    /// Where the machine really is, in ticks.
+    ground: f64,
+    /// In ticks a second: what it is, and what it is becoming.
+    speed: f64,
+    target: f64,
+    /// The speeds of the encoder's count.
+    speeds: Speeds,
+    /// Since when the machine has rolled steadily, and nothing has come in between.
+    calm_since_us: u64,
+    /// The canopy for which the tool last left the row in that time.
+    left_for: Option<Run>,
+    was_out: bool,
+    /// Where the tool was first seen in the row over a canopy, and when: it may be on its way out.
+    suspect: Option<(u64, Place)>,
+    /// Whether something is tried on the bench, so that the tool may be in the row.
+    is_tried: bool,
+    /// In what steps the machine remembers the ground.
+    grain: Grain,
+    encoder_is_silent: bool,
+    edges_get_lost: bool,
+    tool_is_stuck: bool,
+    /// Whether it was stuck since the machine woke up.
+    tool_was_stuck: bool,
+    out_since_us: Option<u64>,
+    turns: u64,
+    steady_swings: u32,
+}
+
+impl<M: Machine> Drive<M> {
+    /// A new board, told that its settings are right.
+    ///
+    /// # Errors
+    /// What does not hold.
+    pub fn new(walk: &Walk) -> Result<Self, TestCaseError> {
+        let (beginning, row) = (walk.beginning.clone(), walk.levels());
+        let world = World {
+            time_us: 0,
+            count: beginning.count.into(),
+            jumps: 0,
+            broken: row[0],
+            switch_on: false,
+            end_switch_on: false,
+            stack_is_low: false,
+        };
+        let machine = M::new(&beginning, &world)?;
+        let mut drive = Self {
+            grain: grain(machine.settings()),
+            machine,
+            current: String::new(),
+            written: Vec::new(),
+            saved: None,
+            saving: None,
+            taught: Vec::new(),
+            model: Model::new(world.count, world.broken),
+            beginning,
+            row,
+            bare_from: i64::MAX,
+            farthest: 0,
+            world,
+            ground: 0.0,
+            speed: 0.0,
+            target: 0.0,
+            speeds: Speeds::default(),
+            calm_since_us: 0,
+            left_for: None,
+            was_out: true,
+            suspect: None,
+            is_tried: false,
+            encoder_is_silent: false,
+            edges_get_lost: false,
+            tool_is_stuck: false,
+            tool_was_stuck: false,
+            out_since_us: Some(0),
+            turns: 0,
+            steady_swings: 0,
+        };
+        drive.say("clear")?;
+        Ok(drive)
+    }
+
+    /// Goes a walk, and back to work; how many turns were checked.
+    ///
+    /// # Errors
+    /// What does not hold.
+    pub fn go(walk: &Walk) -> Result<u64, TestCaseError> {
+        let mut drive = Self::new(walk)?;
+        walk.happenings.iter().try_for_each(|happening| drive.happen(happening))?;
+        drive.come_back_to_work()?;
+        Ok(drive.turns)
+    }
+
+    /// Has it happen.
+    ///
+    /// # Errors
+    /// What does not hold.
+    pub fn happen(&mut self, happening: &Happening) -> Checked {
+        self.have(happening)?;
+        self.look()
+    }
+
+    fn have(&mut self, happening: &Happening) -> Checked {
+        match *happening {
+            Happening::Type(ref line) => self.say(line),
+            Happening::Roll { mm, mm_s } => self.roll(f64::from(mm) * TICKS_A_MM, f64::from(mm_s) * TICKS_A_MM),
+            Happening::Stand { ms } => {
+                self.target = 0.0;
+                self.turns((u64::from(ms) * 1000 / self.beginning.turn_us) as u32)
+            }
+            Happening::Tremble { times } => {
+                self.stop();
+                (0..times).try_for_each(|time| {
+                    self.roll_by(f64::from(time % 2 * 2) - 1.0)?;
+                    self.turn()
+                })
+            }
+            Happening::Switch { on } => {
+                self.world.switch_on = on;
+                self.turn()
+            }
+            Happening::Dust { times } => (0..2 * times).try_for_each(|_| self.edge(!self.world.broken)),
+            Happening::LoseEdges { turns } if M::IS_OPEN => {
+                self.edges_get_lost = true;
+                self.turns(turns)?;
+                self.find_edges_lost()
+            }
+            Happening::LoseEdges { turns } => {
+                (0..TOO_MANY).try_for_each(|_| self.edge(!self.world.broken))?;
+                self.turns(turns)
+            }
+            Happening::Silence { ms } => {
+                (self.encoder_is_silent, self.model.is_shifted) = (true, true);
+                self.turns((u64::from(ms) * 1000 / self.beginning.turn_us) as u32)?;
+                self.encoder_is_silent = false;
+                Ok(())
+            }
+            Happening::Spike { ticks, times } => (0..times).try_for_each(|_| {
+                self.model.is_shifted = true;
+                let off = self.machine.spike(&mut self.world, ticks);
+                self.model.loosen(off);
+                // A spike is a speed of its own, to whoever divides by 10 ms.
+                self.speeds.take(self.world.time_us, self.speed + f64::from(ticks) / 0.01);
+                self.turn()
+            }),
+            Happening::Reset(cause) => self.wake_up(cause, None),
+            Happening::CutPower { line, turns, byte } => {
+                self.type_in(line);
+                self.turns(turns)?;
+                self.wake_up(Cause::PowerOn, Some(byte))
+            }
+            Happening::LowerStack { turns } => {
+                self.world.stack_is_low = true;
+                self.turns(turns)?;
+                self.world.stack_is_low = false;
+                // What the firmware has once seen used stays used.
+                if M::IS_OPEN { Ok(()) } else { self.wake_up(Cause::ResetPin, None) }
+            }
+            Happening::StickTool { stuck } => {
+                self.tool_is_stuck = stuck;
+                self.tool_was_stuck |= stuck;
+                self.turn()
+            }
+        }
+    }
+
+    /// Has the machine tell what cannot be seen of it.
+    fn look(&mut self) -> Checked {
+        if M::IS_OPEN {
+            return Ok(());
+        }
+        if self.machine.settings_are_in_doubt() {
+            self.say("get")?;
+        }
+        self.say("status")?;
+        let state = self.machine.state();
+        // Only in HOLD is anything tried.
+        self.is_tried &= state == State::Hold;
+        let is_false = state == State::Alarm(Alarm::ToolStuck) && !self.tool_was_stuck;
+        prop_assert!(!is_false, "an end switch that follows the tool within {SWITCH_DELAY_US} us is an alarm");
+        Ok(())
+    }
+
+    /// Every fault is mended, and the row is at its end; the operator clears the alarm, starts, and drives on until the tool is
+    /// in. On the way back through the row there may be more alarms.
+    ///
+    /// # Errors
+    /// What does not hold.
+    pub fn come_back_to_work(&mut self) -> Checked {
+        (self.tool_is_stuck, self.world.switch_on, self.bare_from) = (false, false, self.farthest);
+        self.stop();
+        self.turns((1_500_000 / self.beginning.turn_us) as u32)?;
+        if self.ticks(Setting::BeamToToolMm) > 4000 {
+            self.say("clear")?;
+            self.say("defaults")?;
+        }
+        self.look()?;
+        let metre = f64::from(self.machine.settings().wheel().ticks(1000).0);
+        // Over what was seen, and forgotten, and on until ground that is known comes to the tool.
+        let end = self.farthest.max(self.ground as i64)
+            + 2 * self.ticks(Setting::BeamToToolMm)
+            + self.ticks(Setting::MarginMm)
+            + metre as i64;
+        self.target = 0.5 * self.ticks(Setting::TopSpeedMmS) as f64;
+        let mut asked_us = self.world.time_us;
+        while self.machine.tool_out() || self.is_tried {
+            if !M::IS_OPEN && self.world.time_us > asked_us + ASKED_EVERY_US {
+                self.look()?;
+                asked_us = self.world.time_us;
+            }
+            if self.machine.state() != State::Work {
+                self.say("clear")?;
+                self.say("start")?;
+                self.look()?;
+            }
+            self.turn()?;
+            let there = self.ground as i64;
+            // What the last turn has rolled past is still counted.
+            let is_bare = there > self.bare_from + BEHIND_THE_ROW;
+            prop_assert!(!is_bare || !is_alarm(self.machine.state()), "{:?} on bare ground", self.machine.state());
+            prop_assert!(there < end, "the tool does not come back to work: {:?}", self.machine.reason());
+        }
+        Ok(())
+    }
+
+    /// The machine's state.
+    pub fn state(&self) -> State {
+        self.machine.state()
+    }
+
+    /// Whether the tool is out of the row.
+    pub fn tool_out(&self) -> bool {
+        self.machine.tool_out()
+    }
+
+    /// Swings out at a steady speed, each for a window of its own.
+    pub fn steady_swings(&self) -> u32 {
+        self.steady_swings
+    }
+
+    fn ticks(&self, setting: Setting) -> i64 {
+        self.machine.settings().ticks(setting).0.into()
+    }
+
+    /// Types a line, or several, and waits until each of them has been answered: once.
+    fn say(&mut self, text: &str) -> Checked {
+        let lines = self.type_in(text);
+        let mut ends = 0;
+        for _ in 0..PATIENCE {
+            if self.machine.is_done() {
+                prop_assert_eq!(ends, lines.len(), "ends of answers to {:?}", lines);
+                return Ok(());
+            }
+            self.turn()?;
+            ends += self.written.iter().filter(|line| is_end(line)).count();
+        }
+        prop_assert!(false, "{text:?} is not answered");
+        Ok(())
+    }
+
+    /// Types a line, or several; those that are to be answered.
+    fn type_in(&mut self, text: &str) -> Vec<String> {
+        self.disturb();
+        let lines = text.split(['\r', '\n']).map(str::trim).filter(|line| !line.is_empty());
+        let lines: Vec<String> = lines.map(str::to_owned).collect();
+        self.machine.put(text, &lines);
+        lines
+    }
+
+    /// Something came in between.
+    fn disturb(&mut self) {
+        (self.calm_since_us, self.left_for) = (self.world.time_us, None);
+    }
+
+    fn roll(&mut self, ticks: f64, speed: f64) -> Checked {
+        let (from, begun_us) = (self.ground, self.world.time_us);
+        // What it may take to turn round is not rolled.
+        let most_us = ((ticks / speed).abs() * 1e6) as u64 + 5_000_000;
+        if self.target != speed {
+            self.disturb();
+        }
+        self.target = speed;
+        while (self.ground - from) * ticks.signum() < ticks.abs() && self.world.time_us < begun_us + most_us {
+            self.turn()?;
+        }
+        Ok(())
+    }
+
+    fn stop(&mut self) {
+        (self.speed, self.target) = (0.0, 0.0);
+        self.disturb();
+    }
+
+    fn turns(&mut self, turns: u32) -> Checked {
+        self.disturb();
+        let passed = (0..turns).try_for_each(|_| self.turn());
+        self.disturb();
+        passed
+    }
+
+    /// A turn of the machine's loop.
+    fn turn(&mut self) -> Checked {
+        self.turns += 1;
+        let before = self.world;
+        let wheel = self.machine.settings().wheel();
+        let merge_gap = i64::from(self.machine.settings().get(Setting::MergeGapTicks));
+        self.model.follow(self.here(), merge_gap, wheel.ticks(1000).0.into());
+        self.model.leave_narrow(wheel.ticks(M::NARROW_MM).0.into());
+
+        self.world.time_us += self.beginning.turn_us;
+        let seconds = self.beginning.turn_us as f64 / 1e6;
+        let most = f64::from(self.beginning.mm_s2) * TICKS_A_MM * seconds;
+        self.speed += (self.target - self.speed).clamp(-most, most);
+        self.speeds.take(self.world.time_us, if self.encoder_is_silent { 0.0 } else { self.speed });
+        self.roll_by(self.speed * seconds)?;
+        let tool_is_out = self.out_since_us.is_some_and(|since_us| since_us + SWITCH_DELAY_US <= self.world.time_us);
+        self.world.end_switch_on = tool_is_out && !self.tool_is_stuck;
+        self.step(&before)?;
+        self.attend_to_the_console()
+    }
+
+    /// Rolls by so many ticks, past what stands there.
+    fn roll_by(&mut self, ticks: f64) -> Checked {
+        let from = self.ground.floor() as i64;
+        self.ground += ticks;
+        let to = self.ground.floor() as i64;
+        let (moves, direction) = ((to - from).abs(), (to - from).signum());
+        for place in 1..=moves {
+            if !self.encoder_is_silent {
+                self.world.count += direction;
+                self.machine.count(&self.world);
+            }
+            self.beam_at(from + place * direction)?;
+        }
+        self.beam_at(to)
+    }
+
+    fn beam_at(&mut self, ground: i64) -> Checked {
+        self.farthest = self.farthest.max(ground);
+        let broken = ground <= self.bare_from && self.row[ground.rem_euclid(self.row.len() as i64) as usize];
+        if broken == self.world.broken { Ok(()) } else { self.edge(broken) }
+    }
+
+    /// The beam changes its level.
+    fn edge(&mut self, broken: bool) -> Checked {
+        self.world.broken = broken;
+        if !self.edges_get_lost {
+            self.machine.beam_edge(&self.world);
+            self.check_weed()?;
+        }
+        self.model.edge(self.here(), broken, self.blur());
+        Ok(())
+    }
+
+    /// The machine finds that edges were lost.
+    fn find_edges_lost(&mut self) -> Checked {
+        self.edges_get_lost = false;
+        self.machine.lose_edges(&self.world)?;
+        prop_assert!(is_alarm(self.machine.state()) || self.is_tried, "lost edges are no alarm");
+        Ok(())
+    }
+
+    /// How far off the machine may have a place for its sensor's sake: the sensor of this machine answers at once.
+    fn blur(&self) -> i64 {
+        let (slowest, fastest) = self.speeds.extremes();
+        let response_ms = self.machine.settings().get(Setting::BeamResponseMs);
+        (fastest.max(-slowest) * f64::from(response_ms) / 1000.0) as i64 + 1
+    }
+
+    /// The place that the machine takes itself to be at.
+    fn here(&self) -> i64 {
+        self.machine.place(self.world.count)
+    }
+
+    fn step(&mut self, before: &World) -> Checked {
+        let state_before = self.machine.state();
+        let place = self.machine.turn(before, &self.world)?;
+        self.model.roll_to(place, self.blur());
+        let (state, out) = (self.machine.state(), self.machine.tool_out());
+        self.check_weed()?;
+        self.is_tried &= !M::IS_OPEN || state == state_before;
+        if !self.machine.settings_are_in_doubt() {
+            self.machine.check_pulse(self.is_tried)?;
+        }
+        self.out_since_us = self.machine.is_sent_out().then(|| self.out_since_us.unwrap_or(self.world.time_us));
+        if state != state_before {
+            self.disturb();
+        }
+        if M::IS_OPEN && state != state_before {
+            prop_assert!(state != State::Work || self.world.switch_on, "the machine went to work by itself");
+            prop_assert!(!is_alarm(state_before) || !self.world.switch_on, "{state_before:?} went away by itself");
+            let is_false = state == State::Alarm(Alarm::ToolStuck) && !self.tool_was_stuck;
+            prop_assert!(!is_false, "an end switch that follows the tool within {SWITCH_DELAY_US} us is an alarm");
+        }
+        prop_assert!(!M::IS_OPEN || !self.world.stack_is_low || is_alarm(state), "a low stack is no alarm");
+        let works = if M::IS_OPEN { state == State::Work } else { !self.is_tried };
+        let (slowest, fastest) = self.speeds.extremes();
+        let (slowest, fastest) = (slowest - GRAIN_OF_SPEED, fastest + GRAIN_OF_SPEED);
+        let place = Place { tool: place - self.ticks(Setting::BeamToToolMm), slowest, fastest };
+        if out || !works || self.machine.settings_are_in_doubt() {
+            self.suspect = None;
+        } else {
+            self.check(place)?;
+        }
+        if works && out && !self.was_out {
+            self.check_swing(place.tool)?;
+        }
+        self.was_out = out;
+        Ok(())
+    }
+
+    /// The tool is in the row, and may be. One that goes over a canopy may be on its way out; and where it does not go, what was known
+    /// of the ground may have changed at that moment.
+    fn check(&mut self, place: Place) -> Checked {
+        let held = self.check_place(place);
+        match self.suspect {
+            Some((since_us, first)) if since_us + M::LATENESS_US <= self.world.time_us => {
+                self.suspect = None;
+                self.check_place(first)
+            }
+            None if held.is_err() && M::LATENESS_US > 0 => {
+                self.suspect = Some((self.world.time_us, place));
+                Ok(())
+            }
+            None => held,
+            Some(_) => Ok(()),
+        }
+    }
+
+    /// The tool may be in the row.
+    fn check_place(&self, Place { tool, slowest, fastest }: Place) -> Checked {
+        let settings = self.machine.settings();
+        // The machine adds a millisecond to each lead, for the command's way to the pin.
+        let lead = |milliseconds: u16| f64::from(milliseconds + u16::from(milliseconds > 0)) / 1000.0;
+        let lead_out = lead(settings.get(Setting::LeadOutMs));
+        let lead_in = (1.25 * lead(settings.get(Setting::LeadInMs))).min(lead_out);
+        let ticks = |speed: f64, seconds: f64| (speed * seconds) as i64;
+        // Coming back is led, in the direction of rolling; so is leaving, by as much as the slowest speed makes it.
+        let near = tool + ticks(fastest.max(0.0), lead_in) + 1;
+        let far = tool + ticks(slowest.min(0.0), lead_in) - 1;
+        let margin = self.ticks(Setting::MarginMm);
+        let (from, to) = if slowest > 0.0 {
+            prop_assert!(!self.model.is_unseen(near), "the tool is in the row at {tool}, where nothing has been seen");
+            (near, tool + ticks(slowest, lead_out))
+        } else if fastest < 0.0 {
+            (tool + ticks(fastest, lead_out), far)
+        } else {
+            (near, far)
+        };
+        let canopy = if from <= to {
+            self.model.canopy_between(from, to, margin)
+        } else {
+            // At speeds as different as these, or rolling forward and back in the same second, it may be either way: what is
+            // closed all over is closed.
+            self.model.canopies_all_over(to, from, margin)
+        };
+        prop_assert!(
+            canopy.is_none(),
+            "the tool is in the row at {tool}, rolling {slowest:.0} to {fastest:.0} ticks/s, margin {margin}, leads \
+             {lead_out} s and {lead_in} s: {canopy:?}"
+        );
+        Ok(())
+    }
+
+    /// The tool has left the row: at a steady speed, not for the canopy for which it left before.
+    fn check_swing(&mut self, tool: i64) -> Checked {
+        let is_calm = self.speed == self.target
+            && self.speed.abs() > STEADY_SPEED
+            && self.calm_since_us + STEADY_US < self.world.time_us
+            && self.machine.reason().is_none_or(|reason| reason == Reason::Plant)
+            && !self.model.is_unseen(tool)
+            && !self.model.is_shifted;
+        if !is_calm {
+            self.left_for = None;
+            return Ok(());
+        }
+        // A window is left, and over, by the lead before its end, the less as the measured speed wavers.
+        let settings = self.machine.settings();
+        let lead_in_ms = settings.get(Setting::LeadInMs).min(settings.get(Setting::LeadOutMs));
+        let ahead = tool + (0.8 * self.speed * f64::from(lead_in_ms) / 1000.0) as i64;
+        let window = self.model.next_window(ahead, self.speed > 0.0, self.ticks(Setting::MarginMm));
+        let again = window.is_some() && window.map(|run| run.leading) == self.left_for.map(|run| run.leading);
+        prop_assert!(!again, "at {tool} the tool leaves again for {window:?}, at {:.0} ticks/s", self.speed);
+        self.left_for = window;
+        self.steady_swings += 1;
+        Ok(())
+    }
+
+    /// What the machine has just taken for a weed was one, as the model saw it.
+    fn check_weed(&mut self) -> Checked {
+        let Some(width_mm) = self.machine.take_weed() else { return Ok(()) };
+        let wheel = self.machine.settings().wheel();
+        // A millimetre, and what lies between it and the next.
+        let millimetre = i64::from(wheel.ticks(1).0) + 1;
+        let told = self.model.weed(self.here(), wheel.ticks(width_mm as u16).0.into(), millimetre);
+        prop_assert!(told.is_ok() || self.model.is_shifted, "{}", told.unwrap_err());
+        Ok(())
+    }
+
+    /// The console's part of a turn.
+    fn attend_to_the_console(&mut self) -> Checked {
+        let (before, unseen_mm) = (self.machine.state(), self.machine.unseen_mm());
+        let Attended { begun, written } = self.machine.attend()?;
+        if let Some(line) = begun {
+            self.begin(&line, before);
+            if M::IS_OPEN {
+                self.check_begun(&line, before)?;
+                if self.machine.state() == State::Work {
+                    self.trust(&line, unseen_mm);
+                }
+            }
+            self.current = line;
+        }
+        if self.grain != grain(self.machine.settings()) {
+            self.grain = grain(self.machine.settings());
+            self.model.begin_anew(self.here());
+        }
+        for end in written.iter().filter(|line| is_end(line)) {
+            self.end(end, unseen_mm);
+        }
+        self.written = written;
+        Ok(())
+    }
+
+    /// A line is carried out, now or soon.
+    fn begin(&mut self, line: &str, before: State) {
+        let words = words(line);
+        self.is_tried |= matches!(words[0], "servo" | "calibrate" | "test");
+        if M::IS_OPEN {
+            self.is_tried &= self.machine.state() == State::Hold && !matches!(words[..], ["hold"] | ["servo", "out"]);
+        }
+        self.saving = (words == ["save"]).then(|| self.machine.settings().clone());
+        if self.machine.state() != before {
+            self.disturb();
+        }
+    }
+
+    fn check_begun(&self, line: &str, before: State) -> Checked {
+        let (words, after) = (words(line), self.machine.state());
+        prop_assert!(after == before || after != State::Work || words[0] == "start", "{line:?} had it work");
+        prop_assert!(after == before || !is_alarm(before) || words == ["clear"], "{line:?} cleared an alarm");
+        Ok(())
+    }
+
+    /// The line that was begun has been answered.
+    fn end(&mut self, end: &str, unseen_mm: i16) {
+        let (line, is_ok) = (std::mem::take(&mut self.current), end == "ok");
+        if let Some(saving) = self.saving.take()
+            && is_ok
+        {
+            self.saved = Some(saving);
+        }
+        let words = words(&line);
+        if matches!(words.first(), Some(&("label" | "forget"))) {
+            self.taught = self.machine.examples();
+        }
+        if !M::IS_OPEN && is_ok {
+            self.is_tried &= !matches!(words[..], ["hold"] | ["servo", "out"] | ["start", ..]);
+            self.trust(&line, unseen_mm);
+        }
+    }
+
+    /// The operator's word, if the line is it, for the ground that the machine has not seen by so much.
+    fn trust(&mut self, line: &str, unseen_mm: i16) {
+        if words(line) == ["start", "now"] && unseen_mm > 0 {
+            let tool = self.here() - self.ticks(Setting::BeamToToolMm);
+            let unseen = f64::from(unseen_mm + 1) * f64::from(self.machine.settings().wheel().ticks(1000).0) / 1000.0;
+            self.model.trust(tool - self.ticks(Setting::MarginMm), tool + unseen as i64);
+        }
+    }
+
+    /// The machine has been reset: in HOLD or with an alarm, the tool out, and with all that it said that it keeps.
+    fn wake_up(&mut self, cause: Cause, torn: Option<u8>) -> Checked {
+        let is_answered = self.machine.is_done();
+        let maybe = self.machine.examples();
+        self.machine.reset(cause, torn, &self.world)?;
+        let is_lost = self.machine.state() == State::Alarm(Alarm::SettingsLost);
+        prop_assert!(is_lost || self.machine.state() == State::Hold, "woken up in {:?}", self.machine.state());
+        let found = (!is_lost).then(|| self.machine.settings().clone());
+        // What was not acknowledged is there, or is not.
+        if self.saving.is_some() && self.saving == found {
+            self.saved = found;
+        } else {
+            prop_assert_eq!(&found, &self.saved, "other settings than were saved");
+        }
+        let examples = self.machine.examples();
+        if is_answered {
+            prop_assert_eq!(&examples, &self.taught, "other examples than were taught");
+        } else {
+            let is_known = |example| maybe.contains(example) || self.taught.contains(example);
+            prop_assert!(examples.iter().all(is_known) || !M::IS_OPEN, "{examples:?}");
+        }
+        self.taught = examples;
+        self.grain = grain(self.machine.settings());
+        self.model = Model::new(self.here(), self.world.broken);
+        // It takes itself for standing until it has measured.
+        self.speeds = Speeds::default();
+        self.speeds.take(self.world.time_us, 0.0);
+        (self.saving, self.suspect, self.is_tried) = (None, None, false);
+        (self.tool_was_stuck, self.out_since_us) = (self.tool_is_stuck, Some(self.world.time_us));
+        self.disturb();
+        Ok(())
+    }
+}
+
+/// In what steps the machine remembers the ground: for other ones it begins anew.
+fn grain(settings: &Settings) -> Grain {
+    Grain::of(settings.wheel().ticks(1000))
+}
+
+fn words(line: &str) -> Vec<&str> {
+    line.split([' ', '\t']).filter(|word| !word.is_empty()).collect()
+}
+
+fn is_alarm(state: State) -> bool {
+    matches!(state, State::Alarm(_))
+}
+
+/// Whether a line is the last one of an answer.
+pub fn is_end(line: &str) -> bool {
+    line == "ok" || line.starts_with("error: ")
+}

@@ -1,0 +1,83 @@
+//! Random walks of a weeder on a row, judged by a model of the ground that is slow and obvious.
+//!
+//! [`walk`] says what happens, [`drive`] has it happen to a [`Machine`](machine::Machine) and checks it after each turn, [`model`]
+//! knows what the beam has shown. [`go_all`] goes many walks and shrinks one that fails to a few happenings, printed as what a
+//! person would type and roll. The machine is the decisions alone (`control/tests/against_the_model/`) or the firmware in the
+//! virtual Uno (`tests/end_to_end/random_walks.rs`). What is held is the same for both, as far as it can be seen from outside.
+//!
+//! The walks are the same each time, so that a change is judged by them and not by luck. `WEEDER_SEED` gives others, and
+//! `WEEDER_CASES` as many as asked for.
+
+pub mod drive;
+pub mod machine;
+pub mod model;
+mod speeds;
+pub mod walk;
+
+use machine::Checked;
+use proptest::{
+    strategy::{BoxedStrategy, Strategy, ValueTree},
+    test_runner::{Config, RngSeed, TestError, TestRunner},
+};
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicU64, Ordering};
+use walk::Walk;
+
+/// How many walks are gone, and how they are shrunk.
+#[derive(Clone, Copy, Debug)]
+pub struct Extent {
+    /// How many walks, unless the environment says another number.
+    pub walks: u32,
+    /// At least so many turns are to be checked in all of them, so that they have not become idle.
+    pub least_turns: u64,
+    /// At most so many shorter walks are tried where one fails.
+    pub shrinkings: u32,
+}
+
+/// Goes walks in parallel, each by `go`, which returns how many turns were checked.
+///
+/// # Panics
+/// With the first walk that fails, shrunk; where too few turns were checked; and where the environment's numbers are none.
+pub fn go_all(extent: Extent, walks: &BoxedStrategy<Walk>, go: impl Fn(&Walk) -> Result<u64, Failure> + Sync) {
+    let asked = number("WEEDER_CASES");
+    let number_of_walks = asked.unwrap_or(extent.walks.into());
+    let seed = RngSeed::Fixed(number("WEEDER_SEED").unwrap_or(1));
+    let config =
+        Config { failure_persistence: None, max_shrink_iters: extent.shrinkings, rng_seed: seed, ..Config::default() };
+    let mut runner = TestRunner::new(config);
+    let turns = AtomicU64::new(0);
+    let check = |walk: &Walk| -> Checked {
+        turns.fetch_add(go(walk)?, Ordering::Relaxed);
+        Ok(())
+    };
+    let mut left = number_of_walks;
+    while left > 0 {
+        // A walk is shrunk by what it was drawn from, which stays in this thread.
+        let trees: Vec<_> = (0..left.min(BATCH))
+            .map(|_| walks.new_tree(&mut runner).unwrap_or_else(|reason| panic!("no walk can be drawn: {reason}")))
+            .collect();
+        left -= trees.len() as u64;
+        let drawn: Vec<Walk> = trees.iter().map(ValueTree::current).collect();
+        let failed = drawn.par_iter().position_first(|walk| check(walk).is_err());
+        let Some(tree) = failed.and_then(|failed| trees.into_iter().nth(failed)) else { continue };
+        match runner.run_one(tree, |walk| check(&walk)) {
+            Err(TestError::Fail(reason, walk)) => panic!("{reason}\n{walk:?}"),
+            Err(TestError::Abort(reason)) => panic!("{reason}"),
+            Ok(_) => panic!("a walk fails, and when it is gone again it does not:\n{:?}", drawn[failed.unwrap_or(0)]),
+        }
+    }
+    let turns = turns.into_inner();
+    println!("{number_of_walks} walks, {turns} turns");
+    assert!(asked.is_some() || turns >= extent.least_turns, "{turns} turns");
+}
+
+/// Walks that are drawn before they are gone.
+const BATCH: u64 = 64;
+
+pub use proptest::test_runner::TestCaseError as Failure;
+
+/// What an environment variable says, if it is there.
+fn number(name: &str) -> Option<u64> {
+    let text = std::env::var(name).ok()?;
+    Some(text.parse().unwrap_or_else(|_| panic!("{name}={text} is not a whole number")))
+}
