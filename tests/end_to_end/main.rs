@@ -24,6 +24,7 @@ mod performance_servo_jitter;
 mod performance_swing_commands;
 mod power_and_memory_faults;
 mod proved_bounds;
+mod random_walks;
 mod recordings;
 mod saved_while_the_servo_is_timed;
 mod sensor_faults;

@@ -139,7 +139,7 @@ impl Machine for Decisions {
         })
     }
 
-    fn count(&mut self, _: &World) {}
+    fn count(&mut self, _: bool) {}
 
     fn spike(&mut self, world: &mut World, ticks: i32) -> i64 {
         world.count += i64::from(ticks);

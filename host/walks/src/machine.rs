@@ -60,8 +60,8 @@ pub trait Machine: Sized {
     /// Where it does not wake up.
     fn new(beginning: &Beginning, world: &World) -> Result<Self, TestCaseError>;
 
-    /// The encoder has counted, up or down by one, to what the world shows.
-    fn count(&mut self, world: &World);
+    /// The encoder has counted, `up` or down by one.
+    fn count(&mut self, up: bool);
 
     /// Both channels of the encoder are disturbed, which spoils the count by `ticks`; by how many ticks the machine's place may be off
     /// for it.

@@ -1,0 +1,433 @@
+//! The firmware in the virtual Uno as a machine that is driven: what the world shows goes onto its pins, and what is known of it is the
+//! servo's pulse and what its console says.
+//!
+//! The settings in use follow from what was acknowledged. What the firmware alone knows, as the times that it has measured of its
+//! servo, leaves them in doubt until `get` is typed. What is kept is read from the EEPROM, and held against what the woken firmware
+//! says of it.
+
+use crate::common::{elf, number, value};
+use control::alarm::Alarm;
+use control::classifier::{Classifier, Listed, Nearest};
+use control::console::{Command, parse};
+use control::controller::{Reason, State};
+use control::examples::EXAMPLES;
+use control::memory::{SIZE, Volatile};
+use control::reset::Cause;
+use control::settings::{Setting, Settings};
+use field::console::{ConsoleError, ask};
+use field::signal::{CYCLES_PER_SECOND, Pin, PinChange};
+use field::uno::{Uno, UnoError};
+use std::collections::VecDeque;
+use std::fmt;
+use std::path::PathBuf;
+use std::sync::LazyLock;
+use walks::Failure;
+use walks::drive::is_end;
+use walks::machine::{Attended, Checked, Machine, World};
+use walks::walk::Beginning;
+
+static ELF: LazyLock<PathBuf> = LazyLock::new(elf);
+
+const CYCLES_A_US: u64 = CYCLES_PER_SECOND / 1_000_000;
+
+/// Longest time from a reset to the greeting: a loop that stalls is reset after a quarter of a second.
+const GREETING_CYCLES: u64 = CYCLES_PER_SECOND;
+
+/// Changes on the pins that come one after the other at once, as dust in the beam does, come so far apart: 10 us.
+const APART_CYCLES: u64 = 160;
+
+/// A pulse's width is one that was set, give or take this.
+const SAME_US: f64 = 1.5;
+
+/// Free bytes of stack that are an alarm.
+const LOW_STACK: u16 = 40;
+
+/// Ticks that a disturbance of both channels may add: two as it comes, and two as it goes.
+const SPIKE_TICKS: i64 = 4;
+
+/// The servo's line, as it is seen on D9.
+#[derive(Debug, Default)]
+struct ServoLine {
+    rise: Option<u64>,
+    /// The last pulse's width.
+    width_us: f64,
+}
+
+impl ServoLine {
+    fn take(&mut self, changes: &[PinChange]) {
+        for change in changes.iter().filter(|change| change.pin == Pin::Servo) {
+            if change.high {
+                self.rise = Some(change.cycle);
+            } else if let Some(rise) = self.rise.take() {
+                self.width_us = (change.cycle - rise) as f64 / CYCLES_A_US as f64;
+            }
+        }
+    }
+
+    fn is(&self, width_us: u16) -> bool {
+        (self.width_us - f64::from(width_us)).abs() < SAME_US
+    }
+}
+
+/// The machine, see the module's words.
+pub struct Board {
+    uno: Uno,
+    /// Levels that come in this turn, and whether each is one of the encoder's, in time with the others of these.
+    to_come: Vec<(Vec<(Pin, bool)>, bool)>,
+    /// Where the encoder is in its cycle.
+    phase: usize,
+    servo: ServoLine,
+    /// Lines that were typed and are yet to be answered, and the one that is being answered.
+    typed: VecDeque<String>,
+    current: Option<String>,
+    /// What has come, whole lines and the beginning of the next.
+    heard: String,
+    settings: Settings,
+    in_doubt: bool,
+    /// Whether the firmware times its servo, and may set what it has found.
+    times_the_servo: bool,
+    state: State,
+    unseen_mm: i16,
+    /// Since when the machine is not at work, as it has said.
+    rests_since: Option<u64>,
+    resets: usize,
+    stack_was_low: bool,
+}
+
+impl fmt::Debug for Board {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "an Uno at cycle {}", self.uno.cycle())
+    }
+}
+
+fn stopped(error: UnoError) -> Failure {
+    Failure::fail(error.to_string())
+}
+
+fn unanswered(error: ConsoleError) -> Failure {
+    Failure::fail(error.to_string())
+}
+
+/// The encoder's channels A and B, forward.
+const CHANNELS: [(bool, bool); 4] = [(false, false), (true, false), (true, true), (false, true)];
+
+impl Board {
+    fn wake_up(&mut self) -> Result<String, Failure> {
+        let greeting = self.uno.run_until_serial("commands\r\n", GREETING_CYCLES).map_err(stopped)?;
+        let state = greeting.rsplit_once(", state ").and_then(|(_, rest)| rest.split(',').next());
+        self.state = match state.and_then(|state| state.split(' ').next_back()) {
+            Some("hold") => State::Hold,
+            Some(word) => self.alarm(word)?,
+            None => return Err(Failure::fail(format!("no state in {greeting:?}"))),
+        };
+        (self.resets, self.stack_was_low) = (self.uno.resets().len(), false);
+        (self.times_the_servo, self.rests_since) = (false, Some(self.uno.cycle()));
+        Ok(greeting)
+    }
+
+    fn alarm(&self, word: &str) -> Result<State, Failure> {
+        let alarm = Alarm::find(word.as_bytes());
+        alarm.map(State::Alarm).ok_or_else(|| Failure::fail(format!("no alarm is called {word:?}")))
+    }
+
+    /// Takes what was said of the state and of the settings.
+    fn hear(&mut self, line: &str) -> Checked {
+        if line.starts_with("state=") {
+            self.state = match value(line, "state") {
+                "hold" => State::Hold,
+                "work" => State::Work,
+                _ => self.alarm(value(line, "alarm"))?,
+            };
+            self.unseen_mm = number(line, "unseen_mm") as i16;
+            let rests = self.state != State::Work;
+            self.rests_since = rests.then(|| self.rests_since.unwrap_or(self.uno.cycle()));
+            self.times_the_servo &= self.state == State::Hold;
+        } else if line.contains("calibrated") {
+            (self.times_the_servo, self.in_doubt) = (false, true);
+        } else if let Some((setting, value)) = setting(line) {
+            // A value that is out of range is another one in the end, and found out.
+            let _ = self.settings.set(setting, value);
+        }
+        Ok(())
+    }
+
+    /// The line that was begun was answered.
+    fn end(&mut self, line: &str, is_ok: bool) {
+        let Ok(command) = parse(line.as_bytes()) else { return };
+        if !is_ok {
+            return;
+        }
+        match command {
+            Command::Set(setting, value) => {
+                let _ = self.settings.set(setting, value);
+                if setting.is_of_the_wheel() {
+                    let _ = self.settings.set(Setting::TicksPerM, 0);
+                }
+                self.rest_anew();
+            }
+            Command::Defaults | Command::Revert => self.in_doubt = true,
+            Command::GetAll => {
+                self.in_doubt = false;
+                self.rest_anew();
+            }
+            Command::CalibrateServo => self.times_the_servo = true,
+            Command::Hold | Command::Start { .. } | Command::Servo(_) | Command::ServoIn | Command::ServoOut => {
+                self.in_doubt |= std::mem::take(&mut self.times_the_servo);
+            }
+            Command::TestRow { .. } => self.in_doubt |= std::mem::take(&mut self.times_the_servo),
+            _ => {}
+        }
+    }
+
+    /// The servo's pulse has some time again to be the one that is due.
+    fn rest_anew(&mut self) {
+        self.rests_since = self.rests_since.map(|_| self.uno.cycle());
+    }
+
+    /// Puts the turn's levels onto the pins, spread over it.
+    fn drive(&mut self, cycles: u64) {
+        let begin = self.uno.cycle();
+        let ticks = self.to_come.iter().filter(|(_, is_tick)| *is_tick).count() as u64;
+        let (mut cycle, mut tick) = (begin, 0);
+        let mut changes = Vec::new();
+        for (levels, is_tick) in self.to_come.drain(..) {
+            tick += u64::from(is_tick);
+            cycle = (cycle + APART_CYCLES).max(if is_tick { begin + tick * cycles / (ticks + 1) } else { 0 });
+            changes.extend(levels.into_iter().map(|(pin, high)| PinChange { cycle, pin, high }));
+        }
+        self.uno.drive(changes);
+    }
+
+    /// The examples that the firmware says it has from the field.
+    fn told_examples(&mut self) -> Result<usize, Failure> {
+        let lines = ask(&mut self.uno, "examples").map_err(unanswered)?;
+        Ok(lines.iter().filter(|line| line.starts_with("field ")).count())
+    }
+}
+
+/// The setting that a line of `get` shows, and its value.
+fn setting(line: &str) -> Option<(Setting, u16)> {
+    let (name, rest) = line.split_once('=')?;
+    let value = match rest.split(' ').next()? {
+        "on" => 1,
+        "off" => 0,
+        number => number.parse().ok()?,
+    };
+    Some((Setting::find(name.as_bytes())?, value))
+}
+
+impl Machine for Board {
+    const IS_OPEN: bool = false;
+    /// The widest weed of the built-in examples, and what may be like it.
+    const NARROW_MM: u16 = 45;
+    /// A frame of the servo, a pulse that is told by its end, and a turn.
+    const LATENESS_US: u64 = 26_000;
+
+    fn new(beginning: &Beginning, world: &World) -> Result<Self, Failure> {
+        let mut uno = Uno::boot(&ELF).map_err(stopped)?;
+        uno.set(Pin::Beam, !world.broken);
+        uno.run_until_symbol("main", GREETING_CYCLES).map_err(stopped)?;
+        let (count, overflows) = (beginning.count.to_le_bytes(), (beginning.steps >> 8).to_le_bytes());
+        uno.write("weeder_firmware::encoder::COUNT_LOW", &count[..2]).map_err(stopped)?;
+        uno.write("weeder_firmware::encoder::COUNT_HIGH", &count[2..]).map_err(stopped)?;
+        uno.write("weeder_firmware::clock::OVERFLOWS_LOW", &overflows[..1]).map_err(stopped)?;
+        uno.write("weeder_firmware::clock::OVERFLOWS_HIGH", &overflows[1..3]).map_err(stopped)?;
+        let mut board = Self {
+            uno,
+            to_come: Vec::new(),
+            phase: 0,
+            servo: ServoLine::default(),
+            typed: VecDeque::new(),
+            current: None,
+            heard: String::new(),
+            settings: Settings::new(),
+            in_doubt: false,
+            times_the_servo: false,
+            state: State::Hold,
+            unseen_mm: 0,
+            rests_since: None,
+            resets: 0,
+            stack_was_low: false,
+        };
+        board.wake_up()?;
+        Ok(board)
+    }
+
+    fn count(&mut self, up: bool) {
+        let (a, b) = CHANNELS[self.phase];
+        self.phase = (self.phase + if up { 1 } else { 3 }) % 4;
+        let (new_a, new_b) = CHANNELS[self.phase];
+        let level = if a == new_a { (Pin::EncoderB, new_b) } else { (Pin::EncoderA, new_a) };
+        debug_assert!(a != new_a || b != new_b, "a step changes one channel");
+        self.to_come.push((vec![level], true));
+    }
+
+    fn spike(&mut self, _: &mut World, _: i32) -> i64 {
+        let (a, b) = CHANNELS[self.phase];
+        self.to_come.push((vec![(Pin::EncoderA, !a), (Pin::EncoderB, !b)], false));
+        self.to_come.push((vec![(Pin::EncoderA, a), (Pin::EncoderB, b)], false));
+        SPIKE_TICKS
+    }
+
+    fn beam_edge(&mut self, world: &World) {
+        self.to_come.push((vec![(Pin::Beam, !world.broken)], false));
+    }
+
+    fn lose_edges(&mut self, _: &World) -> Checked {
+        Ok(())
+    }
+
+    fn place(&self, count: i64) -> i64 {
+        count
+    }
+
+    fn turn(&mut self, before: &World, now: &World) -> Result<i64, Failure> {
+        let cycles = (now.time_us - before.time_us) * CYCLES_A_US;
+        let until = self.uno.cycle() + cycles;
+        self.uno.set(Pin::WorkSwitch, !now.switch_on);
+        self.uno.set(Pin::EndSwitch, !now.end_switch_on);
+        if now.switch_on {
+            self.rests_since = None;
+        }
+        if now.stack_is_low && !self.stack_was_low {
+            let spoiled = self.uno.first_stack_address() + LOW_STACK;
+            self.uno.write_sram(spoiled, &[0]).map_err(stopped)?;
+            self.stack_was_low = true;
+        }
+        self.drive(cycles);
+        self.uno.run_until(until).map_err(stopped)?;
+        self.servo.take(&self.uno.take_changes());
+        self.heard += &self.uno.received();
+        if self.uno.resets().len() > self.resets {
+            return Err(Failure::fail(format!("it was reset: {:?}", self.uno.resets().last())));
+        }
+        Ok(now.count)
+    }
+
+    fn check_pulse(&self, is_tried: bool) -> Checked {
+        let rests = self.rests_since.is_some_and(|since| since + Self::LATENESS_US * CYCLES_A_US < self.uno.cycle());
+        if is_tried || !rests || self.is_sent_out() {
+            return Ok(());
+        }
+        Err(Failure::fail(format!("in {:?} the servo has a pulse of {} us", self.state, self.servo.width_us)))
+    }
+
+    fn take_weed(&mut self) -> Option<i16> {
+        None
+    }
+
+    fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    fn settings_are_in_doubt(&self) -> bool {
+        self.in_doubt || self.times_the_servo
+    }
+
+    fn state(&self) -> State {
+        self.state
+    }
+
+    fn reason(&self) -> Option<Reason> {
+        None
+    }
+
+    fn unseen_mm(&self) -> i16 {
+        self.unseen_mm
+    }
+
+    fn tool_out(&self) -> bool {
+        self.is_sent_out() || !self.servo.is(self.settings.get(Setting::ServoInUs))
+    }
+
+    fn is_sent_out(&self) -> bool {
+        self.servo.is(self.settings.get(Setting::ServoOutUs))
+    }
+
+    fn put(&mut self, text: &str, lines: &[String]) {
+        self.uno.send(format!("{text}\n").as_bytes());
+        self.typed.extend(lines.iter().cloned());
+    }
+
+    fn attend(&mut self) -> Result<Attended, Failure> {
+        let mut attended = Attended::default();
+        if self.current.is_none() {
+            self.current = self.typed.pop_front();
+            attended.begun = self.current.clone();
+            match self.current.as_deref().and_then(|line| line.split([' ', '\t']).next()) {
+                Some("start" | "servo" | "calibrate" | "test") => self.rests_since = None,
+                // It may be another pulse that has the tool out, from now on or soon.
+                Some("set" | "defaults" | "revert") => self.rest_anew(),
+                _ => {}
+            }
+        }
+        // One end at a time: the next line begins behind it.
+        while let Some((line, rest)) = self.heard.split_once('\n') {
+            let (line, rest) = (line.trim_end().to_owned(), rest.to_owned());
+            self.heard = rest;
+            self.hear(&line)?;
+            let ends = is_end(&line);
+            attended.written.push(line);
+            if ends {
+                let Some(begun) = self.current.take() else {
+                    return Err(Failure::fail(format!("{:?} answers nothing", attended.written.last())));
+                };
+                self.end(&begun, attended.written.last().is_some_and(|line| line == "ok"));
+                break;
+            }
+        }
+        Ok(attended)
+    }
+
+    fn is_done(&self) -> bool {
+        let is_said = self.uno.bytes_on_their_way() == 0 && self.typed.is_empty();
+        is_said && self.current.is_none() && !self.heard.contains('\n')
+    }
+
+    fn examples(&self) -> Vec<Listed> {
+        let mut bytes = [0; SIZE];
+        bytes.copy_from_slice(&self.uno.eeprom()[SIZE..]);
+        let kept = Nearest::new(&EXAMPLES[..], Volatile::holding(bytes));
+        let all = std::iter::successors(kept.listed(0), |&(_, next)| kept.listed(next));
+        all.map(|(listed, _)| listed).filter(|listed| listed.from_field).collect()
+    }
+
+    fn reset(&mut self, cause: Cause, torn: Option<u8>, _: &World) -> Checked {
+        // A line that is on its way would go on to the machine that wakes up.
+        while self.uno.bytes_on_their_way() > 0 {
+            self.uno.run_for_ms(1).map_err(stopped)?;
+        }
+        match cause {
+            Cause::LoopStalled => self.uno.stall().map_err(stopped)?,
+            Cause::BrownOut => self.uno.brown_out(),
+            Cause::ResetPin => self.uno.reset(),
+            _ => match torn {
+                Some(byte) => self.uno.power_cycle_to_noise(byte.into()),
+                None => self.uno.power_cycle(),
+            },
+        }
+        self.uno.received();
+        let greeting = self.wake_up()?;
+        let text: String = cause.text().bytes().map(char::from).collect();
+        if !greeting.contains(&format!("reset by {text},")) {
+            return Err(Failure::fail(format!("reset by {text}, and it says {greeting:?}")));
+        }
+        (self.current, self.heard) = (None, String::new());
+        self.typed.clear();
+        self.uno.take_changes();
+        self.servo = ServoLine::default();
+        for line in ask(&mut self.uno, "get").map_err(unanswered)? {
+            self.hear(&line)?;
+        }
+        self.in_doubt = false;
+        let (told, kept) = (self.told_examples()?, self.examples().len());
+        if told != kept {
+            return Err(Failure::fail(format!("it tells {told} examples, and {kept} are kept")));
+        }
+        self.servo.take(&self.uno.take_changes());
+        if !self.is_sent_out() {
+            return Err(Failure::fail(format!("it wakes up with a pulse of {} us", self.servo.width_us)));
+        }
+        Ok(())
+    }
+}
