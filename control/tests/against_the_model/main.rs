@@ -13,7 +13,8 @@
 //! - in the end, faults mended, the machine comes back to work.
 //!
 //! A failure is shrunk to a few happenings and printed as what a person would type and roll. The walks are the same each time,
-//! so that a change is judged by them and not by luck. For others, for as long as you like:
+//! so that a change is judged by them and not by luck. Walks and model are those of the crate `walks`, which has the firmware walked as
+//! well. For others, for as long as you like:
 //!
 //! ```sh
 //! WEEDER_SEED=7 WEEDER_CASES=1000000 cargo test -p control --release --test against_the_model

@@ -65,8 +65,7 @@ enum Command {
     /// Run the firmware, or a bootloader, on a virtual Uno at a pseudo terminal, in real time.
     VirtualUno(Box<virtual_uno::Arguments>),
     /// Count the cycles and bytes of the firmware and its classifier on a virtual Uno.
-    #[command(after_help = "Example: weeder bench-uno > figures.txt")]
-    BenchUno,
+    BenchUno(bench::Arguments),
     /// Prove from the ELF what the firmware needs at most: stack, interrupts, and how fast the encoder may turn.
     Bounds(bounds::Arguments),
     /// Work for a day with everything going wrong now and then, and say what happened.
@@ -142,7 +141,7 @@ fn main() -> ExitCode {
         Command::Flash(arguments) => flash::run(&arguments).map(|()| Finding::Good),
         Command::Hex(arguments) => hex::run(&arguments).map(|()| Finding::Good),
         Command::VirtualUno(arguments) => virtual_uno::run(&arguments).map(|()| Finding::Good),
-        Command::BenchUno => bench::run().map(|()| Finding::Good),
+        Command::BenchUno(arguments) => bench::run(&arguments).map(|()| Finding::Good),
         Command::Bounds(arguments) => bounds::run(&arguments),
         Command::Soak(arguments) => soak::run(&arguments),
         Command::Trial(arguments) => trial::run(&arguments),
