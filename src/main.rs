@@ -86,11 +86,13 @@ fn run(typed: &mut LineBuffer) -> ! {
         watchdog::feed();
         // The readings come first: an edge that is still in the queue is then never farther than the next readings.
         let readings = read();
+        // Asked before the edges are taken: all that waited at a loss is then taken, and none of it comes behind the level that is read.
+        let lost = beam.take_lost();
         // No more edges than can wait: those that keep coming must not keep the loop from turning.
         for (position, broken) in core::iter::from_fn(|| beam.next_edge()).take(beam::SLOTS) {
             controller.beam_edge(Position::new(position), broken);
         }
-        if beam.take_lost() {
+        if lost {
             controller.beam_edges_lost(beam.is_broken());
         }
         let orders = controller.step(readings);

@@ -1,6 +1,8 @@
 //! Encoder and beam that fail on the way: the firmware notices, names the fault, and has the tool out of the row.
 
-use crate::common::{Run, ask, bare_ground, is_out_at_the_pin, number, run_for_ms, status, steady, trial, value};
+use crate::common::{
+    Run, ask, bare_ground, is_out_at_the_pin, number, run_for_ms, status, steady, trial, value, woken_up,
+};
 use field::machine::cycle_at;
 use field::motion::{Motion, mm_s};
 use field::row::{Row, Thing};
@@ -282,4 +284,24 @@ fn an_end_switch_that_does_not_follow_is_an_alarm() {
     run.uno.set(wiring::END_SWITCH, true);
     run_for_ms(&mut run.uno, 100);
     assert_alarm(&mut run, "tool_stuck", 41);
+}
+
+#[test]
+fn a_beam_that_chatters_faster_than_it_can_be_heard_is_known_as_it_is_afterwards() {
+    let mut uno = woken_up();
+    ask(&mut uno, "plot on");
+    // More edges than can wait, 10 us apart, ending with the beam broken or clear.
+    for edges in 18..=90_u64 {
+        let begin = uno.cycle() + 16 * 7 * edges;
+        uno.drive((0..edges).map(|edge| PinChange { cycle: begin + 160 * edge, pin: Pin::Beam, high: edge % 2 == 1 }));
+        run_for_ms(&mut uno, 10);
+        uno.received();
+        run_for_ms(&mut uno, 120);
+        let said = uno.received();
+        let broken = format!("beam_broken:{}", edges % 2);
+        let last = said.lines().rfind(|line| line.contains("windows:"));
+        assert!(last.is_some_and(|line| line.contains(&broken)), "{edges} edges: {said:?}");
+        uno.set(Pin::Beam, true);
+        run_for_ms(&mut uno, 10);
+    }
 }

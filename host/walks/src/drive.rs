@@ -293,7 +293,8 @@ impl<M: Machine> Drive<M> {
             // What the last turn has rolled past is still counted.
             let is_bare = there > self.bare_from + BEHIND_THE_ROW;
             prop_assert!(!is_bare || !is_alarm(self.machine.state()), "{:?} on bare ground", self.machine.state());
-            prop_assert!(there < end, "the tool does not come back to work: {:?}", self.machine.reason());
+            let (state, reason) = (self.machine.state(), self.machine.reason());
+            prop_assert!(there < end, "the tool does not come back to work: {state:?}, {reason:?}");
         }
         Ok(())
     }

@@ -58,12 +58,14 @@ pub fn go_all(extent: Extent, walks: &BoxedStrategy<Walk>, go: impl Fn(&Walk) ->
             .collect();
         left -= trees.len() as u64;
         let drawn: Vec<Walk> = trees.iter().map(ValueTree::current).collect();
-        let failed = drawn.par_iter().position_first(|walk| check(walk).is_err());
-        let Some(tree) = failed.and_then(|failed| trees.into_iter().nth(failed)) else { continue };
+        let failed = drawn.par_iter().enumerate().find_map_first(|(place, walk)| Some((place, check(walk).err()?)));
+        let Some((place, reason)) = failed else { continue };
+        let Some(tree) = trees.into_iter().nth(place) else { continue };
+        println!("{reason}\n{:?}It is being shrunk.", drawn[place]);
         match runner.run_one(tree, |walk| check(&walk)) {
             Err(TestError::Fail(reason, walk)) => panic!("{reason}\n{walk:?}"),
             Err(TestError::Abort(reason)) => panic!("{reason}"),
-            Ok(_) => panic!("a walk fails, and when it is gone again it does not:\n{:?}", drawn[failed.unwrap_or(0)]),
+            Ok(_) => panic!("a walk fails, and when it is gone again it does not:\n{:?}", drawn[place]),
         }
     }
     let turns = turns.into_inner();
