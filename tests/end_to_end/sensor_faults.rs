@@ -293,7 +293,11 @@ fn a_beam_that_chatters_faster_than_it_can_be_heard_is_known_as_it_is_afterwards
     // More edges than can wait, 10 us apart, ending with the beam broken or clear.
     for edges in 18..=90_u64 {
         let begin = uno.cycle() + 16 * 7 * edges;
-        uno.drive((0..edges).map(|edge| PinChange { cycle: begin + 160 * edge, pin: Pin::Beam, high: edge % 2 == 1 }));
+        uno.drive((0..edges).map(|edge| PinChange {
+            cycle: begin + 160 * edge,
+            pin: wiring::BEAM,
+            high: edge % 2 == 1,
+        }));
         run_for_ms(&mut uno, 10);
         uno.received();
         run_for_ms(&mut uno, 120);
@@ -301,7 +305,7 @@ fn a_beam_that_chatters_faster_than_it_can_be_heard_is_known_as_it_is_afterwards
         let broken = format!("beam_broken:{}", edges % 2);
         let last = said.lines().rfind(|line| line.contains("windows:"));
         assert!(last.is_some_and(|line| line.contains(&broken)), "{edges} edges: {said:?}");
-        uno.set(Pin::Beam, true);
+        uno.set(wiring::BEAM, true);
         run_for_ms(&mut uno, 10);
     }
 }

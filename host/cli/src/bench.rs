@@ -4,12 +4,12 @@ use crate::output::say;
 use crate::progress::Progress;
 use anyhow::Result;
 use clap::Args;
+use knn_bench::Task;
+use serde_json::{Value, json};
 use trial::bench::encoder::{Direction, Load};
 use trial::bench::table::{Figures, TURNINGS};
 use trial::bench::{self, Cycles, encoder, servo, swings};
 use trial::firmware;
-use knn_bench::Task;
-use serde_json::{Value, json};
 
 /// How the figures are to be printed.
 #[derive(Args)]
@@ -136,7 +136,7 @@ mod tests {
     use trial::bench::servo::Jitter;
     use trial::bench::swings::Lateness;
     use trial::bench::{ClassifierCosts, FirmwareCosts};
-    use uno::firmware::Size;
+    use uno::elf::Size;
     use uno::{InterruptStatistics, Turns};
 
     #[test]

@@ -14,13 +14,14 @@ use control::examples::EXAMPLES;
 use control::memory::{SIZE, Volatile};
 use control::reset::Cause;
 use control::settings::{Setting, Settings};
-use field::console::{ConsoleError, ask};
-use field::signal::{CYCLES_PER_SECOND, Pin, PinChange};
-use field::uno::{Uno, UnoError};
+use field::wiring;
+use signal::{CYCLES_PER_SECOND, Pin, PinChange};
 use std::collections::VecDeque;
 use std::fmt;
 use std::path::PathBuf;
 use std::sync::LazyLock;
+use trial::console::{ConsoleError, ask};
+use uno::{Uno, UnoError};
 use walks::Failure;
 use walks::drive::is_end;
 use walks::machine::{Attended, Checked, Machine, World};
@@ -55,7 +56,7 @@ struct ServoLine {
 
 impl ServoLine {
     fn take(&mut self, changes: &[PinChange]) {
-        for change in changes.iter().filter(|change| change.pin == Pin::Servo) {
+        for change in changes.iter().filter(|change| change.pin == wiring::SERVO) {
             if change.high {
                 self.rise = Some(change.cycle);
             } else if let Some(rise) = self.rise.take() {
@@ -225,7 +226,7 @@ impl Machine for Board {
 
     fn new(beginning: &Beginning, world: &World) -> Result<Self, Failure> {
         let mut uno = Uno::boot(&ELF).map_err(stopped)?;
-        uno.set(Pin::Beam, !world.broken);
+        uno.set(wiring::BEAM, !world.broken);
         uno.run_until_symbol("main", GREETING_CYCLES).map_err(stopped)?;
         let (count, overflows) = (beginning.count.to_le_bytes(), (beginning.steps >> 8).to_le_bytes());
         uno.write("weeder_firmware::encoder::COUNT_LOW", &count[..2]).map_err(stopped)?;
@@ -257,20 +258,20 @@ impl Machine for Board {
         let (a, b) = CHANNELS[self.phase];
         self.phase = (self.phase + if up { 1 } else { 3 }) % 4;
         let (new_a, new_b) = CHANNELS[self.phase];
-        let level = if a == new_a { (Pin::EncoderB, new_b) } else { (Pin::EncoderA, new_a) };
+        let level = if a == new_a { (wiring::ENCODER_B, new_b) } else { (wiring::ENCODER_A, new_a) };
         debug_assert!(a != new_a || b != new_b, "a step changes one channel");
         self.to_come.push((vec![level], true));
     }
 
     fn spike(&mut self, _: &mut World, _: i32) -> i64 {
         let (a, b) = CHANNELS[self.phase];
-        self.to_come.push((vec![(Pin::EncoderA, !a), (Pin::EncoderB, !b)], false));
-        self.to_come.push((vec![(Pin::EncoderA, a), (Pin::EncoderB, b)], false));
+        self.to_come.push((vec![(wiring::ENCODER_A, !a), (wiring::ENCODER_B, !b)], false));
+        self.to_come.push((vec![(wiring::ENCODER_A, a), (wiring::ENCODER_B, b)], false));
         SPIKE_TICKS
     }
 
     fn beam_edge(&mut self, world: &World) {
-        self.to_come.push((vec![(Pin::Beam, !world.broken)], false));
+        self.to_come.push((vec![(wiring::BEAM, !world.broken)], false));
     }
 
     fn lose_edges(&mut self, _: &World) -> Checked {
@@ -284,8 +285,8 @@ impl Machine for Board {
     fn turn(&mut self, before: &World, now: &World) -> Result<i64, Failure> {
         let cycles = (now.time_us - before.time_us) * CYCLES_A_US;
         let until = self.uno.cycle() + cycles;
-        self.uno.set(Pin::WorkSwitch, !now.switch_on);
-        self.uno.set(Pin::EndSwitch, !now.end_switch_on);
+        self.uno.set(wiring::WORK_SWITCH, !now.switch_on);
+        self.uno.set(wiring::END_SWITCH, !now.end_switch_on);
         if now.switch_on {
             self.rests_since = None;
         }
