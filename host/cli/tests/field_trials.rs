@@ -141,7 +141,7 @@ fn the_help_of_a_sweep_lists_what_an_axis_can_be_with_its_range() {
     let help = said(Path::new("."), &["sweep", "--help"]);
     for line in [
         "speed                       0.1 to 8",
-        "ground.slip_percent         -15 to 15",
+        "ground.slip_percent         -30 to 30",
         "lead_out_ms                 0 to 500",
     ] {
         assert!(help.contains(line), "{line}: {help}");

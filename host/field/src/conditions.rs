@@ -102,7 +102,7 @@ parameters! {
     }
     /// The ground.
     ground: Ground {
-        slip_percent: f64 = 5.0, -15 to 15, "mean slip of the wheel that the encoder counts: above 0 where it drives, below where it is dragged", "assumed, for a driving wheel on tilled soil that nobody calibrated";
+        slip_percent: f64 = 5.0, -30 to 30, "mean slip of the wheel that the encoder counts: above 0 where it drives, below where it is dragged", "assumed, for a driving wheel on tilled soil that nobody calibrated";
         slip_scatter_percent: f64 = 3.0, 0 to 10, "slip is within this of its mean, evenly spread, and changes every metre or two", "assumed";
     }
     /// The driving.
@@ -473,7 +473,7 @@ mod tests {
         for (text, error) in [
             (
                 "[ground]\n\nslip_percent = 40\n",
-                "field.toml, line 3: ground.slip_percent is 40, but has to be -15 to 15: mean slip",
+                "field.toml, line 3: ground.slip_percent is 40, but has to be -30 to 30: mean slip",
             ),
             (
                 "[settings]\nlead_out_ms = 900\n",
@@ -483,7 +483,7 @@ mod tests {
             ("[ground]\nslip = 4\n", "field.toml, line 2: unknown field `slip`, expected `slip_percent`"),
             (
                 "[ground]\nslip_percent = \"much\"\n",
-                "field.toml, line 2: ground.slip_percent is \"much\", but has to be a number from -15 to 15: mean slip",
+                "field.toml, line 2: ground.slip_percent is \"much\", but has to be a number from -30 to 30: mean slip",
             ),
             ("[ground]\nslip_percent = nan\n", "field.toml, line 2: ground.slip_percent is NaN"),
         ] {

@@ -67,7 +67,7 @@ pub fn drive(conditions: &Conditions, span_mm: &Range<f64>, speed_km_h: f64, rng
         };
         motion = motion.change_speed(speed_mm_s, ACCELERATION_MM_S2);
     }
-    let slip = |rng: &mut _| (ground.slip_percent + scatter(rng, ground.slip_scatter_percent)).clamp(0.0, 90.0) / 100.0;
+    let slip = |rng: &mut _| (ground.slip_percent + scatter(rng, ground.slip_scatter_percent)) / 100.0;
     let motion = motion.stop_at(end_mm, BRAKING_MM_S2).with_slip(|| slip(rng));
     let passed_s = |place_mm: f64| {
         let passings = motion.passings(place_mm + machine.beam_to_tool_mm);
@@ -116,6 +116,19 @@ mod tests {
         let slip_percent = 100.0 * (1.0 - rolled_mm / turned_mm);
         // The mean of some ten legs within 3 % of it.
         assert!((slip_percent - 5.0).abs() < 2.0, "{slip_percent} %");
+    }
+
+    #[test]
+    fn a_wheel_that_is_dragged_and_skids_turns_less_far_than_the_machine_rolls() {
+        for slip_percent in [-30.0, -10.0, 30.0] {
+            let mut conditions = Conditions::default();
+            conditions.set("ground.slip_percent", slip_percent).unwrap();
+            conditions.set("ground.slip_scatter_percent", 0.0).unwrap();
+            let motion = driven(&conditions, 1.0).motion;
+            let turned_mm = motion.wheel_mm(motion.duration_s()) - motion.start_mm();
+            let turned_a_mm = turned_mm / (motion.end_mm() - motion.start_mm());
+            assert!((turned_a_mm - 1.0 / (1.0 - slip_percent / 100.0)).abs() < 1e-9, "{turned_a_mm} at {slip_percent} %");
+        }
     }
 
     #[test]

@@ -5,8 +5,8 @@
 //! passed follows from one quadratic equation and no time step is involved: the edges of an encoder come out at their
 //! exact times.
 //!
-//! A driven wheel turns farther than the machine rolls: its slip is the share of the wheel's way that is lost, and each piece
-//! of the motion may have its own ([`Motion::with_slip`]).
+//! A driven wheel turns farther than the machine rolls: its slip is the share of the wheel's way that is lost. Below 0 it is that
+//! of a dragged wheel that skids, and turns less far. Each piece of the motion may have its own ([`Motion::with_slip`]).
 //!
 //! It knows no machine: what position 0 means is the user's choice.
 
