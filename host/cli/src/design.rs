@@ -1,4 +1,5 @@
-//! `weeder design`: what a machine's engine, servo, shanks, chain, wheels and handle have to be like.
+//! `weeder design`: what a machine's engine, servo, shanks, chain, wheels and handle have to be like, and how its tool has to
+//! swing, as settings for the firmware.
 
 use crate::output::{print, say};
 use crate::source;
@@ -6,6 +7,7 @@ use anyhow::Result;
 use clap::Args;
 use mechanics::design::Design;
 use mechanics::machine::Machine;
+use mechanics::swing::Swing;
 use mechanics::{file, paper, report};
 use serde_json::json;
 use std::path::PathBuf;
@@ -50,16 +52,35 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 }
 
 fn design(machine: &Machine, json: bool) -> Result<()> {
-    let figures = Design::of(machine)?.figures(machine);
+    let design = Design::of(machine)?;
+    let figures = design.figures(machine);
+    let swing = Swing::of(machine, design.servo_torque);
     if json {
-        return say!("{:#}", json!({ "inputs": machine.inputs(), "figures": figures }));
+        let no_swing = swing.err().map(|problem| problem.to_string());
+        let swing = swing.ok();
+        let set = swing.map(|swing| swing.set_lines());
+        let (inputs, figures) = (machine.inputs(), figures);
+        return say!(
+            "{:#}",
+            json!({ "inputs": inputs, "figures": figures, "swing": swing, "no_swing": no_swing, "set": set })
+        );
     }
     let (inputs, paper) = (machine.inputs(), Machine::default().inputs());
     let differing = inputs.iter().zip(&paper).filter(|(input, paper)| input.value != paper.value).count();
     say!("{differing} of the machine's {} values differ from the paper's machine.", inputs.len())?;
     say!("{}\n", report::design_table(&figures))?;
     let concerns = figures.iter().filter(|figure| figure.concern).count();
-    say!("{concerns} of {} figures ask for a change (!).", figures.len())
+    say!("{concerns} of {} figures ask for a change (!).\n", figures.len())?;
+    match swing {
+        Ok(swing) => {
+            let said = swing.sentences(machine, design.servo_torque).join("\n");
+            say!(
+                "{said}\nFor the firmware's console, until the servo has been timed:\n{}",
+                swing.set_lines().join("\n")
+            )
+        }
+        Err(problem) => say!("The tool cannot swing as it has to: {problem}."),
+    }
 }
 
 fn against_paper(own: Option<&Machine>, json: bool) -> Result<()> {

@@ -157,3 +157,32 @@ fn a_file_that_does_not_exist_is_named() {
     assert_eq!(output.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&output.stderr).contains("no-such.toml"));
 }
+
+#[test]
+fn the_swing_comes_as_settings_for_the_firmware() {
+    let machine = "[intra_row]\nwidth = \"55 mm\"\nblade_height = \"5 mm\"\n";
+    let words = printed(machine, &[]);
+    // 95 + 10 + 27.5 mm of an arm of 350 are 22.2 degrees, 247 us, told as 250: 22.5 degrees, half of what 45 take. The soil
+    // takes 19.7 of 60 kg cm, and two thirds of the speed are left.
+    for line in [
+        "The tool clears a canopy of 190 mm at 22.5 degrees, 250 us of the pulse away from the row.",
+        "That takes 60 ms without load, and 89 ms against the soil, which takes 33 % of the servo's torque.",
+        "Between tool and sweeps 22.5 mm on either side of the row are weeded by nobody: a tool of 100 mm would fill that",
+        "\nset servo_in_us 1500\nset servo_out_us 1750\nset lead_out_ms 176\nset lead_in_ms 50\n",
+    ] {
+        assert!(words.contains(line), "{line:?} is not in\n{words}");
+    }
+    let json: Value = serde_json::from_str(&printed(machine, &["--json"])).unwrap();
+    assert_eq!(
+        (json["swing"]["servo_out_us"].as_u64(), json["set"][1].as_str()),
+        (Some(1750), Some("set servo_out_us 1750"))
+    );
+}
+
+#[test]
+fn a_tool_that_cannot_swing_as_it_has_to_is_told_why() {
+    let words = printed("[intra_row]\nshank_length = \"120 mm\"\n", &[]);
+    assert!(words.contains("an arm of 120 mm cannot bring the tool 130 mm aside"), "{words}");
+    let words = printed("[intra_row]\nservo_torque = \"20 kg cm\"\n", &[]);
+    assert!(words.contains("the soil takes 39.4 of the servo's 20.0 kg cm: it stalls"), "{words}");
+}

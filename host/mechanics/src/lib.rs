@@ -30,6 +30,7 @@ pub mod paper;
 pub mod report;
 pub mod sense;
 pub mod shank;
+pub mod swing;
 pub mod tool;
 pub mod traction;
 pub mod unit;

@@ -229,6 +229,25 @@ sections! {
         /// Torque that the servo holds.
         servo_torque: Torque = 60.0, KG_CM, 0.1 to 5000.0;
     }
+    /// The swing of the tool in the row, out of the crop's way.
+    swing: SwingInputs {
+        /// Widest canopy that the tool has to clear.
+        widest_canopy: Length = 190.0, MM, 5.0 to 1000.0;
+        /// Room between the tool that is out and that canopy: plants off the row's line, and a machine that strays.
+        room: Length = 10.0, MM, 0.0 to 300.0;
+        /// From the row's line to the nearest sweep's edge.
+        sweep_from: Length = 50.0, MM, 5.0 to 1000.0;
+        /// Time that the servo takes for 60 degrees without load, as its data sheet has it.
+        servo_time_60: Time = 0.16, SECOND, 0.01 to 5.0;
+        /// Shortest time from a pulse until the servo moves; hobby servos: 0.05 s.
+        least_dead_time: Time = 0.05, SECOND, 0.0 to 0.5;
+        /// Longest such time, under load; hobby servos: 0.08 s.
+        most_dead_time: Time = 0.08, SECOND, 0.0 to 0.5;
+        /// Change of the pulse that turns the servo by 90 degrees, in microseconds.
+        pulse_for_90: f64 = 1000.0, FACTOR, 200.0 to 2500.0;
+        /// Pulse with the tool in the row, in microseconds.
+        pulse_in: f64 = 1500.0, FACTOR, 500.0 to 2500.0;
+    }
     /// The steel of the shanks, and what they are to bear.
     shank: Shank {
         /// Bending stress that the steel may see; 56 MPa is the paper's for mild steel.

@@ -1,0 +1,159 @@
+//! The swing of the tool in the row: the smallest angle that clears the widest canopy, the pulse for it, the time that it takes
+//! by the servo's torque-speed line, and the lead that follows. A shorter stroke takes less time, and leaves more ground weeded.
+//!
+//! The arm swings sideways about a pivot beside the row: at an angle the tool's middle is `arm * sin(angle)` from the row's
+//! line. A servo turns at full speed without load, and falls in a straight line to nothing at the torque at which it stalls. What it
+//! has to turn against is the torque of the whole blade in the soil (above Eq. 10), which the paper sizes its servo by.
+
+use crate::machine::Machine;
+use crate::unit::{KG_CM, MM};
+use serde::Serialize;
+use uom::si::f64::Torque;
+use uom::si::time::second;
+
+/// What a pulse and the gap behind it may add before a servo hears of a command, ms.
+const PULSE_AND_GAP_MS: f64 = 6.0;
+
+/// Pulses are told in whole steps of this, us, rounded outwards.
+const PULSE_STEP_US: f64 = 5.0;
+
+/// A swing, as it has to be.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Swing {
+    /// Smallest angle at which the tool's edge has cleared the canopy, degrees.
+    pub angle_degrees: f64,
+    /// Pulse with the tool in the row, us.
+    pub servo_in_us: u32,
+    /// Pulse with the tool out of it, us.
+    pub servo_out_us: u32,
+    /// Share of the servo's torque that the soil takes, 0 to 1.
+    pub load: f64,
+    /// Time for that angle without load, ms.
+    pub unloaded_ms: f64,
+    /// Time for it against the soil, ms.
+    pub loaded_ms: f64,
+    /// Lead of the command to leave the row, ms.
+    pub lead_out_ms: u32,
+    /// Lead of the command to come back, ms.
+    pub lead_in_ms: u32,
+    /// Width on either side of the row that neither tool nor sweeps weed, mm.
+    pub unweeded_strip_mm: f64,
+    /// Width of the tool that would fill it, mm.
+    pub filling_tool_mm: f64,
+}
+
+/// Why a tool cannot swing as it has to.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum NoSwing {
+    /// The arm is too short.
+    #[error(
+        "an arm of {arm_mm:.0} mm cannot bring the tool {aside_mm:.0} mm aside, which the canopy asks for: take a longer one"
+    )]
+    ShortArm {
+        /// Its length.
+        arm_mm: f64,
+        /// How far it has to bring the tool.
+        aside_mm: f64,
+    },
+    /// The servo stalls.
+    #[error("the soil takes {needed_kg_cm:.1} of the servo's {stall_kg_cm:.1} kg cm: it stalls; take a stronger one")]
+    Stalls {
+        /// What the soil takes.
+        needed_kg_cm: f64,
+        /// What the servo has.
+        stall_kg_cm: f64,
+    },
+}
+
+impl Swing {
+    /// The swing of a machine, whose servo turns against this torque.
+    ///
+    /// # Errors
+    /// Where the arm is too short or the servo too weak.
+    pub fn of(machine: &Machine, torque: Torque) -> Result<Self, NoSwing> {
+        Self::with_tool(machine, torque, MM.value(machine.intra_row.width))
+    }
+
+    /// The same with a tool of another width, mm.
+    ///
+    /// # Errors
+    /// As [`Swing::of`].
+    pub fn with_tool(machine: &Machine, torque: Torque, tool_mm: f64) -> Result<Self, NoSwing> {
+        let inputs = machine.swing;
+        let arm_mm = MM.value(machine.intra_row.shank_length);
+        let aside_mm = MM.value(inputs.widest_canopy) / 2.0 + MM.value(inputs.room) + tool_mm / 2.0;
+        if aside_mm >= arm_mm {
+            return Err(NoSwing::ShortArm { arm_mm, aside_mm });
+        }
+        let (needed_kg_cm, stall_kg_cm) = (KG_CM.value(torque), KG_CM.value(machine.intra_row.servo_torque));
+        let load = needed_kg_cm / stall_kg_cm;
+        if load >= 1.0 {
+            return Err(NoSwing::Stalls { needed_kg_cm, stall_kg_cm });
+        }
+        let exact_degrees = (aside_mm / arm_mm).asin().to_degrees();
+        let us_a_degree = inputs.pulse_for_90 / 90.0;
+        let stroke_us = (exact_degrees * us_a_degree / PULSE_STEP_US).ceil() * PULSE_STEP_US;
+        let angle_degrees = stroke_us / us_a_degree;
+        let unloaded_ms = 1000.0 * inputs.servo_time_60.get::<second>() * angle_degrees / 60.0;
+        let loaded_ms = unloaded_ms / (1.0 - load);
+        let dead_ms = |time: uom::si::f64::Time| 1000.0 * time.get::<second>();
+        let from_mm = MM.value(inputs.sweep_from);
+        let lead_out_ms = dead_ms(inputs.most_dead_time.max(inputs.least_dead_time)) + loaded_ms + PULSE_AND_GAP_MS;
+        Ok(Self {
+            angle_degrees,
+            servo_in_us: inputs.pulse_in.round() as u32,
+            servo_out_us: (inputs.pulse_in + stroke_us).round() as u32,
+            load,
+            unloaded_ms,
+            loaded_ms,
+            lead_out_ms: lead_out_ms.ceil() as u32,
+            lead_in_ms: dead_ms(inputs.least_dead_time.min(inputs.most_dead_time)).floor() as u32,
+            unweeded_strip_mm: (from_mm - tool_mm / 2.0).max(0.0),
+            filling_tool_mm: 2.0 * from_mm,
+        })
+    }
+
+    /// The settings that follow, as lines for the firmware's console.
+    pub fn set_lines(&self) -> [String; 4] {
+        let Self { servo_in_us, servo_out_us, lead_out_ms, lead_in_ms, .. } = self;
+        [
+            format!("set servo_in_us {servo_in_us}"),
+            format!("set servo_out_us {servo_out_us}"),
+            format!("set lead_out_ms {lead_out_ms}"),
+            format!("set lead_in_ms {lead_in_ms}"),
+        ]
+    }
+
+    /// What it is, in sentences. `torque` is what it was calculated with.
+    pub fn sentences(&self, machine: &Machine, torque: Torque) -> Vec<String> {
+        let mut said = vec![
+            format!(
+                "The tool clears a canopy of {:.0} mm at {:.1} degrees, {} us of the pulse away from the row.",
+                MM.value(machine.swing.widest_canopy),
+                self.angle_degrees,
+                self.servo_out_us.abs_diff(self.servo_in_us)
+            ),
+            format!(
+                "That takes {:.0} ms without load, and {:.0} ms against the soil, which takes {:.0} % of the servo's torque.",
+                self.unloaded_ms,
+                self.loaded_ms,
+                100.0 * self.load
+            ),
+        ];
+        if self.unweeded_strip_mm <= 0.0 {
+            said.push("Tool and sweeps leave no strip between them.".to_owned());
+            return said;
+        }
+        let wider = Self::with_tool(machine, torque, self.filling_tool_mm);
+        said.push(format!(
+            "Between tool and sweeps {:.1} mm on either side of the row are weeded by nobody: a tool of {:.0} mm would fill that{}.",
+            self.unweeded_strip_mm,
+            self.filling_tool_mm,
+            wider.map_or_else(
+                |problem| format!(", but {problem}"),
+                |wider| format!(", and swing out to {:.1} degrees, `set servo_out_us {}`", wider.angle_degrees, wider.servo_out_us)
+            )
+        ));
+        said
+    }
+}
