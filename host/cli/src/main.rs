@@ -21,6 +21,7 @@ mod hex;
 mod monitor;
 mod numbers;
 mod output;
+mod plan;
 mod progress;
 mod record;
 mod replay;
@@ -88,6 +89,8 @@ enum Command {
     Settings(settings::Arguments),
     /// Calculate what a machine's engine, servo, shanks, chain, wheels and handle have to be like.
     Design(design::Arguments),
+    /// Draw the plan of a field trial by lot, as the table to fill in.
+    Plan(plan::Arguments),
     /// Judge a field trial by what was counted and measured in its plots.
     Evaluate(evaluate::Arguments),
     /// Write the figures of the manual anew, or say which are no longer true.
@@ -153,6 +156,7 @@ fn main() -> ExitCode {
         Command::Replay(arguments) => replay::run(&arguments),
         Command::Settings(arguments) => settings::run(&arguments),
         Command::Design(arguments) => design::run(&arguments).map(|()| Finding::Good),
+        Command::Plan(arguments) => plan::run(&arguments).map(|()| Finding::Good),
         Command::Evaluate(arguments) => evaluate::run(&arguments).map(|()| Finding::Good),
         Command::Figures(arguments) => figures::run(&arguments),
         Command::Completions(arguments) => completions::run(&arguments, grammar()).map(|()| Finding::Good),

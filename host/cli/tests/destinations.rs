@@ -14,12 +14,13 @@ fn weeder(folder: &Path, arguments: &[&str]) -> Output {
 }
 
 /// Every argument that names something to write, without it.
-const WRITERS: [(&[&str], Kind); 11] = [
+const WRITERS: [(&[&str], Kind); 12] = [
     (&["trial", "--field", "small.toml", "--out"], Kind::Folder),
     (&["evaluate", concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/trial-example.csv"), "--out"], Kind::Folder),
     (&["sim", "--out"], Kind::Folder),
     (&["sim", "--vcd"], Kind::File("row.vcd")),
     (&["sweep", "--field", "small.toml", "--x", "k=1..3:2", "--out"], Kind::File("sweep.csv")),
+    (&["plan", "--out"], Kind::File("trial.csv")),
     (&["train", "--synthetic", "--out"], Kind::File("table.rs")),
     (&["train", "--synthetic", "--out"], Kind::File("table.csv")),
     (&["train", "--synthetic", "--picture"], Kind::File("regions.svg")),
@@ -99,7 +100,7 @@ fn what_is_written_to_a_device_goes_there() {
 
 #[test]
 fn every_out_is_a_folder_or_a_file_by_its_name_in_the_help() {
-    for command in ["trial", "evaluate", "sim", "sweep", "train", "record"] {
+    for command in ["trial", "evaluate", "plan", "sim", "sweep", "train", "record"] {
         let output = Command::new(env!("CARGO_BIN_EXE_weeder")).args([command, "--help"]).output().unwrap();
         let help = String::from_utf8_lossy(&output.stdout).into_owned();
         let is_folder =

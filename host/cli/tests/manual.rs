@@ -39,7 +39,7 @@ speed_mm_s,spacing_mm,delay_mm,hold_mm,actuation_mm,answer,votes,label
 const FOREIGN: [&str; 4] = ["avrdude", "echo", "npm", "sudo"];
 
 /// Subcommands that need neither an Uno nor much time.
-const CHEAP: [&str; 7] = ["classify", "design", "evaluate", "hex", "sweep", "train", "trial"];
+const CHEAP: [&str; 8] = ["classify", "design", "evaluate", "hex", "plan", "sweep", "train", "trial"];
 
 /// A page of the manual.
 struct Page {

@@ -15,7 +15,7 @@ const OBJECTS: &str = "speed_mm_s,spacing_mm,delay_mm,hold_mm,actuation_mm,label
 const TRIAL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/trial-example.csv");
 
 /// Commands of each kind that need no firmware, with what they say.
-const COMMANDS: [&[&str]; 9] = [
+const COMMANDS: [&[&str]; 10] = [
     &["design"],
     &["design", "--json"],
     &["design", "--print-machine"],
@@ -23,6 +23,7 @@ const COMMANDS: [&[&str]; 9] = [
     &["classify", "objects.csv"],
     &["classify", "objects.csv", "--json"],
     &["evaluate", TRIAL],
+    &["plan"],
     &["sweep", "--field", "small.toml", "--x", "k=1..3:2"],
     &["completions", "bash"],
 ];

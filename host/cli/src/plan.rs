@@ -1,0 +1,83 @@
+//! `weeder plan`: draws the plan of a field trial by lot, as the table to be filled in.
+
+use crate::destination::FileName;
+use crate::numbers::{number_within, whole_within};
+use crate::output::{self, print, say};
+use anyhow::Result;
+use clap::Args;
+use study::plan::Plan;
+use study::sweep::{SPACINGS_CM, SPEEDS_KM_H};
+
+/// What the user asks of a plan.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  weeder plan --out trial.csv                       the paper's speeds and spacings in three blocks
+  weeder plan --speeds 1,2 --spacings 50 --blocks 5 --seed 7
+  weeder evaluate trial.csv                         once it has been filled in")]
+pub struct Arguments {
+    /// Forward speeds in km/h, each 0.1 to 8.
+    #[arg(long, value_delimiter = ',', default_value = "1,1.5,2,2.5", value_parser = number_within(SPEEDS_KM_H.0..=SPEEDS_KM_H.1))]
+    speeds: Vec<f64>,
+    /// Plant spacings in cm, each 5 to 500.
+    #[arg(long, value_delimiter = ',', default_value = "50,60", value_parser = number_within(SPACINGS_CM.0..=SPACINGS_CM.1))]
+    spacings: Vec<f64>,
+    /// Blocks, 2 to 100: each has every speed with every spacing once. They are the table's replications.
+    #[arg(long, default_value = "3", value_parser = whole_within(2..=100_u32))]
+    blocks: u32,
+    /// Working width of the machine in m, 0.01 to 50, to go into the table.
+    #[arg(long, value_parser = number_within(0.01..=50.0))]
+    width: Option<f64>,
+    /// Power that it needs in hp, 0.001 to 1000, to go into the table.
+    #[arg(long, value_parser = number_within(0.001..=1000.0))]
+    power: Option<f64>,
+    /// Which of all the possible orders, 0 to 18446744073709551615: the same seed draws the same one.
+    #[arg(long, default_value = "1", value_parser = whole_within(0..=u64::MAX))]
+    seed: u64,
+    /// Write the table into this file instead of printing it.
+    #[arg(long, value_name = "FILE.csv")]
+    out: Option<FileName>,
+}
+
+/// Draws the plan and prints or writes it.
+///
+/// # Errors
+/// Where the file cannot be written.
+pub fn run(arguments: &Arguments) -> Result<()> {
+    let out = arguments.out.as_ref().map(FileName::check).transpose()?;
+    let plan = Plan {
+        speeds_km_h: distinct(&arguments.speeds),
+        spacings_cm: distinct(&arguments.spacings),
+        blocks: arguments.blocks,
+        width_m: arguments.width,
+        power_hp: arguments.power,
+        seed: arguments.seed,
+    };
+    let notes = [
+        format!("Drawn by lot: {}", output::command_line()?),
+        "Mark out the plots side by side in this order; a block is a stretch of field that is as even as it can be."
+            .to_owned(),
+        "Count weeds on the same marked ground before and after, and the plants; write down area and time with turns."
+            .to_owned(),
+        "Then: weeder evaluate THIS_FILE".to_owned(),
+    ];
+    match &out {
+        None => {
+            let mut table = Vec::new();
+            plan.write_csv(&notes, &mut table)?;
+            print(format_args!("{}", String::from_utf8_lossy(&table)))
+        }
+        Some(out) => {
+            out.write(|to| plan.write_csv(&notes, to))?;
+            say!("Written: {}, {} plots in {} blocks", out.path().display(), plan.plots().len(), plan.blocks)
+        }
+    }
+}
+
+/// Levels in ascending order, each once.
+fn distinct(levels: &[f64]) -> Vec<f64> {
+    let mut levels = levels.to_vec();
+    levels.sort_by(f64::total_cmp);
+    levels.dedup();
+    levels
+}

@@ -1,0 +1,74 @@
+//! `weeder plan`, as it is called: what it draws can be filled in by hand, and `weeder evaluate` judges it.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+use tempfile::TempDir;
+
+fn weeder(folder: &Path, arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
+    command.current_dir(folder).args(arguments).output().expect("cargo has built the command")
+}
+
+/// What it prints where all is well.
+#[track_caller]
+fn said(folder: &Path, arguments: &[&str]) -> String {
+    let output = weeder(folder, arguments);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).expect("it prints text")
+}
+
+/// The table with every empty cell filled in: more damage and more weeds left the faster, and a good block and a bad one.
+fn filled_in(table: &str) -> String {
+    let fill = |line: &str| {
+        let cells: Vec<&str> = line.split(',').collect();
+        let [plot, block, speed, spacing, "", "", "", "", "", "", width, power] = cells[..] else {
+            return line.to_owned();
+        };
+        let (number, fast): (u32, f64) = (plot.parse().unwrap(), speed.parse().unwrap());
+        let after = 10 + (10.0 * fast) as u32 + number % 3 + 2 * block.parse::<u32>().unwrap();
+        let damaged = u32::from(fast > 1.8) + number % 2;
+        let time_s = 500.0 / fast;
+        format!("{plot},{block},{speed},{spacing},200,{after},60,{damaged},12,{time_s},{width},{power}")
+    };
+    table.lines().map(fill).collect::<Vec<_>>().join("\n")
+}
+
+#[test]
+fn a_plan_that_is_filled_in_by_hand_is_judged() {
+    let folder = TempDir::new().unwrap();
+    let words = said(folder.path(), &["plan", "--width", "0.4", "--power", "2.5", "--out", "trial.csv"]);
+    assert_eq!(words, "Written: trial.csv, 24 plots in 3 blocks\n");
+    let path = folder.path().join("trial.csv");
+    let empty = fs::read_to_string(&path).unwrap();
+    fs::write(&path, filled_in(&empty)).unwrap();
+    let words = said(folder.path(), &["evaluate", "trial.csv"]);
+    for line in [
+        "24 plots of 8 treatments (1, 1.5, 2 and 2.5 km/h; 50 and 60 cm), 3 of each treatment.",
+        "Weeding efficiency falls by",
+        "│ block",
+    ] {
+        assert!(words.contains(line), "{line:?} is not in\n{words}");
+    }
+}
+
+#[test]
+fn a_plan_that_is_not_filled_in_yet_is_refused_with_the_cell_that_is_empty() {
+    let folder = TempDir::new().unwrap();
+    said(folder.path(), &["plan", "--out", "trial.csv"]);
+    let output = weeder(folder.path(), &["evaluate", "trial.csv"]);
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{message}");
+    assert!(message.contains("trial.csv, line 6: weeds_before is ``: it has to be a whole number"), "{message}");
+}
+
+#[test]
+fn the_same_seed_draws_the_same_plan() {
+    let plan = |seed: &str| {
+        let table = said(Path::new("."), &["plan", "--blocks", "2", "--seed", seed]);
+        table.lines().filter(|line| !line.starts_with('#')).map(str::to_owned).collect::<Vec<_>>()
+    };
+    assert_eq!(plan("7"), plan("7"));
+    assert_ne!(plan("7"), plan("8"));
+    assert_eq!(plan("7").len(), 1 + 2 * 8);
+}

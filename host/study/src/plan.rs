@@ -1,0 +1,127 @@
+//! The plan of a field trial: which plot is weeded at which speed and spacing, and in which order, drawn by lot; and the table for
+//! it, in which somebody fills in by hand what was counted.
+//!
+//! A block has each treatment once, in an order of its own: neighbouring plots are alike, and what differs from block to block
+//! can be told from the treatments. Blocks are the replications of the table that [`crate::evaluation`] reads.
+
+use rand::SeedableRng;
+use rand::seq::SliceRandom;
+use rand_chacha::ChaCha8Rng;
+use std::io;
+
+/// What a trial is to compare.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plan {
+    /// Forward speeds, km/h.
+    pub speeds_km_h: Vec<f64>,
+    /// Plant spacings, cm.
+    pub spacings_cm: Vec<f64>,
+    /// Blocks, each with every treatment once.
+    pub blocks: u32,
+    /// Working width, m, and power, hp, where they are known: they go into the table.
+    pub width_m: Option<f64>,
+    /// See `width_m`.
+    pub power_hp: Option<f64>,
+    /// Which of all the possible orders.
+    pub seed: u64,
+}
+
+/// A plot of the plan.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlannedPlot {
+    /// Its number in the field, from 1, in the order in which plots are weeded.
+    pub plot: u32,
+    /// Its block, from 1.
+    pub block: u32,
+    /// Its speed, km/h.
+    pub speed_km_h: f64,
+    /// Its spacing, cm.
+    pub spacing_cm: f64,
+}
+
+impl Plan {
+    /// The plots, in the order in which they are weeded.
+    pub fn plots(&self) -> Vec<PlannedPlot> {
+        let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
+        let of_block = |block: u32| {
+            let mut treatments: Vec<(f64, f64)> = self
+                .speeds_km_h
+                .iter()
+                .flat_map(|&speed| self.spacings_cm.iter().map(move |&spacing| (speed, spacing)))
+                .collect();
+            treatments.shuffle(&mut rng);
+            treatments.into_iter().map(move |treatment| (block, treatment)).collect::<Vec<_>>()
+        };
+        let drawn = (1..=self.blocks).flat_map(of_block).zip(1..);
+        let planned = |((block, (speed_km_h, spacing_cm)), plot)| PlannedPlot { plot, block, speed_km_h, spacing_cm };
+        drawn.map(planned).collect()
+    }
+
+    /// Writes the table to be filled in, with `notes` above it, a line each. What is not known yet is left empty.
+    ///
+    /// # Errors
+    /// Those of the writer.
+    pub fn write_csv(&self, notes: &[String], mut to: impl io::Write) -> io::Result<()> {
+        for note in notes {
+            writeln!(to, "# {note}")?;
+        }
+        writeln!(
+            to,
+            "plot,replication,speed_km_h,spacing_cm,weeds_before,weeds_after,plants,damaged,area_m2,time_s,width_m,power_hp"
+        )?;
+        let known = |value: Option<f64>| value.map_or_else(String::new, |value| value.to_string());
+        for PlannedPlot { plot, block, speed_km_h, spacing_cm } in self.plots() {
+            let (width, power) = (known(self.width_m), known(self.power_hp));
+            writeln!(to, "{plot},{block},{speed_km_h},{spacing_cm},,,,,,,{width},{power}")?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plan(seed: u64) -> Plan {
+        Plan {
+            speeds_km_h: vec![1.0, 1.5, 2.0, 2.5],
+            spacings_cm: vec![50.0, 60.0],
+            blocks: 3,
+            width_m: Some(0.4),
+            power_hp: None,
+            seed,
+        }
+    }
+
+    #[test]
+    fn each_block_has_every_treatment_once_in_an_order_of_its_own() {
+        let plots = plan(1).plots();
+        assert_eq!(plots.iter().map(|plot| plot.plot).collect::<Vec<_>>(), (1..=24).collect::<Vec<_>>());
+        let orders: Vec<Vec<(f64, f64)>> = plots
+            .chunks(8)
+            .map(|block| block.iter().map(|plot| (plot.speed_km_h, plot.spacing_cm)).collect())
+            .collect();
+        let sorted = |order: &Vec<(f64, f64)>| {
+            let mut order = order.clone();
+            order.sort_by(|a, b| a.partial_cmp(b).unwrap());
+            order
+        };
+        assert!(orders.iter().all(|order| sorted(order) == sorted(&orders[0])));
+        assert!(orders[0] != orders[1] && orders[1] != orders[2]);
+        assert!(plots.chunks(8).zip(1..).all(|(plots, block)| plots.iter().all(|plot| plot.block == block)));
+    }
+
+    #[test]
+    fn the_same_seed_draws_the_same_plan_and_another_seed_another() {
+        assert_eq!(plan(7).plots(), plan(7).plots());
+        assert_ne!(plan(7).plots(), plan(8).plots());
+    }
+
+    #[test]
+    fn each_treatment_comes_first_as_often_as_any_other() {
+        let first = |seed| plan(seed).plots()[0];
+        let slow = (0..800).filter(|&seed| (first(seed).speed_km_h, first(seed).spacing_cm) == (1.0, 50.0)).count();
+        // One of eight, within four standard deviations.
+        assert!((62..=138).contains(&slow), "{slow} of 800");
+    }
+}
