@@ -85,13 +85,17 @@ fn in_json(analysis: &Analysis) -> Value {
 }
 
 fn response_in_json(analysis: &ResponseAnalysis) -> Value {
-    let ResponseAnalysis { response, range, model, variance, published } = analysis;
+    let ResponseAnalysis { response, range, model, checks, binomial, variance, published } = analysis;
+    let counts = binomial.as_ref();
     json!({
         "response": response,
         "unit": response.unit(),
         "range": range,
         "model": model.as_ref().ok(),
         "no_model": model.as_ref().err().map(ToString::to_string),
+        "checks": checks,
+        "binomial": counts.and_then(|model| model.as_ref().ok()),
+        "no_binomial": counts.and_then(|model| model.as_ref().err()).map(ToString::to_string),
         "variance": variance.as_ref().ok(),
         "no_variance": variance.as_ref().err().map(ToString::to_string),
         "published": published,

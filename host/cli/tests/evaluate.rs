@@ -46,7 +46,9 @@ fn the_manual_s_example_is_judged_in_plain_words_and_tables() {
     let said = said(&evaluate(Path::new("."), &[EXAMPLE]));
     for line in [
         "24 plots of 8 treatments (1, 1.5, 2 and 2.5 km/h; 50 and 60 cm), 3 of each treatment.",
-        "13 of 1318 plants were damaged (0.99 %), at most 4.00 % in a plot",
+        "13 of 1318 plants were damaged (0.99 %, which may be 0.53 to 1.68 %), at most 4.00 % in a plot",
+        "the odds that a plant is damaged are 4.49 times as high for each km/h more (1.34 to 15.00; p = 0.0148)",
+        "Performance index scatters more at some speeds or spacings than at others (p = 0.0192)",
         "Plant damage rises by 1.292 points for each km/h (p = 0.0119) and shows no effect of spacing (p = 0.5347)",
         "- Eq. 29 has -0.2068 a cm, where the text has +0.2068: one sign is wrong.",
     ] {
@@ -56,8 +58,9 @@ fn the_manual_s_example_is_judged_in_plain_words_and_tables() {
 }
 
 /// The figures are R's: `d <- read.csv("docs/trial-example.csv", comment = "#")`, `d$we <- (1 - d$weeds_after /
-/// d$weeds_before) * 100`, `summary(lm(we ~ speed_km_h + spacing_cm, d))`, `anova(lm(we ~ factor(speed_km_h) *
-/// factor(spacing_cm), d))`.
+/// d$weeds_before) * 100`, `summary(lm(we ~ speed_km_h + spacing_cm, d))`, `anova(lm(we ~ factor(replication) +
+/// factor(speed_km_h) * factor(spacing_cm), d))`, `g <- glm(cbind(damaged, plants - damaged) ~ speed_km_h + spacing_cm, d, family =
+/// binomial, control = glm.control(epsilon = 1e-15))`, `summary(g)$coefficients`.
 #[test]
 fn the_json_has_what_r_makes_of_the_same_table() {
     let json: Value = serde_json::from_str(&said(&evaluate(Path::new("."), &[EXAMPLE, "--json"]))).unwrap();
@@ -75,10 +78,14 @@ fn the_json_has_what_r_makes_of_the_same_table() {
     close(&speed["t"], -12.4894393247);
     close(&speed["p"], 3.47153171559e-11);
     close(&weeding["model"]["adjusted_r_squared"], 0.874883842566);
-    let interaction = &weeding["variance"]["sources"][2];
-    assert_eq!(interaction["degrees_of_freedom"], 3);
-    close(&interaction["f"], 1.4459696981);
-    close(&interaction["p"], 0.266595646199);
+    let [block, interaction] = [0, 3].map(|source| &weeding["variance"]["sources"][source]);
+    assert_eq!((&block["degrees_of_freedom"], &interaction["degrees_of_freedom"]), (&2.into(), &3.into()));
+    close(&block["f"], 5.30398655487533);
+    close(&interaction["f"], 2.22389896551527);
+    close(&interaction["p"], 0.130564328444606);
+    let odds = &json["responses"][0]["binomial"]["terms"][1];
+    close(&odds["estimate"], 1.5008658105026200);
+    close(&odds["p"], 0.01480901557270615);
 }
 
 #[test]
@@ -101,7 +108,7 @@ fn a_trial_without_damage_and_without_replications_is_judged_as_far_as_it_goes()
     );
     let said = said(&evaluate(folder.path(), &["trial.csv"]));
     for line in [
-        "None of 220 plants was damaged.",
+        "None of 220 plants was damaged: in truth below 1.35 %.",
         "Plant damage has no model: it is 0 in every plot",
         "No analysis of variance: it is 0 in every plot",
         "Note: no treatment was repeated",

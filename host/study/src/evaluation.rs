@@ -10,7 +10,7 @@ pub mod published;
 mod report;
 pub mod table;
 
-use crate::statistics::{AnalysisOfVariance, Design, LinearModel, NoModel};
+use crate::statistics::{AnalysisOfVariance, BinomialModel, Checks, Design, LinearModel, Mean, NoModel, Share};
 use published::Published;
 use serde::Serialize;
 pub use table::{TableError, read_csv, write_csv};
@@ -169,6 +169,17 @@ impl Response {
         }
     }
 
+    /// What it counts in a plot, and of how many; none of a measure that is not counted.
+    pub fn count(self, record: &PlotRecord) -> Option<(u32, u32)> {
+        match self {
+            Self::PlantDamage => Some((record.damaged, record.plants)),
+            Self::WeedingEfficiency => {
+                Some((record.weeds_before.saturating_sub(record.weeds_after), record.weeds_before))
+            }
+            Self::PerformanceIndex | Self::FieldEfficiency => None,
+        }
+    }
+
     /// Its value in a plot.
     pub fn value(self, performance: &Performance) -> f64 {
         match self {
@@ -216,7 +227,11 @@ pub struct ResponseAnalysis {
     pub range: (f64, f64),
     /// It as a linear function of speed in km/h and spacing in cm.
     pub model: Result<LinearModel, NoModel>,
-    /// Its two-way analysis of variance by speed and spacing, with their interaction.
+    /// What that model's residuals say; none without one.
+    pub checks: Option<Checks>,
+    /// The binomial model of its counts; none for a measure that is not counted.
+    pub binomial: Option<Result<BinomialModel, NoModel>>,
+    /// Its two-way analysis of variance by speed and spacing, with their interaction, and the replications as blocks.
     pub variance: Result<AnalysisOfVariance, NoModel>,
     /// What the paper printed of it.
     pub published: Published,
@@ -233,6 +248,10 @@ pub struct Treatment {
     pub plots: usize,
     /// The mean of each measure over them.
     pub mean: Performance,
+    /// The plants of all of them together that were damaged.
+    pub damaged: Share,
+    /// Their mean weeding efficiency, %, and how far it may be off.
+    pub weeding_efficiency: Mean,
 }
 
 impl Analysis {
@@ -248,14 +267,19 @@ impl Analysis {
             record.check().map_err(|problem| AnalysisError::Plot { plot: index + 1, problem })?;
         }
         let performances: Vec<Performance> = records.iter().map(PlotRecord::performance).collect();
-        let design = Design::new(records.iter().map(|record| (record.speed_km_h, record.spacing_cm)));
+        let design = Design::new(records.iter().map(|record| (record.speed_km_h, record.spacing_cm)))
+            .in_blocks(records.iter().map(|record| record.replication).collect());
         let analyse = |response: Response| {
             let values: Vec<f64> = performances.iter().map(|performance| response.value(performance)).collect();
             let extreme = |pick: fn(f64, f64) -> f64| values.iter().copied().reduce(pick).unwrap_or_default();
+            let model = LinearModel::fit(&design, &values);
+            let counts: Option<Vec<(u32, u32)>> = records.iter().map(|record| response.count(record)).collect();
             ResponseAnalysis {
                 response,
                 range: (extreme(f64::min), extreme(f64::max)),
-                model: LinearModel::fit(&design, &values),
+                checks: model.as_ref().ok().map(|model| Checks::of(&design, &values, model)),
+                model,
+                binomial: counts.map(|counts| BinomialModel::fit(&design, &counts)),
                 variance: AnalysisOfVariance::of(&design, &values),
                 published: Published::of(response),
             }
@@ -284,7 +308,7 @@ impl Analysis {
     fn treatment(&self, speed_km_h: f64, spacing_cm: f64) -> Treatment {
         let is_in = |record: &PlotRecord| record.speed_km_h == speed_km_h && record.spacing_cm == spacing_cm;
         let both = self.records.iter().zip(&self.performances);
-        let plots: Vec<&Performance> = both.filter(|(record, _)| is_in(record)).map(|(_, plot)| plot).collect();
+        let (records, plots): (Vec<&PlotRecord>, Vec<&Performance>) = both.filter(|(record, _)| is_in(record)).unzip();
         let mean = |quantity: fn(&Performance) -> f64| {
             plots.iter().map(|plot| quantity(plot)).sum::<f64>() / plots.len() as f64
         };
@@ -296,8 +320,24 @@ impl Analysis {
             field_efficiency_percent: mean(|plot| plot.field_efficiency_percent),
             performance_index: mean(|plot| plot.performance_index),
         };
-        Treatment { speed_km_h, spacing_cm, plots: plots.len(), mean }
+        let weeding: Vec<f64> = plots.iter().map(|plot| plot.weeding_efficiency_percent).collect();
+        Treatment {
+            speed_km_h,
+            spacing_cm,
+            plots: plots.len(),
+            mean,
+            damaged: damaged(records),
+            weeding_efficiency: Mean::of(&weeding),
+        }
     }
+}
+
+/// The plants of some plots that were damaged.
+fn damaged<'a>(records: impl IntoIterator<Item = &'a PlotRecord>) -> Share {
+    let (damaged, plants) = records
+        .into_iter()
+        .fold((0, 0), |(damaged, plants), plot| (damaged + u64::from(plot.damaged), plants + u64::from(plot.plants)));
+    Share::of(damaged, plants)
 }
 
 #[cfg(test)]

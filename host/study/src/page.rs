@@ -232,7 +232,12 @@ fn means(analysis: &Analysis) -> Table {
     let mut table = Table::new("Means of the plots of each treatment", columns);
     for treatment in analysis.treatments() {
         let name = format!("{} km/h, {} cm", short(treatment.speed_km_h), short(treatment.spacing_cm));
-        table.rows.push([name, treatment.plots.to_string()].into_iter().chain(measures(&treatment.mean)).collect());
+        let [damage, weeding, others @ ..] = measures(&treatment.mean);
+        let damage = format!("{damage} ({})", treatment.damaged);
+        let weeding =
+            treatment.weeding_efficiency.within.map_or(weeding.clone(), |it| format!("{weeding} ± {}", fixed(it, 2)));
+        let cells = [name, treatment.plots.to_string(), damage, weeding];
+        table.rows.push(cells.into_iter().chain(others).collect());
     }
     table
 }

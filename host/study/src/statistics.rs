@@ -1,13 +1,20 @@
 //! The statistics of a trial with two factors, forward speed and plant spacing: a linear model of a response on both as
-//! numbers, and the two-way analysis of variance with both as factors.
+//! numbers, a binomial one of counts, the two-way analysis of variance with both as factors and the replications as blocks,
+//! what the residuals say, and how far shares and means may be off.
 //!
-//! The model is R's `lm(response ~ speed + spacing)`, the analysis R's `anova(lm(response ~ factor(speed) *
-//! factor(spacing)))`. Least squares come from linregress and nalgebra, the F distribution from statrs. What the plots
-//! cannot tell is said in words, as [`NoModel`] or as a [`Remark`]: no figure here is infinite or not a number.
+//! The model is R's `lm(response ~ speed + spacing)`, the binomial one R's `glm(..., family = binomial)`, the analysis R's
+//! `anova(lm(response ~ factor(block) + factor(speed) * factor(spacing)))`. Least squares come from linregress and nalgebra, distributions
+//! from statrs. What the plots cannot tell is said in words, as [`NoModel`] or as a [`Remark`]: no figure here is infinite or not a number.
 
+mod binomial;
+mod checks;
+mod interval;
 mod linear;
 mod variance;
 
+pub use binomial::{BinomialModel, OddsTerm};
+pub use checks::Checks;
+pub use interval::{CONFIDENCE, Mean, Share};
 pub use linear::{LinearModel, Term};
 use serde::Serialize;
 use thiserror::Error;
@@ -18,13 +25,24 @@ pub use variance::{AnalysisOfVariance, Source};
 pub struct Design {
     speeds_km_h: Vec<f64>,
     spacings_cm: Vec<f64>,
+    /// The block in which each plot lies; empty where there are none.
+    blocks: Vec<u32>,
 }
 
 impl Design {
     /// The speed in km/h and the spacing in cm of each plot; all are finite.
     pub fn new(plots: impl IntoIterator<Item = (f64, f64)>) -> Self {
         let (speeds_km_h, spacings_cm) = plots.into_iter().unzip();
-        Self { speeds_km_h, spacings_cm }
+        Self { speeds_km_h, spacings_cm, blocks: Vec::new() }
+    }
+
+    /// The same plots, each in its block: what differs from block to block is no chance to the analysis of variance.
+    ///
+    /// # Panics
+    /// Where there are more or fewer blocks than plots.
+    pub fn in_blocks(self, blocks: Vec<u32>) -> Self {
+        assert_eq!(blocks.len(), self.plots(), "each plot lies in a block");
+        Self { blocks, ..self }
     }
 
     /// How many plots there are.
@@ -57,10 +75,15 @@ pub enum NoModel {
     /// Speed and spacing go together.
     #[error("speed and spacing change together, so that their effects cannot be told apart")]
     Inseparable,
+    /// A binomial model's slope has no end.
+    #[error(
+        "all that was counted lies on one side of the speeds or spacings, so that the odds have no slope that could be named"
+    )]
+    OneSided,
 }
 
 /// What a reader has to know of a table of figures.
-#[derive(Clone, Copy, Debug, Error, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Error, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Remark {
     /// Speed is no term.
@@ -79,6 +102,17 @@ pub enum Remark {
         "the treatments differ in their number of plots: sums of squares are sequential (type I), speed first, then spacing, then both"
     )]
     Unbalanced,
+    /// Too few plots for blocks.
+    #[error("the replications are no blocks here: with them no plot would be left to tell an effect from chance")]
+    NoBlocks,
+    /// Plots differ by more than counting makes them.
+    #[error(
+        "plots differ by more than the counting does: take these standard errors times {factor:.2}, and p for too small"
+    )]
+    Overdispersed {
+        /// The root of the dispersion.
+        factor: f64,
+    },
     /// The residual is zero.
     #[error("the plots lie on the model exactly: without scatter there are no test statistics")]
     NoScatter,
@@ -106,4 +140,13 @@ fn scatter(values: &[f64]) -> f64 {
 /// Whether values differ at all.
 fn varies(values: &[f64]) -> bool {
     values.windows(2).any(|pair| pair[0] != pair[1])
+}
+
+/// Whether one column follows from the other.
+fn is_collinear(a: &[f64], b: &[f64]) -> bool {
+    /// Share of a column that the other leaves unexplained, below which the coefficients are all rounding.
+    const TOLERANCE: f64 = 1e-9;
+    let (mean_a, mean_b) = (mean(a), mean(b));
+    let together: f64 = a.iter().zip(b).map(|(a, b)| (a - mean_a) * (b - mean_b)).sum();
+    1.0 - together * together / (scatter(a) * scatter(b)) < TOLERANCE
 }

@@ -5,7 +5,7 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use study::statistics::{AnalysisOfVariance, Design, LinearModel, NoModel, Remark, Source};
+use study::statistics::{AnalysisOfVariance, Checks, Design, LinearModel, NoModel, Remark, Source};
 
 /// The paper's speeds and spacings with three replications: all plots of a speed together, and of a spacing in them.
 ///
@@ -304,4 +304,82 @@ fn whatever_was_left_of_a_trial_no_figure_is_infinite_or_none() {
         }
     }
     assert!(modelled > 1000 && analysed > 1000, "{modelled} {analysed}");
+}
+
+/// ```r
+/// block <- rep(1:3, 8)
+/// anova(lm(y ~ factor(block) + factor(speed) * factor(spacing)))
+/// ```
+#[test]
+fn replications_as_blocks_are_taken_out_first_as_r_does() {
+    let blocks: Vec<u32> = (0..24).map(|plot| plot % 3 + 1).collect();
+    let analysis = AnalysisOfVariance::of(&Design::new(paper_plots()).in_blocks(blocks), &EFFICIENCY).unwrap();
+    assert_sources(
+        &analysis,
+        &[
+            ("block", 2, 0.0608333333333428, Some((0.0182142220638061, 0.981973883594621))),
+            ("speed", 3, 178.3912500000006673, Some((35.6083051149530050, 8.35208653870585e-7))),
+            ("spacing", 1, 13.9537499999998840, Some((8.3558367492425116, 1.18592031983224e-2))),
+            ("speed x spacing", 3, 0.1445833333333504, Some((0.0288599774252990, 0.993089130415473))),
+            ("residual", 14, 23.3791666666666025, None),
+        ],
+    );
+    assert_eq!(analysis.remarks, []);
+}
+
+/// ```r
+/// k <- keep
+/// anova(lm(y[k] ~ factor(block[k]) + factor(speed[k]) * factor(spacing[k])))
+/// ```
+#[test]
+fn blocks_with_lost_plots_are_taken_out_first_as_r_does() {
+    let lost = [1, 8, 9, 22, 23];
+    let blocks = (0..24).filter(|plot| !lost.contains(plot)).map(|plot| plot as u32 % 3 + 1).collect();
+    let (design, values) = unbalanced();
+    let analysis = AnalysisOfVariance::of(&design.in_blocks(blocks), &values).unwrap();
+    assert_sources(
+        &analysis,
+        &[
+            ("block", 2, 2.52441102756897, Some((0.743209828695461, 0.502653534033422))),
+            ("speed", 3, 154.62929101064037, Some((30.349523810573668, 4.89000525296584e-5))),
+            ("spacing", 1, 6.29245205075160, Some((3.705111536624149, 8.63803334080560e-2))),
+            ("speed x spacing", 3, 1.19531321566392, Some((0.234607470957034, 0.870042702458407))),
+            ("residual", 9, 15.28484848484852, None),
+        ],
+    );
+}
+
+/// ```r
+/// anova(m, lm(y ~ factor(speed):factor(spacing)))[2, 6]
+/// pchisq(24 * summary(lm(residuals(m)^2 ~ speed + spacing))$r.squared, 2, lower.tail = FALSE)
+/// which.max(abs(rstudent(m))); 24 * 2 * pt(-max(abs(rstudent(m))), 20)
+/// ```
+#[test]
+fn the_checks_of_the_residuals_are_those_of_r() {
+    let design = Design::new(paper_plots());
+    let checks = Checks::of(&design, &EFFICIENCY, &LinearModel::fit(&design, &EFFICIENCY).unwrap());
+    assert_close(checks.lack_of_fit_p.unwrap(), 0.992704948640819);
+    assert_close(checks.unequal_scatter_p.unwrap(), 0.0718139330165311);
+    // 1.799 by Bonferroni, which is no probability any more.
+    assert_eq!(checks.farthest, Some((21, 1.0)));
+    let said = checks.sentences("Weeding efficiency");
+    assert_eq!(
+        said,
+        ["The residuals of weeding efficiency are as they should be: straight lines, even scatter and no outlier."]
+    );
+}
+
+#[test]
+fn a_bend_a_plot_far_off_and_uneven_scatter_are_each_said_in_words() {
+    let said = |value: fn(usize, f64) -> f64| {
+        let plots = paper_plots();
+        let values: Vec<f64> = (0..24).map(|plot| value(plot, plots[plot].0) + EFFICIENCY[plot % 3] / 20.0).collect();
+        let design = Design::new(plots);
+        let model = LinearModel::fit(&design, &values).unwrap();
+        Checks::of(&design, &values, &model).sentences("It").join(" ")
+    };
+    assert!(said(|_, speed| (speed - 1.75).powi(2)).contains("does not follow straight lines"));
+    assert!(said(|plot, speed| speed + if plot == 4 { 3.0 } else { 0.0 }).contains("Plot 5 is farther off"));
+    let fan = said(|plot, speed| [-1.0, 0.0, 1.0][plot % 3] * (speed - 0.9));
+    assert!(fan.contains("scatters more at some speeds"), "{fan}");
 }

@@ -1,7 +1,8 @@
 //! What a trial found, in plain sentences.
 
 use super::{Analysis, Performance, PlotRecord, Response, ResponseAnalysis, Treatment};
-use crate::statistics::{LinearModel, Term};
+use crate::statistics::{LinearModel, Share, Term};
+use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// A coefficient is taken for an effect where chance makes one as large less often than this.
 pub const SIGNIFICANCE: f64 = 0.05;
@@ -10,7 +11,11 @@ impl Analysis {
     /// What the trial found, a sentence each: its plots, the damage, what each measure depends on, and what cannot be right.
     pub fn findings(&self) -> Vec<String> {
         let mut findings = vec![self.size(), self.damage()];
-        findings.extend(self.responses.iter().map(ResponseAnalysis::finding));
+        for response in &self.responses {
+            findings.push(response.finding());
+            findings.extend(response.odds());
+        }
+        findings.extend(self.responses.iter().flat_map(ResponseAnalysis::checked));
         let hasty = self.faster_than_possible();
         if !hasty.is_empty() {
             let plots: Vec<f64> = hasty.into_iter().map(|plot| plot as f64).collect();
@@ -46,20 +51,20 @@ impl Analysis {
 
     /// How much damage there was, and where most.
     fn damage(&self) -> String {
-        let plants: u64 = self.records.iter().map(|plot| u64::from(plot.plants)).sum();
-        let damaged: u64 = self.records.iter().map(|plot| u64::from(plot.damaged)).sum();
+        let share = super::damaged(&self.records);
+        let Share { count, of, .. } = share;
         let percent = |(_, plot): &(&PlotRecord, &Performance)| plot.plant_damage_percent;
         let plots = self.records.iter().zip(&self.performances);
         match plots.max_by(|a, b| percent(a).total_cmp(&percent(b))) {
-            Some((worst, plot)) if damaged > 0 => format!(
-                "{damaged} of {plants} plants were damaged ({:.2} %), at most {:.2} % in a plot (replication {}, {} km/h, {} cm).",
-                damaged as f64 / plants as f64 * 100.0,
+            Some((worst, plot)) if count > 0 => format!(
+                "{count} of {of} plants were damaged ({:.2} %, which may be {share} %), at most {:.2} % in a plot (replication {}, {} km/h, {} cm).",
+                share.percent(),
                 plot.plant_damage_percent,
                 worst.replication,
                 worst.speed_km_h,
                 worst.spacing_cm
             ),
-            _ => format!("None of {plants} plants was damaged."),
+            _ => format!("None of {of} plants was damaged: in truth {share} %."),
         }
     }
 }
@@ -77,6 +82,59 @@ impl ResponseAnalysis {
                 format!("{title} {}; {}.", effects.join(" and "), explained(model))
             }
         }
+    }
+}
+
+impl Analysis {
+    /// Where a slope of this trial contradicts the paper's text: a sentence for each measure whose 95 % interval leaves the
+    /// paper's out, and one if there is none.
+    pub fn against_the_paper(&self) -> Vec<String> {
+        let said: Vec<String> = self.responses.iter().filter_map(ResponseAnalysis::against_the_paper).collect();
+        let compared =
+            self.responses.iter().filter(|of| of.model.is_ok() && of.published.text.per_km_h.is_some()).count();
+        match (said.is_empty(), compared) {
+            (_, 0) => Vec::new(),
+            (true, _) => vec!["no slope by speed contradicts the paper's.".to_owned()],
+            (false, _) => said,
+        }
+    }
+}
+
+impl ResponseAnalysis {
+    /// What contradicts the paper's slope by speed.
+    fn against_the_paper(&self) -> Option<String> {
+        let paper = self.published.text.per_km_h?;
+        let model = self.model.as_ref().ok()?;
+        let term = model.term("speed").filter(|term| term.p.is_some())?;
+        let distribution = StudentsT::new(0.0, 1.0, model.degrees_of_freedom as f64).ok()?;
+        let within = distribution.inverse_cdf(1.0 - SIGNIFICANCE / 2.0) * term.standard_error;
+        ((term.estimate - paper).abs() > within).then(|| {
+            format!(
+                "{} changes by {:+.2} ± {within:.2} for each km/h, where the paper's text has {paper:+}: they contradict each other.",
+                self.response.title().to_lowercase(),
+                term.estimate
+            )
+        })
+    }
+
+    /// What speed does to the odds of what was counted, where that is an effect.
+    fn odds(&self) -> Option<String> {
+        let model = self.binomial.as_ref()?.as_ref().ok()?;
+        let term = model.term("speed").filter(|term| term.p < SIGNIFICANCE)?;
+        let what = match self.response {
+            Response::PlantDamage => "that a plant is damaged",
+            _ => "that a weed is gone",
+        };
+        let (times, least, greatest) = term.odds_ratio();
+        Some(format!(
+            "Counted, the odds {what} are {times:.2} times as high for each km/h more ({least:.2} to {greatest:.2}; {}).",
+            probability(term.p)
+        ))
+    }
+
+    /// What the residuals say, a sentence each.
+    pub fn checked(&self) -> Vec<String> {
+        self.checks.as_ref().map(|checks| checks.sentences(self.response.title())).unwrap_or_default()
     }
 }
 

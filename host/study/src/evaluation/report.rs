@@ -2,7 +2,7 @@
 
 use super::findings::probability;
 use super::{Analysis, Performance, ResponseAnalysis};
-use crate::statistics::{AnalysisOfVariance, LinearModel, Remark};
+use crate::statistics::{AnalysisOfVariance, BinomialModel, LinearModel, Remark};
 use comfy_table::{CellAlignment, Table, presets};
 use std::fmt::{self, Display, Formatter};
 
@@ -22,6 +22,7 @@ p is how probable it is that chance alone makes an effect as large: below 0.05 i
 Capacities are by Eq. 25 and 26 of the paper, field efficiency by Eq. 24. The performance index (Eq. 27) is
 effective capacity in ha/h, times the percentages of plants unharmed and of weeds gone, by the power in hp.
 Weeding efficiency is of the weeds that were counted: over a whole plot it is higher than in the row alone.
+Behind damage stands its exact 95 % interval over all plants of the treatment, behind weeding that of a mean of plots.
 ";
 
 impl Display for Analysis {
@@ -60,7 +61,13 @@ impl Analysis {
         for treatment in self.treatments() {
             let place =
                 [treatment.speed_km_h.to_string(), treatment.spacing_cm.to_string(), treatment.plots.to_string()];
-            table.add_row(place.into_iter().chain(measures(&treatment.mean)));
+            let [damage, weeding, others @ ..] = measures(&treatment.mean);
+            let damage = format!("{damage} ({})", treatment.damaged);
+            let weeding = match treatment.weeding_efficiency.within {
+                Some(within) => format!("{weeding} ± {within:.2}"),
+                None => weeding,
+            };
+            table.add_row(place.into_iter().chain([damage, weeding]).chain(others));
         }
         right(table, 0)
     }
@@ -72,6 +79,14 @@ impl Display for ResponseAnalysis {
         match &self.model {
             Ok(model) => write!(f, "\nLinear model\n{model}")?,
             Err(reason) => writeln!(f, "\nNo linear model: {reason}.")?,
+        }
+        for sentence in self.checked() {
+            writeln!(f, "Residuals: {sentence}")?;
+        }
+        match &self.binomial {
+            Some(Ok(model)) => write!(f, "\nBinomial model of the counts\n{model}")?,
+            Some(Err(reason)) => writeln!(f, "\nNo binomial model: {reason}.")?,
+            None => {}
         }
         match &self.variance {
             Ok(variance) => write!(f, "\nAnalysis of variance\n{variance}")?,
@@ -120,13 +135,8 @@ impl Display for LinearModel {
     fn fmt(&self, f: &mut Formatter) -> fmt::Result {
         let mut table = table(["term", "estimate", "standard\nerror", "t", "p"]);
         for term in &self.terms {
-            let name = match term.name {
-                "speed" => "speed, for each km/h",
-                "spacing" => "spacing, for each cm",
-                name => name,
-            };
             table.add_row([
-                name.to_owned(),
+                term_name(term.name).to_owned(),
                 format!("{:+.4}", term.estimate),
                 format!("{:.4}", term.standard_error),
                 term.t.map_or_else(dash, |t| format!("{t:.3}")),
@@ -143,6 +153,41 @@ impl Display for LinearModel {
             self.degrees_of_freedom
         )?;
         remarks(f, &self.remarks)
+    }
+}
+
+impl Display for BinomialModel {
+    fn fmt(&self, f: &mut Formatter) -> fmt::Result {
+        let mut table = table(["term", "log odds", "standard\nerror", "z", "p", "odds\ntimes", "95 %"]);
+        for term in &self.terms {
+            let (times, least, greatest) = term.odds_ratio();
+            let is_slope = term.name != "constant";
+            table.add_row([
+                term_name(term.name).to_owned(),
+                format!("{:+.4}", term.estimate),
+                format!("{:.4}", term.standard_error),
+                format!("{:.3}", term.z),
+                chance(Some(term.p)),
+                if is_slope { format!("{times:.3}") } else { dash() },
+                if is_slope { format!("{least:.3} to {greatest:.3}") } else { dash() },
+            ]);
+        }
+        writeln!(f, "{}", right(table, 1))?;
+        writeln!(
+            f,
+            "deviance {:.3} with {} degrees of freedom, of {:.3} without speed and spacing; dispersion {:.2}",
+            self.deviance, self.degrees_of_freedom, self.null_deviance, self.dispersion
+        )?;
+        remarks(f, &self.remarks)
+    }
+}
+
+/// A term as a row of a table says it.
+fn term_name(name: &'static str) -> &'static str {
+    match name {
+        "speed" => "speed, for each km/h",
+        "spacing" => "spacing, for each cm",
+        name => name,
     }
 }
 

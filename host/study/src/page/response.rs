@@ -5,7 +5,7 @@ use super::plot::DrawingError;
 use super::table::{NOTHING, Table, fixed, optional, probability, short, significant};
 use crate::evaluation::published::{Coefficients, Published};
 use crate::evaluation::{Analysis, ResponseAnalysis};
-use crate::statistics::{AnalysisOfVariance, LinearModel};
+use crate::statistics::{AnalysisOfVariance, BinomialModel, LinearModel};
 
 /// What the page says of one measure.
 pub struct Chapter {
@@ -21,6 +21,8 @@ pub struct Chapter {
     pub terms: Table,
     /// How well the model fits.
     pub fit: Table,
+    /// The binomial model, or why there is none; empty for a measure that is not counted.
+    pub binomial: Option<Result<Table, String>>,
     /// The analysis of variance, or why there is none.
     pub variance: Result<Table, String>,
     /// What has to be known of either, and of the paper's figures.
@@ -42,12 +44,14 @@ impl Chapter {
 
         let mut remarks = Vec::new();
         let of_model = model.iter().flat_map(|model| &model.remarks);
-        for remark in of_model.chain(variance.iter().flat_map(|variance| &variance.remarks)) {
+        let of_counts = of.binomial.iter().flatten().flat_map(|model| &model.remarks);
+        for remark in of_model.chain(of_counts).chain(variance.iter().flat_map(|variance| &variance.remarks)) {
             let remark = sentence(&remark.to_string());
             if !remarks.contains(&remark) {
                 remarks.push(remark);
             }
         }
+        remarks.extend(of.checked());
         Ok(Self {
             title: of.response.title(),
             model: model
@@ -57,6 +61,7 @@ impl Chapter {
             equation_number: of.published.equation_number,
             terms: terms(of, model.ok()),
             fit: fit(analysis, of, model.ok()),
+            binomial: of.binomial.as_ref().map(|model| model.as_ref().map(odds).map_err(|why| format!("{why}."))),
             variance: variance.map(sources).map_err(|why| format!("{why}.")),
             remarks,
             contradictions: of.published.contradictions,
@@ -148,6 +153,29 @@ fn fit(analysis: &Analysis, of: &ResponseAnalysis, model: Option<&LinearModel>) 
         ),
         row(&format!("range, {}", of.response.unit()), range(low, high), published.join(",\n")),
     ];
+    table
+}
+
+/// What speed and spacing do to the odds of what was counted.
+fn odds(model: &BinomialModel) -> Table {
+    let columns = ["term", "log odds", "standard error", "z", "p", "odds times (95 %)"];
+    let mut table = Table::new("Binomial model of the counts", columns);
+    for term in &model.terms {
+        let (times, least, greatest) = term.odds_ratio();
+        let (name, times) = match term.name {
+            "speed" => {
+                ("for each km/h", format!("{} ({} to {})", fixed(times, 2), fixed(least, 2), fixed(greatest, 2)))
+            }
+            "spacing" => (
+                "for each cm of spacing",
+                format!("{} ({} to {})", fixed(times, 3), fixed(least, 3), fixed(greatest, 3)),
+            ),
+            name => (name, NOTHING.to_owned()),
+        };
+        let cells =
+            [significant(term.estimate), significant(term.standard_error), fixed(term.z, 2), probability(term.p)];
+        table.rows.push([name.to_owned()].into_iter().chain(cells).chain([times]).collect());
+    }
     table
 }
 

@@ -1,6 +1,6 @@
 //! The linear model of a response on speed and spacing, by least squares.
 
-use super::{Design, NoModel, Remark, is_zero, mean, scatter, varies};
+use super::{Design, NoModel, Remark, is_collinear, is_zero, mean, scatter, varies};
 use linregress::fit_low_level_regression_model;
 use serde::Serialize;
 
@@ -105,13 +105,4 @@ impl LinearModel {
     pub fn term(&self, name: &str) -> Option<&Term> {
         self.terms.iter().find(|term| term.name == name)
     }
-}
-
-/// Whether one column follows from the other.
-fn is_collinear(a: &[f64], b: &[f64]) -> bool {
-    /// Share of a column that the other leaves unexplained, below which the coefficients are all rounding.
-    const TOLERANCE: f64 = 1e-9;
-    let (mean_a, mean_b) = (mean(a), mean(b));
-    let together: f64 = a.iter().zip(b).map(|(a, b)| (a - mean_a) * (b - mean_b)).sum();
-    1.0 - together * together / (scatter(a) * scatter(b)) < TOLERANCE
 }

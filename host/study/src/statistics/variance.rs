@@ -1,8 +1,9 @@
 //! The two-way analysis of variance: how much of a response's variation goes with speed, with spacing, with both together,
 //! and with neither.
 //!
-//! Four models are nested in each other: one mean, a mean for each speed, effects of speed and spacing that add up, a
-//! mean for each treatment. A source's sum of squares is what its model leaves less than the one before.
+//! Models are nested in each other: one mean, a mean for each block, effects of block and speed that add up, those of block,
+//! speed and spacing, those of block and treatment. A source's sum of squares is what its model leaves less than the one before.
+//! Without blocks the first of them falls away.
 
 use super::{Design, NoModel, Remark, is_zero, mean, scatter, varies};
 use nalgebra::{DMatrix, DVector};
@@ -12,7 +13,7 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 /// One line of an analysis of variance.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Source {
-    /// `speed`, `spacing`, `speed x spacing` or `residual`.
+    /// `block`, `speed`, `spacing`, `speed x spacing` or `residual`.
     pub name: &'static str,
     /// Free parameters that it stands for, at least 1.
     pub degrees_of_freedom: usize,
@@ -60,24 +61,42 @@ impl AnalysisOfVariance {
         let spacings = Levels::of(design.spacings_cm.iter().map(|spacing| (0.0, *spacing)));
         let treatments = Levels::of(design.speeds_km_h.iter().copied().zip(design.spacings_cm.iter().copied()));
 
-        let mut fits = vec![("", Fit { parameters: 1, sum_of_squares: scatter(values) })];
+        let blocks = Levels::of(design.blocks.iter().map(|block| (f64::from(*block), 0.0)));
         let mut remarks = Vec::new();
+        let mut in_blocks: Vec<&Levels> = Vec::new();
+        if blocks.count > 1 {
+            in_blocks.push(&blocks);
+            if additive_fit(&[&blocks, &treatments], values).parameters >= values.len() {
+                in_blocks.clear();
+                remarks.push(Remark::NoBlocks);
+            }
+        }
+        let fit = |levels: &[&Levels]| additive_fit(&[in_blocks.as_slice(), levels].concat(), values);
+
+        let mut fits = vec![("", Fit { parameters: 1, sum_of_squares: scatter(values) })];
+        if !in_blocks.is_empty() {
+            fits.push(("block", fit(&[])));
+        }
+        let before = fits.len();
         if has_speed {
-            fits.push(("speed", levels_fit(&speeds, values)));
+            fits.push(("speed", fit(&[&speeds])));
         } else {
             remarks.push(Remark::OneSpeed);
         }
         if has_spacing {
-            fits.push(("spacing", additive_fit(&speeds, &spacings, values)));
+            fits.push(("spacing", fit(&[&speeds, &spacings])));
         } else {
             remarks.push(Remark::OneSpacing);
         }
+        if fits.len() == before {
+            return Err(NoModel::OneTreatment);
+        }
         if has_speed && has_spacing {
-            let (by_speed, both) = (fits[1].1.parameters, fits[2].1.parameters);
-            if both == by_speed || both == spacings.count {
+            let (by_speed, both) = (fits[before].1.parameters, fits[before + 1].1.parameters);
+            if both == by_speed || both == fit(&[&spacings]).parameters {
                 return Err(NoModel::Inseparable);
             }
-            let each = levels_fit(&treatments, values);
+            let each = fit(&[&treatments]);
             if each.parameters == values.len() {
                 remarks.push(Remark::NoReplication);
             } else if each.parameters > both {
@@ -158,30 +177,24 @@ impl Levels {
     }
 }
 
-/// A mean for each level.
-fn levels_fit(levels: &Levels, values: &[f64]) -> Fit {
-    let of_level = |level: usize| -> Vec<f64> {
-        let both = levels.of_plot.iter().zip(values);
-        both.filter(|(of_plot, _)| **of_plot == level).map(|(_, value)| *value).collect()
-    };
-    Fit { parameters: levels.count, sum_of_squares: (0..levels.count).map(|level| scatter(&of_level(level))).sum() }
-}
-
-/// Effects of two factors that add up.
-fn additive_fit(speeds: &Levels, spacings: &Levels, values: &[f64]) -> Fit {
+/// Effects of some factors that add up.
+fn additive_fit(factors: &[&Levels], values: &[f64]) -> Fit {
     /// Singular values below this share of the largest are rounding.
     const TOLERANCE: f64 = 1e-9;
+    // Of a single factor the means do, and are exact.
+    if let [only] = factors {
+        return levels_fit(only, values);
+    }
     let mean = mean(values);
     let response = DVector::from_iterator(values.len(), values.iter().map(|value| value - mean));
-    // A column for each level of either: one more than needed, which the singular values tell.
-    let columns = DMatrix::from_fn(values.len(), speeds.count + spacings.count, |plot, column| {
-        let is_at = match column.checked_sub(speeds.count) {
-            None => speeds.of_plot[plot] == column,
-            Some(spacing) => spacings.of_plot[plot] == spacing,
-        };
-        f64::from(is_at)
+    // A column for each level of each: more than needed, which the singular values tell.
+    let columns: Vec<(&Levels, usize)> =
+        factors.iter().flat_map(|levels| (0..levels.count).map(move |level| (*levels, level))).collect();
+    let matrix = DMatrix::from_fn(values.len(), columns.len(), |plot, column| {
+        let (levels, level) = columns[column];
+        f64::from(levels.of_plot[plot] == level)
     });
-    let decomposition = columns.svd(true, false);
+    let decomposition = matrix.svd(true, false);
     let smallest = decomposition.singular_values.max() * TOLERANCE;
     let mut residual = response.clone();
     let mut parameters = 0;
@@ -191,4 +204,13 @@ fn additive_fit(speeds: &Levels, spacings: &Levels, values: &[f64]) -> Fit {
         parameters += 1;
     }
     Fit { parameters, sum_of_squares: residual.norm_squared() }
+}
+
+/// A mean for each level.
+fn levels_fit(levels: &Levels, values: &[f64]) -> Fit {
+    let of_level = |level: usize| -> Vec<f64> {
+        let both = levels.of_plot.iter().zip(values);
+        both.filter(|(of_plot, _)| **of_plot == level).map(|(_, value)| *value).collect()
+    };
+    Fit { parameters: levels.count, sum_of_squares: (0..levels.count).map(|level| scatter(&of_level(level))).sum() }
 }

@@ -1,0 +1,197 @@
+//! The binomial model of counts on speed and spacing: the logarithm of the odds as `constant + a speed + b spacing`.
+//!
+//! So many plants of so many were damaged, so many weeds of so many are gone: such counts scatter by their share and their
+//! number, and a share ends at 0 and 1. The linear model knows neither. This is R's `glm(cbind(count, of - count) ~ speed +
+//! spacing, family = binomial)`, fitted by iteratively reweighted least squares with nalgebra.
+//!
+//! Plots of one field differ by more than the counting does. [`BinomialModel::dispersion`] says by how much, and where it is
+//! above 1 standard errors are as much too small as its root says; they are left as R's binomial family has them.
+
+use super::{Design, NoModel, Remark, is_collinear, varies};
+use nalgebra::{DMatrix, DVector};
+use serde::Serialize;
+use statrs::distribution::{ContinuousCDF, Normal};
+
+/// Steps after which a fit that has not settled never will, and the change of the deviance at which it has.
+const STEPS: usize = 100;
+const SETTLED: f64 = 1e-14;
+
+/// Odds of e to this power have left what counts can tell: the counts lie on one side of the speeds or spacings.
+const NEVER_LOG_ODDS: f64 = 30.0;
+
+/// One coefficient of a binomial model.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct OddsTerm {
+    /// `constant`, `speed` (for each km/h) or `spacing` (for each cm).
+    pub name: &'static str,
+    /// The coefficient: what is added to the logarithm of the odds.
+    pub estimate: f64,
+    /// Its standard error.
+    pub standard_error: f64,
+    /// Estimate by standard error.
+    pub z: f64,
+    /// How probable such a z is where the true coefficient is zero, 0 to 1, both sides together.
+    pub p: f64,
+}
+
+impl OddsTerm {
+    /// By what the odds are multiplied for each unit, with the ends of its 95 % interval.
+    pub fn odds_ratio(&self) -> (f64, f64, f64) {
+        const QUANTILE: f64 = 1.959_963_984_540_054;
+        let at = |errors: f64| (self.estimate + errors * self.standard_error).exp();
+        (at(0.0), at(-QUANTILE), at(QUANTILE))
+    }
+}
+
+/// Counts on speed and spacing.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct BinomialModel {
+    /// The constant, and a slope for each of speed and spacing that varies.
+    pub terms: Vec<OddsTerm>,
+    /// Twice the logarithm of the likelihood that the model falls short of a share for each plot.
+    pub deviance: f64,
+    /// The same of one share for all plots.
+    pub null_deviance: f64,
+    /// Plots less terms, at least 1.
+    pub degrees_of_freedom: usize,
+    /// Pearson's chi-square by the degrees of freedom: 1 where plots differ by chance of counting alone.
+    pub dispersion: f64,
+    /// What the model says of each plot, 0 to 1.
+    pub fitted: Vec<f64>,
+    /// What a reader has to know of it.
+    pub remarks: Vec<Remark>,
+}
+
+/// A fit on its way.
+struct Fit {
+    coefficients: DVector<f64>,
+    covariance: DMatrix<f64>,
+    fitted: Vec<f64>,
+    deviance: f64,
+}
+
+impl BinomialModel {
+    /// Fits the model to a plot's count, and to how many it is of.
+    ///
+    /// # Errors
+    /// Where the plots carry none: nothing was counted or everything, no factor varies, or the counts lie on one side.
+    ///
+    /// # Panics
+    /// Where there are more or fewer counts than plots.
+    pub fn fit(design: &Design, counts: &[(u32, u32)]) -> Result<Self, NoModel> {
+        assert_eq!(counts.len(), design.plots(), "a response has a count for each plot");
+        let (all, of) =
+            counts.iter().fold((0.0, 0.0), |(all, of), (count, n)| (all + f64::from(*count), of + f64::from(*n)));
+        if all == 0.0 || all == of {
+            return Err(NoModel::Constant { value: if all == 0.0 { 0.0 } else { 100.0 } });
+        }
+        let mut columns = vec![("constant", vec![1.0; counts.len()])];
+        let mut remarks = Vec::new();
+        let factors =
+            [("speed", &design.speeds_km_h, Remark::OneSpeed), ("spacing", &design.spacings_cm, Remark::OneSpacing)];
+        for (name, levels, constant) in factors {
+            if varies(levels) {
+                columns.push((name, levels.clone()));
+            } else {
+                remarks.push(constant);
+            }
+        }
+        match columns.as_slice() {
+            [_] => return Err(NoModel::OneTreatment),
+            [_, (_, speeds), (_, spacings)] if is_collinear(speeds, spacings) => return Err(NoModel::Inseparable),
+            _ if counts.len() <= columns.len() => {
+                return Err(NoModel::TooFewPlots { plots: counts.len(), parameters: columns.len() });
+            }
+            _ => {}
+        }
+        let matrix = DMatrix::from_fn(counts.len(), columns.len(), |plot, column| columns[column].1[plot]);
+        let fit = fit(&matrix, counts).ok_or(NoModel::OneSided)?;
+        let share = all / of;
+        let degrees_of_freedom = counts.len() - columns.len();
+        let dispersion = pearson(counts, &fit.fitted) / degrees_of_freedom as f64;
+        if dispersion > OVERDISPERSED {
+            remarks.push(Remark::Overdispersed { factor: dispersion.sqrt() });
+        }
+        let term = |(index, (name, _)): (usize, &(&'static str, Vec<f64>))| {
+            let (estimate, standard_error) = (fit.coefficients[index], fit.covariance[(index, index)].sqrt());
+            let z = estimate / standard_error;
+            OddsTerm { name, estimate, standard_error, z, p: 2.0 * Normal::standard().sf(z.abs()) }
+        };
+        Ok(Self {
+            terms: columns.iter().enumerate().map(term).collect(),
+            deviance: fit.deviance,
+            null_deviance: deviance(counts, &vec![share; counts.len()]),
+            degrees_of_freedom,
+            dispersion,
+            fitted: fit.fitted,
+            remarks,
+        })
+    }
+
+    /// The term of this name, where the model has it.
+    pub fn term(&self, name: &str) -> Option<&OddsTerm> {
+        self.terms.iter().find(|term| term.name == name)
+    }
+}
+
+/// A dispersion above this is said: half as much again as counting alone makes.
+const OVERDISPERSED: f64 = 1.5;
+
+/// Iteratively reweighted least squares; none where the coefficients run away.
+fn fit(matrix: &DMatrix<f64>, counts: &[(u32, u32)]) -> Option<Fit> {
+    // R begins half a count inside, so that no plot is at 0 or 1.
+    let begin = |(count, of): &(u32, u32)| (f64::from(*count) + 0.5) / (f64::from(*of) + 1.0);
+    let mut fitted: Vec<f64> = counts.iter().map(begin).collect();
+    let (mut last, mut is_settled) = (f64::INFINITY, false);
+    for _ in 0..STEPS {
+        let weight = |plot: usize| f64::from(counts[plot].1) * fitted[plot] * (1.0 - fitted[plot]);
+        let working = DVector::from_iterator(
+            counts.len(),
+            counts.iter().zip(&fitted).map(|((count, of), share)| {
+                let observed = f64::from(*count) / f64::from((*of).max(1));
+                (share / (1.0 - share)).ln() + (observed - share) / (share * (1.0 - share))
+            }),
+        );
+        let root = |plot: usize| weight(plot).sqrt();
+        let weighted =
+            DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |plot, column| matrix[(plot, column)] * root(plot));
+        let working = DVector::from_fn(counts.len(), |plot, _| working[plot] * root(plot));
+        // By QR, which keeps digits that the normal equations lose.
+        let parts = weighted.qr();
+        let inverse = parts.r().try_inverse()?;
+        let coefficients = &inverse * (parts.q().transpose() * working);
+        let covariance = &inverse * inverse.transpose();
+        let log_odds = matrix * &coefficients;
+        if log_odds.iter().any(|odds| odds.abs() > NEVER_LOG_ODDS || odds.is_nan()) {
+            return None;
+        }
+        fitted = log_odds.iter().map(|odds| 1.0 / (1.0 + (-odds).exp())).collect();
+        let deviance = deviance(counts, &fitted);
+        // The deviance is flat where it is least: one step more has the coefficients settle as well.
+        if is_settled {
+            return Some(Fit { coefficients, covariance, fitted, deviance });
+        }
+        is_settled = (deviance - last).abs() <= SETTLED * (deviance.abs() + 0.1);
+        last = deviance;
+    }
+    None
+}
+
+/// Twice the logarithm of the likelihood that these shares fall short of the plots' own.
+fn deviance(counts: &[(u32, u32)], shares: &[f64]) -> f64 {
+    let part = |count: f64, expected: f64| if count > 0.0 { count * (count / expected).ln() } else { 0.0 };
+    let of_plot = |((count, of), share): (&(u32, u32), &f64)| {
+        let (count, of) = (f64::from(*count), f64::from(*of));
+        2.0 * (part(count, of * share) + part(of - count, of * (1.0 - share)))
+    };
+    counts.iter().zip(shares).map(of_plot).sum()
+}
+
+/// Pearson's chi-square.
+fn pearson(counts: &[(u32, u32)], shares: &[f64]) -> f64 {
+    let of_plot = |((count, of), share): (&(u32, u32), &f64)| {
+        let of = f64::from(*of);
+        if of == 0.0 { 0.0 } else { (f64::from(*count) - of * share).powi(2) / (of * share * (1.0 - share)) }
+    };
+    counts.iter().zip(shares).map(of_plot).sum()
+}

@@ -1,0 +1,133 @@
+//! Whether a linear model may be trusted: what its residuals say, as tests with a probability each.
+//!
+//! - **Lack of fit**: do the treatments' means leave the straight lines by more than their plots scatter?
+//!   R: `anova(m, lm(y ~ factor(speed):factor(spacing)))`.
+//! - **Unequal scatter**: do plots scatter more at one speed or spacing than at another? Breusch and Pagan's test in
+//!   Koenker's form, R: `n * summary(lm(residuals(m)^2 ~ speed + spacing))$r.squared` as a chi-square.
+//! - **Outlier**: is one plot farther off than the farthest of so many may be? R: the greatest `abs(rstudent(m))`, its
+//!   probability times the number of plots.
+//!
+//! Whether the residuals are normal is not asked: with a few dozen plots no test could tell, and means forgive it.
+
+use super::{Design, LinearModel, varies};
+use nalgebra::DMatrix;
+use serde::Serialize;
+use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, StudentsT};
+use std::collections::BTreeMap;
+
+/// A check finds something where chance would make as much less often than this.
+const SIGNIFICANCE: f64 = 0.05;
+
+/// What the residuals of a model say. A check that the plots do not allow is none.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Checks {
+    /// How probable so much lack of fit is by chance; it takes repeated treatments, and more of them than terms.
+    pub lack_of_fit_p: Option<f64>,
+    /// How probable scatter as unequal is by chance.
+    pub unequal_scatter_p: Option<f64>,
+    /// The plot that is farthest off, numbered from 1, and how probable one as far off is among so many.
+    pub farthest: Option<(usize, f64)>,
+}
+
+impl Checks {
+    /// Those of a model of these values in this design.
+    pub fn of(design: &Design, values: &[f64], model: &LinearModel) -> Self {
+        // What lies on the model exactly has no residuals to look at.
+        if model.terms.iter().any(|term| term.p.is_none()) {
+            return Self { lack_of_fit_p: None, unequal_scatter_p: None, farthest: None };
+        }
+        Self {
+            lack_of_fit_p: lack_of_fit(design, values, model),
+            unequal_scatter_p: unequal_scatter(design, model),
+            farthest: farthest(design, model),
+        }
+    }
+
+    /// What they say, a sentence each. `name` is the measure's.
+    pub fn sentences(&self, name: &str) -> Vec<String> {
+        let mut said = Vec::new();
+        let is_found = |p: &f64| *p < SIGNIFICANCE;
+        if let Some(p) = self.lack_of_fit_p.filter(is_found) {
+            said.push(format!(
+                "{name} does not follow straight lines ({}): go by the treatments' means, not by the slopes.",
+                probability(p)
+            ));
+        }
+        if let Some(p) = self.unequal_scatter_p.filter(is_found) {
+            said.push(format!(
+                "{name} scatters more at some speeds or spacings than at others ({}): its p are too sure.",
+                probability(p)
+            ));
+        }
+        if let Some((plot, p)) = self.farthest.filter(|(_, p)| is_found(p)) {
+            said.push(format!(
+                "Plot {plot} is farther off than chance puts one of so many ({}): look what happened there.",
+                probability(p)
+            ));
+        }
+        let (made, possible) =
+            ([self.lack_of_fit_p, self.unequal_scatter_p, self.farthest.map(|(_, p)| p)].iter().flatten().count(), 3);
+        if said.is_empty() && made > 0 {
+            let which =
+                if made == possible { "straight lines, even scatter and no outlier" } else { "what can be checked" };
+            said.push(format!("The residuals of {} are as they should be: {which}.", lower(name)));
+        }
+        said
+    }
+}
+
+fn lower(name: &str) -> String {
+    name.to_lowercase()
+}
+
+fn probability(p: f64) -> String {
+    if p < 0.0001 { "p < 0.0001".to_owned() } else { format!("p = {p:.4}") }
+}
+
+fn lack_of_fit(design: &Design, values: &[f64], model: &LinearModel) -> Option<f64> {
+    let mut of_treatments: BTreeMap<(u64, u64), Vec<f64>> = BTreeMap::new();
+    for (plot, value) in values.iter().enumerate() {
+        let treatment = (design.speeds_km_h[plot].to_bits(), design.spacings_cm[plot].to_bits());
+        of_treatments.entry(treatment).or_default().push(*value);
+    }
+    let pure: f64 = of_treatments.values().map(|values| super::scatter(values)).sum();
+    let pure_freedom = values.len().checked_sub(of_treatments.len()).filter(|freedom| *freedom > 0)?;
+    let lack_freedom = of_treatments.len().checked_sub(model.terms.len()).filter(|freedom| *freedom > 0)?;
+    if super::is_zero(pure, values) {
+        return None;
+    }
+    let residual: f64 = model.residuals.iter().map(|residual| residual * residual).sum();
+    let f = ((residual - pure).max(0.0) / lack_freedom as f64) / (pure / pure_freedom as f64);
+    Some(FisherSnedecor::new(lack_freedom as f64, pure_freedom as f64).ok()?.sf(f))
+}
+
+fn unequal_scatter(design: &Design, model: &LinearModel) -> Option<f64> {
+    let squares: Vec<f64> = model.residuals.iter().map(|residual| residual * residual).collect();
+    let of_squares = LinearModel::fit(design, &squares).ok()?;
+    let statistic = squares.len() as f64 * of_squares.r_squared;
+    Some(ChiSquared::new((of_squares.terms.len() - 1) as f64).ok()?.sf(statistic))
+}
+
+fn farthest(design: &Design, model: &LinearModel) -> Option<(usize, f64)> {
+    let columns: Vec<&Vec<f64>> =
+        [&design.speeds_km_h, &design.spacings_cm].into_iter().filter(|levels| varies(levels)).collect();
+    let plots = design.plots();
+    let matrix = DMatrix::from_fn(
+        plots,
+        columns.len() + 1,
+        |plot, column| if column == 0 { 1.0 } else { columns[column - 1][plot] },
+    );
+    let inverse = (matrix.transpose() * &matrix).try_inverse()?;
+    let freedom = model.degrees_of_freedom.checked_sub(1).filter(|freedom| *freedom > 0)? as f64;
+    let residual: f64 = model.residuals.iter().map(|residual| residual * residual).sum();
+    let of_plots = model.residuals.iter().enumerate().filter_map(|(plot, deviation)| {
+        let row = matrix.row(plot);
+        let leverage = (row * &inverse * row.transpose())[(0, 0)];
+        let without = (residual - deviation * deviation / (1.0 - leverage)) / freedom;
+        let t = deviation / (without * (1.0 - leverage)).sqrt();
+        t.is_finite().then_some((plot + 1, t.abs()))
+    });
+    let (plot, t) = of_plots.max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let alone = 2.0 * StudentsT::new(0.0, 1.0, freedom).ok()?.sf(t);
+    Some((plot, (alone * plots as f64).min(1.0)))
+}

@@ -1,0 +1,90 @@
+//! How far a figure may be off: exact intervals of shares that were counted, and intervals of means.
+//!
+//! A share's interval is Clopper and Pearson's, by the quantiles of the beta distribution, as R's `binom.test` has it: it
+//! covers the true share in at least 95 of 100 trials, however few plants there were. Where none or all were counted, the
+//! 5 % lie on the one side that is left (R's `alternative = "less"` or `"greater"`), so that none of `n` says "below about
+//! `3 / n`". A mean's interval is Student's, as R's `t.test` has it, over replications that are taken for independent.
+
+use serde::Serialize;
+use statrs::distribution::{Beta, ContinuousCDF, StudentsT};
+use std::fmt::{self, Display, Formatter};
+
+/// How probable it is at least that an interval covers the true figure.
+pub const CONFIDENCE: f64 = 0.95;
+
+/// So many of so many, and how far their share may be off.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Share {
+    /// Those counted.
+    pub count: u64,
+    /// All, at least as many.
+    pub of: u64,
+    /// The least share that the count goes with, percent; 0 where none was counted.
+    pub least_percent: f64,
+    /// The greatest, percent; 100 where all were counted.
+    pub greatest_percent: f64,
+}
+
+impl Share {
+    /// The share of `count` of `of`. Where there is nothing to count, any share may be true.
+    pub fn of(count: impl Into<u64>, of: impl Into<u64>) -> Self {
+        let (count, of) = (count.into(), of.into());
+        let chance = 1.0 - CONFIDENCE;
+        let (hits, misses) = (count as f64, of.saturating_sub(count) as f64);
+        let quantile = |a: f64, b: f64, probability: f64| {
+            Beta::new(a, b).ok().map_or(f64::NAN, |distribution| 100.0 * distribution.inverse_cdf(probability))
+        };
+        // None and all leave one side only, and there the quantile has a closed form.
+        let one_sided = || -100.0 * (chance.ln() / of.max(1) as f64).exp_m1();
+        let (least_percent, greatest_percent) = match (count, of) {
+            (_, 0) => (0.0, 100.0),
+            (0, _) => (0.0, one_sided()),
+            (count, of) if count >= of => (100.0 - one_sided(), 100.0),
+            _ => (quantile(hits, misses + 1.0, chance / 2.0), quantile(hits + 1.0, misses, 1.0 - chance / 2.0)),
+        };
+        Self { count, of, least_percent, greatest_percent }
+    }
+
+    /// The share itself, percent; 0 of nothing.
+    pub fn percent(&self) -> f64 {
+        100.0 * self.count as f64 / self.of.max(1) as f64
+    }
+}
+
+/// The interval, as it stands behind a share: `below 0.07` where none was counted, else `0.53 to 1.68`.
+impl Display for Share {
+    fn fmt(&self, f: &mut Formatter) -> fmt::Result {
+        let digits = if self.greatest_percent - self.least_percent < 2.0 { 2 } else { 1 };
+        match (self.count, self.of) {
+            (_, 0) => f.write_str("none counted"),
+            (0, _) => write!(f, "below {:.digits$}", self.greatest_percent),
+            (count, of) if count == of => write!(f, "above {:.digits$}", self.least_percent),
+            _ => write!(f, "{:.digits$} to {:.digits$}", self.least_percent, self.greatest_percent),
+        }
+    }
+}
+
+/// A mean, and how far it may be off.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Mean {
+    /// The mean, in the values' unit.
+    pub mean: f64,
+    /// Half the width of its interval, in the same unit; none of a single value.
+    pub within: Option<f64>,
+}
+
+impl Mean {
+    /// The mean of values that are independent of each other; of none, 0.
+    pub fn of(values: &[f64]) -> Self {
+        let count = values.len() as f64;
+        let quantile = || {
+            let distribution = StudentsT::new(0.0, 1.0, count - 1.0).ok()?;
+            Some(distribution.inverse_cdf(1.0 - (1.0 - CONFIDENCE) / 2.0))
+        };
+        let error = || (super::scatter(values) / (count - 1.0) / count).sqrt();
+        Self {
+            mean: super::mean(values),
+            within: (values.len() > 1).then(quantile).flatten().map(|quantile| quantile * error()),
+        }
+    }
+}
