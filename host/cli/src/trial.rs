@@ -10,7 +10,7 @@ use anyhow::Result;
 use clap::{Args, ValueEnum};
 use comfy_table::{CellAlignment, Table, presets};
 use field::conditions::Conditions;
-use field::tool_path::{Effect, WeedCount};
+use field::tool_path::{Effect, WeedCount, unweeded_strip_mm};
 use serde_json::json;
 use std::fs;
 use std::path::PathBuf;
@@ -18,6 +18,7 @@ use std::time::Instant;
 use study::evaluation::Analysis;
 use study::experiment::{self, Controller, Engine, Experiment, PlotOutcome, Total};
 use study::page::{Page, RowPicture};
+use study::statistics::Share;
 use study::sweep::{SPACINGS_CM, SPEEDS_KM_H};
 use trial::{firmware, picture};
 
@@ -43,7 +44,7 @@ pub struct Arguments {
     /// Plant spacings in cm, each 5 to 500.
     #[arg(long, value_delimiter = ',', default_value = "50,60", value_parser = number_within(SPACINGS_CM.0..=SPACINGS_CM.1))]
     spacings: Vec<f64>,
-    /// The field's conditions: a preset (transplanted, even-stand, direct-sown, weedy, soft-ground, heavy-soil, dusty), or a TOML
+    /// The field's conditions: a preset (transplanted, even-stand, direct-sown, weedy, soft-ground, heavy-soil, dusty, hand-steered), or a TOML
     /// file that says what differs from the first of them; - for standard input.
     #[arg(long, value_name = "PRESET|FILE.toml", value_parser = source::named, default_value = "transplanted")]
     field: String,
@@ -96,7 +97,12 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
 
     let totals = experiment::totals(&outcomes);
     let analysis = Analysis::of(experiment::records(&outcomes, Controller::Firmware))?;
-    let summary = summary(&experiment, &totals);
+    let mut summary = summary(&experiment, &totals);
+    // What the paper's controller does here is held against what the paper found of it.
+    let as_in_the_paper = Analysis::of(experiment::records(&outcomes, Controller::Paper))?;
+    summary.extend(
+        as_in_the_paper.against_the_paper().into_iter().map(|said| format!("The paper's controller here: {said}")),
+    );
     let printed = if arguments.json {
         say!("{:#}", json!({ "summary": summary, "plots": outcomes.iter().map(in_json).collect::<Vec<_>>() }))
     } else {
@@ -109,7 +115,7 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
         say!("{}\n\n{}\n{pace}", by_speed(&totals), summary.join("\n"))
     };
     let alarms: u32 = of(&totals, Controller::Firmware).map(|total| total.alarms).sum();
-    let damaged: u32 = of(&totals, Controller::Firmware).map(|total| total.effect.damaged).sum();
+    let damaged: u32 = of(&totals, Controller::Firmware).map(|total| total.effect.injured()).sum();
     if let Some(folder) = &folder {
         let findings = Findings { outcomes: &outcomes, totals, analysis, summary };
         write_report(folder, arguments, &experiment, &engine, &findings)?;
@@ -153,6 +159,7 @@ fn by_speed(totals: &[Total]) -> Table {
         "margins\ncut, %",
         "ground of the\nrow weeded, %",
         "with all margins\nkept at most, %",
+        "undamaged\nat most, %",
         "weeds gone\nin the row, %",
         "in the whole\nplot, %",
         "rows with\nan alarm",
@@ -162,11 +169,15 @@ fn by_speed(totals: &[Total]) -> Table {
         table.add_row([
             total.speed_km_h.to_string(),
             total.controller.title().to_owned(),
-            format!("{:.1}", total.plant_damage_percent()),
+            format!("{:.1} ({})", total.plant_damage_percent(), total.damage()),
             format!("{:.1}", total.canopies_reached_percent()),
             format!("{:.1}", total.margins_cut_percent()),
-            format!("{:.1}", 100.0 * total.weeded_share),
+            match total.weeded_percent.within {
+                Some(within) => format!("{:.1} ± {within:.1}", total.weeded_percent.mean),
+                None => format!("{:.1}", total.weeded_percent.mean),
+            },
             format!("{:.1}", 100.0 * total.weedable_share),
+            format!("{:.1}", 100.0 * total.undamaged_share),
             efficiency(total.effect.in_row),
             efficiency(total.effect.in_plot),
             total.alarms.to_string(),
@@ -197,6 +208,20 @@ fn summary(experiment: &Experiment, totals: &[Total]) -> Vec<String> {
     ));
     let mut weeds = Effect::default();
     of(totals, Controller::Firmware).for_each(|total| weeds += total.effect);
+    let Effect { swept, neighbours, .. } = weeds;
+    if swept + neighbours > 0 {
+        sentences.push(format!(
+            "Of the plants that the firmware's machine damaged, sweeps cut {swept}, since it strays, and the tool that swung aside cut \
+             {neighbours} in the next row."
+        ));
+    }
+    let strip_mm = unweeded_strip_mm(&experiment.conditions.machine(0), &experiment.conditions.machine);
+    if strip_mm > 0.0 {
+        sentences.push(format!(
+            "Between tool and sweeps a strip of {strip_mm:.1} mm on either side of the row is weeded by nobody: a tool of {:.0} mm would fill it.",
+            2.0 * experiment.conditions.machine.sweep_from_mm
+        ));
+    }
     if let (Some(in_row), Some(in_plot)) = (weeds.in_row.efficiency_percent(), weeds.in_plot.efficiency_percent()) {
         sentences.push(format!(
             "Of the weeds in the row the firmware removed {in_row:.0} %; of all weeds of the plot, as the paper counts them, \
@@ -216,15 +241,16 @@ fn summary(experiment: &Experiment, totals: &[Total]) -> Vec<String> {
 fn damage(totals: &[Total], controller: Controller) -> String {
     let name = controller.title();
     let (damaged, plants) = of(totals, controller)
-        .fold((0, 0), |(damaged, plants), total| (damaged + total.effect.damaged, plants + total.effect.plants));
+        .fold((0, 0), |(damaged, plants), total| (damaged + total.effect.injured(), plants + total.effect.plants));
     let worst = of(totals, controller).max_by(|a, b| a.plant_damage_percent().total_cmp(&b.plant_damage_percent()));
     match worst {
         Some(worst) if damaged > 0 => format!(
-            "Plants damaged by {name}: {damaged} of {plants}, most of them at {} km/h, {:.1} %.",
+            "Plants damaged by {name}: {damaged} of {plants} ({} %), most of them at {} km/h, {:.1} %.",
+            Share::of(damaged, plants),
             worst.speed_km_h,
             worst.plant_damage_percent()
         ),
-        _ => format!("Plants damaged by {name}: none of {plants}."),
+        _ => format!("Plants damaged by {name}: none of {plants} ({} %).", Share::of(damaged, plants)),
     }
 }
 
@@ -279,6 +305,10 @@ fn in_json(outcome: &PlotOutcome) -> serde_json::Value {
         "in_row_weeds_after": in_row.after,
         "in_row_weeded_percent": 100.0 * outcome.weeded_share,
         "in_row_bound_percent": 100.0 * outcome.weedable_share,
+        "undamaged_bound_percent": 100.0 * outcome.undamaged_share,
+        "damaged_by_tool": outcome.effect.damaged,
+        "damaged_by_sweeps": outcome.effect.swept,
+        "damaged_in_next_row": outcome.effect.neighbours,
         "canopies": outcome.canopies.all,
         "canopies_reached": outcome.canopies.reached,
         "margins_cut": outcome.canopies.margins_cut,

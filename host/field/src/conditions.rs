@@ -6,133 +6,18 @@
 //!
 //! What the conditions do is not here: [`crate::stand`] grows plants and weeds, [`crate::driving`] rolls.
 
+mod errors;
+mod parameters;
+
 use crate::machine::{Dirt, Machine};
 use crate::servo::{Scatter, Servo};
 use crate::verdict::Timing;
 use control::settings::Setting;
-use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+pub use errors::{ConditionsError, WrongValue};
+use errors::{explain, line, line_at};
+pub use parameters::{Conditions, Crop, Driving, Ground, Mechanism, PARAMETERS, Parameter, Plot, Sensors, Weeds};
 use std::io;
-use std::path::{Path, PathBuf};
-use thiserror::Error;
-use toml::de::DeTable;
-
-/// A parameter, as the table has it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Parameter {
-    /// Table and key, joined by a point.
-    pub name: &'static str,
-    /// What it is, in the unit that its name carries.
-    pub meaning: &'static str,
-    /// Where its default comes from.
-    pub source: &'static str,
-    /// Least value.
-    pub least: f64,
-    /// Greatest value.
-    pub greatest: f64,
-}
-
-/// The one table from which everything else about the parameters is made.
-macro_rules! parameters {
-    ($($(#[doc = $about:literal])* $table:ident: $Table:ident {
-        $($key:ident: $kind:ty = $default:literal, $least:literal to $greatest:literal, $meaning:literal, $source:literal;)*
-    })*) => {
-        $($(#[doc = $about])*
-        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-        #[serde(deny_unknown_fields, default)]
-        pub struct $Table {
-            $(#[doc = $meaning] pub $key: $kind,)*
-        }
-
-        impl Default for $Table {
-            fn default() -> Self {
-                Self { $($key: $default,)* }
-            }
-        })*
-
-        /// What a field trial takes place in, and with.
-        #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-        #[serde(deny_unknown_fields, default)]
-        pub struct Conditions {
-            $($(#[doc = $about])* pub $table: $Table,)*
-            /// Settings that the firmware is told instead of those that follow from the machine, by their names.
-            pub settings: BTreeMap<String, u16>,
-        }
-
-        /// Every parameter, in the table's order.
-        pub const PARAMETERS: &[Parameter] = &[$($(Parameter {
-            name: concat!(stringify!($table), ".", stringify!($key)),
-            meaning: $meaning,
-            source: $source,
-            least: $least as f64,
-            greatest: $greatest as f64,
-        },)*)*];
-
-        impl Conditions {
-            /// Every parameter with its value.
-            pub fn values(&self) -> impl Iterator<Item = (&'static Parameter, f64)> {
-                PARAMETERS.iter().zip([$($(f64::from(self.$table.$key),)*)*])
-            }
-        }
-    };
-}
-
-parameters! {
-    /// The plot.
-    plot: Plot {
-        rows: u32 = 3, 1 to 1000, "rows of a plot", "assumed";
-        row_m: f64 = 20.0, 2 to 1000, "length of a row", "assumed";
-        row_spacing_mm: f64 = 400.0, 200 to 2000, "distance between rows, which is the working width", "the machine's width, the paper's Table 1";
-    }
-    /// The crop.
-    crop: Crop {
-        spacing_scatter_mm: f64 = 30.0, 0 to 200, "a plant stands within this of its place along the row, evenly spread", "assumed";
-        across_scatter_mm: f64 = 5.0, 0 to 50, "a plant stands within this of the row's line, evenly spread", "assumed";
-        canopy_mm: f64 = 150.0, 20 to 350, "mean width of a canopy", "assumed, for chilli some weeks after transplanting";
-        canopy_scatter_mm: f64 = 40.0, 0 to 150, "a canopy's width is within this of its mean, evenly spread", "assumed";
-        protected_mm: f64 = 90.0, 2 to 350, "diameter of the zone round a stem that no tool may enter", "assumed; with it the paper's controller damages about what the paper found, up to 3.9 %";
-        missing_percent: f64 = 3.0, 0 to 90, "share of the places without a plant", "assumed";
-        double_percent: f64 = 2.0, 0 to 90, "share of the places with a second plant beside the first", "assumed";
-        ragged_percent: f64 = 30.0, 0 to 100, "share of the canopies with gaps through which the beam passes", "assumed";
-    }
-    /// The weeds.
-    weeds: Weeds {
-        short_per_m2: f64 = 60.0, 1 to 2000, "weeds too short for the beam, everywhere", "assumed";
-        tall_per_m: f64 = 0.3, 0 to 5, "weeds in the row tall enough to break the beam", "assumed";
-    }
-    /// The ground.
-    ground: Ground {
-        slip_percent: f64 = 5.0, -30 to 30, "mean slip of the wheel that the encoder counts: above 0 where it drives, below where it is dragged", "assumed, for a driving wheel on tilled soil that nobody calibrated";
-        slip_scatter_percent: f64 = 3.0, 0 to 10, "slip is within this of its mean, evenly spread, and changes every metre or two", "assumed";
-    }
-    /// The driving.
-    driving: Driving {
-        speed_scatter_percent: f64 = 8.0, 0 to 50, "speed wanders within this of its mean, evenly spread", "assumed, for a person who walks behind";
-        stops_per_100_m: f64 = 1.0, 0 to 50, "stops on the way", "assumed";
-        stop_s: f64 = 5.0, 0 to 600, "mean length of a stop", "assumed";
-        turn_s: f64 = 6.0, 0 to 600, "mean time for a turn at a row's end", "assumed: the paper's field efficiency of 81 to 86 % asks for about this";
-    }
-    /// What the sensors suffer.
-    sensors: Sensors {
-        unseen_percent: f64 = 0.0, 0 to 100, "share of the plants that the beam does not see, for they are too short", "none: no controller can spare them";
-        dust_per_m: f64 = 0.02, 0 to 10, "breaks of the beam by clods and insects", "assumed";
-        lost_pulses_percent: f64 = 0.01, 0 to 20, "share of the encoder's pulses that are missing", "assumed";
-    }
-    /// The machine.
-    machine: Mechanism {
-        beam_to_tool_mm: f64 = 400.0, 100 to 2000, "X, from the beam back to the tool", "assumed: the paper does not say it";
-        arm_mm: f64 = 350.0, 100 to 1000, "length of the arm that swings the tool aside", "the paper's Table 1";
-        tool_width_mm: f64 = 55.0, 10 to 200, "width of the tool in the row", "the paper's Table 1";
-        sweeps_a_side: u32 = 2, 0 to 6, "sweeps between the rows, on each side of the row", "the paper's Eq. 7";
-        sweep_width_mm: f64 = 80.0, 10 to 400, "width of a sweep", "the paper's Table 1";
-        sweep_from_mm: f64 = 50.0, 10 to 400, "from the row's line to the nearest sweep's edge: so wide is the row on either side", "assumed: the sweeps then keep off the zones round the stems and fill the machine's width";
-        dead_time_ms: f64 = 65.0, 0 to 500, "mean time from a pulse until the servo moves", "hobby servos under load: 57 to 117 ms";
-        dead_time_scatter_ms: f64 = 15.0, 0 to 200, "dead time is within this of its mean, evenly spread", "assumed";
-        travel_ms: f64 = 120.0, 10 to 2000, "time for 45 degrees without load", "60 kg cm servos: 98 to 120 ms";
-        load_percent: f64 = 20.0, 0 to 200, "the soil makes the travel longer by up to this, evenly spread", "up to 100 in the worst case";
-        power_hp: f64 = 2.5, 0.1 to 50, "the engine's power, for the performance index", "the paper's Table 1";
-    }
-}
+use std::path::Path;
 
 /// The presets: a name, and a file that says what differs from the default.
 const PRESETS: &[(&str, &str)] = &[
@@ -143,93 +28,12 @@ const PRESETS: &[(&str, &str)] = &[
     ("soft-ground", include_str!("../presets/soft-ground.toml")),
     ("heavy-soil", include_str!("../presets/heavy-soil.toml")),
     ("dusty", include_str!("../presets/dusty.toml")),
+    ("hand-steered", include_str!("../presets/hand-steered.toml")),
 ];
-
-/// What is wrong with conditions, and what would be right.
-#[derive(Debug, Error)]
-pub enum ConditionsError {
-    /// Neither a preset nor a file that can be read.
-    #[error("{} is none of the presets ({presets}), and as a file it cannot be read", path.display(), presets = presets().collect::<Vec<_>>().join(", "))]
-    Unreadable {
-        /// The name or path.
-        path: PathBuf,
-        /// What the system says.
-        source: io::Error,
-    },
-    /// The file is no TOML, or has keys or kinds of values that are not known.
-    #[error("{}, line {line}: {problem}", path.display())]
-    NotUnderstood {
-        /// The file.
-        path: PathBuf,
-        /// The line, from 1.
-        line: usize,
-        /// What is wrong, and what would be right where that is known.
-        problem: String,
-    },
-    /// A value in a file is out of its range.
-    #[error("{}, line {line}: {problem}", path.display())]
-    AtLine {
-        /// The file.
-        path: PathBuf,
-        /// The line, from 1.
-        line: usize,
-        /// What is wrong.
-        problem: WrongValue,
-    },
-    /// A value is wrong.
-    #[error(transparent)]
-    Wrong(#[from] WrongValue),
-}
-
-/// A value that a parameter or setting cannot have.
-#[derive(Clone, Debug, Error, PartialEq)]
-pub enum WrongValue {
-    /// The value is out of its range.
-    #[error("{name} is {value}, but has to be {least} to {greatest}: {meaning}")]
-    OutOfRange {
-        /// The parameter.
-        name: String,
-        /// Its value.
-        value: f64,
-        /// The least value.
-        least: f64,
-        /// The greatest value.
-        greatest: f64,
-        /// What it is.
-        meaning: String,
-    },
-    /// Sweeps would run through what is to be kept.
-    #[error("machine.sweep_from_mm is {from_mm}, but {why}")]
-    Sweeps {
-        /// Where they begin.
-        from_mm: f64,
-        /// What would be right.
-        why: String,
-    },
-    /// A count is no whole number.
-    #[error("{name} is {value}, but has to be a whole number")]
-    NotWhole {
-        /// The parameter.
-        name: String,
-        /// Its value.
-        value: f64,
-    },
-    /// Nobody knows the name.
-    #[error("{0} is neither a parameter of the field nor a setting of the firmware; there are {known}", known = names().collect::<Vec<_>>().join(", "))]
-    Unknown(String),
-}
 
 /// The presets' names.
 pub fn presets() -> impl Iterator<Item = &'static str> {
     PRESETS.iter().map(|(preset, _)| *preset)
-}
-
-/// All names that [`Conditions::set`] takes.
-fn names() -> impl Iterator<Item = String> {
-    PARAMETERS
-        .iter()
-        .map(|parameter| parameter.name.to_owned())
-        .chain(Setting::all().map(|setting| setting.text().to_string()))
 }
 
 impl Conditions {
@@ -348,14 +152,19 @@ impl Conditions {
     /// The machine, whose servo and encoder are the `seed`'s of all the possible ones.
     pub fn machine(&self, seed: u64) -> Machine {
         let Mechanism { beam_to_tool_mm, arm_mm, tool_width_mm, .. } = self.machine;
-        let scatter =
-            Scatter { dead_time_ms: self.machine.dead_time_scatter_ms, load: self.machine.load_percent / 100.0, seed };
-        let (dead_time_ms, travel_ms) = (self.machine.dead_time_ms, self.machine.travel_ms);
+        let Mechanism { dead_time_ms, dead_time_scatter_ms, travel_ms, load_kg_cm, stall_kg_cm, .. } = self.machine;
+        let scatter = Scatter { dead_time_ms: dead_time_scatter_ms, load: load_kg_cm / stall_kg_cm, seed };
+        // The stroke is what the firmware is told of it.
+        let default = Servo::default();
+        let in_us = self.told_or(Setting::ServoInUs, default.in_us);
+        let out_us = self.told_or(Setting::ServoOutUs, default.out_us);
         Machine {
             beam_to_tool_mm,
             arm_mm,
             tool_width_mm,
-            servo: Servo { dead_time_ms, travel_ms, scatter, ..Servo::default() },
+            servo: Servo { in_us, out_us, dead_time_ms, travel_ms, scatter },
+            beam_mm: self.sensors.beam_mm,
+            beam_response_ms: self.sensors.beam_response_ms,
             dirt: Dirt { share: self.sensors.lost_pulses_percent / 100.0, seed },
             ..Machine::default()
         }
@@ -364,14 +173,17 @@ impl Conditions {
     /// Margin and leads that the firmware is told.
     pub fn timing(&self) -> Timing {
         let default = Timing::default();
-        let told = |setting: Setting, otherwise| {
-            self.settings.get(&setting.text().to_string()).map_or(otherwise, |&value| value.into())
-        };
+        let told = |setting: Setting, otherwise: u32| self.told_or(setting, f64::from(otherwise)) as u32;
         Timing {
             margin_mm: told(Setting::MarginMm, default.margin_mm),
             lead_out_ms: told(Setting::LeadOutMs, default.lead_out_ms),
             lead_in_ms: told(Setting::LeadInMs, default.lead_in_ms),
         }
+    }
+
+    /// What the firmware is told of a setting, or what it is otherwise.
+    fn told_or(&self, setting: Setting, otherwise: f64) -> f64 {
+        self.settings.get(&setting.text().to_string()).map_or(otherwise, |&value| value.into())
     }
 
     /// The firmware's settings that are told beside those of machine and timing.
@@ -383,56 +195,6 @@ impl Conditions {
             .filter(|(setting, _)| !timing.contains(setting))
             .collect()
     }
-}
-
-impl WrongValue {
-    fn name(&self) -> &str {
-        match self {
-            Self::OutOfRange { name, .. } | Self::NotWhole { name, .. } | Self::Unknown(name) => name,
-            Self::Sweeps { .. } => "machine.sweep_from_mm",
-        }
-    }
-}
-
-/// The line, from 1, in which `table.key` stands.
-fn line(text: &str, name: &str) -> Option<usize> {
-    let (table, key) = name.split_once('.')?;
-    let root = DeTable::parse(text).ok()?;
-    let (key, _) = root.get_ref().get(table)?.get_ref().as_table()?.get_key_value(key)?;
-    Some(line_at(text, key.span().start))
-}
-
-/// The line, from 1, in which this byte stands.
-fn line_at(text: &str, byte: usize) -> usize {
-    text.bytes().take(byte).filter(|&byte| byte == b'\n').count() + 1
-}
-
-/// What the TOML reader found wrong, in a line; where it is the value of a parameter or setting, what that has to be.
-fn explain(text: &str, error: &toml::de::Error) -> String {
-    let at = error.span().map_or(0, |span| span.start);
-    let root = DeTable::parse(text).ok();
-    let entries = root.iter().flat_map(|root| root.get_ref()).flat_map(|(table, entries)| {
-        let entries = entries.get_ref().as_table().into_iter().flatten();
-        entries.map(|(key, value)| (table.get_ref().as_ref(), key.get_ref().as_ref(), value.span()))
-    });
-    let wrong = entries.into_iter().find_map(|(table, key, value): (&str, &str, _)| {
-        let is_here = value.contains(&at);
-        let (least, greatest, meaning) = range(table, key).filter(|_| is_here)?;
-        let written = &text[value];
-        Some(format!("{table}.{key} is {written}, but has to be a number from {least} to {greatest}: {meaning}"))
-    });
-    wrong.unwrap_or_else(|| error.message().trim().replace('\n', ", "))
-}
-
-/// The range of a parameter or setting, and what it is.
-fn range(table: &str, key: &str) -> Option<(f64, f64, String)> {
-    if table == "settings" {
-        let setting = Setting::find(key.as_bytes())?;
-        let range = setting.description();
-        return Some((range.least.into(), range.greatest.into(), setting.help().to_string()));
-    }
-    let parameter = PARAMETERS.iter().find(|known| known.name.split_once('.') == Some((table, key)))?;
-    Some((parameter.least, parameter.greatest, parameter.meaning.to_owned()))
 }
 
 #[cfg(test)]

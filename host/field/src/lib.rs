@@ -1,15 +1,18 @@
 //! The simulated field: what stands in the row, the machine that rolls past it, who weeds it, and what became of each plant.
 //!
 //! - **The row**: [`row`] says what stands in it, [`planting`] grows one by chance, [`ground`] counts which ground is covered. Under
-//!   some [`conditions`], [`stand`] grows what beam and tools meet, and [`driving`] rolls through it.
+//!   some [`conditions`], [`stand`] grows what beam and tools meet, [`sight`] says what a beam sees of it, [`driving`] rolls through it
+//!   and [`steering`] off its line.
 //! - **The machine**: [`motion`] is how it rolls, [`machine`] turns motion and row into levels on the Uno's pins, [`servo`] is
 //!   what pulses do to the tool, and [`wiring`] says which pin is wired to what.
 //! - **Who weeds**: a [`trial`] is a row, a machine and the firmware's settings. The [`twin`] weeds it by the firmware's own decisions,
 //!   compiled for the host, and its [`rivals`] are models.
-//! - **What became of it**: [`verdict`] judges canopies and margins, [`tool_path`] counts stems and weeds.
+//! - **What became of it**: [`verdict`] judges canopies and margins, [`tool_path`] counts stems and weeds, and [`bound`] says what nobody
+//!   could do better.
 //!
 //! The firmware's ELF is not run here, and no file is opened: texts are given, and the crate is at home in a browser as well.
 
+pub mod bound;
 pub mod conditions;
 pub mod driving;
 pub mod ground;
@@ -19,7 +22,9 @@ pub mod planting;
 pub mod rivals;
 pub mod row;
 pub mod servo;
+pub mod sight;
 pub mod stand;
+pub mod steering;
 pub mod tool_path;
 pub mod trial;
 pub mod twin;

@@ -14,6 +14,7 @@
 use crate::motion::{Motion, marks};
 use crate::row::Row;
 use crate::servo::{OUT_DEGREES, Servo, Stroke};
+use crate::sight::half_covered;
 use crate::wiring;
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
@@ -32,6 +33,8 @@ pub struct Machine {
     pub beam_to_tool_mm: f64,
     /// Time after which the beam's sensor reports a change. A change that lasts less is not reported.
     pub beam_response_ms: f64,
+    /// Diameter of the beam: its sensor reports it broken while more than half of it is. 0 is a line.
+    pub beam_mm: f64,
     /// The servo.
     pub servo: Servo,
     /// Length of the arm from its pivot to the tool.
@@ -71,6 +74,7 @@ impl Default for Machine {
             ticks_per_rev: 2400,
             beam_to_tool_mm: 400.0,
             beam_response_ms: 1.0,
+            beam_mm: 0.0,
             servo: Servo::default(),
             arm_mm: 350.0,
             tool_width_mm: 55.0,
@@ -126,12 +130,22 @@ impl Machine {
 
     /// Share of a stroke during which the tool does not work the row's line.
     pub fn idle_share_of_stroke(&self) -> f64 {
-        (1.0 - self.line_degrees() / OUT_DEGREES).max(0.0)
+        (1.0 - self.line_degrees() / self.servo.stroke_degrees()).max(0.0)
+    }
+
+    /// Time in which the servo turns by its whole stroke without load.
+    pub fn stroke_s(&self) -> f64 {
+        self.servo.travel_ms / 1000.0 * self.servo.stroke_degrees() / OUT_DEGREES
+    }
+
+    /// How far from the row's line the tool's nearer edge is when it is fully out.
+    pub fn room_mm(&self) -> f64 {
+        self.across_mm(self.servo.stroke_degrees()) - self.tool_width_mm / 2.0
     }
 
     /// The times within `during_s` at which the tool is not fully out.
     pub fn times_not_clear_s(&self, stroke: &Stroke, during_s: &Range<f64>) -> Vec<Range<f64>> {
-        stroke.times_below_s(OUT_DEGREES - CLEAR_WITHIN_DEGREES, during_s)
+        stroke.times_below_s(self.servo.stroke_degrees() - CLEAR_WITHIN_DEGREES, during_s)
     }
 
     /// The times within `during_s` at which the tool works the row's line.
@@ -141,8 +155,13 @@ impl Machine {
 
     /// The beam's level at power-up, before the motion begins.
     pub fn beam_before(&self, row: &Row, motion: &Motion) -> PinChange {
-        let broken = row.blocks_mm().iter().any(|block| block.contains(&motion.start_mm()));
+        let broken = self.seen_mm(row).iter().any(|block| block.contains(&motion.start_mm()));
         PinChange { cycle: 0, pin: wiring::BEAM, high: !broken }
+    }
+
+    /// The stretches over which the sensor has the beam broken.
+    fn seen_mm(&self, row: &Row) -> Vec<Range<f64>> {
+        half_covered(row.blocks_mm(), self.beam_mm)
     }
 
     /// What the encoder and the beam do to their pins while the machine rolls past the row, in order of time.
@@ -179,8 +198,8 @@ impl Machine {
         let response_s = self.beam_response_ms / 1000.0;
 
         // Each end of a leaf that is passed toggles the beam, in whatever direction.
-        let mut toggles_s: Vec<f64> = row
-            .blocks_mm()
+        let mut toggles_s: Vec<f64> = self
+            .seen_mm(row)
             .into_iter()
             .flat_map(|block| [block.start, block.end])
             .flat_map(|end_mm| motion.passings(end_mm))

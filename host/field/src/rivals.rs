@@ -8,8 +8,8 @@
 //! Where the beam stands nearer to the tool than a canopy is wide, it is late for another reason than its authors knew.
 //!
 //! [`all_knowing`] knows where each stem stands and what the servo may take: it has the tool out over the zones round the stems, by the
-//! servo's slowest swing, and in the row everywhere else. What it damages nobody could keep, and what it weeds nobody can have more of
-//! without a risk. Both have the machine of the [`Trial`], with the same servo.
+//! servo's slowest swing, and in the row everywhere else. What it damages nobody could keep. It is no bound: it allows for the slowest swing each
+//! time, and keeps the whole length of a zone that is round. The bound is [`crate::bound`]. Both have the machine of the [`Trial`], with the same servo.
 
 use crate::ground::union;
 use crate::machine::Machine;
@@ -74,10 +74,10 @@ pub fn as_in_the_paper(trial: &Trial) -> Vec<Pulse> {
 /// Whoever knows where each stem stands weeds the trial's row: the first of the servo's pulses of each width.
 pub fn all_knowing(trial: &Trial, stems: &[Stem]) -> Vec<Pulse> {
     let Trial { machine, motion, .. } = trial;
-    let Servo { dead_time_ms, travel_ms, scatter, out_us, .. } = machine.servo;
+    let Servo { dead_time_ms, scatter, out_us, .. } = machine.servo;
     // A command may wait for a pulse and the gap behind it, and the loop for its turn.
     let wait_s = (out_us / 1000.0 + f64::from(SERVO_GAP_MS)) / 1000.0 + 2.0 * TURN_S;
-    let slowest_s = (dead_time_ms + scatter.dead_time_ms + travel_ms * (1.0 + scatter.load)) / 1000.0 + wait_s;
+    let slowest_s = machine.servo.slowest_s() + wait_s;
     let quickest_s = ((dead_time_ms - scatter.dead_time_ms) / 1000.0).max(0.0);
     let passed_s = |place_mm: f64| Some(motion.passings(place_mm + machine.beam_to_tool_mm).first()?.time_s);
     let zones =

@@ -23,6 +23,9 @@ pub use files::TableError;
 /// Widest thing that a row takes. Wider than any crop plant that is weeded between.
 pub const MAX_WIDTH_MM: f64 = 1000.0;
 
+/// Widest canopy of a single plant: what is wider along the row is no wider than this across it.
+const MAX_CANOPY_MM: f64 = 400.0;
+
 /// Farthest from the origin that a thing stands, 10 km: farther than any row goes.
 pub const MAX_POSITION_MM: f64 = 1e7;
 
@@ -68,6 +71,8 @@ pub struct Thing {
     pub position_mm: f64,
     /// Its width at the beam's height: for a crop plant the canopy's.
     pub width_mm: f64,
+    /// Its width across the row. What has grown together is no wider across than its widest.
+    pub across_mm: f64,
     /// What it is.
     pub kind: Kind,
     /// Where within its width leaves break the beam, as places along the row in ascending order. Empty for a thing
@@ -78,12 +83,16 @@ pub struct Thing {
 impl Thing {
     /// A crop plant with a closed canopy.
     pub fn plant(position_mm: f64, width_mm: f64) -> Self {
-        Self { position_mm, width_mm, kind: Kind::Plant, leaves: Vec::new() }
+        Self::new(position_mm, width_mm, Kind::Plant)
     }
 
     /// A tall weed.
     pub fn weed(position_mm: f64, width_mm: f64) -> Self {
-        Self { position_mm, width_mm, kind: Kind::Weed, leaves: Vec::new() }
+        Self::new(position_mm, width_mm, Kind::Weed)
+    }
+
+    fn new(position_mm: f64, width_mm: f64, kind: Kind) -> Self {
+        Self { position_mm, width_mm, across_mm: width_mm.min(MAX_CANOPY_MM), kind, leaves: Vec::new() }
     }
 
     /// The stretch of ground below it.
@@ -265,12 +274,12 @@ impl Row {
         let table = CsvTable::parse(path, text, &COLUMNS)?;
         let mut lines = Vec::new();
         for line in table.lines() {
-            let thing = Thing {
-                position_mm: line.value("position_mm", "a number of millimetres along the row")?,
-                width_mm: line.value("width_mm", "a number of millimetres")?,
-                kind: line.value("kind", "plant or weed")?,
-                leaves: Vec::new(),
-            };
+            let position_mm = line.value("position_mm", "a number of millimetres along the row")?;
+            let thing = Thing::new(
+                position_mm,
+                line.value("width_mm", "a number of millimetres")?,
+                line.value("kind", "plant or weed")?,
+            );
             thing.check().map_err(|problem| line.error(problem.to_string()))?;
             lines.push((line, thing));
         }

@@ -5,8 +5,11 @@
 //! comes during a stroke takes the same dead time; then the servo turns from wherever it is. Widths between the two ends
 //! ask for angles between them.
 //!
+//! A degree is always as much of a pulse: a shorter stroke is told by a shorter pulse, and takes as much less time. The soil
+//! slows the servo down by its torque-speed line: full speed without load, none at the torque at which it stalls.
+//!
 //! Widths that are no servo's are ignored. There is no overshoot and no acceleration here: dead and travel time stand for
-//! them, and for the soil's load. Where they scatter, each command has its own, by chance.
+//! them. Where dead time and load scatter, each command has its own, by chance.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -18,11 +21,11 @@ use std::ops::{Range, RangeInclusive};
 pub struct Servo {
     /// Pulse width for the tool in the row, at 0 degrees.
     pub in_us: f64,
-    /// Pulse width for the tool out of the row, at [`OUT_DEGREES`].
+    /// Pulse width for the tool out of the row: [`US_A_DEGREE`] for each degree that it is from the other.
     pub out_us: f64,
     /// Time from a pulse's falling edge until the servo moves.
     pub dead_time_ms: f64,
-    /// Time in which it then turns by [`OUT_DEGREES`].
+    /// Time in which it then turns by [`OUT_DEGREES`] without load.
     pub travel_ms: f64,
     /// What dead time and travel may be off by.
     pub scatter: Scatter,
@@ -33,23 +36,31 @@ pub struct Servo {
 pub struct Scatter {
     /// The dead time lies within this of its mean, evenly spread.
     pub dead_time_ms: f64,
-    /// The soil's load makes the travel longer by a share from 0 to this, evenly spread.
+    /// The soil's load, as a share of the torque at which the servo stalls, lies between 0 and this, evenly spread.
     pub load: f64,
     /// Which of all the possible sequences of swings.
     pub seed: u64,
 }
 
-/// Angle of the tool that is fully out of the row.
+/// Angle of the tool that is fully out of the row, as the paper has it.
 pub const OUT_DEGREES: f64 = 45.0;
+
+/// What a degree takes of a pulse: 1500 us and 2000 us are the two ends of the paper's stroke.
+pub const US_A_DEGREE: f64 = 500.0 / OUT_DEGREES;
+
+/// However much a servo is loaded, it still crawls at a twentieth of its speed.
+const GREATEST_LOAD: f64 = 0.95;
+
+/// How many times as long a travel takes under a load, which is a share of the torque at which the servo stalls.
+pub fn slowed(load: f64) -> f64 {
+    1.0 / (1.0 - load.clamp(0.0, GREATEST_LOAD))
+}
 
 /// Pulse widths that differ by less than this ask for the same angle: the dead band of a digital servo.
 const DEAD_BAND_US: f64 = 2.0;
 
 /// Widths that a servo takes for a command. It ignores whatever else comes along its line, and so does this one.
 pub const WIDTHS_US: RangeInclusive<f64> = 400.0..=2600.0;
-
-/// Commands for more than this count as commands out of the row.
-const OUT_COMMAND_DEGREES: f64 = OUT_DEGREES / 2.0;
 
 /// A change of the angle asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,12 +71,14 @@ pub struct Command {
     pub fall_cycle: u64,
     /// The angle asked for; 0 is in the row.
     pub degrees: f64,
+    /// Whether that is more than half of the stroke.
+    out: bool,
 }
 
 impl Command {
     /// Whether it asks for the tool to leave the row.
     pub fn is_out(&self) -> bool {
-        self.degrees > OUT_COMMAND_DEGREES
+        self.out
     }
 }
 
@@ -77,9 +90,22 @@ impl Default for Servo {
 }
 
 impl Servo {
-    /// The angle that a pulse asks for.
+    /// The whole stroke: the angle of a tool that is told to be out of the row.
+    pub fn stroke_degrees(&self) -> f64 {
+        (self.out_us - self.in_us).abs() / US_A_DEGREE
+    }
+
+    /// The longest that the whole stroke takes, dead time and all.
+    pub fn slowest_s(&self) -> f64 {
+        let Scatter { dead_time_ms, load, .. } = self.scatter;
+        let travel_ms = self.travel_ms * self.stroke_degrees() / OUT_DEGREES * slowed(load);
+        (self.dead_time_ms + dead_time_ms + travel_ms) / 1000.0
+    }
+
+    /// The angle that a pulse asks for: outwards is whichever way the pulse for out lies.
     fn degrees(&self, pulse: Pulse) -> f64 {
-        (pulse.width_us() - self.in_us) / (self.out_us - self.in_us) * OUT_DEGREES
+        let outwards = if self.out_us < self.in_us { -1.0 } else { 1.0 };
+        (pulse.width_us() - self.in_us) * outwards / US_A_DEGREE
     }
 
     /// The pulses that asked for another angle than the one before them; the first pulse is the first command. Pulses
@@ -90,7 +116,9 @@ impl Servo {
         for &pulse in pulses.iter().filter(|pulse| WIDTHS_US.contains(&pulse.width_us())) {
             if (pulse.width_us() - width_us).abs() >= DEAD_BAND_US {
                 width_us = pulse.width_us();
-                commands.push(Command { rise_cycle: pulse.rise, fall_cycle: pulse.fall, degrees: self.degrees(pulse) });
+                let degrees = self.degrees(pulse);
+                let out = degrees > self.stroke_degrees() / 2.0;
+                commands.push(Command { rise_cycle: pulse.rise, fall_cycle: pulse.fall, degrees, out });
             }
         }
         commands
@@ -103,13 +131,13 @@ impl Servo {
     pub fn stroke(&self, commands: &[Command], start_cycle: u64) -> Stroke {
         let Scatter { dead_time_ms, load, seed } = self.scatter;
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let rest_degrees = commands.first().map_or(OUT_DEGREES, |command| command.degrees);
+        let rest_degrees = commands.first().map_or_else(|| self.stroke_degrees(), |command| command.degrees);
         let mut corners = vec![Corner { time_s: f64::NEG_INFINITY, degrees: rest_degrees }];
         let mut target_degrees = rest_degrees;
         for (index, command) in commands.iter().enumerate() {
             let heard_s = (command.fall_cycle as f64 - start_cycle as f64) / CYCLES_PER_SECOND as f64;
             let late_ms = rng.random_range(-1.0..=1.0) * dead_time_ms;
-            let travel_ms = self.travel_ms * (1.0 + rng.random_range(0.0..=1.0) * load);
+            let travel_ms = self.travel_ms * slowed(rng.random_range(0.0..=1.0) * load);
             let begin = Corner { time_s: heard_s + (self.dead_time_ms + late_ms) / 1000.0, degrees: 0.0 };
             let begin = Corner { degrees: angle(&corners, begin.time_s, target_degrees), ..begin };
             // A corner that the stroke had planned beyond this moment is not reached any more.
@@ -251,6 +279,29 @@ mod tests {
     #[test]
     fn a_width_between_the_ends_asks_for_an_angle_between_them() {
         assert_degrees(&stroke(&[(5, 1500), (20, 1750)]), 1.0, 22.5);
+    }
+
+    #[test]
+    fn a_shorter_stroke_is_a_shorter_pulse_and_a_shorter_travel() {
+        let servo = Servo { out_us: 1750.0, ..Servo::default() };
+        assert_eq!(servo.stroke_degrees(), 22.5);
+        let commands = servo.commands(&frames(&[(10, 1500), (20, 1750)]));
+        assert!(!commands[0].is_out() && commands[1].is_out());
+        let stroke = servo.stroke(&commands, 0);
+        // The tenth frame's pulse ends at 201.75 ms; behind 60 ms of dead time 60 ms of travel, not 120.
+        assert_degrees(&stroke, 0.2917, 11.25 - 0.05 * 0.375);
+        assert_degrees(&stroke, 0.3218, 22.5);
+        let mirrored = Servo { in_us: 1500.0, out_us: 1000.0, ..Servo::default() };
+        assert_eq!(mirrored.commands(&frames(&[(5, 1000)]))[0].degrees, 45.0);
+    }
+
+    #[test]
+    fn the_soil_slows_the_servo_down_by_its_torque_speed_line() {
+        // The paper's 39.4 of 60 kg cm leave a third of the speed.
+        assert!((slowed(39.4 / 60.0) - 2.913).abs() < 0.001);
+        assert_eq!((slowed(0.0), slowed(2.0).round()), (1.0, 20.0));
+        let loaded = Servo { scatter: Scatter { load: 0.5, ..Scatter::default() }, ..Servo::default() };
+        assert!((loaded.slowest_s() - 0.3).abs() < 1e-9);
     }
 
     #[test]

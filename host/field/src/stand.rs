@@ -1,18 +1,21 @@
 //! A crop stand: the plants and weeds of a row, as they grow from a seed under some conditions.
 //!
-//! It is seen twice. The beam sees a [`Row`]: canopies and tall weeds, of which those that touch have grown together, and
-//! dust. The tools meet stems with a protected zone round each, and weeds everywhere ([`crate::tool_path`]).
+//! It is seen twice. The beam sees a [`Row`]: canopies and weeds that are tall enough for it, as wide as they are at its height
+//! ([`crate::sight`]), of which those that touch have grown together, and dust. The tools meet stems with a protected zone round
+//! each, not quite in the middle of their canopies, and weeds everywhere ([`crate::tool_path`]). A stem of the next row may be
+//! met as well, by a tool that swings aside that far.
 //!
 //! Places are millimetres along the row, and across it from its line, left above 0. What grows does not depend on the
 //! machine, nor on what is done there.
 
 use crate::conditions::Conditions;
 use crate::ground::union;
-use crate::planting::{WEED_WIDTHS_MM, leaves, scatter};
+use crate::planting::{leaves, scatter};
 use crate::row::{Kind, Problem, Row, Thing};
+use crate::sight::width_at;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, Poisson};
+use rand_distr::{Distribution, LogNormal, Poisson};
 use std::ops::Range;
 
 /// A crop plant's stem, and the zone round it.
@@ -42,8 +45,12 @@ pub struct Stand {
     pub row: Row,
     /// The crop plants, in ascending order of place.
     pub stems: Vec<Stem>,
+    /// The crop plants of the next row on the side to which the tool swings.
+    pub neighbours: Vec<Stem>,
     /// The weeds, those that are tall included.
     pub weeds: Vec<Weed>,
+    /// The ground, across the whole width, on which somebody counts the weeds: the row's part of the plot's square metres.
+    pub counted_mm: Range<f64>,
     /// The row's ground.
     pub span_mm: Range<f64>,
 }
@@ -63,10 +70,15 @@ impl Stand {
     /// # Errors
     /// Where canopies grow together to something that is no row, or the row is shorter than the spacing.
     pub fn grow(conditions: &Conditions, spacing_mm: f64, rng: &mut impl Rng) -> Result<Self, Problem> {
-        let Conditions { plot, crop, weeds, sensors, .. } = conditions;
+        let Conditions { plot, crop, weeds, sensors, machine, .. } = conditions;
         let span_mm = 0.0..plot.row_m * 1000.0;
         // Each has a chance of its own, so that a parameter of one leaves the others as they are.
         let [mut leaf_rng, mut weed_rng, mut dust_rng] = [(); 3].map(|()| ChaCha8Rng::from_rng(rng));
+        let [mut height_rng, mut stem_rng, mut size_rng, mut next_rng] = [1, 2, 3, 4].map(|stream| {
+            let mut rng = leaf_rng.clone();
+            rng.set_stream(stream);
+            rng
+        });
         let mut stems = Vec::new();
         let mut things = Vec::new();
         let places = (span_mm.end / spacing_mm).floor() as u32;
@@ -78,15 +90,18 @@ impl Stand {
             let mut along_mm = at_mm + scatter(rng, crop.spacing_scatter_mm);
             for _ in 0..plants {
                 let width_mm = (crop.canopy_mm + scatter(rng, crop.canopy_scatter_mm)).max(MIN_CANOPY_MM);
-                let mut plant = Thing::plant(along_mm, width_mm);
+                let height_mm = crop.height_mm + scatter(&mut height_rng, crop.height_scatter_mm);
+                let seen_mm = width_at(sensors.beam_height_mm, height_mm, width_mm);
+                let mut plant = Thing::plant(along_mm, seen_mm.unwrap_or(width_mm).max(MIN_CANOPY_MM));
                 if chance(&mut leaf_rng, crop.ragged_percent) {
                     plant.leaves = leaves(&mut leaf_rng, plant.span_mm());
                 }
-                if !chance(rng, sensors.unseen_percent) {
+                if !chance(rng, sensors.unseen_percent) && seen_mm.is_some() {
                     things.push(plant);
                 }
                 let across_mm = scatter(rng, crop.across_scatter_mm);
-                stems.push(Stem { along_mm, across_mm, protected_mm: crop.protected_mm / 2.0 });
+                let stem_mm = along_mm + scatter(&mut stem_rng, crop.stem_off_mm);
+                stems.push(Stem { along_mm: stem_mm, across_mm, protected_mm: crop.protected_mm / 2.0 });
                 along_mm += rng.random_range(DOUBLE_MM);
             }
         }
@@ -98,10 +113,18 @@ impl Stand {
                 across_mm: weed_rng.random_range(-half_mm..half_mm),
             })
             .collect();
+        // One that stands in the row, and is tall enough, breaks the beam.
+        for weed in grown.iter().filter(|weed| weed.across_mm.abs() < machine.sweep_from_mm) {
+            let height_mm = about(&mut size_rng, weeds.height_mm, weeds.height_factor);
+            let widest_mm = about(&mut size_rng, weeds.width_mm, weeds.width_factor);
+            things.extend(weed_seen(weed.along_mm, sensors.beam_height_mm, height_mm, widest_mm));
+        }
         for _ in 0..count(&mut weed_rng, weeds.tall_per_m * plot.row_m) {
             let along_mm = weed_rng.random_range(span_mm.clone());
-            things.push(Thing::weed(along_mm, weed_rng.random_range(WEED_WIDTHS_MM)));
             grown.push(Weed { along_mm, across_mm: scatter(&mut weed_rng, crop.across_scatter_mm) });
+            let height_mm = crop.height_mm + scatter(&mut size_rng, crop.height_scatter_mm);
+            let widest_mm = about(&mut size_rng, weeds.width_mm, weeds.width_factor);
+            things.extend(weed_seen(along_mm, sensors.beam_height_mm, height_mm, widest_mm));
         }
         let air_mm = span_mm.start - HEADLAND_MM..span_mm.end + HEADLAND_MM;
         let dust_mm = (0..count(&mut dust_rng, sensors.dust_per_m * (air_mm.end - air_mm.start) / 1000.0))
@@ -112,9 +135,34 @@ impl Stand {
             .collect();
         stems.sort_by(|a, b| a.along_mm.total_cmp(&b.along_mm));
         let row = Row::new(grown_together(things))?.with_dust(dust_mm).on_ground(span_mm.clone());
-        Ok(Self { row, stems, weeds: grown, span_mm })
+        // The next row is sown or planted by itself: its places are the same, its chance is not.
+        let next_to = |place: u32| {
+            let at_mm = (f64::from(place) + 0.5) * spacing_mm + scatter(&mut next_rng, crop.spacing_scatter_mm);
+            let across_mm = plot.row_spacing_mm + scatter(&mut next_rng, crop.across_scatter_mm);
+            Stem { along_mm: at_mm, across_mm, protected_mm: crop.protected_mm / 2.0 }
+        };
+        let neighbours = (0..places).map(next_to).collect();
+        let counted_m = plot.counted_m2 / f64::from(plot.rows) / (plot.row_spacing_mm / 1000.0);
+        let counted_mm = if counted_m <= 0.0 { plot.row_m * 1000.0 } else { counted_m.min(plot.row_m) * 1000.0 };
+        let from_mm = size_rng.random_range(0.0..=span_mm.end - counted_mm);
+        Ok(Self { row, stems, neighbours, weeds: grown, counted_mm: from_mm..from_mm + counted_mm, span_mm })
     }
 }
+
+/// A size whose logarithm is spread normally about that of its median; the factor is its standard deviation's.
+fn about(rng: &mut impl Rng, median: f64, factor: f64) -> f64 {
+    LogNormal::new(median.ln(), factor.ln()).map_or(median, |sizes| sizes.sample(rng))
+}
+
+/// A weed as the beam sees it; none where the beam passes above it. A weed that is wider than the widest canopy is several.
+fn weed_seen(along_mm: f64, beam_height_mm: f64, height_mm: f64, widest_mm: f64) -> Option<Thing> {
+    let width_mm = width_at(beam_height_mm, height_mm, widest_mm.min(MAX_WEED_MM))?;
+    Some(Thing::weed(along_mm, width_mm.max(MIN_WEED_MM)))
+}
+
+/// Widest weed, and narrowest stalk.
+const MAX_WEED_MM: f64 = 350.0;
+const MIN_WEED_MM: f64 = 1.0;
 
 /// No scatter makes a canopy narrower.
 const MIN_CANOPY_MM: f64 = 10.0;
@@ -137,12 +185,14 @@ fn grown_together(mut things: Vec<Thing>) -> Vec<Thing> {
     for thing in things {
         match together.last_mut() {
             Some(last) if thing.span_mm().start <= last.span_mm().end => {
+                let across_mm = last.across_mm.max(thing.across_mm);
                 let span = last.span_mm().start..last.span_mm().end.max(thing.span_mm().end);
                 let blocks = union(last.blocks_mm().into_iter().chain(thing.blocks_mm()).collect());
                 let kind = if last.kind == Kind::Plant { Kind::Plant } else { thing.kind };
                 *last = Thing {
                     position_mm: (span.start + span.end) / 2.0,
                     width_mm: span.end - span.start,
+                    across_mm,
                     kind,
                     leaves: if blocks.len() > 1 { blocks } else { Vec::new() },
                 };
@@ -219,9 +269,58 @@ mod tests {
     }
 
     #[test]
+    fn plants_lower_than_the_beam_are_not_in_the_row_and_their_stems_are() {
+        let mut conditions = Conditions::default();
+        conditions.set("weeds.tall_per_m", 0.0).unwrap();
+        conditions.set("plot.row_m", 500.0).unwrap();
+        conditions.set("crop.double_percent", 0.0).unwrap();
+        // Plants of 250 to 350 mm: a beam at 275 mm passes above a quarter of them.
+        conditions.set("sensors.beam_height_mm", 275.0).unwrap();
+        let stand = grow(&conditions, 2);
+        let seen = stand.row.plants().count() as f64 / stand.stems.len() as f64;
+        assert!((seen - 0.75).abs() < 0.05, "{seen}");
+        let widest_mm = stand.row.plants().map(|plant| plant.width_mm).fold(0.0, f64::max);
+        assert!(widest_mm < 190.0 * 0.85, "near its top a canopy is narrow: {widest_mm} mm");
+    }
+
+    #[test]
+    fn weeds_that_outgrow_the_beam_break_it_and_some_are_as_wide_as_plants() {
+        let mut conditions = Conditions::preset("even-stand").unwrap().unwrap();
+        conditions.set("plot.row_m", 500.0).unwrap();
+        let low = grow(&conditions, 2);
+        assert_eq!(low.row.weeds().count(), 0);
+        for (name, value) in [("weeds.height_mm", 150.0), ("weeds.height_factor", 1.5), ("weeds.width_factor", 2.5)] {
+            conditions.set(name, value).unwrap();
+        }
+        let high = grow(&conditions, 2);
+        let seen = high.row.weeds().count();
+        // Half of the weeds in the row's 100 mm: 60 a square metre on 50 m2, less those that canopies hide.
+        assert!((800..1500).contains(&seen), "{seen}");
+        assert!(high.row.weeds().filter(|weed| weed.width_mm > 60.0).count() > 20);
+        assert_eq!(low.weeds, high.weeds);
+    }
+
+    #[test]
+    fn stems_stand_off_the_middle_of_their_canopies_as_far_as_they_are_told() {
+        let mut conditions = Conditions::preset("even-stand").unwrap().unwrap();
+        conditions.set("crop.stem_off_mm", 20.0).unwrap();
+        let stand = grow(&conditions, 4);
+        let off = || stand.stems.iter().zip(stand.row.plants()).map(|(stem, plant)| stem.along_mm - plant.position_mm);
+        assert!(off().all(|mm| mm.abs() <= 20.0) && off().any(|mm| mm > 10.0) && off().any(|mm| mm < -10.0));
+    }
+
+    #[test]
+    fn the_counted_ground_is_a_square_metre_a_plot_and_lies_in_the_row() {
+        let stand = grow(&Conditions::default(), 1);
+        // Three rows of 0.4 m share it.
+        assert!((stand.counted_mm.end - stand.counted_mm.start - 1000.0 / 1.2).abs() < 1e-6);
+        assert!(stand.counted_mm.start >= 0.0 && stand.counted_mm.end <= 20_000.0);
+    }
+
+    #[test]
     fn what_touches_is_one_thing_and_a_plant_if_any_of_it_is() {
         let things = vec![Thing::weed(100.0, 20.0), Thing::plant(150.0, 100.0), Thing::weed(300.0, 20.0)];
         let together = grown_together(things);
-        assert_eq!(together, [Thing::plant(145.0, 110.0), Thing::weed(300.0, 20.0)]);
+        assert_eq!(together, [Thing { across_mm: 100.0, ..Thing::plant(145.0, 110.0) }, Thing::weed(300.0, 20.0)]);
     }
 }

@@ -4,19 +4,26 @@
 //! across the row; along the row it is taken for a line. (An arm that lies along the row also carries the tool along it, by 10 mm where it
 //! leaves a stem's zone: that is left out.) A plant is *damaged* where the tool passes through the protected zone round its stem.
 //! A weed is *removed* where the tool passes it, or one of the sweeps, which run between the rows without ever swinging and keep
-//! off the zones.
+//! off the zones, so far as the machine keeps its line: where it strays, they cut plants as well. So does a tool that swings
+//! aside as far as the next row. Each is counted by itself. Between the tool in the row and the nearest sweep a strip may be left
+//! that nobody weeds ([`unweeded_strip_mm`]).
 //!
 //! Weeding efficiency is counted twice (Eq. 22). *In the row* are the weeds between the sweeps on either side: what becomes of them
 //! is the controller's doing. *In the whole plot* are all weeds between the middles of two gaps between rows, as in the paper's
-//! square metre: most of them fall to the sweeps, whatever the controller does.
+//! square metre: most of them fall to the sweeps, whatever the controller does. *Counted* are those of them that stand on the
+//! ground on which somebody counts.
 
 use crate::conditions::Mechanism;
 use crate::machine::Machine;
 use crate::motion::Motion;
 use crate::servo::Stroke;
 use crate::stand::{Stand, Stem, Weed};
+use crate::steering::Steering;
 use signal::Pulse;
 use std::ops::{AddAssign, Range};
+
+/// A sweep that is in a zone by less than this touches it.
+const TOUCH_MM: f64 = 1e-6;
 
 /// Time between two looks at where the tool is in a protected zone: at 2.5 km/h it moves by a millimetre or so.
 const LOOK_S: f64 = 0.000_5;
@@ -51,18 +58,34 @@ pub struct Effect {
     pub plants: u32,
     /// Crop plants through whose protected zone the tool passed.
     pub damaged: u32,
+    /// Crop plants through whose protected zone a sweep passed, but not the tool.
+    pub swept: u32,
+    /// Crop plants of the next row through whose protected zone the tool passed that swung aside.
+    pub neighbours: u32,
     /// Weeds in the row.
     pub in_row: WeedCount,
     /// Weeds in the whole plot, those in the row included.
     pub in_plot: WeedCount,
+    /// Those of them that are counted.
+    pub counted: WeedCount,
+}
+
+impl Effect {
+    /// Plants that somebody would find injured, whatever injured them.
+    pub fn injured(&self) -> u32 {
+        (self.damaged + self.swept + self.neighbours).min(self.plants)
+    }
 }
 
 impl AddAssign for Effect {
     fn add_assign(&mut self, other: Self) {
         self.plants += other.plants;
         self.damaged += other.damaged;
+        self.swept += other.swept;
+        self.neighbours += other.neighbours;
         self.in_row += other.in_row;
         self.in_plot += other.in_plot;
+        self.counted += other.counted;
     }
 }
 
@@ -71,7 +94,13 @@ struct Tools<'a> {
     machine: &'a Machine,
     mechanism: &'a Mechanism,
     motion: &'a Motion,
+    steering: &'a Steering,
     stroke: Stroke,
+}
+
+/// Width, on each side of the row, of the ground between the tool in the row and the nearest sweep: nobody weeds it.
+pub fn unweeded_strip_mm(machine: &Machine, mechanism: &Mechanism) -> f64 {
+    if mechanism.sweeps_a_side == 0 { 0.0 } else { (mechanism.sweep_from_mm - machine.tool_width_mm / 2.0).max(0.0) }
 }
 
 /// What a machine did to a stand with these servo pulses. The motion began at `start_cycle`.
@@ -79,20 +108,28 @@ pub fn effect(
     stand: &Stand,
     machine: &Machine,
     mechanism: &Mechanism,
-    motion: &Motion,
+    drive: (&Motion, &Steering),
     pulses: &[Pulse],
     start_cycle: u64,
 ) -> Effect {
     let stroke = machine.servo.stroke(&machine.servo.commands(pulses), start_cycle);
-    let tools = Tools { machine, mechanism, motion, stroke };
-    let mut effect = Effect {
-        plants: stand.stems.len() as u32,
-        damaged: stand.stems.iter().filter(|stem| tools.damage(stem)).count() as u32,
-        ..Effect::default()
-    };
+    let (motion, steering) = drive;
+    let tools = Tools { machine, mechanism, motion, steering, stroke };
+    let mut effect = Effect { plants: stand.stems.len() as u32, ..Effect::default() };
+    for stem in &stand.stems {
+        if tools.damage(stem) {
+            effect.damaged += 1;
+        } else if tools.sweep_cuts(stem) {
+            effect.swept += 1;
+        }
+    }
+    effect.neighbours = stand.neighbours.iter().filter(|stem| tools.reaches(stem) && tools.damage(stem)).count() as u32;
     for weed in &stand.weeds {
         let counted = WeedCount { before: 1, after: u32::from(!tools.remove(weed)) };
         effect.in_plot += counted;
+        if stand.counted_mm.contains(&weed.along_mm) {
+            effect.counted += counted;
+        }
         if weed.across_mm.abs() < mechanism.sweep_from_mm {
             effect.in_row += counted;
         }
@@ -101,7 +138,33 @@ pub fn effect(
 }
 
 impl Tools<'_> {
-    /// The ground across the row that the tool covers at a time.
+    /// Where a place across the row is from the machine's middle, at a place along it.
+    fn across_mm(&self, place_mm: f64, across_mm: f64) -> f64 {
+        across_mm - self.steering.across_mm(place_mm)
+    }
+
+    /// Whether the tool can swing as far aside as the zone of a stem in the next row.
+    fn reaches(&self, stem: &Stem) -> bool {
+        let tip_mm = self.machine.room_mm() + self.machine.tool_width_mm + self.steering.within_mm();
+        tip_mm > stem.across_mm - stem.protected_mm
+    }
+
+    /// Whether a sweep passes through the zone round a stem.
+    fn sweep_cuts(&self, stem: &Stem) -> bool {
+        let Mechanism { sweeps_a_side, sweep_width_mm, sweep_from_mm, .. } = *self.mechanism;
+        let to_mm = sweep_from_mm + f64::from(sweeps_a_side) * sweep_width_mm;
+        let Stem { along_mm, across_mm, protected_mm } = *stem;
+        let steps = protected_mm.ceil() as i32;
+        (-steps..=steps).any(|step| {
+            let beside_mm = protected_mm * f64::from(step) / f64::from(steps);
+            let chord_mm = (protected_mm.powi(2) - beside_mm.powi(2)).max(0.0).sqrt();
+            let across_mm = self.across_mm(along_mm + beside_mm, across_mm).abs();
+            // What only touches does not cut: sweeps may run along the zones.
+            across_mm + chord_mm > sweep_from_mm + TOUCH_MM && across_mm - chord_mm < to_mm - TOUCH_MM
+        })
+    }
+
+    /// The ground across the row that the tool covers at a time, from the machine's middle.
     fn covered_mm(&self, time_s: f64) -> Range<f64> {
         let middle_mm = self.machine.across_mm(self.stroke.degrees(time_s));
         let half_mm = self.machine.tool_width_mm / 2.0;
@@ -113,7 +176,9 @@ impl Tools<'_> {
         let zone = along_mm - protected_mm..along_mm + protected_mm;
         let x_mm = self.machine.beam_to_tool_mm;
         let enters = |time_s: f64| {
-            let beside_mm = self.machine.tool_mm(self.motion.position_mm(time_s)) - along_mm;
+            let place_mm = self.machine.tool_mm(self.motion.position_mm(time_s));
+            let across_mm = self.across_mm(place_mm, across_mm);
+            let beside_mm = place_mm - along_mm;
             let half_chord_mm = (protected_mm.powi(2) - beside_mm.powi(2)).max(0.0).sqrt();
             let covered = self.covered_mm(time_s);
             covered.start < across_mm + half_chord_mm && across_mm - half_chord_mm < covered.end
@@ -123,8 +188,9 @@ impl Tools<'_> {
             // Between two turns of the servo the tool is nowhere beyond where it is at them: often that is clear of the zone.
             self.between_turns_s(&times).any(|stretch| {
                 let [from, to] = [stretch.start, stretch.end].map(|time_s| self.covered_mm(time_s));
-                let comes_near = from.start.min(to.start) < across_mm + protected_mm
-                    && across_mm - protected_mm < from.end.max(to.end);
+                let near_mm = protected_mm + self.steering.within_mm();
+                let comes_near =
+                    from.start.min(to.start) < across_mm + near_mm && across_mm - near_mm < from.end.max(to.end);
                 let look_at = |time_s: f64| (time_s - times.start) / LOOK_S;
                 // Not at the very ends, where the zone is a point.
                 let first = (look_at(stretch.start).floor() as u32).max(1);
@@ -145,8 +211,9 @@ impl Tools<'_> {
         let Mechanism { sweeps_a_side, sweep_width_mm, sweep_from_mm, .. } = *self.mechanism;
         let swept_mm = sweep_from_mm..sweep_from_mm + f64::from(sweeps_a_side) * sweep_width_mm;
         let passings = || self.motion.passings(weed.along_mm + self.machine.beam_to_tool_mm);
-        swept_mm.contains(&weed.across_mm.abs())
-            || passings().iter().any(|passing| self.covered_mm(passing.time_s).contains(&weed.across_mm))
+        let across_mm = self.across_mm(weed.along_mm, weed.across_mm);
+        swept_mm.contains(&across_mm.abs())
+            || passings().iter().any(|passing| self.covered_mm(passing.time_s).contains(&across_mm))
     }
 }
 
@@ -154,6 +221,7 @@ impl Tools<'_> {
 mod tests {
     use super::*;
     use crate::row::{Row, Thing};
+    use rand::SeedableRng;
     use signal::CYCLES_PER_SECOND;
 
     /// A stem at 1000 mm on the row's line, and weeds before it, beside it and between the rows.
@@ -162,13 +230,19 @@ mod tests {
         Stand {
             row: Row::new(vec![Thing::plant(1000.0, 150.0)]).unwrap(),
             stems: vec![Stem { along_mm: 1000.0, across_mm: 0.0, protected_mm: 40.0 }],
+            neighbours: vec![Stem { along_mm: 1000.0, across_mm: 400.0, protected_mm: 40.0 }],
             weeds: vec![weed(500.0, 10.0), weed(1000.0, -20.0), weed(1000.0, 100.0), weed(500.0, 35.0)],
+            counted_mm: 900.0..1100.0,
             span_mm: 0.0..2000.0,
         }
     }
 
     /// Rolls at 1 m/s with the tool swinging out and back when it is at these places.
     fn effect_of(out_mm: f64, in_mm: f64) -> Effect {
+        steered(&stand(), &Steering::default(), out_mm, in_mm)
+    }
+
+    fn steered(stand: &Stand, steering: &Steering, out_mm: f64, in_mm: f64) -> Effect {
         let machine = Machine::default();
         let motion = Motion::steady(-500.0, 1e6, 1000.0, 3000.0);
         let pulse = |tool_mm: f64, width_us: u64| {
@@ -178,7 +252,7 @@ mod tests {
         };
         let first = Pulse { rise: 0, fall: 1500 * 16 };
         let pulses = [first, pulse(out_mm, 2000), pulse(in_mm, 1500)];
-        effect(&stand(), &machine, &Mechanism::default(), &motion, &pulses, 0)
+        effect(stand, &machine, &Mechanism::default(), (&motion, steering), &pulses, 0)
     }
 
     #[test]
@@ -188,6 +262,42 @@ mod tests {
         // Nothing reaches the one at 35 mm; the sweeps take the one at 100 mm.
         assert_eq!(effect.in_row, WeedCount { before: 3, after: 2 });
         assert_eq!(effect.in_plot, WeedCount { before: 4, after: 2 });
+        assert_eq!(effect.counted, WeedCount { before: 2, after: 1 });
+        assert_eq!((effect.swept, effect.neighbours, effect.injured()), (0, 0, 0));
+    }
+
+    #[test]
+    fn a_machine_that_strays_cuts_plants_with_its_sweeps() {
+        // The zone ends 10 mm from the sweeps.
+        let cut = |within_mm: f64| {
+            let seeds = (0..100).map(|seed| {
+                let steering =
+                    Steering::within(within_mm, -1000.0..3000.0, &mut rand_chacha::ChaCha8Rng::seed_from_u64(seed));
+                steered(&stand(), &steering, 800.0, 1100.0).swept
+            });
+            seeds.sum::<u32>()
+        };
+        assert_eq!((cut(0.0), cut(9.9)), (0, 0));
+        assert!((5..60).contains(&cut(20.0)), "{}", cut(20.0));
+    }
+
+    #[test]
+    fn a_tool_that_swings_as_far_as_the_next_row_cuts_its_plants() {
+        // It swings 247 mm aside, and is 27 mm wide on either side.
+        for (next_mm, cut) in [(400.0, 0), (320.0, 0), (300.0, 1)] {
+            let mut stand = stand();
+            stand.neighbours[0].across_mm = next_mm;
+            let effect = steered(&stand, &Steering::default(), 800.0, 1100.0);
+            assert_eq!((effect.neighbours, effect.injured()), (cut, cut), "{next_mm} mm");
+        }
+    }
+
+    #[test]
+    fn nobody_weeds_the_strip_between_tool_and_sweeps() {
+        let mechanism = Mechanism::default();
+        assert_eq!(unweeded_strip_mm(&Machine::default(), &mechanism), 22.5);
+        let wide = Machine { tool_width_mm: 100.0, ..Machine::default() };
+        assert_eq!(unweeded_strip_mm(&wide, &mechanism), 0.0);
     }
 
     #[test]

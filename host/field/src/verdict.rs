@@ -1,7 +1,8 @@
 //! What the tool did to the row: from the servo's pulses to a verdict on each plant.
 //!
 //! Pulses become commands and the tool's angle over time ([`crate::servo`]); with the machine's motion that is an angle
-//! over the ground. A plant is damaged when the tool was anything but fully out at any time over its canopy; its margin
+//! over the ground. A plant is damaged when the tool was anything but fully out at any time over its canopy, or where the
+//! stroke is too short for the canopy, which is taken to be as wide across the row as along it; its margin
 //! is cut when the tool was clear of the canopy by less than the margin and [`MARGIN_TOLERANCE_MM`]. Both are strict: for
 //! most of its stroke the tool is beside the row's line already, and a canopy is as wide as the beam saw it only at the
 //! height of the beam.
@@ -149,7 +150,7 @@ impl Judgement {
 /// while the tool swings and does not work the row's line. `T` is the servo's travel; its dead time costs nothing where it
 /// is led. The inter-row tools beside the row have no part in this figure.
 pub fn weedable_share(row: &Row, machine: &Machine, motion: &Motion, timing: Timing) -> f64 {
-    let swing_s = machine.idle_share_of_stroke() * machine.servo.travel_ms / 1000.0;
+    let swing_s = machine.idle_share_of_stroke() * machine.stroke_s();
     let margin_mm = f64::from(timing.margin_mm);
     let lost = row.plants().map(|plant| {
         let span = plant.span_mm();
@@ -188,7 +189,8 @@ pub fn judge(
     let run = machine.tool_mm(run.start)..machine.tool_mm(run.end);
     let swings = Swing::all(&commands, motion, start_cycle);
 
-    let mut plants: Vec<PlantOutcome> = row.plants().map(|plant| plant_outcome(plant, &closed, timing)).collect();
+    let mut plants: Vec<PlantOutcome> =
+        row.plants().map(|plant| plant_outcome(plant, &closed, machine, timing)).collect();
     let mut idle_swings = 0;
     for swing in &swings {
         let passed = swing.passed_mm(machine, motion);
@@ -286,7 +288,7 @@ impl SwingError<'_> {
 }
 
 /// Clearances and verdict of a plant, given the ground over which the tool was not fully out.
-fn plant_outcome(plant: &Thing, closed: &[Range<f64>], timing: Timing) -> PlantOutcome {
+fn plant_outcome(plant: &Thing, closed: &[Range<f64>], machine: &Machine, timing: Timing) -> PlantOutcome {
     let span = plant.span_mm();
     // What was done before the plant and what was done behind it part in the canopy's middle, or where a swing ended or
     // began that reached beyond the middle.
@@ -304,7 +306,8 @@ fn plant_outcome(plant: &Thing, closed: &[Range<f64>], timing: Timing) -> PlantO
     let clearance_behind_mm =
         closed.iter().find(|ground| ground.end > parting_mm).map(|ground| ground.start.max(span.start) - span.end);
     let narrowest_mm = [clearance_before_mm, clearance_behind_mm].into_iter().flatten().fold(f64::INFINITY, f64::min);
-    let verdict = if narrowest_mm < 0.0 {
+    // A stroke that ends within the canopy is no way out of it.
+    let verdict = if narrowest_mm < 0.0 || machine.room_mm() < plant.across_mm / 2.0 {
         Verdict::Damaged
     } else if narrowest_mm < f64::from(timing.margin_mm) - MARGIN_TOLERANCE_MM {
         Verdict::MarginCut

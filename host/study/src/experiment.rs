@@ -11,6 +11,7 @@ pub mod total;
 
 use crate::evaluation::PlotRecord;
 use control::controller::State;
+use field::bound::undamaged_share;
 use field::conditions::Conditions;
 use field::driving::{Drive, drive};
 use field::rivals;
@@ -51,7 +52,7 @@ pub enum Controller {
     WithoutLookAhead,
     /// The paper's: one slot, no look-ahead, a loop that polls.
     Paper,
-    /// Who knows where each stem stands and how slow the servo may be: whose damage, if any, nobody can avoid.
+    /// Who knows where each stem stands and allows for the servo's slowest swing: whose damage, if any, nobody can avoid.
     AllKnowing,
 }
 
@@ -100,8 +101,10 @@ pub struct PlotOutcome {
     pub canopies: Canopies,
     /// Share of the rows' ground that the tool weeded, from 0 to 1.
     pub weeded_share: f64,
-    /// Share that could be weeded at best with this servo ([`field::verdict::weedable_share`]).
+    /// Share that could be weeded at best with this servo and every margin kept ([`field::verdict::weedable_share`]).
     pub weedable_share: f64,
+    /// Share that could be weeded at best without a plant damaged ([`field::bound::undamaged_share`]).
+    pub undamaged_share: f64,
     /// Rows in which an alarm took the tool out.
     pub alarms: u32,
     /// Time that was simulated, run-ups included and turns not, s.
@@ -175,6 +178,7 @@ struct RowOutcome {
     canopies: Canopies,
     weeded_share: f64,
     weedable_share: f64,
+    undamaged_share: f64,
     /// For the row and its turn, and of these what was simulated.
     seconds: f64,
     moved_s: f64,
@@ -298,6 +302,7 @@ impl Experiment {
             canopies: Canopies::default(),
             weeded_share: 0.0,
             weedable_share: 0.0,
+            undamaged_share: 0.0,
             alarms: 0,
             moved_s: 0.0,
         }
@@ -306,13 +311,21 @@ impl Experiment {
     /// What every controller does in the same row.
     fn weed_row(&self, plot: &Plot, row: u32, engine: &Engine) -> Result<Vec<RowOutcome>, ExperimentError> {
         let (stand, drive, trial) = self.grow(plot, row)?;
+        let undamaged_share = undamaged_share(&stand, &trial.machine, &drive.motion, &drive.steering);
         let outcome = |&controller: &Controller| {
             let weeded = weed(&trial, &stand, controller, engine)?;
             let Trial { row, machine, motion, timing, .. } = &trial;
             let (pulses, start_cycle) = (&weeded.pulses, weeded.start_cycle);
             let judgement = judge(row, machine, motion, *timing, pulses, start_cycle);
             Ok(RowOutcome {
-                effect: effect(&stand, machine, &self.conditions.machine, motion, pulses, start_cycle),
+                effect: effect(
+                    &stand,
+                    machine,
+                    &self.conditions.machine,
+                    (motion, &drive.steering),
+                    pulses,
+                    start_cycle,
+                ),
                 canopies: Canopies {
                     all: judgement.plants.len() as u32,
                     reached: judgement.count(Verdict::Damaged) as u32,
@@ -320,6 +333,7 @@ impl Experiment {
                 },
                 weeded_share: judgement.weeded_share,
                 weedable_share: judgement.weedable_share,
+                undamaged_share,
                 seconds: drive.row_s + drive.turn_s,
                 moved_s: motion.duration_s(),
                 alarm: weeded.alarm,
@@ -394,14 +408,17 @@ impl PlotOutcome {
         self.canopies += row.canopies;
         self.weeded_share += row.weeded_share / f64::from(rows);
         self.weedable_share += row.weedable_share / f64::from(rows);
+        self.undamaged_share += row.undamaged_share / f64::from(rows);
         self.alarms += u32::from(row.alarm);
         self.moved_s += row.moved_s;
-        let Effect { plants, damaged, in_plot, .. } = self.effect;
+        let Effect { plants, in_plot, counted, .. } = self.effect;
+        // Where no weed stands on the ground that was to be counted, somebody counts the plot.
+        let weeds = if counted.before > 0 { counted } else { in_plot };
         self.record = PlotRecord {
-            weeds_before: in_plot.before,
-            weeds_after: in_plot.after,
+            weeds_before: weeds.before,
+            weeds_after: weeds.after,
             plants,
-            damaged,
+            damaged: self.effect.injured(),
             time_s: self.record.time_s + row.seconds,
             ..self.record
         };
@@ -457,7 +474,10 @@ mod tests {
             }
             assert!(of(Controller::AllKnowing).all(|total| total.effect.damaged == 0));
             let damage: Vec<f64> = of(Controller::Paper).map(Total::plant_damage_percent).collect();
-            assert!(damage.is_sorted() && damage[3] < damage[4] && damage[4] < damage[5], "{damage:?}");
+            // A weed as wide as a plant takes its one slot at any speed; what comes too late grows with it.
+            let (slow, fast) = damage.split_at(3);
+            assert!(slow.iter().all(|percent| *percent < 1.0) && fast[0] > 1.0, "{damage:?}");
+            assert!(fast.is_sorted() && fast[0] < fast[1] && fast[1] < fast[2], "{damage:?}");
         }
     }
 
@@ -474,6 +494,50 @@ mod tests {
                 assert_eq!(all_knowing.effect.damaged, 0, "{preset}");
                 assert!(all_knowing.weeded_share > firmware.weeded_share, "{preset}");
             }
+        }
+    }
+
+    #[test]
+    fn whoever_damages_no_plant_weeds_no_more_than_the_bound_in_any_field() {
+        for preset in presets() {
+            for seed in 1..=3 {
+                // Rows of their own: a plot with one damaged plant may weed more than its bound.
+                let mut experiment = Experiment { seed, ..experiment(&[1.0, 2.5], preset) };
+                experiment.conditions.set("plot.rows", 1.0).unwrap();
+                for outcome in run(&experiment).iter().filter(|outcome| outcome.effect.damaged == 0) {
+                    let (share, bound) = (outcome.weeded_share, outcome.undamaged_share);
+                    assert!(share <= bound + 1e-3, "{preset}, {:?}: {share} of {bound}", outcome.controller);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_shorter_stroke_that_the_firmware_is_told_weeds_more_and_reaches_no_canopy() {
+        let mut shorter = experiment(&[2.5], "transplanted");
+        let paper = totals(&run(&shorter))[0];
+        for (setting, value) in [("servo_out_us", 1750.0), ("lead_out_ms", 150.0)] {
+            shorter.conditions.set(setting, value).unwrap();
+        }
+        let shorter = totals(&run(&shorter))[0];
+        assert_eq!((shorter.effect.damaged, shorter.canopies.reached), (0, 0), "{shorter:?}");
+        assert!(shorter.weeded_share > paper.weeded_share + 0.05, "{shorter:?}, {paper:?}");
+        // Too short for the canopies, and said to be.
+        let mut stub = experiment(&[1.0], "transplanted");
+        stub.conditions.set("servo_out_us", 1620.0).unwrap();
+        let stub = totals(&run(&stub))[0];
+        assert!(stub.canopies.reached > stub.canopies.all / 2, "{stub:?}");
+    }
+
+    #[test]
+    fn field_efficiency_falls_with_speed_as_the_paper_s_equation_has_it() {
+        let outcomes = run(&Experiment { replications: 6, ..experiment(&[1.0, 1.5, 2.0, 2.5], "transplanted") });
+        let analysis = Analysis::of(records(&outcomes, Controller::Firmware)).unwrap();
+        let slope = analysis.responses[3].model.as_ref().unwrap().term("speed").unwrap().clone();
+        assert!((slope.estimate - -2.06).abs() < 3.0 * slope.standard_error + 0.5, "{slope:?}");
+        for treatment in analysis.treatments() {
+            let percent = treatment.mean.field_efficiency_percent;
+            assert!((77.0..91.0).contains(&percent), "{percent} % at {} km/h", treatment.speed_km_h);
         }
     }
 

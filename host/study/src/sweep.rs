@@ -111,7 +111,12 @@ impl Results {
         let performance = outcome.record.performance();
         Self {
             plant_damage_percent: performance.plant_damage_percent,
-            weeding_efficiency_percent: performance.weeding_efficiency_percent,
+            // Of all weeds: a square metre's scatter would hide what is swept.
+            weeding_efficiency_percent: outcome
+                .effect
+                .in_plot
+                .efficiency_percent()
+                .unwrap_or(performance.weeding_efficiency_percent),
             in_row_weeding_percent: 100.0 * outcome.weeded_share,
             in_row_bound_percent: 100.0 * outcome.weedable_share,
             field_efficiency_percent: performance.field_efficiency_percent,
@@ -306,7 +311,7 @@ mod tests {
     fn a_value_that_cannot_be_is_refused_before_anything_is_weeded() {
         let run = |x: &str| sweep(x, None).run(|_| panic!("nothing is weeded")).unwrap_err().to_string();
         assert!(run("lead_out_ms=400..600:200").contains("settings.lead_out_ms is 600, but has to be 0 to 500"));
-        assert!(run("ground.slip_percent=10..20:5").contains("ground.slip_percent is 20, but has to be -15 to 15"));
+        assert!(run("ground.slip_percent=20..40:10").contains("ground.slip_percent is 40, but has to be -30 to 30"));
         assert!(run("speed=1..40:13").contains("speed is 14, but has to be 0.1 to 8 km/h"));
         assert!(run("plot.rows=1..2:0.5").contains("plot.rows is 1.5, but has to be a whole number"));
         assert!(run("slip=1..2:1").contains("slip is neither a parameter of the field nor a setting"));

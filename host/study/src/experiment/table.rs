@@ -27,6 +27,10 @@ struct Line {
     in_row_weeds_after: u32,
     in_row_weeded_percent: f64,
     in_row_bound_percent: f64,
+    undamaged_bound_percent: f64,
+    damaged_by_tool: u32,
+    damaged_by_sweeps: u32,
+    damaged_in_next_row: u32,
     alarms: u32,
 }
 
@@ -61,6 +65,10 @@ pub fn write_csv(outcomes: &[PlotOutcome], controllers: &[Controller], to: impl 
             in_row_weeds_after: outcome.effect.in_row.after,
             in_row_weeded_percent: thousandth(100.0 * outcome.weeded_share),
             in_row_bound_percent: thousandth(100.0 * outcome.weedable_share),
+            undamaged_bound_percent: thousandth(100.0 * outcome.undamaged_share),
+            damaged_by_tool: outcome.effect.damaged,
+            damaged_by_sweeps: outcome.effect.swept,
+            damaged_in_next_row: outcome.effect.neighbours,
             alarms: outcome.alarms,
         })?;
     }

@@ -2,7 +2,9 @@
 
 use super::{Canopies, Controller, PlotOutcome};
 use crate::page::{Comparison, ControllerCurve, ControllerPoint};
+use crate::statistics::{Mean, Share};
 use field::tool_path::Effect;
+use std::collections::BTreeMap;
 
 /// All plots of one speed that one controller weeded.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,43 +21,63 @@ pub struct Total {
     pub weeded_share: f64,
     /// Share that this servo could weed with every canopy and margin kept.
     pub weedable_share: f64,
+    /// Share that could be weeded at best without a plant damaged.
+    pub undamaged_share: f64,
+    /// The weeded share, percent, as a mean of the replications, each with all its spacings.
+    pub weeded_percent: Mean,
     /// Rows in which an alarm took the tool out.
     pub alarms: u32,
 }
 
 impl Total {
+    /// Plants damaged by the tool or by sweeps, with how far their share may be off.
+    pub fn damage(&self) -> Share {
+        Share::of(self.effect.injured(), self.effect.plants)
+    }
+
+    /// Canopies over which the tool was not fully out, with how far their share may be off.
+    pub fn reached(&self) -> Share {
+        Share::of(self.canopies.reached, self.canopies.all)
+    }
+
     /// Plants damaged, % (Eq. 23).
     pub fn plant_damage_percent(&self) -> f64 {
-        percent(self.effect.damaged, self.effect.plants)
+        self.damage().percent()
     }
 
     /// Canopies over which the tool was not fully out, % of all.
     pub fn canopies_reached_percent(&self) -> f64 {
-        percent(self.canopies.reached, self.canopies.all)
+        self.reached().percent()
     }
 
     /// Canopies whose margin was cut, but not they, % of all.
     pub fn margins_cut_percent(&self) -> f64 {
-        percent(self.canopies.margins_cut, self.canopies.all)
+        Share::of(self.canopies.margins_cut, self.canopies.all).percent()
     }
-}
-
-fn percent(part: u32, whole: u32) -> f64 {
-    100.0 * f64::from(part) / f64::from(whole.max(1))
 }
 
 /// What each controller did at each speed, all spacings and replications together: by speed, then in the order in which the
 /// controllers took part.
 pub fn totals(outcomes: &[PlotOutcome]) -> Vec<Total> {
-    let mut totals: Vec<(Total, f64)> = Vec::new();
+    let mut totals: Vec<(Total, Vec<&PlotOutcome>)> = Vec::new();
     for outcome in outcomes {
         let (controller, speed_km_h) = (outcome.controller, outcome.record.speed_km_h);
-        let is_its = |(total, _): &(Total, f64)| total.controller == controller && total.speed_km_h == speed_km_h;
+        let is_its =
+            |(total, _): &(Total, Vec<&PlotOutcome>)| total.controller == controller && total.speed_km_h == speed_km_h;
         let index = totals.iter().position(is_its).unwrap_or_else(|| {
             let (effect, canopies) = Default::default();
-            let none =
-                Total { controller, speed_km_h, effect, canopies, weeded_share: 0.0, weedable_share: 0.0, alarms: 0 };
-            totals.push((none, 0.0));
+            let none = Total {
+                controller,
+                speed_km_h,
+                effect,
+                canopies,
+                weeded_share: 0.0,
+                weedable_share: 0.0,
+                undamaged_share: 0.0,
+                weeded_percent: Mean::of(&[]),
+                alarms: 0,
+            };
+            totals.push((none, Vec::new()));
             totals.len() - 1
         });
         let (total, plots) = &mut totals[index];
@@ -63,17 +85,29 @@ pub fn totals(outcomes: &[PlotOutcome]) -> Vec<Total> {
         total.canopies += outcome.canopies;
         total.weeded_share += outcome.weeded_share;
         total.weedable_share += outcome.weedable_share;
+        total.undamaged_share += outcome.undamaged_share;
         total.alarms += outcome.alarms;
-        *plots += 1.0;
+        plots.push(outcome);
     }
-    let mean = |(total, plots): (Total, f64)| Total {
-        weeded_share: total.weeded_share / plots,
-        weedable_share: total.weedable_share / plots,
+    let mean = |(total, plots): (Total, Vec<&PlotOutcome>)| Total {
+        weeded_share: total.weeded_share / plots.len() as f64,
+        weedable_share: total.weedable_share / plots.len() as f64,
+        undamaged_share: total.undamaged_share / plots.len() as f64,
+        weeded_percent: Mean::of(&by_replication(&plots)),
         ..total
     };
     let mut totals: Vec<Total> = totals.into_iter().map(mean).collect();
     totals.sort_by(|a, b| a.speed_km_h.total_cmp(&b.speed_km_h));
     totals
+}
+
+/// The weeded share of each replication in percent, its spacings together: a block each, so that they are independent.
+fn by_replication(plots: &[&PlotOutcome]) -> Vec<f64> {
+    let mut blocks: BTreeMap<u32, Vec<f64>> = BTreeMap::new();
+    for plot in plots {
+        blocks.entry(plot.record.replication).or_default().push(100.0 * plot.weeded_share);
+    }
+    blocks.values().map(|shares| shares.iter().sum::<f64>() / shares.len() as f64).collect()
 }
 
 /// The controllers side by side, for the report.
