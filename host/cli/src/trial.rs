@@ -15,7 +15,7 @@ use serde_json::json;
 use std::fs;
 use std::path::PathBuf;
 use std::time::Instant;
-use study::evaluation::Analysis;
+use study::evaluation::{Analysis, published};
 use study::experiment::{self, Controller, Engine, Experiment, PlotOutcome, Total};
 use study::page::{Page, RowPicture};
 use study::statistics::Share;
@@ -98,11 +98,7 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     let totals = experiment::totals(&outcomes);
     let analysis = Analysis::of(experiment::records(&outcomes, Controller::Firmware))?;
     let mut summary = summary(&experiment, &totals);
-    // What the paper's controller does here is held against what the paper found of it.
-    let as_in_the_paper = Analysis::of(experiment::records(&outcomes, Controller::Paper))?;
-    summary.extend(
-        as_in_the_paper.against_the_paper().into_iter().map(|said| format!("The paper's controller here: {said}")),
-    );
+    summary.extend(against_the_paper(&outcomes));
     let printed = if arguments.json {
         say!("{:#}", json!({ "summary": summary, "plots": outcomes.iter().map(in_json).collect::<Vec<_>>() }))
     } else {
@@ -125,6 +121,15 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     }
     printed?;
     Ok(if damaged == 0 && alarms == 0 { Finding::Good } else { Finding::Bad })
+}
+
+/// Where the paper's controller does here what the paper did not find of it, at the paper's speeds.
+fn against_the_paper(outcomes: &[PlotOutcome]) -> Vec<String> {
+    let (slowest, fastest) = published::SPEEDS_KM_H;
+    let mut records = experiment::records(outcomes, Controller::Paper);
+    records.retain(|record| (slowest..=fastest).contains(&record.speed_km_h));
+    let said = Analysis::of(records).map(|analysis| analysis.against_the_paper()).unwrap_or_default();
+    said.into_iter().map(|said| format!("The paper's controller at {slowest} to {fastest} km/h: {said}")).collect()
 }
 
 /// Everything that came of a trial.

@@ -60,7 +60,7 @@ fn the_manual_s_example_is_judged_in_plain_words_and_tables() {
 /// The figures are R's: `d <- read.csv("docs/trial-example.csv", comment = "#")`, `d$we <- (1 - d$weeds_after /
 /// d$weeds_before) * 100`, `summary(lm(we ~ speed_km_h + spacing_cm, d))`, `anova(lm(we ~ factor(replication) +
 /// factor(speed_km_h) * factor(spacing_cm), d))`, `g <- glm(cbind(damaged, plants - damaged) ~ speed_km_h + spacing_cm, d, family =
-/// binomial, control = glm.control(epsilon = 1e-15))`, `summary(g)$coefficients`.
+/// binomial, control = glm.control(epsilon = 1e-300, maxit = 30))`, `summary(g)$coefficients`.
 #[test]
 fn the_json_has_what_r_makes_of_the_same_table() {
     let json: Value = serde_json::from_str(&said(&evaluate(Path::new("."), &[EXAMPLE, "--json"]))).unwrap();
@@ -84,8 +84,8 @@ fn the_json_has_what_r_makes_of_the_same_table() {
     close(&interaction["f"], 2.22389896551527);
     close(&interaction["p"], 0.130564328444606);
     let odds = &json["responses"][0]["binomial"]["terms"][1];
-    close(&odds["estimate"], 1.5008658105026200);
-    close(&odds["p"], 0.01480901557270615);
+    close(&odds["estimate"], 1.5008658105026169);
+    close(&odds["p"], 0.01480901583914556);
 }
 
 #[test]

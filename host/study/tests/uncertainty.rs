@@ -93,7 +93,7 @@ fn assert_terms(model: &BinomialModel, expected: [(&str, [f64; 4]); 3]) {
 }
 
 /// ```r
-/// control <- glm.control(epsilon = 1e-15, maxit = 100)
+/// control <- glm.control(epsilon = 1e-300, maxit = 30)  # it goes on until nothing changes any more
 /// g <- glm(cbind(damaged, plants - damaged) ~ speed + spacing, family = binomial, control = control)
 /// summary(g)$coefficients; c(g$deviance, g$null.deviance, g$df.residual); fitted(g)[1]
 /// sum(residuals(g, "pearson")^2) / g$df.residual

@@ -12,6 +12,9 @@
 use super::Response;
 use serde::Serialize;
 
+/// The speeds of its trial, least and greatest, km/h: beyond them its slopes say nothing.
+pub const SPEEDS_KM_H: (f64, f64) = (1.0, 2.5);
+
 /// A response as a linear function of speed (A, km/h) and plant spacing (B, cm), as far as it was printed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Coefficients {
