@@ -1,0 +1,76 @@
+//! A trial judged: the equations, what cannot be, and means of treatments.
+
+use super::*;
+
+/// A plot whose figures come out round.
+const PLOT: PlotRecord = PlotRecord {
+    replication: 1,
+    speed_km_h: 1.5,
+    spacing_cm: 50.0,
+    weeds_before: 200,
+    weeds_after: 30,
+    plants: 50,
+    damaged: 1,
+    area_m2: 24.0,
+    time_s: 180.0,
+    width_m: 0.4,
+    power_hp: 2.5,
+};
+
+#[test]
+fn a_plot_is_judged_by_the_paper_s_equations() {
+    let plot = PLOT.performance();
+    let close = |value: f64, expected: f64| assert!((value - expected).abs() < 1e-9, "{value} is not {expected}");
+    close(plot.plant_damage_percent, 2.0);
+    close(plot.weeding_efficiency_percent, 85.0);
+    close(plot.theoretical_capacity_ha_h, 0.06);
+    close(plot.effective_capacity_ha_h, 0.048);
+    close(plot.field_efficiency_percent, 80.0);
+    // 0.048 ha/h * 98 % * 85 % / 2.5 hp
+    close(plot.performance_index, 159.936);
+}
+
+#[test]
+fn a_plot_that_cannot_be_is_named_with_its_place_and_column() {
+    let wrong = |change: fn(&mut PlotRecord)| {
+        let mut plot = PLOT;
+        change(&mut plot);
+        Analysis::of(vec![PLOT, plot]).err().map(|error| error.to_string()).unwrap_or_default()
+    };
+    assert_eq!(wrong(|plot| plot.weeds_after = 201), "plot 2: weeds_after is 201: it cannot exceed weeds_before");
+    assert_eq!(wrong(|plot| plot.damaged = 51), "plot 2: damaged is 51: it cannot exceed plants");
+    assert_eq!(wrong(|plot| plot.time_s = f64::NAN), "plot 2: time_s is NaN: it has to be from 0.1 to 1000000 s");
+    assert_eq!(Analysis::of(Vec::new()).err(), Some(AnalysisError::NoPlots));
+}
+
+#[test]
+fn a_treatment_has_the_means_of_its_plots() {
+    let second = PlotRecord { replication: 2, damaged: 3, ..PLOT };
+    let slow = PlotRecord { speed_km_h: 1.0, ..PLOT };
+    let treatments = Analysis::of(vec![PLOT, second, slow]).unwrap().treatments();
+    let found: Vec<_> = treatments.iter().map(|treatment| (treatment.speed_km_h, treatment.plots)).collect();
+    assert_eq!(found, [(1.0, 1), (1.5, 2)]);
+    assert!((treatments[1].mean.plant_damage_percent - 4.0).abs() < 1e-12);
+}
+
+#[test]
+fn ground_covered_faster_than_the_machine_drives_is_noticed() {
+    let hasty = PlotRecord { replication: 2, time_s: 100.0, ..PLOT };
+    assert_eq!(Analysis::of(vec![PLOT, hasty]).unwrap().faster_than_possible(), [2]);
+}
+
+#[test]
+fn without_damage_anywhere_the_other_measures_still_have_their_models() {
+    let plot = |(index, speed_km_h): (u32, f64)| PlotRecord {
+        replication: index,
+        speed_km_h,
+        damaged: 0,
+        weeds_after: 30 + index,
+        ..PLOT
+    };
+    let analysis = Analysis::of((0..).zip([1.0, 1.0, 2.0, 2.0]).map(plot).collect()).unwrap();
+    let [damage, weeding, ..] = analysis.responses.as_slice() else { panic!("there are four") };
+    assert_eq!(damage.model, Err(NoModel::Constant { value: 0.0 }));
+    assert_eq!(damage.variance, Err(NoModel::Constant { value: 0.0 }));
+    assert!(weeding.model.is_ok() && weeding.variance.is_ok(), "{weeding:?}");
+}
