@@ -4,7 +4,7 @@
 //! one of its parts is [`Said::Other`]. Nothing here knows which command a line answers. Where a setting's name, range and unit
 //! stand in the line, they are taken from there and not from this version's table.
 
-use super::{Status, Told, Values};
+use super::{Status, Told};
 use control::classifier::Class;
 
 /// What a line says.
@@ -25,7 +25,7 @@ pub enum Said {
     Refused(String),
     /// The first line of the answer to `status`.
     Status(Status),
-    /// A line of the answer to `get`.
+    /// A line of the answer to `get`, or the one to `calibrate MM`, which shows what was measured.
     Setting(Shown),
     /// A line of the answer to `help`.
     Help {
@@ -43,8 +43,6 @@ pub enum Said {
         /// What it is an example of.
         label: Class,
     },
-    /// The answer to `calibrate MM`: encoder counts in a metre.
-    TicksPerM(u16),
     /// What the machine tells by itself.
     Told(Told),
     /// Something else.
@@ -88,7 +86,6 @@ impl Said {
             .or_else(|| firmware(line))
             .or_else(|| example(line))
             .or_else(shown)
-            .or_else(|| ticks_per_m(line))
             .or_else(|| help(line))
             .unwrap_or(Self::Other)
     }
@@ -119,11 +116,6 @@ fn example(line: &str) -> Option<Said> {
         _ => return None,
     };
     words.next().map(|_| Said::Example { from_field, number, label })
-}
-
-/// `ticks_per_m=VALUE`, and nothing of its range.
-fn ticks_per_m(line: &str) -> Option<Said> {
-    Values(line).number("ticks_per_m").filter(|_| line.starts_with("ticks_per_m=")).map(Said::TicksPerM)
 }
 
 /// `NAME and what it takes - what it is`.
@@ -238,7 +230,6 @@ mod tests {
         assert_eq!(Said::parse("error: no such command"), Said::Refused("no such command".to_owned()));
         let taught = Said::Example { from_field: true, number: 7, label: Class::Weed };
         assert_eq!(Said::parse("field 7 weed 1 2 3 4 5"), taught);
-        assert_eq!(Said::parse("ticks_per_m=1950"), Said::TicksPerM(1950));
         let help = Said::Help { name: "get".to_owned(), help: "shows settings".to_owned() };
         assert_eq!(Said::parse("get [name] - shows settings"), help);
         let status = "state=work tool=in pos=1 speed_mm_s=2 windows=1 unseen_mm=0";
