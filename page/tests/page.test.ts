@@ -16,10 +16,14 @@ after(() => browser?.close());
 
 const part = (page: Page, name: string) => page.locator(`#try-panel [data-part="${name}"]`);
 
-/** Opens "Try it", and waits until the machine holds. */
+/** Opens "Try it", and waits until its settings are saved and it holds: a switch that is thrown before that does nothing. */
 async function tryIt(viewport = DESK): Promise<Opened> {
     const opened = await open(browser, "try", viewport);
     await pass(opened.page, 0.5);
+    await part(opened.page, "said")
+        .locator("div", { hasText: /clear$/ })
+        .waitFor();
+    await pass(opened.page, 0.3);
     await part(opened.page, "state").filter({ hasText: "hold" }).waitFor();
     return opened;
 }
@@ -100,7 +104,7 @@ test("a plant that was damaged is marked in the row, and told in words", async (
     const opened = await tryIt();
     const { page } = opened;
     await type(page, "set lead_out_ms 0", /^ok$/);
-    await page.getByLabel("Speed").fill("2.5");
+    await page.locator("#speed").fill("2.5");
     await page.getByLabel("Work switch").check();
     while (await page.evaluate(() => globalThis.trial.outcome.totals.plants.damaged === 0)) await pass(page, 0.3);
     await page.locator("#outcome", { hasText: /1 is damaged: the tool was over the canopy\./ }).waitFor();
@@ -112,13 +116,13 @@ test("a plant that was damaged is marked in the row, and told in words", async (
 test("what is moved or broken on the page is moved or broken on the machine", async () => {
     const opened = await tryIt();
     const { page } = opened;
-    for (const [label, value] of [
-        ["Speed", "-0.5"],
-        ["Plant spacing", "400"],
-        ["Tall weeds", "60"],
-        ["Wheel slip", "12"],
+    for (const [slider, value] of [
+        ["speed", "-0.5"],
+        ["spacing", "400"],
+        ["weeds", "60"],
+        ["slip", "12"],
     ] as const)
-        await page.getByLabel(label).fill(value);
+        await page.locator(`#${slider}`).fill(value);
     for (const label of ["Tear the beam's wire", "Kill the encoder"]) await page.getByLabel(label).check();
     await pass(page, 2);
     const found = await page.evaluate(() => {
@@ -133,7 +137,7 @@ test("what is moved or broken on the page is moved or broken on the machine", as
     await page.getByRole("button", { name: "Press reset" }).click();
     await pass(page, 0.5);
     await part(page, "said")
-        .locator("div", { hasText: /reset by external/ })
+        .locator("div", { hasText: /reset by reset_pin/ })
         .waitFor();
     await close(opened);
 });
