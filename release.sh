@@ -55,7 +55,7 @@ cp -r page/dist "$folder/page"
 mkdir "$folder/manual"
 cp -r README.md CHANGELOG.md CONTRIBUTING.md docs "$folder/manual/"
 
-# Licences. What only builds, and is not in what is built, is left out where cargo tells.
+# Licences. What runs only as it is built, and is not in what is built, is left out.
 mkdir -p "$folder/licences/texts"
 cp LICENSE-MIT LICENSE-APACHE "$folder/licences/"
 list=$folder/licences/LICENCES.txt
@@ -63,16 +63,16 @@ cat >"$list" <<'END'
 This project's own files are licensed under MIT or Apache-2.0, at your choice. What else is in this release stands below; texts/ has
 each licence's text where its author gives one.
 
-- weeder has simavr in it (https://github.com/buserror/simavr, by simavr-ffi), which is under GPL-3.0: so is `weeder` as a whole. Its
-  sources are this project's.
+- weeder has simavr in it (https://github.com/buserror/simavr, by simavr-ffi), which is under GPL-3.0: so is `weeder` as a whole, and
+  whoever passes it on has to offer all sources with it. libelf (LGPL-3.0 or GPL-2.0) is in it too.
 - weeder.hex has code of avr-libc (modified BSD) and libgcc (GPL-3.0 with the GCC Runtime Library Exception) in it.
 - The page has avr8js in it (MIT), and this project's firmware and Rust.
 
 END
 # Lines `NAME VERSION LICENCE` of the crates that a package of this repository is linked with.
 crates() {
-    cargo tree --locked --edges normal --no-dedupe --prefix none --format '{p}|{l}' "$@" |
-        sed -e '/ (\//d' -e 's/ (proc-macro)//' -e 's/ v\([0-9][^|]*\)|/ \1 /'
+    cargo tree --locked --edges normal,no-proc-macro --no-dedupe --prefix none --format '{p}|{l}' "$@" |
+        sed -e '/ (\//d' -e 's/ v\([0-9][^|]*\)|/ \1 /'
 }
 sources=(
     "weeder.hex|--package weeder-firmware --features avr --target avr-none"
