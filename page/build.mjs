@@ -1,7 +1,8 @@
 // Makes what runs out of what is written: `node build.mjs page` makes dist/, `node build.mjs tests` makes build/tests/.
 //
-// The page is three files that a browser opens from anywhere, the disk included: the firmware is inside.
-// The firmware's HEX comes from `cargo firmware`, which has to be run first; WEEDER_HEX names another HEX file.
+// The page is three files that a browser opens from anywhere, the disk included: the firmware is inside, and so is the project's
+// own Rust, as a browser gives no page a file of the disk. The firmware's HEX comes from `cargo firmware`, which has to be run
+// first; WEEDER_HEX names another HEX file. The Rust is built here.
 
 import { execFileSync } from "node:child_process";
 import { existsSync, mkdirSync, readdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
@@ -12,10 +13,12 @@ import { build } from "esbuild";
 const here = fileURLToPath(new URL(".", import.meta.url));
 process.chdir(here);
 
+const target = process.env.CARGO_TARGET_DIR ?? "../target";
+
 /** The firmware as a HEX file. */
 function firmware() {
     if (process.env.WEEDER_HEX) return process.env.WEEDER_HEX;
-    const elf = join(process.env.CARGO_TARGET_DIR ?? "../target", "avr-none/firmware/weeder-firmware.elf");
+    const elf = join(target, "avr-none/firmware/weeder-firmware.elf");
     if (!existsSync(elf)) {
         console.error(`${elf} is not there: run \`cargo firmware\` first, or name a HEX file in WEEDER_HEX`);
         process.exit(1);
@@ -23,6 +26,12 @@ function firmware() {
     mkdirSync("build", { recursive: true });
     execFileSync("avr-objcopy", ["-O", "ihex", "-j", ".text", "-j", ".data", elf, "build/weeder.hex"]);
     return "build/weeder.hex";
+}
+
+/** The project's Rust as WebAssembly. */
+function rust() {
+    execFileSync("cargo", ["page", "--quiet"], { stdio: "inherit" });
+    return join(target, "wasm32-unknown-unknown/page/page.wasm");
 }
 
 /** What the manual's table says of alarms and warnings, as a file. */
@@ -42,8 +51,8 @@ const common = {
     target: "es2022",
     // avr8js as modules also for node: its other form looks each function up anew at every call, and takes twice the time.
     mainFields: ["module", "main"],
-    alias: { "weeder.hex": resolve(firmware()), "faults.json": resolve(faults()) },
-    loader: { ".hex": "text" },
+    alias: { "weeder.hex": resolve(firmware()), "page.wasm": resolve(rust()), "faults.json": resolve(faults()) },
+    loader: { ".hex": "text", ".wasm": "binary" },
 };
 
 const what = process.argv[2];

@@ -1,7 +1,12 @@
-// What build.mjs puts in: the firmware, and what the manual says of alarms and warnings.
+// What build.mjs puts in: the firmware, the project's Rust, and what the manual says of alarms and warnings.
 declare module "weeder.hex" {
     const hex: string;
     export default hex;
+}
+
+declare module "page.wasm" {
+    const bytes: Uint8Array<ArrayBuffer>;
+    export default bytes;
 }
 
 declare module "faults.json" {

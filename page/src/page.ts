@@ -8,6 +8,7 @@ import type { Wire } from "./link/session.ts";
 import { Connection } from "./panel/connection.ts";
 import { Panel } from "./panel/panel.ts";
 import { Drawing } from "./try/drawing.ts";
+import { inWords } from "./try/outcome.ts";
 import { Trial } from "./try/trial.ts";
 import { CYCLES_PER_SECOND } from "./uno/uno.ts";
 
@@ -140,12 +141,16 @@ const time = find("time", HTMLSelectElement);
 const workSwitch = find("switch", HTMLInputElement);
 const lamp = find("lamp", HTMLElement);
 const hint = find("hint", HTMLElement);
+const outcome = find("outcome", HTMLElement);
 
 function showTrial(): void {
     const { machine } = trial;
     write("true-tool", machine.isWeeding ? "in the row" : machine.isClear ? "out" : "swings");
     lamp.classList.toggle("lit", trial.isLampLit);
     lamp.ariaLabel = trial.isLampLit ? "status lamp, lit" : "status lamp, dark";
+    const { totals } = trial.outcome;
+    write("outcome", inWords(totals));
+    outcome.classList.toggle("damaged", totals.plants.damaged > 0);
     hint.hidden = !(workSwitch.checked && trialPanel.machine.mode !== "work");
     drawing.draw(trial);
     trialPanel.show();

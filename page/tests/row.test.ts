@@ -37,6 +37,28 @@ test("a wheel that slips turns farther than the machine rolls, from when it slip
     near(turning?.timeS, 2);
 });
 
+test("a motion knows how it rolled until that is forgotten", () => {
+    const motion = new Motion(100);
+    motion.changeSpeed(1, 500, 500);
+    motion.changeSpeed(1.5, 0, 500);
+    motion.slipFrom(1.75, 0.1);
+    for (const fromS of [0, 1.25, 1.5, 1.9]) {
+        let placeMm = motion.placeMm(fromS);
+        let timeS = fromS;
+        for (const { durationS, speedMmS, accelerationMmS2 } of motion.rolled(fromS, 3)) {
+            near(motion.speedMmS(timeS), speedMmS);
+            placeMm += speedMmS * durationS + (accelerationMmS2 * durationS ** 2) / 2;
+            timeS += durationS;
+            near(motion.placeMm(timeS), placeMm);
+        }
+        near(timeS, 3);
+    }
+    near(motion.placeMm(3), 100 + 2 * 62.5);
+    motion.forget(1.6);
+    near(motion.placeMm(1.6), 100 + 62.5 + 250 * 0.1 - 250 * 0.01);
+    assert.equal(motion.rolled(0, 3).length, 3);
+});
+
 test("a row is sown in order and apart, whatever is asked of it, and the same for the same seed", () => {
     const tight = {
         ...PLANTING,

@@ -41,6 +41,8 @@ pub struct Machine {
     pub arm_mm: f64,
     /// Width of the tool, across the row.
     pub tool_width_mm: f64,
+    /// An arm within this angle of fully out is fully out.
+    pub clear_within_degrees: f64,
     /// Dirt on the encoder's disc.
     pub dirt: Dirt,
 }
@@ -78,13 +80,12 @@ impl Default for Machine {
             servo: Servo::default(),
             arm_mm: 350.0,
             tool_width_mm: 55.0,
+            // A tenth of a millimetre at the tool's end.
+            clear_within_degrees: 0.02,
             dirt: Dirt::default(),
         }
     }
 }
-
-/// An arm within this angle of fully out is fully out: a tenth of a millimetre at the tool's end.
-const CLEAR_WITHIN_DEGREES: f64 = 0.02;
 
 impl Machine {
     /// Distance rolled between two encoder counts.
@@ -145,7 +146,7 @@ impl Machine {
 
     /// The times within `during_s` at which the tool is not fully out.
     pub fn times_not_clear_s(&self, stroke: &Stroke, during_s: &Range<f64>) -> Vec<Range<f64>> {
-        stroke.times_below_s(self.servo.stroke_degrees() - CLEAR_WITHIN_DEGREES, during_s)
+        stroke.times_below_s(self.servo.stroke_degrees() - self.clear_within_degrees, during_s)
     }
 
     /// The times within `during_s` at which the tool works the row's line.

@@ -98,6 +98,14 @@ impl Motion {
         self.then(duration_s, 0.0, end_mm, speed_mm_s)
     }
 
+    /// Rolls for a time from a speed on, with an acceleration that does not turn it round. The speed should be the one reached: it is
+    /// given so that errors of rounding do not add up.
+    pub fn roll_for(self, duration_s: f64, speed_mm_s: f64, acceleration_mm_s2: f64) -> Self {
+        let end_mm = self.end_mm + speed_mm_s * duration_s + acceleration_mm_s2 * duration_s.powi(2) / 2.0;
+        let from = Self { end_speed_mm_s: speed_mm_s, ..self };
+        from.then(duration_s, acceleration_mm_s2, end_mm, speed_mm_s + acceleration_mm_s2 * duration_s)
+    }
+
     /// Changes to a speed, negative for rolling back, with an acceleration whose sign does not matter.
     ///
     /// # Panics

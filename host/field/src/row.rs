@@ -10,7 +10,7 @@
 
 use crate::ground::union;
 use files::CsvTable;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::io;
 use std::ops::Range;
@@ -33,7 +33,7 @@ pub const MAX_POSITION_MM: f64 = 1e7;
 pub const MAX_LENGTH_MM: f64 = 6e6;
 
 /// What a thing in the row is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
     /// A crop plant: the tool has to go round it.

@@ -2,8 +2,8 @@
 //!
 //! [`Link::open`] opens an Uno's port, real or virtual, waits out the reset that opening a real one causes, and makes sure
 //! that the weeder's firmware answers. [`Link::ask`] types a command and waits for its answer; [`Link::next_line`] hears
-//! what the machine says by itself, and a [`session`] does both for as long as one likes. What a line means is told by [`Told`] and [`Status`], and [`settings`] and
-//! [`settings_file`] move all settings at once.
+//! what the machine says by itself, and a [`session`] does both for as long as one likes. [`Said`] is what a line means, and
+//! [`settings`] and [`settings_file`] move all settings at once.
 //!
 //! Whatever comes from the port is suspect: noise, lines without an end, a firmware that is not the weeder's. What is kept
 //! of it is bounded, characters that could move a terminal's cursor are taken out, and no wait is endless.
@@ -18,6 +18,7 @@ pub mod log;
 #[cfg(not(target_arch = "wasm32"))]
 mod port;
 pub mod replay;
+mod said;
 pub mod session;
 pub mod settings;
 pub mod settings_file;
@@ -26,7 +27,8 @@ mod told;
 pub use self::lines::LineReader;
 #[cfg(not(target_arch = "wasm32"))]
 pub use self::port::{find_uno, try_port};
-pub use self::told::{Mode, Status, Told, Values};
+pub use self::said::{Said, Shown};
+pub use self::told::{Mode, Status, Timed, Told, Values};
 pub use control::classifier::Class;
 
 use std::collections::VecDeque;
@@ -52,9 +54,6 @@ const BOOT_READS: usize = 150;
 
 /// Times that the version is asked for again.
 const RETRIES: usize = 2;
-
-/// What the firmware's name begins with, in its greeting and its version.
-const NAME: &str = "weeder ";
 
 /// Why there is no link, or no good answer.
 #[derive(Debug, Error)]
@@ -192,9 +191,9 @@ impl Link {
             answer = link.ask("version");
         }
         let answer = answer?;
-        match answer.last().and_then(|line| line.strip_prefix(NAME)) {
-            Some(version) => link.version = version.to_owned(),
-            None => return Err(LinkError::NotTheWeeder(answer.join(" "))),
+        match answer.last().map(|line| Said::parse(line)) {
+            Some(Said::Version(version)) => link.version = version,
+            _ => return Err(LinkError::NotTheWeeder(answer.join(" "))),
         }
         Ok(link)
     }
@@ -214,17 +213,24 @@ impl Link {
         let (mut silent_reads, mut bytes) = (0, 0);
         let mut answer: Vec<String> = Vec::new();
         while silent_reads < SILENT_READS && bytes < ANSWER_BYTES && Instant::now() < deadline {
-            match self.hear()? {
-                Heard::Nothing => silent_reads += 1,
-                Heard::Bytes(count) => bytes += count,
-                Heard::Line(line) if line == "ok" => return Ok(answer),
-                Heard::Line(line) if line.starts_with("error:") => {
-                    return Err(LinkError::Refused { command: command.to_owned(), answer: line });
+            let line = match self.hear()? {
+                Heard::Nothing => {
+                    silent_reads += 1;
+                    continue;
                 }
-                Heard::Line(line) if is_greeting(&line) => return Err(LinkError::Restarted(command.to_owned())),
+                Heard::Bytes(count) => {
+                    bytes += count;
+                    continue;
+                }
+                Heard::Line(line) => line,
+            };
+            match Said::parse(&line) {
+                Said::Done => return Ok(answer),
+                Said::Refused(_) => return Err(LinkError::Refused { command: command.to_owned(), answer: line }),
+                Said::Greeting { .. } => return Err(LinkError::Restarted(command.to_owned())),
                 // Events come before an answer, and never within it.
-                Heard::Line(line) if answer.is_empty() && Told::parse(&line).is_some() => self.told.push_back(line),
-                Heard::Line(line) => answer.push(line),
+                Said::Told(_) if answer.is_empty() => self.told.push_back(line),
+                _ => answer.push(line),
             }
         }
         answer.push(self.lines.partial().to_owned());
@@ -316,7 +322,7 @@ pub fn is_command(line: &str) -> bool {
 
 /// Whether a line is the one by which the firmware says that it has started.
 pub fn is_greeting(line: &str) -> bool {
-    line.starts_with(NAME) && line.contains(", reset by ")
+    matches!(Said::parse(line), Said::Greeting { .. })
 }
 
 /// Whether a read ended without a byte, but may be repeated.

@@ -14,6 +14,7 @@
 //! - Where the state changed is not in the log. The swing that follows says it, and is not judged by its place.
 //! - An alarm that encoder, beam, end switch or stack gave rests on what the log does not hold. It is raised where the log has it.
 //! - Where a log begins with ground already seen, what the tool did there is not judged.
+//! - A command that the firmware refused is left out, as it did nothing there.
 //! - A replay ends where the bench was used (`servo`, `calibrate`, `test`) or examples were forgotten.
 
 mod compare;
@@ -24,10 +25,11 @@ use self::compare::{Bounds, Heard, compare};
 use self::player::Player;
 use super::log::{Entry, Kind};
 use super::settings::{Setting, Settings, shown};
-use super::{Status, Told};
+use super::{Said, Status, Told};
 use control::classifier::label;
 use control::features;
 use knn::Example;
+use std::collections::VecDeque;
 use std::fmt;
 use thiserror::Error;
 
@@ -122,7 +124,11 @@ pub fn replay(log: &[Entry]) -> Result<Replayed, ReplayError> {
 enum Happened<'a> {
     Status(Status),
     Told(Told),
-    Command(&'a str),
+    Command {
+        line: &'a str,
+        /// Whether the firmware answered by an error, and so did nothing.
+        is_refused: bool,
+    },
 }
 
 /// A log from one start of the link to its end.
@@ -141,6 +147,8 @@ impl<'a> Stretch<'a> {
         let mut settings = Settings::new();
         let (mut examples, mut built_in) = (Vec::new(), 0);
         let mut happened = Vec::new();
+        // Places in `happened` of the commands that are not answered yet. Answers come in their order.
+        let mut unanswered = VecDeque::new();
         for entry in entries {
             let wrong = |problem: &str| {
                 let problem = format!("`{}` is {problem}", entry.text);
@@ -163,8 +171,18 @@ impl<'a> Stretch<'a> {
                     let told = Told::parse(&entry.text).ok_or_else(|| wrong("no event"))?;
                     happened.push((entry, Happened::Told(told)));
                 }
-                Kind::Command => happened.push((entry, Happened::Command(&entry.text))),
-                Kind::Answer | Kind::Connected | Kind::Lost => {}
+                Kind::Command => {
+                    unanswered.push_back(happened.len());
+                    happened.push((entry, Happened::Command { line: &entry.text, is_refused: false }));
+                }
+                Kind::Answer => {
+                    let Some(is_error) = end_of_answer(&entry.text) else { continue };
+                    let place = unanswered.pop_front();
+                    if let Some((_, Happened::Command { is_refused, .. })) = place.map(|place| &mut happened[place]) {
+                        *is_refused = is_error;
+                    }
+                }
+                Kind::Connected | Kind::Lost => {}
             }
         }
         let first = happened.iter().find_map(|(_, happened)| match happened {
@@ -212,7 +230,8 @@ impl<'a> Stretch<'a> {
                     }
                     logged.push(Heard { line: entry.number, told: *told, speed: player.speed().0, is_given });
                 }
-                Happened::Command(line) => {
+                Happened::Command { is_refused: true, .. } => {}
+                Happened::Command { line, .. } => {
                     if let Some(at) = self.place_of_command(entry.time_ms, &last, place) {
                         player.roll_to(at, &last.0, self.next_status(place));
                         last.0.position = player.position();
@@ -307,6 +326,15 @@ impl<'a> Stretch<'a> {
     }
 }
 
+/// Whether a line that ends an answer is an error; none where it ends none.
+fn end_of_answer(line: &str) -> Option<bool> {
+    match Said::parse(line) {
+        Said::Done => Some(false),
+        Said::Refused(_) => Some(true),
+        _ => None,
+    }
+}
+
 /// Reads a line of the examples; none where it only counts those that are spoiled.
 fn example(line: &str) -> Result<Option<Example<{ features::COUNT }>>, ()> {
     let words: Vec<&str> = line.split(' ').collect();
@@ -323,5 +351,51 @@ fn example(line: &str) -> Result<Option<Example<{ features::COUNT }>>, ()> {
         }
         [line] if line.starts_with("spoiled=") => Ok(None),
         _ => Err(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The log of a machine that rolls at half a metre a second over bare ground. At each of the statuses, ten a second, something
+    /// is typed and answered, or told.
+    fn log(statuses: u64, happens: impl Fn(u64) -> Vec<(Kind, &'static str)>) -> Vec<Entry> {
+        let mut lines = vec![(0, Kind::Connected, "0.1.0".to_owned())];
+        for status in 0..statuses {
+            let (time_ms, position) = (100 * status, status as i64 * 95);
+            let unseen_mm = 400_u64.saturating_sub(50 * status);
+            let line = format!("state=hold tool=out pos={position} speed_mm_s=500 windows=0 unseen_mm={unseen_mm}");
+            lines.push((time_ms, Kind::Status, line));
+            lines.extend(happens(status).into_iter().map(|(kind, line)| (time_ms + 1, kind, line.to_owned())));
+        }
+        let entry = |(place, (time_ms, kind, text))| Entry { number: place as u64 + 2, time_ms, kind, text };
+        lines.into_iter().enumerate().map(entry).collect()
+    }
+
+    #[test]
+    fn a_command_that_the_firmware_refused_is_not_carried_out() {
+        let refused = "error: an alarm is latched, look after it and clear it first";
+        let start = |end: &'static str| vec![(Kind::Command, "start"), (Kind::Answer, end)];
+        let never = log(20, |status| if status == 2 { start(refused) } else { Vec::new() });
+        let replayed = replay(&never).unwrap();
+        assert_eq!((replayed.difference, replayed.swings), (None, 0));
+
+        // The same start where it was taken has the tool come into the row.
+        let taken = log(20, |status| if status == 2 { start("ok") } else { Vec::new() });
+        let difference = replay(&taken).unwrap().difference.expect("the log has no swing");
+        assert!(difference.replayed.contains("swing tool=in"), "{difference}");
+    }
+
+    #[test]
+    fn answers_belong_to_commands_in_their_order() {
+        // `hold` does not wait for the answer before it.
+        let log = log(20, |status| match status {
+            2 => vec![(Kind::Command, "set margin_mm 9999"), (Kind::Command, "start")],
+            3 => vec![(Kind::Answer, "error: margin_mm takes a whole number from 0 to 200"), (Kind::Answer, "ok")],
+            _ => Vec::new(),
+        });
+        let difference = replay(&log).unwrap().difference.expect("the start was taken");
+        assert!(difference.replayed.contains("swing tool=in"), "{difference}");
     }
 }

@@ -6,7 +6,7 @@
 //! command that changes settings it asks for them anew.
 
 use super::settings::{self, Settings, SettingsError};
-use super::{Link, LinkError, Status, Told, is_greeting};
+use super::{Link, LinkError, Said, Status, Told, is_greeting};
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
@@ -193,20 +193,21 @@ impl Session {
 
     /// Takes a line, and knows whose it is.
     fn take(&mut self, line: String) {
-        let is_end = line == "ok" || line.starts_with("error:");
-        if !is_end && let Some(told) = Told::parse(&line) {
-            self.settings_changed |= told == Told::Calibrated;
+        let said = Said::parse(&line);
+        if let Said::Told(told) = said {
+            self.settings_changed |= matches!(told, Told::Calibrated { .. });
             self.happened.push_back(Happening::Told(told, line));
             return;
         }
+        let is_end = matches!(said, Said::Done | Said::Refused(_));
         match &mut self.asked {
             Some((Question::Status, _)) => {
-                if let Some(status) = Status::parse(&line) {
+                if let Said::Status(status) = said {
                     self.happened.push_back(Happening::Status(status, line));
                 }
             }
             Some((Question::Command, _)) => {
-                self.settings_changed |= line == "ok" && changes_settings(&self.asked_for);
+                self.settings_changed |= said == Said::Done && changes_settings(&self.asked_for);
                 self.happened.push_back(Happening::Answer(line));
             }
             Some((Question::Settings(lines), _)) if is_end => match settings::shown_by(lines) {

@@ -44,10 +44,26 @@ pub enum Told {
     },
     /// Something that the operator should know of.
     Warning(Warning),
-    /// What came of timing the servo, in words for the operator.
-    Calibrated,
+    /// What came of timing the servo.
+    Calibrated {
+        /// By what it was timed.
+        by: Timed,
+        /// Whether the leads that follow from it are in use.
+        is_set: bool,
+    },
     /// Points of a plotter's curves.
     Plot,
+}
+
+/// By what the servo was timed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Timed {
+    /// By the end switch.
+    EndSwitch,
+    /// By the operator, who has seen it swing.
+    Eye,
+    /// In vain: the end switch did not follow.
+    None,
 }
 
 /// What the machine is doing, without the reason for an alarm.
@@ -151,7 +167,15 @@ impl Told {
                 position: values.number("pos")?,
             }),
             "warning" => Warning::find(values.text("name")?.as_bytes()).map(Self::Warning),
-            "calibrated" => Some(Self::Calibrated),
+            "calibrated" => {
+                let by = match values.text("by") {
+                    None => Timed::EndSwitch,
+                    Some("eye,") => Timed::Eye,
+                    Some("none,") => Timed::None,
+                    Some(_) => return None,
+                };
+                Some(Self::Calibrated { by, is_set: values.text("set") == Some("yes") })
+            }
             _ => None,
         }
     }
@@ -185,7 +209,7 @@ impl Status {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use control::calibration::Outcome;
+    use control::calibration::{Leads, Outcome};
     use control::classifier::Vote;
     use control::controller::State;
     use control::event::Event;
@@ -219,8 +243,16 @@ mod tests {
             assert_eq!(Told::parse(&line(event)), Some(Told::Alarm { alarm, position: 1 }));
             assert_eq!(Told::parse(&line(Event::State(State::Alarm(alarm)))), Some(Told::State(Mode::Alarm)));
         }
-        let calibrated = Event::Calibrated { outcome: Outcome::Shown, fits: true };
-        assert_eq!(Told::parse(&line(calibrated)), Some(Told::Calibrated));
+        let measured = Outcome::Measured(Leads { out_ms: 150, in_ms: 40 });
+        for (outcome, fits, by) in [
+            (measured, true, Timed::EndSwitch),
+            (measured, false, Timed::EndSwitch),
+            (Outcome::Shown, false, Timed::Eye),
+            (Outcome::Failed, false, Timed::None),
+        ] {
+            let calibrated = Event::Calibrated { outcome, fits };
+            assert_eq!(Told::parse(&line(calibrated)), Some(Told::Calibrated { by, is_set: fits }));
+        }
         let warning = Event::Warning(Warning::NoPlants);
         assert_eq!(Told::parse(&line(warning)), Some(Told::Warning(Warning::NoPlants)));
     }

@@ -1,8 +1,10 @@
 // What a line of the machine means. This is the page's one door to the console's grammar: whoever wants to know what was
-// said asks `read`, and nobody else takes a line apart.
+// said asks `read`, and nobody else takes a line apart. Behind it is the project's own Rust (host/link/src/said.rs), of which
+// these are the types.
 //
-// Keys that are not known are passed over, so that a newer firmware may say more; a line that lacks one of its keys is
-// `other`. Commands are put together where they are typed; their words stand in the firmware's help.
+// Commands are put together where they are typed; their words stand in the firmware's help.
+
+import { ask } from "../core.ts";
 
 /** What the machine is doing. */
 export type Mode = "hold" | "work" | "alarm";
@@ -11,10 +13,10 @@ export type Mode = "hold" | "work" | "alarm";
 export interface Status {
     readonly mode: Mode;
     /** The latched alarm's name. */
-    readonly alarm: string | undefined;
+    readonly alarm?: string;
     readonly toolOut: boolean;
     /** Why the tool is out while the machine works, in the console's word. */
-    readonly reason: string | undefined;
+    readonly reason?: string;
     readonly position: number;
     /** Negative backwards. */
     readonly speedMmS: number;
@@ -47,7 +49,7 @@ export interface Setting {
     readonly isSwitched: boolean;
     readonly default: number;
     /** Nothing where none are saved. */
-    readonly saved: number | undefined;
+    readonly saved?: number;
 }
 
 /** What a line says. */
@@ -57,7 +59,7 @@ export type Said =
     /** The answer to `version`. */
     | { is: "version"; version: string }
     /** The end of an answer: what was wrong, and what would be right, where something was. */
-    | { is: "end"; error: string | undefined }
+    | { is: "end"; error?: string }
     | { is: "status"; status: Status }
     | { is: "setting"; setting: Setting }
     /** What a setting or a command is. */
@@ -80,111 +82,27 @@ export function isTold({ is }: Said): boolean {
     return ["object", "state", "swing", "alarm", "warning", "calibrated", "plot"].includes(is);
 }
 
-const OTHER: Said = { is: "other" };
-const SETTING =
-    /^(\w+)=(\w+)(?: ([a-z/]+))?(?: from (\d+) to (\d+)| on or off), default (\w+)(?:, saved (\w+)|(, not saved))?$/;
-
 /** Reads a line. */
 export function read(line: string): Said {
-    if (line === "ok") return { is: "end", error: undefined };
-    if (line.startsWith("error:")) return { is: "end", error: line.slice("error:".length).trim() };
-    const greeting = /^weeder (\S+), reset by (\w+)/.exec(line);
-    if (greeting) return { is: "greeting", version: greeting[1] ?? "", cause: greeting[2] ?? "" };
-    const version = /^weeder (\S+)$/.exec(line);
-    if (version) return { is: "version", version: version[1] ?? "" };
-    const example = /^(field|built_in) (\d+) (plant|weed) /.exec(line);
-    if (example)
-        return {
-            is: "example",
-            fromField: example[1] === "field",
-            number: Number(example[2]),
-            label: example[3] ?? "",
-        };
-    const help = /^(\w+)[^=]*? - (.*)$/.exec(line);
-    if (help) return { is: "help", name: help[1] ?? "", help: help[2] ?? "" };
-    if (/^>?\w+:-?\d+(,\w+:-?\d+)*$/.test(line)) return { is: "plot" };
-    const setting = SETTING.exec(line);
-    if (setting) return readSetting(setting);
-    return readValues(line);
+    return ask<Said>({ read: line });
 }
 
-/** A setting's value, which may be switched. */
-function value(word: string): number {
-    return word === "on" ? 1 : word === "off" ? 0 : Number(word);
+/** The order in which values can be sent, or why they cannot be at all. */
+export interface Steps {
+    /** What contradicts what, and what would be right. */
+    readonly contradiction?: string;
+    readonly steps: readonly (readonly [name: string, value: number])[];
 }
 
-function readSetting([
-    ,
-    name = "",
-    is = "",
-    unit = "",
-    least,
-    greatest,
-    usual = "",
-    saved,
-    unsaved,
-]: RegExpExecArray): Said {
-    const isSwitched = least === undefined;
-    const setting = {
-        name,
-        value: value(is),
-        unit,
-        least: Number(least ?? 0),
-        greatest: Number(greatest ?? 1),
-        isSwitched,
-        default: value(usual),
-        saved: unsaved ? undefined : value(saved ?? is),
-    };
-    return { is: "setting", setting };
-}
-
-/** Reads what is `name key=value key=value`. */
-function readValues(line: string): Said {
-    const [first = ""] = line.split(" ");
-    const values = new Map([...line.matchAll(/(\w+)=(\S+)/g)].map(([, key = "", value = ""]) => [key, value]));
-    const text = (key: string) => values.get(key) ?? "";
-    const number = (key: string) => Number.parseInt(text(key), 10);
-    const mode = (key: string) => ["hold", "work", "alarm"].find((mode) => mode === text(key)) as Mode | undefined;
-    switch (first) {
-        case "plant":
-        case "weed":
-        case "unknown": {
-            const seen = {
-                class: first,
-                position: number("pos"),
-                votes: number("votes"),
-                spacing: number("spacing"),
-                delay: number("delay"),
-                hold: number("hold"),
-            } as const;
-            return Number.isNaN(seen.position + seen.delay + seen.hold) ? OTHER : { is: "object", seen };
-        }
-        case "swing":
-            return text("tool") === "" ? OTHER : { is: "swing", out: text("tool") === "out" };
-        case "state": {
-            const is = mode("is");
-            return is ? { is: "state", mode: is } : OTHER;
-        }
-        case "alarm":
-        case "warning":
-            return text("name") === "" ? OTHER : { is: first, name: text("name") };
-        case "calibrated": {
-            const by = text("by").startsWith("eye") ? "eye" : text("by").startsWith("none") ? "none" : "end switch";
-            return { is: "calibrated", by, isSet: text("set") === "yes" };
-        }
-        default:
-    }
-    const state = mode("state");
-    if (!state || Number.isNaN(number("pos") + number("speed_mm_s") + number("unseen_mm"))) return OTHER;
-    const status = {
-        mode: state,
-        alarm: values.get("alarm"),
-        toolOut: text("tool") === "out",
-        reason: values.get("for"),
-        position: number("pos"),
-        speedMmS: number("speed_mm_s"),
-        windows: number("windows"),
-        unseenMm: number("unseen_mm"),
-    };
-    return { is: "status", status };
+/**
+ * The values to send that lead from the machine's settings to some others, with no contradiction on the way. What no setting's
+ * value can be goes last, for the machine to say what is wrong with it.
+ */
+export function steps(from: readonly Setting[], to: ReadonlyMap<string, number>): Steps {
+    const canBe = (value: number) => Number.isInteger(value) && value >= 0 && value <= 65_535;
+    const values = from.map(({ name, value }) => [name, value] as const);
+    const [good, bad] = [true, false].map((good) => [...to].filter(([, value]) => canBe(value) === good));
+    const change = { from: Object.fromEntries(values), to: Object.fromEntries(good ?? []) };
+    const { steps, ...rest } = ask<Steps>({ steps: change });
+    return { ...rest, steps: [...steps, ...(bad ?? [])] };
 }

@@ -1,7 +1,7 @@
 // Calibration, step by step: the wheel over a measured stretch, then the servo's pulses and times.
 
 import type { Parts } from "../dom.ts";
-import type { Said } from "../link/grammar.ts";
+import { read, type Said } from "../link/grammar.ts";
 import { Refused } from "../link/session.ts";
 import type { Machine } from "./machine.ts";
 import type { Ask } from "./panel.ts";
@@ -92,9 +92,10 @@ export class Calibration {
         force_.hidden = true;
         const distance = this.#parts.get("wheel-mm", HTMLInputElement).value;
         try {
-            const [line = ""] = await this.#ask(`calibrate ${distance}${force}`);
-            const ticks = /^ticks_per_m=(\d+)/.exec(line)?.[1] ?? "";
-            this.#parts.write("wheel-said", `${ticks} encoder counts a metre. Not saved yet.`);
+            const said = (await this.#ask(`calibrate ${distance}${force}`)).map(read);
+            const measured = said.find((said) => said.is === "setting");
+            const counts = measured ? `${measured.setting.value} encoder counts a metre. ` : "";
+            this.#parts.write("wheel-said", `${counts}Not saved yet.`);
         } catch (error) {
             this.#parts.write("wheel-said", error instanceof Error ? error.message : String(error));
             force_.hidden = !(error instanceof Refused && error.message.includes("force"));

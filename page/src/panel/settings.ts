@@ -2,9 +2,9 @@
 // kept in a file and taken from one.
 
 import { download, make, type Parts } from "../dom.ts";
-import type { Setting } from "../link/grammar.ts";
+import { steps as order, type Setting } from "../link/grammar.ts";
 import { parse, range, SettingsFileError, write } from "../link/settings_file.ts";
-import type { Machine } from "./machine.ts";
+import { type Machine, sentence } from "./machine.ts";
 import type { Ask } from "./panel.ts";
 
 export class SettingsForm {
@@ -129,28 +129,26 @@ export class SettingsForm {
     }
 
     /**
-     * Sends what was changed. A value that contradicts one that is yet to be changed is refused by the machine, and goes again
-     * behind the others; what is refused when nothing else has gone stays refused, with the machine's words.
+     * Sends what was changed, in an order in which no value contradicts one that is yet to be sent, and saves it. What contradicts
+     * itself in the end is not sent; what the machine refuses is shown with its words.
      */
     async #send(): Promise<void> {
         this.#problems.clear();
-        let rest = [...this.#wanted];
-        const sent = rest.length;
-        for (let left = Number.POSITIVE_INFINITY; rest.length > 0 && rest.length < left; ) {
-            left = rest.length;
-            this.#problems.clear();
-            const refused: typeof rest = [];
-            for (const [name, value] of rest)
-                try {
-                    const setting = this.#machine.settings.find((setting) => setting.name === name);
-                    await this.#ask(`set ${name} ${setting?.isSwitched ? (value === 1 ? "on" : "off") : value}`);
-                } catch (error) {
-                    refused.push([name, value]);
-                    this.#problems.set(name, error instanceof Error ? error.message : String(error));
-                }
-            rest = refused;
+        const { settings } = this.#machine;
+        const { contradiction, steps } = order(settings, this.#wanted);
+        if (contradiction) {
+            this.#say(`${sentence(contradiction)} Nothing was sent.`);
+            return;
         }
-        if (rest.length > 0) this.#say(`${rest.length} of ${sent} were refused, and nothing is saved: see there.`);
+        for (const [name, value] of steps)
+            try {
+                const setting = settings.find((setting) => setting.name === name);
+                await this.#ask(`set ${name} ${setting?.isSwitched ? (value === 1 ? "on" : "off") : value}`);
+            } catch (error) {
+                this.#problems.set(name, error instanceof Error ? error.message : String(error));
+            }
+        const { size } = this.#problems;
+        if (size > 0) this.#say(`${size} of ${steps.length} were refused, and nothing is saved: see there.`);
         else
             try {
                 await this.#ask("save");

@@ -42,7 +42,7 @@ export const DIMENSIONS: Dimensions = {
  * An arm within this angle of fully out is fully out: half a millimetre at the tool's end, and 1 us of a pulse, whose edges
  * avr8js does not place more exactly (docs/simulators.md).
  */
-const CLEAR_WITHIN_DEGREES = 0.09;
+export const CLEAR_WITHIN_DEGREES = 0.09;
 
 /** Levels of the channels A and B in the four phases of forward motion. */
 const CHANNELS = [
@@ -66,6 +66,8 @@ export class Machine {
     readonly motion: Motion;
     readonly dimensions: Dimensions;
     readonly servo: Servo;
+    /** The servo has taken a pulse for a command: the cycles of its edges. */
+    onCommand: (rise: number, fall: number) => void = () => {};
     readonly faults: Faults = { beamWireTorn: false, encoderDead: false };
     /** Counts of a perfect encoder, net, since the machine was put in front of the row. */
     ticks = 0;
@@ -100,7 +102,8 @@ export class Machine {
         uno.onLevel = (pin, high, cycle) => {
             if (pin !== PIN.servo) return;
             if (high) this.#pulseRise = cycle;
-            else this.servo.hear(((cycle - this.#pulseRise) / CYCLES_PER_SECOND) * 1e6, this.timeS(cycle));
+            else if (this.servo.hear(((cycle - this.#pulseRise) / CYCLES_PER_SECOND) * 1e6, this.timeS(cycle)))
+                this.onCommand(this.#pulseRise, cycle);
         };
     }
 

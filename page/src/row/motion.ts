@@ -2,7 +2,8 @@
 //
 // A motion is a chain of pieces of constant acceleration, the last of which goes on for ever. Each piece keeps its
 // direction, so the moment at which a place is passed follows from one quadratic equation and no time step is involved:
-// the edges of an encoder come out at their exact times. `changeSpeed` and `slipFrom` change what is yet to come.
+// the edges of an encoder come out at their exact times. `changeSpeed` and `slipFrom` change what is yet to come; what was
+// is kept until somebody has it forgotten.
 //
 // A driven wheel turns farther than the machine rolls: its slip is the share of the wheel's way that is lost.
 
@@ -15,6 +16,13 @@ export function mmS(speedKmH: number): number {
 export interface Passing {
     readonly timeS: number;
     readonly forward: boolean;
+}
+
+/** How it rolled for a time. */
+export interface Rolled {
+    readonly durationS: number;
+    readonly speedMmS: number;
+    readonly accelerationMmS2: number;
 }
 
 /** A stretch of constant acceleration in which the direction does not change. */
@@ -64,7 +72,7 @@ export class Motion {
         this.#pieces = [{ ...standing, startS, endS: Number.POSITIVE_INFINITY }];
     }
 
-    /** Where the machine is; the time must not lie before the last change. */
+    /** Where the machine is; of times that are forgotten it knows nothing. */
     placeMm(timeS: number): number {
         return placeMm(this.#pieceAt(timeS), timeS);
     }
@@ -134,6 +142,21 @@ export class Motion {
         });
     }
 
+    /** How it rolled from one time to another: pieces without a gap, each with its speed at its beginning. */
+    rolled(fromS: number, toS: number): Rolled[] {
+        const within = this.#pieces.filter(({ startS, endS }) => endS > fromS && startS < toS);
+        return within.map((piece) => {
+            const startS = Math.max(piece.startS, fromS);
+            const durationS = Math.min(piece.endS, toS) - startS;
+            return { durationS, speedMmS: speedMmS(piece, startS), accelerationMmS2: piece.accelerationMmS2 };
+        });
+    }
+
+    /** Forgets what was before a time. */
+    forget(beforeS: number): void {
+        this.#pieces = this.#pieces.filter(({ endS }) => endS > beforeS);
+    }
+
     #next(fromS: number, target: (piece: Piece, forward: boolean) => number): Passing | undefined {
         for (const piece of this.#pieces) {
             if (piece.endS < fromS || (piece.speedMmS === 0 && piece.accelerationMmS2 === 0)) continue;
@@ -155,7 +178,7 @@ export class Motion {
         return piece;
     }
 
-    /** Forgets what was, and goes on from a time at the speed then reached: that piece, without end. */
+    /** Keeps what was, and goes on from a time at the speed then reached: that piece, without end. */
     #cut(fromS: number): Piece {
         const piece = this.#pieceAt(fromS);
         const going: Piece = {
@@ -167,7 +190,8 @@ export class Motion {
             wheelStartMm: wheelMm(piece, fromS),
             wheelMmAMm: piece.wheelMmAMm,
         };
-        this.#pieces = [going];
+        const was = this.#pieces.filter(({ startS }) => startS < fromS);
+        this.#pieces = [...was.map((piece) => ({ ...piece, endS: Math.min(piece.endS, fromS) })), going];
         return going;
     }
 

@@ -44,16 +44,17 @@ export class Servo {
         this.kind = kind;
     }
 
-    /** Hears a pulse, at its falling edge. */
-    hear(widthUs: number, timeS: number): void {
-        if (widthUs < WIDTHS_US.least || widthUs > WIDTHS_US.greatest) return;
-        if (Math.abs(widthUs - this.#widthUs) < DEAD_BAND_US) return;
+    /** Hears a pulse, at its falling edge; whether it is a command. */
+    hear(widthUs: number, timeS: number): boolean {
+        if (widthUs < WIDTHS_US.least || widthUs > WIDTHS_US.greatest) return false;
+        if (Math.abs(widthUs - this.#widthUs) < DEAD_BAND_US) return false;
         this.#widthUs = widthUs;
         this.commands += 1;
         const { inUs, outUs, deadTimeMs } = this.kind;
         const fromS = timeS + deadTimeMs / 1000;
         const toDegrees = ((widthUs - inUs) / (outUs - inUs)) * OUT_DEGREES;
         this.#turns.push({ fromS, fromDegrees: this.degrees(fromS), toDegrees });
+        return true;
     }
 
     /** The angle at a time, which must not lie before the last one asked for by more than the dead time; 0 is in the row. */

@@ -4,6 +4,7 @@
 // is put there once and moved with it, and taken away when it has left the picture.
 
 import { span, type Thing } from "../row/row.ts";
+import type { Verdict } from "./outcome.ts";
 import type { Trial } from "./trial.ts";
 
 const SVG = "http://www.w3.org/2000/svg";
@@ -15,6 +16,13 @@ const BEHIND = { share: 0.3, mostMm: 700 };
 /** Distance between two short weeds, on the mean, and how far from the row's line they stand at most. */
 const SPECK_SPACING_MM = 14;
 const SPECK_ACROSS_MM = 150;
+
+/** A tick for a plant that was kept, a bar where its margin was cut, and a cross where it was damaged. */
+const SIGNS: Readonly<Record<Verdict, string>> = {
+    kept: "M-16 0L-5 12L17 -13",
+    "margin cut": "M-16 0H16",
+    damaged: "M-14 -14L14 14M-14 14L14 -14",
+};
 
 function make<Name extends keyof SVGElementTagNameMap>(
     name: Name,
@@ -104,6 +112,7 @@ export class Drawing {
         this.#ground.setAttribute("transform", `translate(${-toolMm} 0)`);
         const [fromMm, toMm] = [toolMm - behindMm, toolMm - behindMm + lengthMm];
         this.#drawThings(machine.row.things, fromMm, toMm);
+        this.#drawVerdicts(trial);
         this.#drawSpecks(fromMm, toMm);
         const way = trial.track.map(({ alongMm, acrossMm }) => `${alongMm.toFixed(1)} ${(-acrossMm).toFixed(1)}`);
         this.#track.setAttribute("d", way.length > 1 ? `M${way.join("L")}` : "");
@@ -149,6 +158,23 @@ export class Drawing {
             const shape = thingShape(thing);
             this.#shapes.set(index, shape);
             this.#things.append(shape);
+        }
+    }
+
+    /** Puts a sign at each plant that is judged. */
+    #drawVerdicts({ machine, outcome }: Trial): void {
+        for (const [index, shape] of this.#shapes) {
+            const [thing, verdict] = [machine.row.things[index], outcome.plants.get(index)];
+            if (!thing || !verdict || shape.dataset.verdict === verdict) continue;
+            shape.dataset.verdict = verdict;
+            const way = SIGNS[verdict];
+            const sign = make("path", {
+                class: "verdict",
+                d: way,
+                transform: `translate(0 ${thing.widthMm / 2 + 32})`,
+            });
+            shape.querySelector(".verdict")?.remove();
+            shape.append(sign);
         }
     }
 

@@ -1,7 +1,7 @@
 // A trial without an end: the real firmware on the virtual Uno, a machine, and a row that goes on for as long as it rolls.
 //
-// `advance` lets time pass. What the operator does, to the machine or to the row, he may do between two calls. What
-// became of a plant is not said here: `onStep` is where somebody can look on who judges it.
+// `advance` lets time pass. What the operator does, to the machine or to the row, he may do between two calls. `outcome`
+// knows what became of each plant that the tool has left behind.
 
 import type { Seen } from "../link/grammar.ts";
 import type { Happening } from "../link/session.ts";
@@ -9,6 +9,7 @@ import { Machine, PIN } from "../row/machine.ts";
 import { Motion, mmS } from "../row/motion.ts";
 import { chance, PLANTING, type Planting, Row, sow } from "../row/row.ts";
 import { CYCLES_PER_SECOND, Uno } from "../uno/uno.ts";
+import { Outcome } from "./outcome.ts";
 
 /** Ground that lies sown ahead of the beam. */
 const SOWN_AHEAD_MM = 2000;
@@ -37,8 +38,7 @@ export class Trial {
     readonly uno: Uno;
     readonly machine: Machine;
     readonly planting: Planting = { ...PLANTING };
-    /** Called at each count of the encoder and each change of the beam, with the machine there. */
-    onStep: (machine: Machine) => void = () => {};
+    readonly outcome: Outcome;
     /** What the firmware sends. */
     onText: (text: string) => void = () => {};
     windows: Window[] = [];
@@ -53,6 +53,7 @@ export class Trial {
         const row = new Row();
         sow(row, SOWN_AHEAD_MM, this.planting, this.#random, FIRST_MM);
         this.machine = new Machine(this.uno, row, new Motion(0));
+        this.outcome = new Outcome(this.machine);
         this.uno.onByte = (byte) => this.onText(String.fromCharCode(byte));
         this.#mark();
     }
@@ -65,11 +66,9 @@ export class Trial {
         const until = performance.now() + budgetMs;
         while (uno.cycle < end && performance.now() < until) {
             sow(machine.row, machine.placeMm + SOWN_AHEAD_MM, this.planting, this.#random, FIRST_MM);
-            machine.runUntil(Math.min(end, uno.cycle + SLICE_CYCLES), () => {
-                this.#mark();
-                this.onStep(machine);
-            });
+            machine.runUntil(Math.min(end, uno.cycle + SLICE_CYCLES), () => this.#mark());
         }
+        this.outcome.judge();
         this.#forget();
         return (uno.cycle - begin) / CYCLES_PER_SECOND;
     }
@@ -104,6 +103,10 @@ export class Trial {
         if (happening.is === "started") {
             this.#zero = this.machine.ticks;
             this.windows = [];
+        }
+        if (happening.is === "connected" || happening.is === "settings") {
+            const margin = happening.settings.find(({ name }) => name === "margin_mm");
+            if (margin) this.outcome.marginMm = margin.value;
         }
         if (happening.is !== "told") return;
         const { said } = happening;

@@ -136,7 +136,7 @@ impl Model {
                     Some(format!("warning {}: {}", name_of(warning.text().bytes()), advice::warning(warning)));
             }
             Told::Plot => return,
-            Told::Swing { .. } | Told::State(_) | Told::Calibrated => {}
+            Told::Swing { .. } | Told::State(_) | Told::Calibrated { .. } => {}
         }
         self.say(line);
     }

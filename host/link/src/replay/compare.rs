@@ -150,6 +150,6 @@ fn describe(heard: Option<&Heard>) -> String {
             let name: String = alarm.text().bytes().map(char::from).collect();
             format!("`alarm name={name} pos={position}`")
         }
-        Told::State(_) | Told::Warning(_) | Told::Calibrated | Told::Plot => "something else".to_owned(),
+        Told::State(_) | Told::Warning(_) | Told::Calibrated { .. } | Told::Plot => "something else".to_owned(),
     }
 }

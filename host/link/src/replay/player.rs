@@ -260,7 +260,7 @@ impl<'a> Player<'a> {
             Ok(Command::Hold) => self.controller.hold(),
             Ok(Command::Clear) => self.controller.clear(),
             Ok(Command::Set(setting, value)) => {
-                // Refused here as there.
+                // Where the answer was lost, it is refused here as there.
                 let _ = self.controller.set(setting, value);
             }
             Ok(Command::Label { label, force }) => {
@@ -313,8 +313,8 @@ fn canopies(stretch: &Stretch) -> Vec<Canopy> {
                 let from = position.wrapping_sub(settings.ticks(Setting::MaxWidthMm).0 + 1);
                 canopies.push(Canopy { from, to: position.wrapping_add(1), seen: None });
             }
-            Happened::Command(line) => {
-                // The holds behind it have the new margin. Refused here as there.
+            Happened::Command { line, is_refused: false } => {
+                // The holds behind it have the new margin.
                 if let Ok(Command::Set(setting, value)) = console::parse(line.as_bytes()) {
                     let _ = settings.set(setting, value);
                 }

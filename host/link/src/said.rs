@@ -1,0 +1,298 @@
+//! What any line of the console is: the greeting, an end of an answer, a line of an answer, or something told unasked.
+//!
+//! Keys and words behind those that are known here are passed over, so that a newer firmware may say more; a line that lacks
+//! one of its parts is [`Said::Other`]. Nothing here knows which command a line answers. Where a setting's name, range and unit
+//! stand in the line, they are taken from there and not from this version's table.
+
+use super::{Status, Told};
+use control::classifier::Class;
+
+/// What a line says.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Said {
+    /// The first line after a reset.
+    Greeting {
+        /// The firmware's version.
+        version: String,
+        /// Why it started, in its word.
+        cause: String,
+    },
+    /// The answer to `version`.
+    Version(String),
+    /// The end of an answer: what was asked is done.
+    Done,
+    /// The end of an answer: what was wrong, and what would be right.
+    Refused(String),
+    /// The first line of the answer to `status`.
+    Status(Status),
+    /// A line of the answer to `get`, or the one to `calibrate MM`, which shows what was measured.
+    Setting(Shown),
+    /// A line of the answer to `help`.
+    Help {
+        /// A setting's or a command's name.
+        name: String,
+        /// What it is.
+        help: String,
+    },
+    /// A line of the answer to `examples`.
+    Example {
+        /// Whether it was taught, and is not a built-in one.
+        from_field: bool,
+        /// Its number, of its kind.
+        number: u16,
+        /// What it is an example of.
+        label: Class,
+    },
+    /// What the machine tells by itself.
+    Told(Told),
+    /// Something else.
+    Other,
+}
+
+/// A setting as `get` shows it. A switched one is 0 or 1.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Shown {
+    /// Its name.
+    pub name: String,
+    /// Its value in use.
+    pub value: u16,
+    /// Its unit; empty for a count.
+    pub unit: String,
+    /// The least and the greatest value; none for a switched one.
+    pub range: Option<(u16, u16)>,
+    /// Its value on a new machine.
+    pub default: u16,
+    /// The saved value; none where none are saved.
+    pub saved: Option<u16>,
+}
+
+/// What the firmware's name begins with, in its greeting and its version.
+const NAME: &str = "weeder ";
+
+impl Said {
+    /// Reads a line.
+    pub fn parse(line: &str) -> Self {
+        if line == "ok" {
+            return Self::Done;
+        }
+        if let Some(error) = line.strip_prefix("error:") {
+            return Self::Refused(error.trim().to_owned());
+        }
+        let by_itself = || Told::parse(line).map(Self::Told);
+        let answer = || Status::parse(line).map(Self::Status);
+        let shown = || Shown::parse(line).map(Self::Setting);
+        by_itself()
+            .or_else(answer)
+            .or_else(|| firmware(line))
+            .or_else(|| example(line))
+            .or_else(shown)
+            .or_else(|| help(line))
+            .unwrap_or(Self::Other)
+    }
+}
+
+/// `weeder VERSION`, and in the greeting `, reset by CAUSE` behind it.
+fn firmware(line: &str) -> Option<Said> {
+    let rest = line.strip_prefix(NAME)?;
+    let Some((version, rest)) = rest.split_once(", reset by ") else {
+        return (is_word(rest)).then(|| Said::Version(rest.to_owned()));
+    };
+    let cause = rest.split(|character| !is_of_a_name(character)).next().filter(|cause| !cause.is_empty())?;
+    is_word(version).then(|| Said::Greeting { version: version.to_owned(), cause: cause.to_owned() })
+}
+
+/// `field|built_in NUMBER LABEL FEATURES`.
+fn example(line: &str) -> Option<Said> {
+    let mut words = line.split(' ');
+    let from_field = match words.next()? {
+        "field" => true,
+        "built_in" => false,
+        _ => return None,
+    };
+    let number = words.next()?.parse().ok()?;
+    let label = match words.next()? {
+        "plant" => Class::Plant,
+        "weed" => Class::Weed,
+        _ => return None,
+    };
+    words.next().map(|_| Said::Example { from_field, number, label })
+}
+
+/// `NAME and what it takes - what it is`.
+fn help(line: &str) -> Option<Said> {
+    let (usage, help) = line.split_once(" - ")?;
+    let name = usage.split(' ').next().filter(|name| is_name(name))?;
+    (!usage.contains('=')).then(|| Said::Help { name: name.to_owned(), help: help.to_owned() })
+}
+
+impl Shown {
+    /// `NAME=VALUE UNIT from LEAST to GREATEST, default VALUE, saved VALUE`. A count has no unit, a switched setting has `on or off`
+    /// in the range's place, and nothing stands behind the default where the saved value is the one in use.
+    fn parse(line: &str) -> Option<Self> {
+        let mut parts = line.split(", ");
+        let (name, rest) = parts.next()?.split_once('=')?;
+        let mut words = rest.split(' ');
+        let value = value(words.next()?)?;
+        let words: Vec<&str> = words.collect();
+        let (unit, range) = match words.as_slice() {
+            ["on", "or", "off"] => ("", None),
+            ["from", least, "to", greatest] => ("", Some((least, greatest))),
+            [unit, "from", least, "to", greatest] => (*unit, Some((least, greatest))),
+            _ => return None,
+        };
+        let range = match range {
+            Some((least, greatest)) => Some((least.parse().ok()?, greatest.parse().ok()?)),
+            None => None,
+        };
+        let default = self::value(parts.next()?.strip_prefix("default ")?)?;
+        let saved = match parts.next() {
+            None => Some(value),
+            Some("not saved") => None,
+            Some(saved) => Some(self::value(saved.strip_prefix("saved ")?)?),
+        };
+        let is_shown = is_name(name) && parts.next().is_none();
+        is_shown.then(|| Self { name: name.to_owned(), value, unit: unit.to_owned(), range, default, saved })
+    }
+}
+
+fn value(word: &str) -> Option<u16> {
+    match word {
+        "on" => Some(1),
+        "off" => Some(0),
+        number => number.parse().ok(),
+    }
+}
+
+fn is_of_a_name(character: char) -> bool {
+    character.is_ascii_alphanumeric() || character == '_'
+}
+
+fn is_name(word: &str) -> bool {
+    !word.is_empty() && word.chars().all(is_of_a_name)
+}
+
+fn is_word(text: &str) -> bool {
+    !text.is_empty() && !text.contains(' ')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Mode;
+    use crate::settings::{self, Setting};
+    use control::classifier::{Nearest, label};
+    use control::console;
+    use control::controller::{Controller, Readings, WakeUp};
+    use control::line::Line;
+    use control::memory::Volatile;
+    use control::reply;
+    use control::reset::Cause;
+    use control::units::{Instant, Position};
+    use knn::Example;
+
+    #[test]
+    fn a_setting_is_read_with_its_range_and_what_is_saved() {
+        let wheel = |saved| Shown {
+            name: "wheel_mm".to_owned(),
+            value: 405,
+            unit: "mm".to_owned(),
+            range: Some((200, 800)),
+            default: 400,
+            saved,
+        };
+        let line = "wheel_mm=405 mm from 200 to 800, default 400";
+        for (rest, saved) in [("", Some(405)), (", not saved", None), (", saved 410", Some(410))] {
+            assert_eq!(Said::parse(&format!("{line}{rest}")), Said::Setting(wheel(saved)));
+        }
+        let switched = Shown {
+            name: "end_switch".to_owned(),
+            value: 0,
+            unit: String::new(),
+            range: None,
+            default: 0,
+            saved: Some(1),
+        };
+        assert_eq!(Said::parse("end_switch=off on or off, default off, saved on"), Said::Setting(switched));
+        let Said::Setting(count) = Said::parse("k=3 from 1 to 9, default 3") else { panic!("no setting") };
+        assert_eq!((count.unit.as_str(), count.range), ("", Some((1, 9))));
+    }
+
+    #[test]
+    fn the_firmware_says_its_name_by_itself_and_when_asked() {
+        let greeting = Said::Greeting { version: "0.1.0".to_owned(), cause: "brown_out".to_owned() };
+        assert_eq!(Said::parse("weeder 0.1.0, reset by brown_out, state alarm settings_lost, tool out"), greeting);
+        assert_eq!(Said::parse("weeder 0.1.0"), Said::Version("0.1.0".to_owned()));
+    }
+
+    #[test]
+    fn lines_of_answers_are_told_apart() {
+        assert_eq!(Said::parse("ok"), Said::Done);
+        assert_eq!(Said::parse("error: no such command"), Said::Refused("no such command".to_owned()));
+        let taught = Said::Example { from_field: true, number: 7, label: Class::Weed };
+        assert_eq!(Said::parse("field 7 weed 1 2 3 4 5"), taught);
+        let help = Said::Help { name: "get".to_owned(), help: "shows settings".to_owned() };
+        assert_eq!(Said::parse("get [name] - shows settings"), help);
+        let status = "state=work tool=in pos=1 speed_mm_s=2 windows=1 unseen_mm=0";
+        assert!(matches!(Said::parse(status), Said::Status(Status { mode: Mode::Work, .. })));
+        assert!(matches!(Said::parse("swing tool=in pos=3"), Said::Told(Told::Swing { out: false, position: 3 })));
+        for line in ["", "okay", "weeder", "weeder ", "weeder 1, reset by ", "field 7 grass 1", "field x weed 1", "k=3"]
+        {
+            assert_eq!(Said::parse(line), Said::Other, "{line:?}");
+        }
+    }
+
+    /// All lines of the firmware's answer to a command.
+    fn answer(command: &str) -> Vec<Said> {
+        let wake_up = WakeUp {
+            readings: Readings::new(Instant::new(0), Position::new(0)),
+            beam_broken: false,
+            cause: Cause::Unknown,
+        };
+        let examples = [Example::new([1, 2, 3, 4, 5], label::PLANT), Example::new([9, 8, 7, 6, 5], label::WEED)];
+        let mut controller = Controller::new(Nearest::new(&examples[..], Volatile::new()), Volatile::new(), wake_up);
+        let mut answer = reply::answer(console::parse(command.as_bytes()), &mut controller);
+        let mut said = String::new();
+        while !answer.is_done() {
+            let mut line = Line::new();
+            answer.write_line(&controller, &mut line);
+            said.extend(line.map(char::from));
+        }
+        said.lines().map(Said::parse).collect()
+    }
+
+    #[test]
+    fn every_line_of_the_firmwares_answers_is_read() {
+        let table = Setting::all().map(|setting| {
+            let description = setting.description();
+            Said::Setting(Shown {
+                name: settings::name(setting),
+                value: description.default,
+                unit: settings::unit(setting),
+                range: (!setting.is_switched()).then_some((description.least, description.greatest)),
+                default: description.default,
+                saved: None,
+            })
+        });
+        assert_eq!(answer("get"), table.chain([Said::Done]).collect::<Vec<_>>());
+        assert!(matches!(answer("version").as_slice(), [Said::Version(_), Said::Done]));
+        assert!(matches!(answer("status").as_slice(), [Said::Status(_), Said::Other, Said::Done]));
+        assert!(matches!(answer("nothing").as_slice(), [Said::Refused(_)]));
+        let examples = answer("examples");
+        let [Said::Example { from_field: false, .. }, Said::Example { label: Class::Weed, .. }, rest @ ..] =
+            examples.as_slice()
+        else {
+            panic!("{examples:?}")
+        };
+        assert_eq!(rest.last(), Some(&Said::Done));
+        let help = answer("help");
+        assert!(
+            help.len() > 15 && help[..help.len() - 1].iter().all(|said| matches!(said, Said::Help { .. })),
+            "{help:?}"
+        );
+        for setting in Setting::all() {
+            let (name, help) = (settings::name(setting), settings::help(setting));
+            let said = answer(&format!("help {name}"));
+            assert!(said.contains(&Said::Help { name, help }), "{said:?}");
+        }
+    }
+}
