@@ -28,6 +28,7 @@ use trial::{firmware, picture};
 Examples:
   weeder trial                                       the paper's speeds and spacings, three replications
   weeder trial --field soft-ground --out report      with its report as a page, report/report.html
+  weeder trial --brief                               what counts most, as a short table
   weeder trial --engine uno --replications 1         with the real firmware on the virtual Uno
   weeder trial --field my-field.toml --speeds 1,3 --spacings 30,40,50
 The status is 1 where the firmware damaged a plant, or an alarm stopped it.")]
@@ -57,6 +58,9 @@ pub struct Arguments {
     /// Write report.html, trial.csv and controllers.csv into this folder, which is made where there is none.
     #[arg(long, value_name = "FOLDER")]
     out: Option<FolderName>,
+    /// Print what counts most of the table, and nothing else.
+    #[arg(long, conflicts_with = "json")]
+    brief: bool,
     /// Print JSON for programs instead of tables.
     #[arg(long)]
     json: bool,
@@ -101,6 +105,8 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     summary.extend(against_the_paper(&outcomes));
     let printed = if arguments.json {
         say!("{:#}", json!({ "summary": summary, "plots": outcomes.iter().map(in_json).collect::<Vec<_>>() }))
+    } else if arguments.brief {
+        say!("{}", by_speed(&totals, true))
     } else {
         let worked_s: f64 = outcomes.iter().map(|outcome| outcome.moved_s).sum();
         let pace = format!(
@@ -108,7 +114,7 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
             worked_s / 3600.0,
             worked_s / took_s
         );
-        say!("{}\n\n{}\n{pace}", by_speed(&totals), summary.join("\n"))
+        say!("{}\n\n{}\n{pace}", by_speed(&totals, false), summary.join("\n"))
     };
     let alarms: u32 = of(&totals, Controller::Firmware).map(|total| total.alarms).sum();
     let damaged: u32 = of(&totals, Controller::Firmware).map(|total| total.effect.injured()).sum();
@@ -153,45 +159,44 @@ fn of(totals: &[Total], controller: Controller) -> impl Iterator<Item = &Total> 
     totals.iter().filter(move |total| total.controller == controller)
 }
 
-/// A line a speed and controller.
-fn by_speed(totals: &[Total]) -> Table {
+/// The columns of the table, each with its heading, how a total fills it, and whether it is one of those that count most.
+const COLUMNS: [(&str, fn(&Total) -> String, bool); 11] = [
+    ("km/h", |total| total.speed_km_h.to_string(), true),
+    ("controller", |total| total.controller.title().to_owned(), true),
+    ("plants\ndamaged, %", |total| format!("{:.1} ({})", total.plant_damage_percent(), total.damage()), true),
+    ("canopies\nreached, %", |total| format!("{:.1}", total.canopies_reached_percent()), true),
+    ("margins\ncut, %", |total| format!("{:.1}", total.margins_cut_percent()), false),
+    ("ground of the\nrow weeded, %", |total| weeded(total), true),
+    ("with all margins\nkept at most, %", |total| format!("{:.1}", 100.0 * total.weedable_share), false),
+    ("undamaged\nat most, %", |total| format!("{:.1}", 100.0 * total.undamaged_share), false),
+    ("weeds gone\nin the row, %", |total| gone(total.effect.in_row), true),
+    ("in the whole\nplot, %", |total| gone(total.effect.in_plot), false),
+    ("rows with\nan alarm", |total| total.alarms.to_string(), false),
+];
+
+/// A line a speed and controller; if it is to be brief, of what counts most.
+fn by_speed(totals: &[Total], brief: bool) -> Table {
+    let columns = || COLUMNS.iter().filter(|(_, _, counts_most)| *counts_most || !brief);
     let mut table = Table::new();
-    table.load_style(presets::UTF8_BORDERS_ONLY).set_header([
-        "km/h",
-        "controller",
-        "plants\ndamaged, %",
-        "canopies\nreached, %",
-        "margins\ncut, %",
-        "ground of the\nrow weeded, %",
-        "with all margins\nkept at most, %",
-        "undamaged\nat most, %",
-        "weeds gone\nin the row, %",
-        "in the whole\nplot, %",
-        "rows with\nan alarm",
-    ]);
+    table.load_style(presets::UTF8_BORDERS_ONLY).set_header(columns().map(|(heading, _, _)| heading));
     for total in totals {
-        let efficiency = |weeds: WeedCount| weeds.efficiency_percent().map_or("-".to_owned(), |it| format!("{it:.1}"));
-        table.add_row([
-            total.speed_km_h.to_string(),
-            total.controller.title().to_owned(),
-            format!("{:.1} ({})", total.plant_damage_percent(), total.damage()),
-            format!("{:.1}", total.canopies_reached_percent()),
-            format!("{:.1}", total.margins_cut_percent()),
-            match total.weeded_percent.within {
-                Some(within) => format!("{:.1} ± {within:.1}", total.weeded_percent.mean),
-                None => format!("{:.1}", total.weeded_percent.mean),
-            },
-            format!("{:.1}", 100.0 * total.weedable_share),
-            format!("{:.1}", 100.0 * total.undamaged_share),
-            efficiency(total.effect.in_row),
-            efficiency(total.effect.in_plot),
-            total.alarms.to_string(),
-        ]);
+        table.add_row(columns().map(|(_, cell, _)| cell(total)));
     }
     for (index, column) in table.column_iter_mut().enumerate() {
         column.set_cell_alignment(if index == 1 { CellAlignment::Left } else { CellAlignment::Right });
     }
     table
+}
+
+/// The share of the row's ground that was weeded, and how far its mean may be off.
+fn weeded(total: &Total) -> String {
+    let mean = total.weeded_percent.mean;
+    total.weeded_percent.within.map_or(format!("{mean:.1}"), |within| format!("{mean:.1} ± {within:.1}"))
+}
+
+/// The share of weeds that is gone.
+fn gone(weeds: WeedCount) -> String {
+    weeds.efficiency_percent().map_or("-".to_owned(), |percent| format!("{percent:.1}"))
 }
 
 /// What came of it, in plain words.

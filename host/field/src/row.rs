@@ -91,7 +91,8 @@ impl Thing {
         Self::new(position_mm, width_mm, Kind::Weed)
     }
 
-    fn new(position_mm: f64, width_mm: f64, kind: Kind) -> Self {
+    /// A thing without gaps, as wide across the row as along it, as far as a canopy may be.
+    pub fn new(position_mm: f64, width_mm: f64, kind: Kind) -> Self {
         Self { position_mm, width_mm, across_mm: width_mm.min(MAX_CANOPY_MM), kind, leaves: Vec::new() }
     }
 

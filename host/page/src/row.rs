@@ -67,12 +67,7 @@ struct Piece {
 impl Passed {
     /// How each plant fared, and whether each weed was cut, in the order in which they were given.
     pub fn judge(self) -> Result<Value, String> {
-        let things = self.things.iter().map(|thing| Thing {
-            position_mm: thing.place_mm,
-            width_mm: thing.width_mm,
-            kind: thing.kind,
-            leaves: Vec::new(),
-        });
+        let things = self.things.iter().map(|thing| Thing::new(thing.place_mm, thing.width_mm, thing.kind));
         let row = Row::new(things.collect()).map_err(|problem| problem.to_string())?;
         let ServoKind { in_us, out_us, dead_time_ms, travel_ms } = self.servo;
         let machine = Machine {
