@@ -159,8 +159,10 @@ fn of(totals: &[Total], controller: Controller) -> impl Iterator<Item = &Total> 
     totals.iter().filter(move |total| total.controller == controller)
 }
 
-/// The columns of the table, each with its heading, how a total fills it, and whether it is one of those that count most.
-const COLUMNS: [(&str, fn(&Total) -> String, bool); 11] = [
+/// A column of the table: its heading, how a total fills it, and whether it is one of those that count most.
+type Column = (&'static str, fn(&Total) -> String, bool);
+
+const COLUMNS: [Column; 11] = [
     ("km/h", |total| total.speed_km_h.to_string(), true),
     ("controller", |total| total.controller.title().to_owned(), true),
     ("plants\ndamaged, %", |total| format!("{:.1} ({})", total.plant_damage_percent(), total.damage()), true),
