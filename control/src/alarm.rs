@@ -5,38 +5,36 @@
 //! the status LED blinks one after the other: the first says where to look, the second which fault it is. Its name is
 //! what the console says. A warning is counted and told, and changes nothing else.
 
-use crate::text::words;
-
-words! {
-    /// A latched fault, in the order of the codes.
-    pub enum Alarm {
-        /// The beam was broken over more ground than any plant covers: something hangs in it, or it is out of line.
-        BeamBlocked = "beam_blocked",
-        /// The beam breaks and clears more often than plants and their leaves can make it: dust, or a loose wire.
-        BeamFlickers = "beam_flickers",
-        /// Edges of the beam came faster than they could be taken.
-        BeamEdgesLost = "beam_edges_lost",
-        /// Plants pass the beam, and the encoder says that the machine stands.
-        EncoderSilent = "encoder_silent",
-        /// Edges without progress: only one of the encoder's channels is alive.
-        EncoderChannelDead = "encoder_channel_dead",
-        /// Both channels keep changing at once, which a turning wheel does not do.
-        EncoderJumps = "encoder_jumps",
-        /// The machine works faster than its settings allow.
-        TooFast = "too_fast",
-        /// The tool was rolled back to ground that has been forgotten.
-        RolledBackTooFar = "rolled_back_too_far",
-        /// More plants stand between beam and tool than the schedule can hold.
-        ScheduleFull = "schedule_full",
-        /// The end switch does not say what the tool was told.
-        ToolStuck = "tool_stuck",
-        /// No copy of the settings in the EEPROM is whole and of this firmware: the defaults are in use.
-        SettingsLost = "settings_lost",
-        /// The saved settings cannot be right together.
-        SettingsContradict = "settings_contradict",
-        /// The stack has come too near to the variables.
-        StackLow = "stack_low",
-    }
+/// A latched fault, in the order of the codes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Alarm {
+    /// The beam was broken over more ground than any plant covers: something hangs in it, or it is out of line.
+    BeamBlocked,
+    /// The beam breaks and clears more often than plants and their leaves can make it: dust, or a loose wire.
+    BeamFlickers,
+    /// Edges of the beam came faster than they could be taken.
+    BeamEdgesLost,
+    /// Plants pass the beam, and the encoder says that the machine stands.
+    EncoderSilent,
+    /// Edges without progress: only one of the encoder's channels is alive.
+    EncoderChannelDead,
+    /// Both channels keep changing at once, which a turning wheel does not do.
+    EncoderJumps,
+    /// The machine works faster than its settings allow.
+    TooFast,
+    /// The tool was rolled back to ground that has been forgotten.
+    RolledBackTooFar,
+    /// More plants stand between beam and tool than the schedule can hold.
+    ScheduleFull,
+    /// The end switch does not say what the tool was told.
+    ToolStuck,
+    /// No copy of the settings in the EEPROM is whole and of this firmware: the defaults are in use.
+    SettingsLost,
+    /// The saved settings cannot be right together.
+    SettingsContradict,
+    /// The stack has come too near to the variables.
+    StackLow,
 }
 
 impl Alarm {
@@ -60,14 +58,14 @@ impl Alarm {
     }
 }
 
-words! {
-    /// Something that the operator should know of.
-    pub enum Warning {
-        /// The tool was told to leave the row later than it needed: the speed jumped, or a plant came up too near.
-        LateCommand = "late_command",
-        /// The machine has worked for a long way without the beam being broken: it may be blind, or too high.
-        NoPlants = "no_plants",
-    }
+/// Something that the operator should know of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Warning {
+    /// The tool was told to leave the row later than it needed: the speed jumped, or a plant came up too near.
+    LateCommand,
+    /// The machine has worked for a long way without the beam being broken: it may be blind, or too high.
+    NoPlants,
 }
 
 #[cfg(test)]

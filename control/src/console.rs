@@ -4,7 +4,7 @@
 //! are separated by blanks. A line that cannot be understood becomes one [`Mistake`] and changes nothing. How commands
 //! are carried out and answered is the business of [`reply`](crate::reply).
 
-use crate::{classifier::label, settings::Setting, text::words};
+use crate::{classifier::label, settings::Setting};
 use heapless::Vec;
 
 /// Characters that a line may have.
@@ -13,50 +13,50 @@ pub const LINE_LENGTH: usize = 80;
 /// What stands in the stream of bytes where some were lost: ASCII's own character for it, SUB.
 pub const GAP_MARK: u8 = 0x1A;
 
-words! {
-    /// The first word of a command.
-    pub enum Word {
-        /// Lists the commands, or explains a setting.
-        Help = "help",
-        /// One line of figures.
-        Status = "status",
-        /// Shows one setting or all.
-        Get = "get",
-        /// Changes a setting.
-        Set = "set",
-        /// Keeps the settings.
-        Save = "save",
-        /// Takes the settings back that are kept.
-        Revert = "revert",
-        /// Takes the settings back that a new machine has.
-        Defaults = "defaults",
-        /// Measures the wheel or the servo.
-        Calibrate = "calibrate",
-        /// Moves the tool by hand.
-        Servo = "servo",
-        /// Swings the tool as for a row.
-        Test = "test",
-        /// Goes to work.
-        Start = "start",
-        /// Takes the tool out.
-        Hold = "hold",
-        /// Clears an alarm.
-        Clear = "clear",
-        /// Tells what happens, or stops telling.
-        Events = "events",
-        /// Draws curves on a plotter.
-        Plot = "plot",
-        /// Says what the last object was, and teaches it.
-        Label = "label",
-        /// Lists the examples.
-        Examples = "examples",
-        /// Forgets examples from the field.
-        Forget = "forget",
-        /// Lists the last objects.
-        Dump = "dump",
-        /// Names the firmware.
-        Version = "version",
-    }
+/// The first word of a command.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Word {
+    /// Lists the commands, or explains a setting.
+    Help,
+    /// One line of figures.
+    Status,
+    /// Shows one setting or all.
+    Get,
+    /// Changes a setting.
+    Set,
+    /// Keeps the settings.
+    Save,
+    /// Takes the settings back that are kept.
+    Revert,
+    /// Takes the settings back that a new machine has.
+    Defaults,
+    /// Measures the wheel or the servo.
+    Calibrate,
+    /// Moves the tool by hand.
+    Servo,
+    /// Swings the tool as for a row.
+    Test,
+    /// Goes to work.
+    Start,
+    /// Takes the tool out.
+    Hold,
+    /// Clears an alarm.
+    Clear,
+    /// Tells what happens, or stops telling.
+    Events,
+    /// Draws curves on a plotter.
+    Plot,
+    /// Says what the last object was, and teaches it.
+    Label,
+    /// Lists the examples.
+    Examples,
+    /// Forgets examples from the field.
+    Forget,
+    /// Lists the last objects.
+    Dump,
+    /// Names the firmware.
+    Version,
 }
 
 /// A line that was understood.
@@ -168,36 +168,36 @@ pub enum Mistake {
     Value(Setting),
 }
 
-words! {
-    /// A word that a command may take.
-    pub enum Argument {
-        /// Of `start`.
-        Now = "now",
-        /// Of `events`, and of settings that are switched.
-        On = "on",
-        /// As `on`.
-        Off = "off",
-        /// Of `forget`.
-        All = "all",
-        /// Of `calibrate`.
-        Start = "start",
-        /// Of `calibrate`.
-        Servo = "servo",
-        /// Of `calibrate` and `label`.
-        Force = "force",
-        /// Of `servo`.
-        In = "in",
-        /// Of `servo`.
-        Out = "out",
-        /// Of `test`.
-        Row = "row",
-        /// Of `plot`.
-        Teleplot = "teleplot",
-        /// Of `label`.
-        Plant = "plant",
-        /// Of `label`.
-        Weed = "weed",
-    }
+/// A word that a command may take.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Argument {
+    /// Of `start`.
+    Now,
+    /// Of `events`, and of settings that are switched.
+    On,
+    /// As `on`.
+    Off,
+    /// Of `forget`.
+    All,
+    /// Of `calibrate`.
+    Start,
+    /// Of `calibrate`.
+    Servo,
+    /// Of `calibrate` and `label`.
+    Force,
+    /// Of `servo`.
+    In,
+    /// Of `servo`.
+    Out,
+    /// Of `test`.
+    Row,
+    /// Of `plot`.
+    Teleplot,
+    /// Of `label`.
+    Plant,
+    /// Of `label`.
+    Weed,
 }
 
 /// Reads a line.

@@ -40,3 +40,4 @@ pub mod switch;
 pub mod taught;
 pub mod text;
 pub mod units;
+mod words;

@@ -3,26 +3,24 @@
 //! A bootloader may clear the flags before the firmware starts, as optiboot does. The mark in SRAM, which a reset leaves
 //! alone, still tells then of a loop that stalled and of a panic; everything else is [`Cause::Unknown`].
 
-use crate::text::words;
-
-words! {
-    /// What started the machine.
-    pub enum Cause {
-        /// The power came on.
-        PowerOn = "power_on",
-        /// The reset pin was pulled: by the button, or by a computer that opened the serial line.
-        ResetPin = "reset_pin",
-        /// The supply was too low for a moment.
-        BrownOut = "brown_out",
-        /// The watchdog ran out and nothing tells why.
-        Watchdog = "watchdog",
-        /// The loop stopped turning.
-        LoopStalled = "loop_stalled",
-        /// The firmware met what cannot be, and gave up.
-        Panic = "panic",
-        /// The flags were cleared before the firmware saw them.
-        Unknown = "unknown",
-    }
+/// What started the machine.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Cause {
+    /// The power came on.
+    PowerOn,
+    /// The reset pin was pulled: by the button, or by a computer that opened the serial line.
+    ResetPin,
+    /// The supply was too low for a moment.
+    BrownOut,
+    /// The watchdog ran out and nothing tells why.
+    Watchdog,
+    /// The loop stopped turning.
+    LoopStalled,
+    /// The firmware met what cannot be, and gave up.
+    Panic,
+    /// The flags were cleared before the firmware saw them.
+    Unknown,
 }
 
 /// Marks that the firmware leaves in SRAM. At power-up SRAM holds either by a chance of one in 32,768.

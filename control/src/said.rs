@@ -1,4 +1,5 @@
-//! Everything that the machine says, but for its settings and the words that it also reads, which stand where they belong.
+//! Everything that the machine says, but for what its settings' table has of them and for the [words](crate::words) that it also
+//! reads.
 //!
 //! A `#` in a text stands for a number of its line.
 

@@ -5,7 +5,6 @@
 
 use crate::{
     memory::CHECK,
-    text::{Text, words},
     units::{Ticks, TicksPerSecond, Wheel},
 };
 
@@ -25,10 +24,26 @@ pub struct Description {
 /// The one table from which everything else about the settings is made.
 macro_rules! settings {
     ($($(#[$doc:meta])* $Variant:ident $name:literal $(in $unit:literal)?: $least:literal to $greatest:literal, $default:literal, $hold_only:literal, $help:literal;)*) => {
-        words! {
-            /// A setting.
-            pub enum Setting {
-                $($(#[$doc])* $Variant = $name,)*
+        /// A setting.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[repr(u8)]
+        pub enum Setting {
+            $($(#[$doc])* $Variant,)*
+        }
+
+        impl Setting {
+            /// The names, in the table's order.
+            pub(crate) const WORDS: &[&str] = &[$($name),*];
+
+            /// How many there are.
+            pub const COUNT: u8 = Self::WORDS.len() as u8;
+
+            /// The one at a place in the table.
+            pub const fn from_index(index: u8) -> Option<Self> {
+                match index {
+                    $(index if index == Self::$Variant as u8 => Some(Self::$Variant),)*
+                    _ => None,
+                }
             }
         }
 
@@ -135,16 +150,6 @@ impl Setting {
     /// All settings, in the table's order.
     pub fn all() -> impl Iterator<Item = Self> {
         (0..).map_while(Self::from_index)
-    }
-
-    /// What it is, for the operator.
-    pub fn help(self) -> Text {
-        const { Text::first_of(HELPS) }.plus(self as u8)
-    }
-
-    /// Its unit behind a blank, or nothing where it is a count or switched.
-    pub fn unit(self) -> Text {
-        const { Text::first_of(UNITS) }.plus(self as u8)
     }
 
     /// Whether it is switched on and off, as 1 and 0.

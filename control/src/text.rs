@@ -1,8 +1,8 @@
 //! Text that lies in flash.
 //!
 //! An AVR keeps Rust's string literals in SRAM, of which there are 2 KiB. So all that the machine says lies in flash, in one
-//! table, and a [`Text`] is no more than its number there: one byte. What is said stands in [`said`](crate::said); `words!`
-//! makes an enum whose variants are words of that table, to be written and to be read.
+//! table, and a [`Text`] is no more than its number there: one byte. What is said stands in [`said`](crate::said), and the words for
+//! the machine's alarms, settings and the like in [`words`](crate::words).
 //!
 //! The texts are packed: [`FRAGMENTS`] that come again and again are one byte each. A fragment is a pair of bytes, each of
 //! which is a character or stands for another fragment, so that nothing is searched where one is unpacked. The compiler
@@ -358,52 +358,6 @@ const fn is_same_group(one: &[&str], other: &[&str]) -> bool {
     }
     one.len() == other.len()
 }
-
-/// An enum whose variants are words: `text` writes one, `find` reads one.
-macro_rules! words {
-    (
-        $(#[$enum_doc:meta])*
-        $visibility:vis enum $Name:ident {
-            $($(#[$doc:meta])* $Variant:ident = $word:literal,)*
-        }
-    ) => {
-        $(#[$enum_doc])*
-        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-        #[repr(u8)]
-        $visibility enum $Name {
-            $($(#[$doc])* $Variant,)*
-        }
-
-        impl $Name {
-            /// The words, in the order of declaration.
-            pub(crate) const WORDS: &[&str] = &[$($word),*];
-
-            /// How many there are.
-            pub const COUNT: u8 = Self::WORDS.len() as u8;
-
-            const FIRST: $crate::text::Text = $crate::text::Text::first_of(Self::WORDS);
-
-            /// The one at a place in the order of declaration.
-            pub const fn from_index(index: u8) -> Option<Self> {
-                match index {
-                    $(index if index == Self::$Variant as u8 => Some(Self::$Variant),)*
-                    _ => None,
-                }
-            }
-
-            /// The word for it.
-            pub const fn text(self) -> $crate::text::Text {
-                Self::FIRST.plus(self as u8)
-            }
-
-            /// The one that `word` stands for.
-            pub fn find(word: &[u8]) -> Option<Self> {
-                Self::from_index(Self::FIRST.find(Self::COUNT, word))
-            }
-        }
-    };
-}
-pub(crate) use words;
 
 #[cfg(test)]
 mod tests {

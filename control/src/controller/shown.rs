@@ -9,7 +9,6 @@ use crate::{
     memory::Memory,
     reset::Cause,
     settings::{Setting, Settings},
-    text::words,
     units::{Coarse, Ticks},
 };
 
@@ -19,18 +18,18 @@ const FAST: u16 = 20_000;
 /// Time between two points of a plotter's curves.
 const PLOT_PERIOD: u16 = Coarse::steps_in_ms(50);
 
-words! {
-    /// Why the tool is out of the row while the machine works.
-    pub enum Reason {
-        /// A plant is there, or comes up.
-        Plant = "plant",
-        /// The beam has not seen the ground.
-        UnseenGround = "unseen_ground",
-        /// A plant just behind the beam would be reached before the tool is out.
-        TooFast = "too_fast",
-        /// The encoder fell silent while the machine rolled, or the beam broke while it stands.
-        EncoderDoubtful = "encoder_doubtful",
-    }
+/// Why the tool is out of the row while the machine works.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Reason {
+    /// A plant is there, or comes up.
+    Plant,
+    /// The beam has not seen the ground.
+    UnseenGround,
+    /// A plant just behind the beam would be reached before the tool is out.
+    TooFast,
+    /// The encoder fell silent while the machine rolled, or the beam broke while it stands.
+    EncoderDoubtful,
 }
 
 impl<C: Classifier, M: Memory> Controller<C, M> {
