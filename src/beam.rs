@@ -15,12 +15,10 @@ use crate::{
     shared::{Byte, Shared},
 };
 use avr_device::atmega328p::{EXINT, PORTB, portb};
-
-/// Position and level of an edge: the beam is broken from here on, or clear.
-pub type Edge = (i32, bool);
+use control::{controller::Edge, units::Position};
 
 /// Edges that can wait for the loop, which a sensor with a response of 1 ms cannot make in less than 16 ms.
-pub const SLOTS: usize = 16;
+const SLOTS: usize = 16;
 
 /// Edges that wait for the loop: twice the count, and 1 where the beam is clear.
 static EDGES: Ring<SLOTS> = Ring::new();
@@ -50,24 +48,44 @@ impl<'a> Beam<'a> {
         is_broken(self.0.pinb().read().bits())
     }
 
-    /// The oldest edge that was not taken yet.
-    pub fn next_edge(&mut self) -> Option<Edge> {
-        let stamp = EDGES.take(|slot| STAMPS[slot].get())?;
-        let now = encoder::position();
-        // Both in half ticks, which leaves the sign to the machine.
-        let rolled_since = ((now as u16) << 1).wrapping_sub(stamp & !u16::from(BEAM)) as i16 >> 1;
-        Some((now.wrapping_sub(rolled_since.into()), is_broken(stamp as u8)))
+    /// The edges that wait; behind them, that some found no room, if any did.
+    pub fn edges(&mut self) -> impl Iterator<Item = Edge> {
+        // Asked before the edges are taken: all that waited at a loss is then taken, and none of it comes behind the level that is
+        // read.
+        let mut lost = take_lost();
+        // No more edges than can wait: those that keep coming must not keep the loop from turning.
+        let mut left = SLOTS as u8;
+        core::iter::from_fn(move || {
+            if left > 0 {
+                left -= 1;
+                if let Some(edge) = next_edge() {
+                    return Some(edge);
+                }
+                left = 0;
+            }
+            core::mem::take(&mut lost).then(|| Edge::Lost { broken: self.is_broken() })
+        })
     }
+}
 
-    /// Whether edges were lost since this was last asked.
-    pub fn take_lost(&mut self) -> bool {
-        let lost = LOST.get() != 0;
-        if lost {
-            // An edge that is lost right before this is among those that the answer tells of.
-            LOST.set(0);
-        }
-        lost
+/// The oldest edge that was not taken yet.
+fn next_edge() -> Option<Edge> {
+    let stamp = EDGES.take(|slot| STAMPS[slot].get())?;
+    let now = encoder::position();
+    // Both in half ticks, which leaves the sign to the machine.
+    let rolled_since = ((now as u16) << 1).wrapping_sub(stamp & !u16::from(BEAM)) as i16 >> 1;
+    let position = Position::new(now.wrapping_sub(rolled_since.into()));
+    Some(Edge::Seen { position, broken: is_broken(stamp as u8) })
+}
+
+/// Whether edges were lost since this was last asked.
+fn take_lost() -> bool {
+    let lost = LOST.get() != 0;
+    if lost {
+        // An edge that is lost right before this is among those that the answer tells of.
+        LOST.set(0);
     }
+    lost
 }
 
 /// Whether the beam is broken, from its bit.

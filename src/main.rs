@@ -86,16 +86,7 @@ fn run(typed: &mut LineBuffer) -> ! {
         watchdog::feed();
         // The readings come first: an edge that is still in the queue is then never farther than the next readings.
         let readings = read();
-        // Asked before the edges are taken: all that waited at a loss is then taken, and none of it comes behind the level that is read.
-        let lost = beam.take_lost();
-        // No more edges than can wait: those that keep coming must not keep the loop from turning.
-        for (position, broken) in core::iter::from_fn(|| beam.next_edge()).take(beam::SLOTS) {
-            controller.beam_edge(Position::new(position), broken);
-        }
-        if lost {
-            controller.beam_edges_lost(beam.is_broken());
-        }
-        let orders = controller.step(readings);
+        let orders = controller.turn(readings, beam.edges());
         heartbeat::beat(orders.pulse_out);
         servo.command(orders.pulse, orders.gap_ms);
         let Ok(()) = lamp.set_state(controller.lamp_is_lit().into());

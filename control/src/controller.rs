@@ -1,7 +1,7 @@
 //! The front door: edges, readings and commands go in, the tool's place and the lamp come out.
 //!
-//! One [`Controller::step`] a turn of the main loop: measure the speed, roll the watched ground on, ask the schedule
-//! whether the tool may be in the row. Beam edges come before the step that has rolled past them. Nothing in here waits,
+//! One [`Controller::turn`] a turn of the main loop: take the edges of the beam that the machine has rolled past, measure the
+//! speed, roll the watched ground on, ask the schedule whether the tool may be in the row. Nothing in here waits,
 //! and nothing remembers a time at which something ought to happen: the answer is worked out anew each time, from where
 //! the machine is and how fast it rolls.
 
@@ -53,7 +53,7 @@ pub enum State {
     Alarm(Alarm),
 }
 
-/// What the main loop reads from the machine for a step.
+/// What the main loop reads from the machine for a turn.
 #[derive(Clone, Copy, Debug)]
 pub struct Readings {
     /// The time of the reading.
@@ -79,6 +79,23 @@ impl Readings {
     }
 }
 
+/// What came from the beam since the last turn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Edge {
+    /// The beam broke or cleared.
+    Seen {
+        /// What the encoder showed when it came.
+        position: Position,
+        /// Whether the beam is broken from here on.
+        broken: bool,
+    },
+    /// Edges found no room to wait in: what stood there is not known, and neither is the beam's level until then.
+    Lost {
+        /// Whether the beam is broken now.
+        broken: bool,
+    },
+}
+
 /// How the machine woke up.
 #[derive(Clone, Copy, Debug)]
 pub struct WakeUp {
@@ -90,7 +107,7 @@ pub struct WakeUp {
     pub cause: Cause,
 }
 
-/// What the machine is to do after a step.
+/// What the machine is to do after a turn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Orders {
     /// The servo's pulse width.
@@ -99,7 +116,7 @@ pub struct Orders {
     pub pulse_out: HalfMicros,
     /// The shortest gap between servo pulses in milliseconds; 0 for fixed frames.
     pub gap_ms: u8,
-    /// Whether an object was judged since the last step: that is enough for a turn of the loop.
+    /// Whether an object was judged: that is enough for a turn of the loop.
     pub has_judged: bool,
 }
 
@@ -152,7 +169,7 @@ pub struct Controller<C, M> {
     awaits_ground: bool,
     /// Times that it came sooner than the tool could be out.
     late: u16,
-    /// Whether an object was judged since the last step.
+    /// Whether an object was judged in this turn.
     has_judged: bool,
     /// Lines that were not understood, or came with a hole in them.
     mistakes: u16,
@@ -251,8 +268,25 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         asleep.0
     }
 
+    /// A turn of the loop: takes what came from the beam since the last one, in its order, then the machine's readings, and decides
+    /// where the tool is to be. No edge is farther than the readings of the next turn.
+    #[inline(always)]
+    pub fn turn(&mut self, readings: Readings, edges: impl IntoIterator<Item = Edge>) -> Orders {
+        edges.into_iter().for_each(|edge| self.take_edge(edge));
+        self.step(readings)
+    }
+
+    /// The first part of a [`turn`](Self::turn), for a test that looks in between.
+    #[inline(always)]
+    pub fn take_edge(&mut self, edge: Edge) {
+        match edge {
+            Edge::Seen { position, broken } => self.beam_edge(position, broken),
+            Edge::Lost { broken } => self.beam_edges_lost(broken),
+        }
+    }
+
     /// Takes an edge of the beam, with the position at which it came.
-    pub fn beam_edge(&mut self, position: Position, broken: bool) {
+    fn beam_edge(&mut self, position: Position, broken: bool) {
         self.beam_broken = broken;
         if let Some(alarm) = self.beam.edge(self.readings.now) {
             self.raise(alarm);
@@ -269,13 +303,13 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     }
 
     /// Edges of the beam were lost: what stood there is not known, and neither is the beam's level, which is now `broken`.
-    pub fn beam_edges_lost(&mut self, broken: bool) {
+    fn beam_edges_lost(&mut self, broken: bool) {
         self.beam_broken = broken;
         self.ground.lose_edges(broken);
         self.raise(Alarm::BeamEdgesLost);
     }
 
-    /// Takes the machine's readings and decides where the tool is to be.
+    /// The last part of a [`turn`](Self::turn), for a test that looks in between.
     #[inline(never)]
     pub fn step(&mut self, readings: Readings) -> Orders {
         self.readings = readings;
@@ -316,7 +350,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         orders
     }
 
-    /// What the machine is to do as of the last step.
+    /// What the machine is to do as of the last turn.
     pub fn orders(&self) -> Orders {
         let pulse = if self.tool_out { Setting::ServoOutUs } else { Setting::ServoInUs };
         let pulse_of = |setting| servo::from_us(self.settings.get(setting));

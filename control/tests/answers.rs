@@ -8,7 +8,7 @@ use control::{
     calibration::{Leads, Outcome},
     classifier::{Class, Vote},
     console::{LineBuffer, Plot, Word},
-    controller::{Controller, Readings, State},
+    controller::{Controller, Edge, Readings, State},
     event::Event,
     ground::schedule::Plan,
     line::Line,
@@ -139,8 +139,7 @@ fn what_changes_where_the_tool_is_is_not_set_while_the_machine_works() {
 fn an_alarm_is_named_and_keeps_the_machine_from_starting_until_it_is_cleared() {
     let mut machine = machine();
     ask(&mut machine, "start");
-    machine.beam_edges_lost(false);
-    machine.step(readings(1000, 0));
+    machine.turn(readings(1000, 0), [Edge::Lost { broken: false }]);
     assert!(ask(&mut machine, "status")[0].starts_with("state=alarm alarm=beam_edges_lost tool=out "));
     assert_eq!(ask(&mut machine, "start"), ["error: an alarm is latched, see status, then clear it"]);
     ask(&mut machine, "hold");
@@ -161,7 +160,7 @@ fn status_says_how_far_the_ground_that_was_seen_still_is() {
         ]
     );
     assert_eq!(ask(&mut machine, "start"), ["ok"]);
-    machine.step(readings(1000, 0));
+    machine.turn(readings(1000, 0), []);
     assert!(ask(&mut machine, "status")[0].starts_with("state=work tool=out for=unseen_ground "));
     assert_eq!(ask(&mut machine, "start now"), ["ok"]);
     assert!(ask(&mut machine, "status")[0].ends_with("unseen_mm=0"));
@@ -171,10 +170,9 @@ fn status_says_how_far_the_ground_that_was_seen_still_is() {
 fn the_longest_numbers_fit_on_the_status_line() {
     let mut machine = machine();
     ask(&mut machine, "start");
-    machine.beam_edges_lost(false);
     let mut readings = readings(1000, i32::MIN);
     (readings.lost, readings.jumps) = (u16::MAX, u16::MAX);
-    machine.step(readings);
+    machine.turn(readings, [Edge::Lost { broken: false }]);
     ask(&mut machine, "status");
 }
 
@@ -205,10 +203,10 @@ fn every_event_fits_on_a_line() {
 fn an_alarm_is_not_cleared_by_throwing_the_switch_on() {
     let mut machine = machine();
     ask(&mut machine, "start");
-    machine.beam_edges_lost(false);
+    machine.turn(readings(0, 0), [Edge::Lost { broken: false }]);
     let mut throw = |milliseconds: u64, switch_on: bool| {
         for moment in [milliseconds, milliseconds + 30] {
-            machine.step(Readings { switch_on, ..readings(moment * 1000, 0) });
+            machine.turn(Readings { switch_on, ..readings(moment * 1000, 0) }, []);
         }
         machine.state()
     };
@@ -221,7 +219,7 @@ fn an_alarm_is_not_cleared_by_throwing_the_switch_on() {
 fn after_lost_edges_the_beam_is_what_it_is_now_and_not_what_the_last_edge_said() {
     for broken in [false, true] {
         let mut machine = machine();
-        machine.beam_edges_lost(broken);
+        machine.turn(readings(1000, 0), [Edge::Lost { broken }]);
         assert_eq!(machine.windows(), u8::from(broken));
     }
 }
@@ -315,7 +313,7 @@ fn a_calibration_is_answered_by_what_it_gave_or_by_what_would_be_right() {
     let mut machine = machine();
     assert_eq!(ask(&mut machine, "calibrate 10000"), ["error: calibrate start first, then roll"]);
     assert_eq!(ask(&mut machine, "calibrate start"), ["ok"]);
-    machine.step(readings(1000, 18_900));
+    machine.turn(readings(1000, 18_900), []);
     assert_eq!(ask(&mut machine, "calibrate 500"), ["error: roll 1000 mm at least, 10000 are better"]);
     let refusal = "error: that would be ticks_per_m 3780, the wheel has 1910, look again, or add force";
     assert_eq!(ask(&mut machine, "calibrate 5000"), [refusal]);
@@ -361,7 +359,7 @@ fn events_and_curves_wait_until_an_answer_is_complete() {
     let mut to_type = b"help\nnonsense\nget\nversion\n".iter();
     let mut said = String::new();
     for turn in 0..20_000 {
-        machine.step(readings(turn * 300, 0));
+        machine.turn(readings(turn * 300, 0), []);
         match turn % 200 {
             0 => machine.start(false).expect("no alarm is latched"),
             100 => machine.hold(),

@@ -11,7 +11,7 @@
 use control::{
     alarm::Alarm,
     classifier::Nearest,
-    controller::{Controller, Readings, State, WakeUp},
+    controller::{Controller, Edge, Readings, State, WakeUp},
     examples::EXAMPLES,
     memory::Volatile,
     quadrature::{Quadrature, Step},
@@ -294,6 +294,7 @@ fn roll(run: Run) -> Shown {
     let (mut out, mut told_s, mut was_clear) = (true, f64::NEG_INFINITY, true);
     let end_s = way.time_s(canopies[PLANTS - 1].end + BEAM_TO_TOOL_MM + MARGIN_MM);
     let (mut time_s, mut turn, mut alarm) = (0.0, 0_u32, None);
+    let mut edges = Vec::new();
     while time_s < alarm.map_or(end_s, |(_, at_s): (Alarm, f64)| f64::min(at_s + 2.0 * SWING_S, end_s)) {
         turn += 1;
         // The loop's turns as they are while it weeds and its status is asked for.
@@ -304,10 +305,10 @@ fn roll(run: Run) -> Shown {
         };
         while let Some((edge_s, broken)) = beam.next_if(|&(edge_s, _)| edge_s <= time_s) {
             wires.roll_to(edge_s);
-            weeder.beam_edge(Position::new(wires.count as i32), broken);
+            edges.push(Edge::Seen { position: Position::new(wires.count as i32), broken });
         }
         wires.roll_to(time_s);
-        let orders = weeder.step(readings(time_s, &wires));
+        let orders = weeder.turn(readings(time_s, &wires), edges.drain(..));
         if let (State::Alarm(raised), None) = (weeder.state(), alarm) {
             alarm = Some((raised, time_s));
         }

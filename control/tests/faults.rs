@@ -5,7 +5,7 @@ mod common;
 use common::{ByWidth, Machine, machine, readings, woken_up};
 use control::{
     alarm::{Alarm, Warning},
-    controller::{Controller, Orders, Readings, Reason, Refusal, State},
+    controller::{Controller, Edge, Orders, Readings, Reason, Refusal, State},
     event::Event,
     memory::Volatile,
     reset::Cause,
@@ -27,12 +27,15 @@ struct Drive {
     place: f64,
     /// What every reading has besides time and place.
     readings: Readings,
+    /// What came from the beam since the last turn.
+    edges: Vec<Edge>,
 }
 
 impl Drive {
     /// At work, with the tool in the row, at 1.8 km/h.
     fn at_work() -> Self {
-        let mut drive = Self { machine: machine(), time_us: 0, place: 0.0, readings: readings(0, 0) };
+        let mut drive =
+            Self { machine: machine(), time_us: 0, place: 0.0, readings: readings(0, 0), edges: Vec::new() };
         drive.machine.start(false).unwrap();
         drive.machine.tell_events(true);
         drive.roll(0.5, 1.0);
@@ -43,7 +46,7 @@ impl Drive {
 
     /// In HOLD, at rest.
     fn in_hold() -> Self {
-        Self { machine: machine(), time_us: 0, place: 0.0, readings: readings(0, 0) }
+        Self { machine: machine(), time_us: 0, place: 0.0, readings: readings(0, 0), edges: Vec::new() }
     }
 
     fn tool_is_in(&self) -> bool {
@@ -54,7 +57,8 @@ impl Drive {
     fn turn_at(&mut self, count: i32) -> Orders {
         self.time_us += TURN_US;
         let now = readings(self.time_us, count);
-        self.machine.step(Readings { now: now.now, position: now.position, ..self.readings })
+        let readings = Readings { now: now.now, position: now.position, ..self.readings };
+        self.machine.turn(readings, self.edges.drain(..))
     }
 
     /// Rolls so many metres at a speed, or stands for so many seconds at none.
@@ -91,8 +95,7 @@ impl Drive {
     }
 
     fn beam(&mut self, broken: bool) {
-        let position = readings(0, self.place.floor() as i32).position;
-        self.machine.beam_edge(position, broken);
+        self.edges.push(Edge::Seen { position: Position::new(self.place.floor() as i32), broken });
     }
 
     /// A plant of 150 mm passes the beam.
@@ -202,7 +205,7 @@ fn a_hard_stop_is_no_silence_whatever_the_encoder() {
         let mut turn = |speed_m_s: f64, place_m: &mut f64| {
             time_us += 250;
             *place_m += speed_m_s * 0.000_25;
-            machine.step(readings(time_us, (*place_m * a_metre).floor() as i32));
+            machine.turn(readings(time_us, (*place_m * a_metre).floor() as i32), []);
             machine.encoder_is_silent()
         };
         let mut silent = 0;
@@ -234,12 +237,12 @@ fn a_fine_encoder_that_falls_silent_is_noticed_as_soon() {
         let base_us = u64::from(machine.readings().now.steps()) * 4;
         for turn in 1..4000 {
             place += speed_m_s * 20_000.0 * 0.000_25;
-            machine.step(readings(base_us + turn * 250, base + place as i32));
+            machine.turn(readings(base_us + turn * 250, base + place as i32), []);
             assert!(!machine.encoder_is_silent() || turn < 200);
         }
         let now_us = u64::from(machine.readings().now.steps()) * 4;
         for turn in 1..200 {
-            machine.step(readings(now_us + turn * 250, base + place as i32));
+            machine.turn(readings(now_us + turn * 250, base + place as i32), []);
         }
         assert!(machine.encoder_is_silent(), "{speed_m_s} m/s");
     }
@@ -356,7 +359,7 @@ fn jumps_are_an_alarm_by_the_way_on_which_they_come() {
             wake_up.readings.jumps = u16::MAX - 10;
             let mut machine = Controller::new(ByWidth, Volatile::new(), wake_up);
             machine.clear();
-            let mut drive = Drive { machine, time_us: 0, place: 0.0, readings: wake_up.readings };
+            let mut drive = Drive { machine, time_us: 0, place: 0.0, readings: wake_up.readings, edges: Vec::new() };
             for _ in 0..200 {
                 drive.readings.jumps = drive.readings.jumps.wrapping_add(1);
                 drive.place += 2.0;
@@ -575,9 +578,8 @@ fn a_test_row_that_contradicting_settings_refuse_leaves_what_stands_in_the_beam(
     settings.set(Setting::ServoInUs, 2000).unwrap();
     let mut machine = Controller::new(ByWidth, saved(&settings), woken_up(Cause::PowerOn));
     machine.clear();
-    machine.step(readings(0, 0));
-    machine.beam_edge(readings(0, 0).position, true);
-    machine.step(readings(1000, 0));
+    machine.turn(readings(0, 0), []);
+    machine.turn(readings(1000, 0), [Edge::Seen { position: Position::new(0), broken: true }]);
     assert_eq!(machine.windows(), 1);
     assert_eq!(machine.test_row(500), Err(Refusal::Contradiction(Contradiction::PulsesEqual)));
     assert_eq!(machine.windows(), 1);
@@ -595,7 +597,7 @@ fn saved_settings_that_contradict_each_other_are_an_alarm_and_do_not_start() {
     assert_eq!(machine.save(), Err(Refusal::Contradiction(Contradiction::PulsesEqual)));
     // The switch does not start it either.
     for millisecond in 0..100 {
-        machine.step(Readings { switch_on: true, ..readings(millisecond * 1000, 0) });
+        machine.turn(Readings { switch_on: true, ..readings(millisecond * 1000, 0) }, []);
     }
     assert_eq!(machine.state(), State::Alarm(Alarm::SettingsContradict));
     machine.clear();
@@ -628,10 +630,8 @@ fn nothing_happens_where_time_and_place_wrap() {
             let count = (turn as f64 * 0.53) as i32;
             let broken = count % 1000 >= 700 && count > 1000;
             let now = place(readings(turn * TURN_US, count));
-            if count > 1000 && broken != ((count - 1) % 1000 >= 700 && count - 1 > 1000) {
-                machine.beam_edge(now.position, broken);
-            }
-            machine.step(now);
+            let is_edge = count > 1000 && broken != ((count - 1) % 1000 >= 700 && count - 1 > 1000);
+            machine.turn(now, is_edge.then_some(Edge::Seen { position: now.position, broken }));
             if machine.tool_out() != was_out {
                 was_out = !was_out;
                 swings.push((turn, was_out));

@@ -68,7 +68,7 @@ fn every_line_that_comes_is_answered_by_lines_that_fit_and_one_verdict() {
         let mut machine = machine(Volatile::new(), Volatile::new());
         let mut line = LineBuffer::new();
         for (turn, byte) in (0_u32..).zip(bytes) {
-            machine.step(Readings::new(Instant::new(turn * 125), Position::new(turn.cast_signed() / 4)));
+            machine.turn(Readings::new(Instant::new(turn * 125), Position::new(turn.cast_signed() / 4)), []);
             let Some(command) = line.take(byte) else { continue };
             let mut answer = reply::answer(command, &mut machine);
             while !machine.carry_on() {}

@@ -6,7 +6,7 @@ mod readings;
 use control::{
     classifier::{Class, Nearest},
     console::LineBuffer,
-    controller::Controller,
+    controller::{Controller, Edge},
     examples::EXAMPLES,
     line::Line,
     memory::Volatile,
@@ -28,6 +28,8 @@ struct Rolling {
     count: i32,
     /// Where the last object began.
     leading: i32,
+    /// What came from the beam since the last turn.
+    edges: Vec<Edge>,
 }
 
 impl Rolling {
@@ -35,7 +37,7 @@ impl Rolling {
         let nearest = Nearest::new(&EXAMPLES[..], Volatile::new());
         let mut machine = Controller::new(nearest, Volatile::new(), woken_up(Cause::PowerOn));
         machine.clear();
-        Self { machine, count: 0, leading: 0 }
+        Self { machine, count: 0, leading: 0, edges: Vec::new() }
     }
 
     /// Rolls past an object so far behind the leading edge of the one before it; returns what it is taken for.
@@ -44,9 +46,9 @@ impl Rolling {
         let leading = self.leading + wheel.ticks(spacing_mm).0;
         let trailing = leading + wheel.ticks(width_mm).0;
         self.roll_to(leading);
-        self.machine.beam_edge(Position::new(leading), true);
+        self.edges.push(Edge::Seen { position: Position::new(leading), broken: true });
         self.roll_to(trailing);
-        self.machine.beam_edge(Position::new(trailing), false);
+        self.edges.push(Edge::Seen { position: Position::new(trailing), broken: false });
         self.roll_to(trailing + wheel.ticks(40).0);
         self.leading = leading;
         self.machine.objects().last().expect("the object was seen").vote.class
@@ -55,7 +57,7 @@ impl Rolling {
     fn roll_to(&mut self, count: i32) {
         while self.count < count {
             self.count += 1;
-            self.machine.step(readings(self.count as u64 * 1_000_000 / SPEED, self.count));
+            self.machine.turn(readings(self.count as u64 * 1_000_000 / SPEED, self.count), self.edges.drain(..));
         }
     }
 

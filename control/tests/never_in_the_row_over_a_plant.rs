@@ -6,7 +6,13 @@
 mod common;
 
 use common::{machine, readings};
-use control::{event::Event, servo, settings::Setting, units::Ticks};
+use control::{
+    controller::Edge,
+    event::Event,
+    servo,
+    settings::Setting,
+    units::{Position, Ticks},
+};
 use proptest::prelude::*;
 
 /// Ticks a metre of the default wheel.
@@ -84,6 +90,7 @@ fn roll(distance_mm: u16, plants: &[(f64, f64)], legs: &[Leg], paper: bool) -> R
     let (mut time_us, mut position, mut count, mut broken, mut farthest) = (0_u64, 0.0_f64, 0_i32, false, 0_i32);
     let mut speed = 0.0_f64;
     let mut out_since_us = None;
+    let mut edges = Vec::new();
     for leg in legs {
         let target = leg.speed_mm_s.min(0.95 * top_speed_mm_s) * TICKS_A_METRE / 1000.0;
         let mut left = leg.length_mm * TICKS_A_METRE / 1000.0;
@@ -102,11 +109,11 @@ fn roll(distance_mm: u16, plants: &[(f64, f64)], legs: &[Leg], paper: bool) -> R
                 count += (reached - count).signum();
                 if broken_at(count) != broken {
                     broken = !broken;
-                    machine.beam_edge(readings(0, count).position, broken);
+                    edges.push(Edge::Seen { position: Position::new(count), broken });
                 }
             }
             farthest = farthest.max(count);
-            let orders = machine.step(readings(time_us, count));
+            let orders = machine.turn(readings(time_us, count), edges.drain(..));
             while let Some(event) = machine.next_event() {
                 run.plants_told += usize::from(matches!(event, Event::Object { .. }));
             }
@@ -172,12 +179,12 @@ proptest! {
 fn the_tool_is_in_the_row_wherever_nothing_keeps_it_out() {
     let mut machine = machine();
     machine.start(false).unwrap();
-    let mut orders = machine.step(readings(0, 0));
+    let mut orders = machine.turn(readings(0, 0), []);
     let out = servo::from_us(machine.settings().get(Setting::ServoOutUs));
     assert_eq!(orders.pulse, out, "the beam has not seen this ground");
     for millisecond in 1..2000 {
         let count = millisecond as i32;
-        orders = machine.step(readings(millisecond * 1000, count));
+        orders = machine.turn(readings(millisecond * 1000, count), []);
         let seen = Ticks(count) - machine.settings().ticks(Setting::BeamToToolMm);
         // 40 ticks are what the lead of 40 ms is at this speed.
         if seen > Ticks(5) {

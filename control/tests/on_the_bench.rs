@@ -7,17 +7,18 @@ use control::{
     alarm::Alarm,
     calibration::{Leads, Outcome, Unfit},
     console::Plot,
-    controller::{Orders, Readings, Refusal, State},
+    controller::{Edge, Orders, Readings, Refusal, State},
     event::Event,
     servo,
     settings::{Setting, Settings},
+    units::Position,
 };
 
 /// Steps the machine, standing at a count, through so many milliseconds; returns the last orders.
 fn stand(machine: &mut Machine, from_ms: u64, duration_ms: u64, count: i32) -> Orders {
     let mut orders = machine.orders();
     for now in from_ms..from_ms + duration_ms {
-        orders = machine.step(readings(now * 1000, count));
+        orders = machine.turn(readings(now * 1000, count), []);
     }
     orders
 }
@@ -39,7 +40,7 @@ fn the_tool_moves_by_hand_in_hold_only_and_is_out_again_when_the_machine_starts(
     machine.start(false).unwrap();
     assert_eq!(stand(&mut machine, 30, 10, 0).pulse, servo::from_us(2000), "the ground is not known");
     assert_eq!(machine.servo_in(), Err(Refusal::NotInHold));
-    machine.beam_edges_lost(false);
+    machine.turn(readings(40_000, 0), [Edge::Lost { broken: false }]);
     assert_eq!(machine.servo_in(), Err(Refusal::AlarmLatched));
 }
 
@@ -58,7 +59,7 @@ fn hold_and_the_switch_going_off_end_what_is_done_by_hand() {
 
     let with_switch = |machine: &mut Machine, from_ms: u64, switch_on| {
         for now in from_ms..from_ms + 50 {
-            machine.step(Readings { switch_on, ..readings(now * 1000, 0) });
+            machine.turn(Readings { switch_on, ..readings(now * 1000, 0) }, []);
         }
     };
     with_switch(&mut machine, 100, true);
@@ -74,7 +75,7 @@ fn hold_and_the_switch_going_off_end_what_is_done_by_hand() {
 fn an_alarm_ends_what_is_done_by_hand() {
     let mut machine = machine();
     machine.servo_in().unwrap();
-    machine.beam_edges_lost(false);
+    machine.turn(readings(0, 0), [Edge::Lost { broken: false }]);
     assert_eq!(stand(&mut machine, 0, 1, 0).pulse, servo::from_us(2000));
     assert_eq!(machine.state(), State::Alarm(Alarm::BeamEdgesLost));
 }
@@ -103,14 +104,14 @@ fn a_distance_that_was_rolled_sets_the_wheel() {
 /// Has the servo timed, with a tool that is out so long after it was told to, and leaves that long after.
 fn swings(machine: &mut Machine, out_ms: u64, in_ms: u64) -> Vec<Event> {
     for now in 0..1_000 {
-        machine.step(Readings { end_switch_on: true, ..readings(now * 1000, 0) });
+        machine.turn(Readings { end_switch_on: true, ..readings(now * 1000, 0) }, []);
     }
     machine.calibrate_servo().unwrap();
     let (mut told_out, mut told_at) = (true, 0);
     for now in 1_000..13_000 {
         let after = if told_out { out_ms } else { in_ms };
         let end_switch_on = told_out == (now - told_at >= after);
-        machine.step(Readings { end_switch_on, ..readings(now * 1000, 0) });
+        machine.turn(Readings { end_switch_on, ..readings(now * 1000, 0) }, []);
         if machine.tool_out() != told_out {
             (told_out, told_at) = (machine.tool_out(), now);
         }
@@ -166,11 +167,10 @@ fn the_tool_swings_as_for_a_row_whatever_the_sensors_say() {
     let mut swings = Vec::new();
     for now in 100..10_000 {
         // Nothing is wired: the beam flickers faster than anybody can count, and the encoder's contacts pick up hum.
-        machine.beam_edge(readings(0, 77).position, now % 2 == 0);
-        if now % 5 == 0 {
-            machine.beam_edges_lost(now % 2 == 0);
-        }
-        machine.step(Readings { jumps: now as u16, ..readings(now * 1000, 77) });
+        let broken = now % 2 == 0;
+        let seen = Edge::Seen { position: Position::new(77), broken };
+        let lost = (now % 5 == 0).then_some(Edge::Lost { broken });
+        machine.turn(Readings { jumps: now as u16, ..readings(now * 1000, 77) }, [seen].into_iter().chain(lost));
         assert_eq!(machine.state(), State::Hold);
         swings.extend(std::iter::from_fn(|| machine.next_event()));
         if swings.len() == 14 {
@@ -191,10 +191,9 @@ fn a_row_that_is_played_leaves_what_is_known_of_the_ground_alone() {
         let mut milliseconds = 0;
         for count in 0..2000 {
             milliseconds += 1;
-            if matches!(count, 1000 | 1300 | 1900) {
-                machine.beam_edge(readings(0, count).position, count != 1300);
-            }
-            machine.step(readings(milliseconds * 1000, count));
+            let edge = matches!(count, 1000 | 1300 | 1900)
+                .then(|| Edge::Seen { position: Position::new(count), broken: count != 1300 });
+            machine.turn(readings(milliseconds * 1000, count), edge);
         }
         if played {
             machine.test_row(1000).unwrap();
@@ -206,10 +205,8 @@ fn a_row_that_is_played_leaves_what_is_known_of_the_ground_alone() {
         let mut tool = Vec::new();
         for count in 2000..4500 {
             milliseconds += 1;
-            if count == 2200 {
-                machine.beam_edge(readings(0, count).position, false);
-            }
-            machine.step(readings((milliseconds + 9000) * 1000, count));
+            let edge = (count == 2200).then(|| Edge::Seen { position: Position::new(count), broken: false });
+            machine.turn(readings((milliseconds + 9000) * 1000, count), edge);
             tool.push(machine.tool_out());
         }
         (played_on, tool)
@@ -245,10 +242,9 @@ fn whatever_comes_in_the_turn_in_which_a_row_ends_the_next_real_plant_keeps_the_
             for count in 0..3000 {
                 milliseconds += 1;
                 let plant = (1000..1300).contains(&count);
-                if matches!(count, 1000 | 1300) {
-                    machine.beam_edge(readings(0, count).position, plant);
-                }
-                machine.step(readings(milliseconds * 1000, count));
+                let edge =
+                    matches!(count, 1000 | 1300).then(|| Edge::Seen { position: Position::new(count), broken: plant });
+                machine.turn(readings(milliseconds * 1000, count), edge);
                 let window = (1010..2150).contains(&count);
                 assert!(!window || machine.windows() == 1, "command {number}, {count}");
                 // What the command leads by, on its way in.
@@ -308,7 +304,7 @@ fn a_plotter_gets_twenty_points_a_second() {
     machine.set_plot(Plot::Teleplot);
     let mut points = 0;
     for now in 0..2000 {
-        machine.step(readings(now * 1000, 0));
+        machine.turn(readings(now * 1000, 0), []);
         points += u32::from(machine.next_plot() == Some(Plot::Teleplot));
     }
     assert_eq!(points, 39);

@@ -7,7 +7,7 @@ use crate::{
 };
 use control::{
     classifier::{Class, Classifier, Full, Listed, Nearest, Vote},
-    controller::{Controller, Orders, Readings, Reason, State, WakeUp},
+    controller::{Controller, Edge, Orders, Readings, Reason, State, WakeUp},
     examples::EXAMPLES,
     features::Features,
     quadrature::Odometer,
@@ -148,11 +148,11 @@ impl Machine for Decisions {
     }
 
     fn beam_edge(&mut self, world: &World) {
-        self.weeder.beam_edge(Position::new(world.count as i32), world.broken);
+        self.weeder.take_edge(Edge::Seen { position: Position::new(world.count as i32), broken: world.broken });
     }
 
     fn lose_edges(&mut self, world: &World) -> Checked {
-        self.weeder.beam_edges_lost(world.broken);
+        self.weeder.take_edge(Edge::Lost { broken: world.broken });
         Ok(())
     }
 

@@ -12,7 +12,7 @@ use crate::motion::{Course, marks};
 use crate::trial::{Start, Trial};
 use control::classifier::Nearest;
 use control::console::LineBuffer;
-use control::controller::{Controller, Readings, State, WakeUp};
+use control::controller::{Controller, Edge, Readings, State, WakeUp};
 use control::examples::EXAMPLES;
 use control::features;
 use control::line::Line;
@@ -185,12 +185,12 @@ pub fn weed(trial: &Trial) -> Result<Weeded, Refused> {
     let turns = (trial.motion.duration_s() / TURN_S).ceil() as u64;
     for turn in 0..=turns {
         let time_s = turn as f64 * TURN_S;
+        let mut edges = Vec::new();
         while let Some((edge_s, broken)) = sensors.next_edge(time_s) {
-            let position = sensors.position(edge_s);
-            weeder.beam_edge(Position::new(position as i32), broken);
+            edges.push(Edge::Seen { position: Position::new(sensors.position(edge_s) as i32), broken });
         }
         let position = Position::new(sensors.position(time_s) as i32);
-        let orders = weeder.step(Readings::new(instant(turn), position));
+        let orders = weeder.turn(Readings::new(instant(turn), position), edges);
         line.command(orders.pulse, time_s);
     }
     Ok(Weeded { pulses: line.into_pulses(), state: weeder.state() })

@@ -7,7 +7,7 @@ use crate::{Mode, Status, Told};
 use control::alarm::Alarm;
 use control::classifier::Vote;
 use control::console::{self, Command};
-use control::controller::{Controller, Readings, State, WakeUp};
+use control::controller::{Controller, Edge, Readings, State, WakeUp};
 use control::event::Event;
 use control::memory::Volatile;
 use control::reset::Cause;
@@ -181,21 +181,28 @@ impl<'a> Player<'a> {
 
     /// Has the decisions take the place where the machine now is.
     fn step(&mut self) {
+        self.step_behind(None);
+    }
+
+    /// Has the decisions take what came from the beam before, and the place where the machine now is.
+    fn step_behind(&mut self, before: Option<Edge>) {
         let response = self.speed().distance_in_ms(self.controller.settings().get(Setting::BeamResponseMs));
         let ground = (Position::new(self.position) - response).count();
         let broken = is_in(&self.canopies, ground);
-        if broken != self.broken {
-            self.broken = broken;
-            // The edge may end the object before, which is then judged.
-            self.controller.beam_edge(Position::new(self.position), broken);
-            if let Some(canopy) = self.canopies.iter().find(|canopy| canopy.is_over(ground)) {
+        let edge = (broken != self.broken).then_some(Edge::Seen { position: Position::new(self.position), broken });
+        self.broken = broken;
+        // The edge may end the object before, which is judged by the time that another edge is asked for.
+        let canopy = edge.and_then(|_| self.canopies.iter().find(|canopy| canopy.is_over(ground)));
+        let behind_it = std::iter::from_fn(|| {
+            if let Some(canopy) = canopy {
                 self.witness.seen.set(canopy.seen);
             }
-        }
+            None
+        });
         let mut readings = Readings::new(self.now, Position::new(self.position));
         // An end switch that does as it is told.
         readings.end_switch_on = self.controller.tool_out();
-        self.controller.step(readings);
+        self.controller.turn(readings, before.into_iter().chain(edge).chain(behind_it));
         self.listen();
     }
 
@@ -245,8 +252,7 @@ impl<'a> Player<'a> {
             self.swallows_alarm = true;
             // What was in the beam begins anew here, give or take what an object's place may differ by.
             self.broken = (0..=OBJECT_TICKS).any(|ahead| is_in(&self.canopies, self.position.wrapping_add(ahead)));
-            self.controller.beam_edges_lost(self.broken);
-            self.step();
+            self.step_behind(Some(Edge::Lost { broken: self.broken }));
         }
         is_given
     }

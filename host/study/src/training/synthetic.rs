@@ -13,7 +13,7 @@
 
 use super::Labelled;
 use control::classifier::{Class, Classifier, Full, Listed, Vote};
-use control::controller::{Controller, Readings, WakeUp};
+use control::controller::{Controller, Edge, Readings, WakeUp};
 use control::features::{Features, SPEED_CLASSES_MM_S};
 use control::memory::Volatile;
 use control::quadrature::{Quadrature, Step};
@@ -212,17 +212,18 @@ fn roll_past(row: &Row, speed_mm_s: f64, slip: f64) -> Result<Vec<Labelled>, Syn
 
     let mut wheel = Encoder::default();
     let mut next_loop = LOOP_CYCLES;
+    let mut edges = Vec::new();
     for change in machine.pin_changes(row, &motion, 0) {
         while next_loop <= change.cycle {
-            controller.step(readings(next_loop, wheel.position));
+            controller.turn(readings(next_loop, wheel.position), edges.drain(..));
             next_loop += LOOP_CYCLES;
         }
         match change.pin {
-            wiring::BEAM => controller.beam_edge(wheel.position, !change.high),
+            wiring::BEAM => edges.push(Edge::Seen { position: wheel.position, broken: !change.high }),
             _ => wheel.turn(change),
         }
     }
-    controller.step(readings(next_loop, wheel.position));
+    controller.turn(readings(next_loop, wheel.position), edges);
     drop(controller);
 
     let seen = recorder.seen.into_inner();

@@ -6,7 +6,7 @@ use super::{Plan, SoakError, Tally, count};
 use control::{
     classifier::{Class, Nearest},
     console::LineBuffer,
-    controller::{Controller, Readings, State, WakeUp},
+    controller::{Controller, Edge, Readings, State, WakeUp},
     event::Event,
     examples::EXAMPLES,
     line::Line,
@@ -127,6 +127,8 @@ struct Field {
     count: i64,
     speed: f64,
     broken: bool,
+    /// What came from the beam since the last turn.
+    edges: Vec<Edge>,
     /// Turns for which the encoder is yet to be dead, and whether one of its channels is alive then.
     silent_turns: u32,
     one_channel_lives: bool,
@@ -181,6 +183,7 @@ impl Field {
             count: FIRST_COUNT.into(),
             speed: 0.0,
             broken: false,
+            edges: Vec::new(),
             silent_turns: 0,
             one_channel_lives: false,
             jumps: 0,
@@ -318,7 +321,7 @@ impl Field {
             // The measured speed was wrong, and with it the leads: a swing may be late by that.
             self.blind_until_turn = self.turns + self.swing_ms() as u64 + SPEED_SETTLES_TURNS;
         }
-        self.weeder.step(self.readings());
+        self.weeder.turn(self.readings(), self.edges.drain(..));
         if !self.weeder.tool_out() {
             self.tally.weeded_metres += (to - from).abs() as f64 * self.machine.tick_mm() / 1000.0;
         }
@@ -329,7 +332,7 @@ impl Field {
 
     fn edge(&mut self, broken: bool) {
         self.broken = broken;
-        self.weeder.beam_edge(Position::new(self.count as i32), broken);
+        self.edges.push(Edge::Seen { position: Position::new(self.count as i32), broken });
     }
 
     /// Takes what the machine tells.
@@ -436,7 +439,7 @@ impl Field {
             }
             3 => {
                 self.broken = ground.is_broken(self.place as i64);
-                self.weeder.beam_edges_lost(self.broken);
+                self.edges.push(Edge::Lost { broken: self.broken });
                 "lost_edges"
             }
             4 => {
