@@ -4,7 +4,7 @@
 //! are separated by blanks. A line that cannot be understood becomes one [`Mistake`] and changes nothing. How commands
 //! are carried out and answered is the business of [`reply`](crate::reply).
 
-use crate::{classifier::label, settings::Setting};
+use crate::{classifier::label, plot::Plot, settings::Setting};
 use heapless::Vec;
 
 /// Characters that a line may have.
@@ -132,18 +132,6 @@ pub enum Command {
     Dump,
     /// `version`.
     Version,
-}
-
-/// Curves for a plotter.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Plot {
-    /// None.
-    #[default]
-    Off,
-    /// For the Arduino IDE's Serial Plotter.
-    Arduino,
-    /// For Teleplot.
-    Teleplot,
 }
 
 /// Speed at which a row is played unless another is given: 1.8 km/h.

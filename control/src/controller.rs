@@ -10,35 +10,31 @@ mod commands;
 mod faults;
 mod shown;
 
-pub use self::{commands::Refusal, shown::Reason};
+pub use self::shown::Reason;
 
-use self::{bench::Bench, faults::Limits};
+use self::faults::{Limits, NoPlants};
 use crate::{
     alarm::Alarm,
+    bench::Bench,
     calibration::Distance,
     classifier::{Class, Classifier, Vote},
-    console::Plot,
-    event::Event,
+    configuration::Configuration,
+    event::{Event, Events},
     features::{self, Features},
     ground::{Ground, watch::Object},
     memory::Memory,
     monitor::{BeamMonitor, EncoderMonitor},
+    objects::{Judged, Objects},
+    plot::Curves,
     quadrature::Odometer,
     reset::Cause,
-    saved::SavedSettings,
     servo::{self, HalfMicros},
-    settings::{Setting, Settings},
+    settings::Setting,
     speed::SpeedMeter,
     switch::Switch,
-    units::{Coarse, Instant, Position},
+    tool::Tool,
+    units::{Instant, Position},
 };
-use heapless::Vec;
-
-/// Objects remembered, so that they can be looked at and labelled.
-const OBJECTS: usize = 16;
-
-/// Events that wait to be told. They are short-lived: a plant gives three in half a second.
-const EVENTS: usize = 6;
 
 /// What the machine is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -120,33 +116,11 @@ pub struct Orders {
     pub has_judged: bool,
 }
 
-/// An object as it was judged: what its features follow from, in less room than they take.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Judged {
-    speed_class_mm_s: i16,
-    spacing_mm: i16,
-    width_mm: i16,
-    /// What it was taken for.
-    pub vote: Vote,
-    /// What the operator said that it is, one of [`label`](crate::classifier::label).
-    pub label: Option<u8>,
-}
-
-impl Judged {
-    /// Its features.
-    pub fn features(&self) -> Features {
-        Features::describe(self.speed_class_mm_s, self.spacing_mm, self.width_mm)
-    }
-}
-
 /// The machine's decisions and all that they rest on.
 #[derive(Clone, Debug)]
 pub struct Controller<C, M> {
     classifier: C,
-    settings: Settings,
-    /// Whether what follows from them is yet to be worked out.
-    settings_changed: bool,
-    saved: SavedSettings<M>,
+    configuration: Configuration<M>,
     ground: Ground,
     limits: Limits,
     cause: Cause,
@@ -161,28 +135,15 @@ pub struct Controller<C, M> {
     distance: Distance,
     meter: SpeedMeter,
     state: State,
-    tool_out: bool,
-    /// The servo's pulse, and since when it has been told to be that.
-    pulse: HalfMicros,
-    told_at: Instant,
-    /// Whether the ground for which the tool was told to leave the row is yet to come.
-    awaits_ground: bool,
-    /// Times that it came sooner than the tool could be out.
-    late: u16,
+    tool: Tool,
     /// Whether an object was judged in this turn.
     has_judged: bool,
     /// Lines that were not understood, or came with a hole in them.
     mistakes: u16,
-    /// Where the last object ended, or work began, and whether the operator was warned since.
-    last_seen: Position,
-    warned: bool,
-    /// The last objects, the oldest first.
-    objects: Vec<Judged, OBJECTS>,
-    events: Vec<Event, EVENTS>,
-    events_on: bool,
-    events_missed: u16,
-    plot: Plot,
-    plotted_at: Coarse,
+    no_plants: NoPlants,
+    objects: Objects,
+    events: Events,
+    curves: Curves,
 }
 
 /// A controller before the machine has woken up: nothing but zeros and what it is made of, so that a `static` can hold it
@@ -198,9 +159,7 @@ impl<C: Classifier, M: Memory> Asleep<C, M> {
             classifier,
             ground: Ground::NONE,
             limits: Limits::NONE,
-            settings: Settings::NONE,
-            settings_changed: false,
-            saved: SavedSettings::new(memory),
+            configuration: Configuration::new(memory),
             cause: Cause::PowerOn,
             readings: Readings { stack_free: 0, ..Readings::new(start, place) },
             switch: Switch::new(false),
@@ -213,21 +172,13 @@ impl<C: Classifier, M: Memory> Asleep<C, M> {
             distance: Distance::NONE,
             meter: SpeedMeter::NONE,
             state: State::Hold,
-            tool_out: false,
-            pulse: 0,
-            told_at: start,
-            awaits_ground: false,
-            late: 0,
+            tool: Tool::NONE,
             has_judged: false,
             mistakes: 0,
-            last_seen: place,
-            warned: false,
-            objects: Vec::new(),
-            events: Vec::new(),
-            events_on: false,
-            events_missed: 0,
-            plot: Plot::Off,
-            plotted_at: Coarse::ZERO,
+            no_plants: NoPlants::since(place),
+            objects: Objects::NONE,
+            events: Events::NONE,
+            curves: Curves::NONE,
         })
     }
 
@@ -238,15 +189,9 @@ impl<C: Classifier, M: Memory> Asleep<C, M> {
         let Readings { now, position, jumps, .. } = readings;
         let controller = &mut self.0;
         controller.classifier.wake_up();
-        let loaded = controller.saved.load();
-        let fault = match &loaded {
-            None => Some(Alarm::SettingsLost),
-            Some(settings) => settings.contradiction().map(|_| Alarm::SettingsContradict),
-        };
-        controller.state = fault.map_or(State::Hold, State::Alarm);
-        controller.settings = loaded.unwrap_or_default();
+        controller.state = controller.configuration.load().map_or(State::Hold, State::Alarm);
         controller.follow_settings();
-        controller.ground.begin(&controller.settings, position, beam_broken);
+        controller.ground.begin(controller.configuration.settings(), position, beam_broken);
         (controller.cause, controller.readings, controller.beam_broken) = (cause, readings, beam_broken);
         controller.switch = Switch::new(readings.switch_on);
         controller.end_switch = Switch::new(readings.end_switch_on);
@@ -254,8 +199,9 @@ impl<C: Classifier, M: Memory> Asleep<C, M> {
         controller.encoder = EncoderMonitor::new(now, position);
         controller.beam = BeamMonitor::new(now);
         controller.meter = SpeedMeter::new(position, now);
-        (controller.tool_out, controller.told_at) = (true, now);
-        (controller.last_seen, controller.plotted_at) = (position, now.coarse());
+        controller.tool.wake_up(now);
+        controller.no_plants = NoPlants::since(position);
+        controller.curves.wake_up(now);
         controller
     }
 }
@@ -317,7 +263,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         let position = self.odometer.place(readings.position);
         self.readings.position = position;
         if let Some(speed) = self.meter.read(readings.now, position) {
-            self.ground.lead(&self.settings, speed);
+            self.ground.lead(self.configuration.settings(), speed);
         }
         match self.switch.read(readings.now, readings.switch_on) {
             // An alarm wants to be cleared first, if by nothing else then by the switch going off.
@@ -329,22 +275,19 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             self.judge(object);
         }
         // Either takes half of what a turn may take.
-        if self.settings_changed && !self.has_judged {
+        if self.configuration.has_changed() && !self.has_judged {
             self.follow_settings();
         }
         if let Some(alarm) = self.fault(doubted) {
             self.raise(alarm);
         }
         let out = self.try_out().unwrap_or(!self.is_working() || self.must_be_out());
-        if out != self.tool_out {
-            self.tool_out = out;
-            self.awaits_ground = out && self.is_working() && !self.encoder.is_doubtful();
-            self.tell(Event::Swing { out, position });
+        if out != self.tool.is_out() {
+            self.tool.send(out, out && self.is_working() && !self.encoder.is_doubtful());
+            self.events.add(Event::Swing { out, position });
         }
         let orders = self.orders();
-        if orders.pulse != self.pulse {
-            (self.pulse, self.told_at) = (orders.pulse, readings.now);
-        }
+        self.tool.order(orders.pulse, readings.now);
         self.warn();
         self.has_judged = false;
         orders
@@ -352,26 +295,27 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// What the machine is to do as of the last turn.
     pub fn orders(&self) -> Orders {
-        let pulse = if self.tool_out { Setting::ServoOutUs } else { Setting::ServoInUs };
-        let pulse_of = |setting| servo::from_us(self.settings.get(setting));
+        let pulse = if self.tool.is_out() { Setting::ServoOutUs } else { Setting::ServoInUs };
+        let pulse_of = |setting| servo::from_us(self.configuration.get(setting));
         Orders {
-            pulse: if let Bench::ByHand(pulse) = self.bench { pulse } else { pulse_of(pulse) },
+            pulse: self.bench.pulse().unwrap_or_else(|| pulse_of(pulse)),
             pulse_out: pulse_of(Setting::ServoOutUs),
-            gap_ms: self.settings.get(Setting::ServoGapMs) as u8,
+            gap_ms: self.configuration.get(Setting::ServoGapMs) as u8,
             has_judged: self.has_judged,
         }
     }
 
     /// Whether the encoder's silence or the ground keeps the tool out of the row.
     fn must_be_out(&self) -> bool {
-        self.encoder.is_doubtful() || self.tool_out && self.encoder.is_quiet() || self.ground.must_be_out(self.tool_out)
+        let out = self.tool.is_out();
+        self.encoder.is_doubtful() || out && self.encoder.is_quiet() || self.ground.must_be_out(out)
     }
 
     /// Classifies a complete object and remembers it unless it is a weed.
     fn judge(&mut self, object: Object) {
         self.has_judged = true;
         let position = self.readings.position;
-        (self.last_seen, self.warned) = (position, false);
+        self.no_plants = NoPlants::since(position);
         let spacing = self.ground.spacing(&object);
         let speed_class_mm_s = features::speed_class(self.speed_mm_s());
         let (spacing_mm, width_mm) =
@@ -381,15 +325,11 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             Vote { class: Class::Unknown, votes: 0 }
         } else {
             let features = Features::describe(speed_class_mm_s, spacing_mm, width_mm);
-            self.classifier.classify(&features, self.settings.get(Setting::K) as u8)
+            self.classifier.classify(&features, self.configuration.get(Setting::K) as u8)
         };
-        if self.objects.is_full() {
-            self.objects.remove(0);
-        }
-        // There is room, as was just seen to.
-        let _ = self.objects.push(Judged { speed_class_mm_s, spacing_mm, width_mm, vote, label: None });
+        self.objects.remember(Judged { speed_class_mm_s, spacing_mm, width_mm, vote, label: None });
         let leading = self.ground.position_of(object.leading, position);
-        self.tell(Event::Object { vote, leading, spacing, plan: self.ground.plan(&object) });
+        self.events.add(Event::Object { vote, leading, spacing, plan: self.ground.plan(&object) });
         if vote.class != Class::Weed && self.ground.keep(object).is_err() {
             self.raise(Alarm::ScheduleFull);
         }
@@ -398,12 +338,11 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// Latches an alarm. What was seen can no longer be trusted.
     fn raise(&mut self, alarm: Alarm) {
         self.ground.forget();
-        // No sensor need be wired for the servo to be tried.
-        let nobody_asks = alarm.is_of_a_sensor() && matches!(self.bench, Bench::Row(_));
+        let nobody_asks = alarm.is_of_a_sensor() && self.bench.needs_no_sensor();
         if nobody_asks || matches!(self.state, State::Alarm(_)) {
             return;
         }
-        self.tell(Event::Alarm { alarm, position: self.readings.position });
+        self.events.add(Event::Alarm { alarm, position: self.readings.position });
         self.enter(State::Alarm(alarm));
     }
 
@@ -412,11 +351,11 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     }
 
     fn go_to_work(&mut self) {
-        if self.settings.contradiction().is_some() {
+        if self.configuration.expect_no_contradiction().is_err() {
             self.raise(Alarm::SettingsContradict);
             return;
         }
-        (self.last_seen, self.warned) = (self.readings.position, false);
+        self.no_plants = NoPlants::since(self.readings.position);
         self.enter(State::Work);
     }
 
@@ -425,31 +364,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         self.bench = Bench::Idle;
         if state != self.state {
             self.state = state;
-            self.tell(Event::State(state));
+            self.events.add(Event::State(state));
         }
-    }
-
-    fn tell(&mut self, event: Event) {
-        if self.events_on {
-            self.announce(event);
-        }
-    }
-
-    /// Tells an event that the operator waits for, whether or not events are told.
-    fn announce(&mut self, event: Event) {
-        if self.events.push(event).is_err() {
-            count(&mut self.events_missed);
-        }
-    }
-}
-
-/// Counts one more, as far as 16 bits go.
-#[expect(
-    clippy::implicit_saturating_add,
-    reason = "the compiler makes twice the code of `saturating_add` on this chip"
-)]
-fn count(number: &mut u16) {
-    if *number < u16::MAX {
-        *number += 1;
     }
 }

@@ -15,8 +15,10 @@
 #![forbid(unsafe_code)]
 
 pub mod alarm;
+pub mod bench;
 pub mod calibration;
 pub mod classifier;
+pub mod configuration;
 pub mod console;
 pub mod controller;
 pub mod event;
@@ -27,7 +29,10 @@ pub mod lamp;
 pub mod line;
 pub mod memory;
 pub mod monitor;
+pub mod objects;
+pub mod plot;
 pub mod quadrature;
+pub mod refusal;
 pub mod rehearsal;
 pub mod reply;
 pub mod reset;
@@ -39,5 +44,6 @@ pub mod speed;
 pub mod switch;
 pub mod taught;
 pub mod text;
+pub mod tool;
 pub mod units;
 mod words;

@@ -19,9 +19,10 @@ use self::{
 use crate::{
     classifier::Classifier,
     console::{Command, Mistake, Word},
-    controller::{Controller, Refusal},
+    controller::Controller,
     line::Line,
     memory::Memory,
+    refusal::Refusal,
     said,
     settings::Setting,
     text::Text,

@@ -326,3 +326,14 @@ impl Wheel {
         if distance.0 < 0 { -millimetres } else { millimetres }
     }
 }
+
+/// Counts one more, as far as 16 bits go.
+#[expect(
+    clippy::implicit_saturating_add,
+    reason = "the compiler makes twice the code of `saturating_add` on this chip"
+)]
+pub fn count(number: &mut u16) {
+    if *number < u16::MAX {
+        *number += 1;
+    }
+}

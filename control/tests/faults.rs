@@ -5,9 +5,10 @@ mod common;
 use common::{ByWidth, Machine, machine, readings, woken_up};
 use control::{
     alarm::{Alarm, Warning},
-    controller::{Controller, Edge, Orders, Readings, Reason, Refusal, State},
+    controller::{Controller, Edge, Orders, Readings, Reason, State},
     event::Event,
     memory::Volatile,
+    refusal::Refusal,
     reset::Cause,
     saved::SavedSettings,
     settings::{Contradiction, Setting, Settings},

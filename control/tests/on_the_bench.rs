@@ -6,9 +6,10 @@ use common::{Machine, machine, readings};
 use control::{
     alarm::Alarm,
     calibration::{Leads, Outcome, Unfit},
-    console::Plot,
-    controller::{Edge, Orders, Readings, Refusal, State},
+    controller::{Edge, Orders, Readings, State},
     event::Event,
+    plot::Plot,
+    refusal::Refusal,
     servo,
     settings::{Setting, Settings},
     units::Position,

@@ -1,33 +1,17 @@
-//! What is tried on the bench: the tool by hand, the servo's times, the wheel's ticks, and the swings of a row.
-//!
-//! All of it needs the machine in HOLD, where it stays, and ends when the machine is told to do something else. None of it
-//! touches what the machine knows of the ground.
+//! What the operator tries on the bench: the tool by hand, the servo's times, the wheel's ticks, and the swings of a row.
 
-use super::{Controller, Refusal, State};
+use super::{Controller, Readings, State};
 use crate::{
+    bench::Bench,
     calibration::{Leads, Outcome, Swings},
     classifier::Classifier,
     event::Event,
     memory::Memory,
+    refusal::Refusal,
     rehearsal::Rehearsal,
-    servo::{self, HalfMicros},
+    servo,
     settings::Setting,
 };
-
-/// What is being tried.
-#[derive(Clone, Debug)]
-// Nothing is 0, as the memory is before anybody has woken up.
-#[repr(u8)]
-pub(super) enum Bench {
-    /// Nothing.
-    Idle,
-    /// The servo has this pulse.
-    ByHand(HalfMicros),
-    /// The servo swings to and fro, to be timed.
-    Swings(Swings),
-    /// The tool swings as for a row of plants.
-    Row(Rehearsal),
-}
 
 impl<C: Classifier, M: Memory> Controller<C, M> {
     /// Gives the servo a pulse by hand, in microseconds.
@@ -50,7 +34,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// # Errors
     /// As [`servo_by_hand`](Self::servo_by_hand).
     pub fn servo_in(&mut self) -> Result<(), Refusal> {
-        self.servo_by_hand(self.settings.get(Setting::ServoInUs))
+        self.servo_by_hand(self.configuration.get(Setting::ServoInUs))
     }
 
     /// Ends what was tried: the tool goes out of the row.
@@ -69,7 +53,8 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// [`Refusal::NotInHold`] and [`Refusal::AlarmLatched`].
     pub fn calibrate_servo(&mut self) -> Result<(), Refusal> {
         self.expect_hold()?;
-        let (watched, gap_ms) = (self.settings.get(Setting::EndSwitch) != 0, self.settings.get(Setting::ServoGapMs));
+        let watched = self.configuration.get(Setting::EndSwitch) != 0;
+        let gap_ms = self.configuration.get(Setting::ServoGapMs);
         self.bench = Bench::Swings(Swings::new(self.readings.now, watched, gap_ms as u8));
         Ok(())
     }
@@ -89,7 +74,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// # Errors
     /// [`Refusal::Unfit`], [`Refusal::NotInHold`], [`Refusal::OutOfRange`] and [`Refusal::Contradiction`]; nothing is changed then.
     pub fn calibrate(&mut self, distance_mm: u16, force: bool) -> Result<(), Refusal> {
-        let nominal = self.settings.nominal_wheel().ticks(1000).0 as u16;
+        let nominal = self.configuration.settings().nominal_wheel().ticks(1000).0 as u16;
         let ended = self.distance.end(self.readings.position, distance_mm, nominal, force);
         self.set(Setting::TicksPerM, ended.map_err(Refusal::Unfit)?)
     }
@@ -101,31 +86,21 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// the machine would not work at.
     pub fn test_row(&mut self, speed_mm_s: u16) -> Result<(), Refusal> {
         self.expect_hold()?;
-        self.expect_no_contradiction()?;
-        let fastest = self.settings.get(Setting::TopSpeedMmS);
+        self.configuration.expect_no_contradiction()?;
+        let fastest = self.configuration.get(Setting::TopSpeedMmS);
         if !(Setting::TopSpeedMmS.description().least..=fastest).contains(&speed_mm_s) {
             return Err(Refusal::TestSpeed { fastest });
         }
-        self.bench = Bench::Row(Rehearsal::new(self.readings.now, speed_mm_s, &self.settings));
+        self.bench = Bench::Row(Rehearsal::new(self.readings.now, speed_mm_s, self.configuration.settings()));
         Ok(())
     }
 
     /// Carries on with what is being tried; whether it has the tool out, if it says.
     pub(super) fn try_out(&mut self) -> Option<bool> {
-        let now = self.readings.now;
-        let out = match &mut self.bench {
-            Bench::Idle | Bench::ByHand(_) => return None,
-            Bench::Swings(swings) => match swings.step(now, self.readings.end_switch_on) {
-                None => Some(swings.tool_out()),
-                Some(outcome) => {
-                    self.finish_swings(outcome);
-                    None
-                }
-            },
-            Bench::Row(row) => row.tool_out(now, self.tool_out),
-        };
-        if out.is_none() {
-            self.bench = Bench::Idle;
+        let Readings { now, end_switch_on, .. } = self.readings;
+        let (out, outcome) = self.bench.carry_on(now, end_switch_on, self.tool.is_out());
+        if let Some(outcome) = outcome {
+            self.finish_swings(outcome);
         }
         out
     }
@@ -133,12 +108,13 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// Sets the leads by what was measured, if they fit, and tells how it ended.
     fn finish_swings(&mut self, outcome: Outcome) {
         let fits = match outcome {
-            Outcome::Measured(Leads { out_ms, in_ms }) => {
-                self.change(&[(Setting::LeadOutMs, out_ms), (Setting::LeadInMs, in_ms)]).is_ok()
-            }
+            Outcome::Measured(Leads { out_ms, in_ms }) => self
+                .configuration
+                .change(&[(Setting::LeadOutMs, out_ms), (Setting::LeadInMs, in_ms)], self.is_working())
+                .is_ok(),
             _ => false,
         };
-        self.announce(Event::Calibrated { outcome, fits });
+        self.events.announce(Event::Calibrated { outcome, fits });
     }
 
     #[inline(never)]

@@ -1,13 +1,13 @@
 //! Faults and warnings: what the readings show that the machine cannot work with, and what the operator should know.
 
-use super::{Controller, Readings, bench::Bench, count};
+use super::{Controller, Readings};
 use crate::{
     alarm::{Alarm, Warning},
     classifier::Classifier,
     event::Event,
     memory::Memory,
     settings::{Setting, Settings},
-    units::{Interval, Length, Ticks},
+    units::{Length, Position, Ticks},
 };
 
 /// What the end switch may take longer than the lead: a servo frame, the contacts' bouncing, and some patience.
@@ -40,6 +40,35 @@ impl Limits {
     }
 }
 
+/// How far the machine has worked without seeing a plant.
+#[derive(Clone, Debug)]
+pub(super) struct NoPlants {
+    /// Where the last object ended, or work began.
+    since: Position,
+    warned: bool,
+}
+
+impl NoPlants {
+    /// None since here.
+    pub(super) const fn since(position: Position) -> Self {
+        Self { since: position, warned: false }
+    }
+
+    /// Whether the operator is to be warned, once, as none was seen on a way longer than this; zero never.
+    fn warn(&mut self, position: Position, longest: Ticks) -> bool {
+        if self.warned || longest == Ticks::ZERO || position - self.since <= longest {
+            return false;
+        }
+        self.warned = true;
+        true
+    }
+
+    /// Whether the operator was warned.
+    pub(super) const fn has_warned(&self) -> bool {
+        self.warned
+    }
+}
+
 impl<C: Classifier, M: Memory> Controller<C, M> {
     /// The fault that the readings show, if any; so many of the encoder's ticks are `doubted`.
     #[inline(never)]
@@ -67,22 +96,15 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             return Some(Alarm::RolledBackTooFar);
         }
         self.end_switch.read(now, end_switch_on);
-        if self.settings.get(Setting::EndSwitch) != 0
-            && !matches!(self.bench, Bench::ByHand(_) | Bench::Swings(_))
-            && self.end_switch.is_on() != self.tool_out
-            // What was done by hand has ended just now, and the tool is yet to be told.
-            && self.orders().pulse == self.pulse
-            && self.was_told_for(self.settings.get(Setting::LeadOutMs) + END_SWITCH_GRACE_MS)
+        if self.configuration.get(Setting::EndSwitch) != 0
+            && !self.bench.needs_no_end_switch()
+            && self.end_switch.is_on() != self.tool.is_out()
+            // Where what was done by hand has ended just now, the tool is yet to be told.
+            && self.tool.has_had(self.orders().pulse, now, self.configuration.get(Setting::LeadOutMs) + END_SWITCH_GRACE_MS)
         {
             return Some(Alarm::ToolStuck);
         }
         (stack_free < STACK_RESERVE).then_some(Alarm::StackLow)
-    }
-
-    /// Whether the servo was told its pulse so long ago.
-    #[inline(never)]
-    fn was_told_for(&self, milliseconds: u16) -> bool {
-        self.readings.now - self.told_at >= Interval::from_ms(milliseconds.into())
     }
 
     /// Tells what the operator should know, once.
@@ -90,19 +112,15 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         if !self.is_working() {
             return;
         }
-        if self.awaits_ground && self.ground.is_closed_at_tool() {
-            self.awaits_ground = false;
+        if self.tool.awaits_ground() && self.ground.is_closed_at_tool() {
             // An eighth of the lead is what the speed may waver by.
-            let lead_ms = self.settings.get(Setting::LeadOutMs);
-            if !self.was_told_for(lead_ms - lead_ms / 8) {
-                count(&mut self.late);
-                self.tell(Event::Warning(Warning::LateCommand));
+            let lead_ms = self.configuration.get(Setting::LeadOutMs);
+            if self.tool.is_late(self.readings.now, lead_ms - lead_ms / 8) {
+                self.events.add(Event::Warning(Warning::LateCommand));
             }
         }
-        let no_plant = self.limits.no_plant;
-        if !self.warned && no_plant > Ticks::ZERO && self.readings.position - self.last_seen > no_plant {
-            self.warned = true;
-            self.tell(Event::Warning(Warning::NoPlants));
+        if self.no_plants.warn(self.readings.position, self.limits.no_plant) {
+            self.events.add(Event::Warning(Warning::NoPlants));
         }
     }
 }

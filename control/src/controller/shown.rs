@@ -1,22 +1,20 @@
 //! What the machine shows of itself: its state, what it has counted, and what there is to tell.
 
-use super::{Bench, Controller, Judged, Readings, State};
+use super::{Controller, Readings, State};
 use crate::{
     classifier::Classifier,
-    console::Plot,
     event::Event,
     lamp,
     memory::Memory,
+    objects::Judged,
+    plot::Plot,
     reset::Cause,
     settings::{Setting, Settings},
-    units::{Coarse, Ticks},
+    units::Ticks,
 };
 
 /// A wheel whose edges come less than 50 us apart, in ticks a second: faster than any weeder with an encoder of 0.2 mm or more.
 const FAST: u16 = 20_000;
-
-/// Time between two points of a plotter's curves.
-const PLOT_PERIOD: u16 = Coarse::steps_in_ms(50);
 
 /// Why the tool is out of the row while the machine works.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,7 +38,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// Why the tool is out of the row although the machine works.
     pub fn reason(&self) -> Option<Reason> {
-        if !self.is_working() || !self.tool_out {
+        if !self.is_working() || !self.tool.is_out() {
             None
         } else if self.encoder.is_doubtful() || self.encoder.is_quiet() {
             Some(Reason::EncoderDoubtful)
@@ -85,15 +83,12 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// Whether the status LED shines: while the servo is being tried, it marks the commands.
     pub fn lamp_is_lit(&self) -> bool {
-        match self.bench {
-            Bench::Swings(_) | Bench::Row(_) => self.tool_out,
-            _ => lamp::is_lit(self.state, self.readings.now),
-        }
+        if self.bench.swings() { self.tool.is_out() } else { lamp::is_lit(self.state, self.readings.now) }
     }
 
     /// Whether the tool is to be out of the row.
     pub fn tool_out(&self) -> bool {
-        self.tool_out
+        self.tool.is_out()
     }
 
     /// The last readings.
@@ -103,12 +98,12 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// The settings in use.
     pub fn settings(&self) -> &Settings {
-        &self.settings
+        self.configuration.settings()
     }
 
     /// The value of a setting that is saved, if any is.
     pub fn saved(&self, setting: Setting) -> Option<u16> {
-        self.saved.value(setting)
+        self.configuration.saved(setting)
     }
 
     /// What tells plants from weeds.
@@ -118,7 +113,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// The last objects, the oldest first.
     pub fn objects(&self) -> &[Judged] {
-        &self.objects
+        self.objects.all()
     }
 
     /// Why the machine was reset.
@@ -128,7 +123,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// Times that closed ground reached the tool sooner than it could be out.
     pub fn late(&self) -> u16 {
-        self.late
+        self.tool.late()
     }
 
     /// Lines that were not understood.
@@ -138,26 +133,21 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// Events that found no room to wait in.
     pub fn events_missed(&self) -> u16 {
-        self.events_missed
+        self.events.missed()
     }
 
     /// Whether the machine has worked for a long way without seeing a plant.
     pub fn sees_no_plants(&self) -> bool {
-        self.warned
+        self.no_plants.has_warned()
     }
 
     /// The next event to be told.
-    #[inline(never)]
     pub fn next_event(&mut self) -> Option<Event> {
-        (!self.events.is_empty()).then(|| self.events.remove(0))
+        self.events.next()
     }
 
     /// The curves of which the next points are due, which are due 20 times a second.
     pub fn next_plot(&mut self) -> Option<Plot> {
-        if self.plot == Plot::Off || self.readings.now.coarse().since(self.plotted_at) < PLOT_PERIOD {
-            return None;
-        }
-        self.plotted_at = self.readings.now.coarse();
-        Some(self.plot)
+        self.curves.next(self.readings.now)
     }
 }

@@ -30,7 +30,7 @@ enum Behind {
 /// The canopies known, in the order in which the beam saw them.
 #[derive(Clone, Debug)]
 pub struct Schedule {
-    canopies: Vec<Object, CAPACITY>,
+    canopies: Vec<Object, CAPACITY, u8>,
     /// Everything behind this place is unknown.
     known_from: Place,
     behind: Behind,

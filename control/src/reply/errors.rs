@@ -4,8 +4,8 @@ use super::{names::class_name, shown::write_allowed};
 use crate::{
     calibration::Unfit,
     console::{Mistake, Word},
-    controller::Refusal,
     line::Line,
+    refusal::Refusal,
     said,
     settings::{Contradiction, Setting},
 };

@@ -1,0 +1,49 @@
+//! Curves for a plotter: which, and when their next points are due.
+
+use crate::units::{Coarse, Instant};
+
+/// Time between two points of a plotter's curves.
+const PERIOD: u16 = Coarse::steps_in_ms(50);
+
+/// Curves for a plotter.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Plot {
+    /// None.
+    #[default]
+    Off,
+    /// For the Arduino IDE's Serial Plotter.
+    Arduino,
+    /// For Teleplot.
+    Teleplot,
+}
+
+/// The curves that are drawn.
+#[derive(Clone, Debug)]
+pub struct Curves {
+    plot: Plot,
+    drawn_at: Coarse,
+}
+
+impl Curves {
+    /// None.
+    pub const NONE: Self = Self { plot: Plot::Off, drawn_at: Coarse::ZERO };
+
+    /// The machine has woken up: the next points are due a period from now.
+    pub const fn wake_up(&mut self, now: Instant) {
+        self.drawn_at = now.coarse();
+    }
+
+    /// Draws curves from now on, or no longer.
+    pub fn set(&mut self, plot: Plot) {
+        self.plot = plot;
+    }
+
+    /// The curves of which the next points are due, 20 times a second.
+    pub fn next(&mut self, now: Instant) -> Option<Plot> {
+        if self.plot == Plot::Off || now.coarse().since(self.drawn_at) < PERIOD {
+            return None;
+        }
+        self.drawn_at = now.coarse();
+        Some(self.plot)
+    }
+}
