@@ -15,7 +15,7 @@ use crate::{
     shared::{Byte, Shared},
 };
 use avr_device::atmega328p::{EXINT, PORTB, portb};
-use control::{controller::Edge, units::Position};
+use control::{measure::readings::Edge, units::Position};
 
 /// Edges that can wait for the loop, which a sensor with a response of 1 ms cannot make in less than 16 ms.
 const SLOTS: usize = 16;

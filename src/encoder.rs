@@ -15,7 +15,7 @@ use avr_device::{
     atmega328p::{CPU, EXINT, PORTD},
     interrupt,
 };
-use control::quadrature::{Quadrature, Step};
+use control::measure::quadrature::{Quadrature, Step};
 
 /// The count's lower half, which the beam's handler reads too, and its upper.
 pub static COUNT_LOW: Shared<u16> = Shared::new(0);

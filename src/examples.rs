@@ -8,7 +8,7 @@
 //! that find no place although they are as far as the farthest go to the classifier.
 
 use avr_progmem::wrapper::ProgMem;
-use control::{examples, features};
+use control::ground::{examples, features};
 use core::arch::asm;
 use knn::{Example, Examples, Neighbour};
 

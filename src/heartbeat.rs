@@ -13,7 +13,7 @@ use crate::{
     watchdog,
 };
 use avr_device::interrupt;
-use control::{reset::mark, servo::HalfMicros};
+use control::{measure::reset::mark, operate::servo::HalfMicros};
 
 /// Periods of the clock's interrupt that may pass without a beat: 200 ms. The watchdog's 250 ms come after them.
 const PERIODS: u8 = 195;

@@ -28,11 +28,11 @@ mod watchdog;
 
 use avr_device::{atmega328p::Peripherals, interrupt};
 use control::{
-    classifier::Nearest,
-    console::LineBuffer,
-    controller::{Asleep, Controller, Readings, WakeUp},
-    reply::Console,
+    ground::nearest::Nearest,
+    measure::readings::{Readings, WakeUp},
+    say::{Console, command::LineBuffer},
     units::Position,
+    weeder::{Asleep, Controller},
 };
 use embedded_hal::digital::{InputPin, OutputPin};
 use embedded_hal_nb::serial::Read;

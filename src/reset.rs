@@ -4,7 +4,7 @@
 
 use crate::shared::Shared;
 use avr_device::atmega328p::CPU;
-use control::reset::{Cause, mark};
+use control::measure::reset::{Cause, mark};
 
 #[unsafe(link_section = ".noinit")]
 // SAFETY: at power-up it holds any two bytes, which are a number.

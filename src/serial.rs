@@ -7,7 +7,7 @@
 
 use crate::{handler::handler, ring::Ring, shared::Byte};
 use avr_device::atmega328p::USART0;
-use control::console::GAP_MARK;
+use control::say::command::GAP_MARK;
 use core::convert::Infallible;
 use embedded_hal_nb::serial::{ErrorType, Read, Write};
 

@@ -11,7 +11,7 @@ use avr_device::{
     atmega328p::{PORTB, TC1},
     interrupt,
 };
-use control::servo::{self, Action, FRAME, HalfMicros};
+use control::operate::servo::{self, Action, FRAME, HalfMicros};
 use core::convert::Infallible;
 use embedded_hal::pwm::{ErrorType, SetDutyCycle};
 

@@ -4,17 +4,26 @@
 //! ahead the servo has to be told. [`Ground`] holds the three together, so that none of them can forget by itself: whatever
 //! the reason, [`Ground::forget`] closes all that was seen, and what is open at the frontier becomes the rest of something.
 //!
-//! Places have 16 bits, so ground is left behind before the counter could come round: see [`Ground::roll_to`]. What an
-//! object is, plant or weed, is decided elsewhere.
+//! Places have 16 bits, so ground is left behind before the counter could come round: see [`Ground::roll_to`].
+//!
+//! What an [`object`] is, plant or weed, the ground is told: that is a [`class`], by the object's [`features`] the vote of the
+//! [`nearest`] of built-in [`examples`] and [those taught in the field](field_examples).
 
+pub mod class;
+pub mod examples;
+pub mod features;
+pub mod field_examples;
+pub mod nearest;
+pub mod object;
 pub mod reach;
 pub mod schedule;
 pub mod watch;
 
 use self::{
+    object::Object,
     reach::{Geometry, Leads},
     schedule::{Full, Plan, Schedule},
-    watch::{Object, Watch},
+    watch::Watch,
 };
 use crate::{
     settings::Settings,

@@ -1,9 +1,10 @@
 //! The weeder's decisions, from beam edge to swing, without a register, a clock, a float or a heap.
 //!
-//! The data's way: a beam edge with its position becomes an object of the [`ground`], the object's [`features`] a class by the
-//! [`classifier`], a plant a window on the ground, and that with the present [`speed`] tells whether the tool has to be out
-//! of the row. [`controller`] is the front door through which all of that, the operator's [`switch`] and the
-//! [`console`] pass; [`reply`] words what comes back.
+//! The data's way: [`measure`] takes clock, encoder, beam and switches; a beam edge with its position becomes an object of the
+//! [`ground`], the object's features a class, a plant a window on the ground, and that with the present speed tells whether the
+//! tool has to be out of the row. [`operate`] holds what the operator and the servo have to do with that. [`weeder`] joins them,
+//! a turn of the loop at a time, and [`say`] is its console. Imports run that way and no other: `ground` and `measure` know
+//! neither each other nor the three behind them, and all of them know [`units`], [`settings`], [`memory`] and [`alarm`].
 //!
 //! Position and time are arguments everywhere, so that a test can bend both. What this crate does not do: read a pin,
 //! wait, or know how its text reaches a terminal.
@@ -15,35 +16,11 @@
 #![forbid(unsafe_code)]
 
 pub mod alarm;
-pub mod bench;
-pub mod calibration;
-pub mod classifier;
-pub mod configuration;
-pub mod console;
-pub mod controller;
-pub mod event;
-pub mod examples;
-pub mod features;
 pub mod ground;
-pub mod lamp;
-pub mod line;
+pub mod measure;
 pub mod memory;
-pub mod monitor;
-pub mod objects;
-pub mod plot;
-pub mod quadrature;
-pub mod refusal;
-pub mod rehearsal;
-pub mod reply;
-pub mod reset;
-mod said;
-pub mod saved;
-pub mod servo;
+pub mod operate;
+pub mod say;
 pub mod settings;
-pub mod speed;
-pub mod switch;
-pub mod taught;
-pub mod text;
-pub mod tool;
 pub mod units;
-mod words;
+pub mod weeder;

@@ -5,19 +5,29 @@ mod common;
 use common::{ByWidth, Machine, machine, readings, woken_up};
 use control::{
     alarm::{Alarm, Warning},
-    calibration::{Leads, Outcome},
-    classifier::{Class, Vote},
-    console::{LineBuffer, Word},
-    controller::{Controller, Edge, Readings, State},
-    event::Event,
-    ground::schedule::Plan,
-    line::Line,
+    ground::{
+        class::{Class, Vote},
+        schedule::Plan,
+    },
+    measure::{
+        readings::{Edge, Readings},
+        reset::Cause,
+    },
     memory::Volatile,
-    plot::Plot,
-    reply::{self, Console, LINE},
-    reset::Cause,
+    operate::{
+        calibration::{Leads, Outcome},
+        event::Event,
+        plot::Plot,
+        state::State,
+    },
+    say::{
+        self, Console, LINE,
+        command::{LineBuffer, Word},
+        line::Line,
+    },
     settings::Setting,
     units::{Position, Ticks},
+    weeder::Controller,
 };
 
 /// The text of a line, which is one that fits.
@@ -31,7 +41,7 @@ fn said(line: Line) -> String {
 fn ask(machine: &mut Machine, line: &str) -> Vec<String> {
     let mut buffer = LineBuffer::new();
     let command = line.bytes().chain(*b"\n").find_map(|byte| buffer.take(byte)).expect("a line that says something");
-    let mut answer = reply::answer(command, machine);
+    let mut answer = say::execute(command, machine);
     let mut lines = Vec::new();
     while !answer.is_done() {
         let mut line = Line::new();
@@ -194,7 +204,7 @@ fn every_event_fits_on_a_line() {
     events.extend((0..).map_while(Alarm::from_index).map(|alarm| Event::Alarm { alarm, position: far }));
     for event in events {
         let mut line = Line::new();
-        reply::write_event(&event, &mut line);
+        say::write_event(&event, &mut line);
         let said = said(line);
         assert!(said.ends_with("\r\n") && !said.contains(':'), "{said}");
     }
@@ -269,7 +279,7 @@ fn lines_that_are_not_understood_are_counted() {
 #[test]
 fn the_table_of_faults_names_every_alarm_with_its_code_and_every_warning_and_cause() {
     let table = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/faults.md")).unwrap();
-    let name = |text: control::text::Text| String::from_utf8(text.bytes().collect()).unwrap();
+    let name = |text: control::say::packed::Text| String::from_utf8(text.bytes().collect()).unwrap();
     for alarm in (0..).map_while(Alarm::from_index) {
         let row = format!("| {}-{} | `{}` |", alarm.code() / 10, alarm.code() % 10, name(alarm.text()));
         assert!(table.lines().any(|line| line.starts_with(&row)), "{row}");
@@ -346,7 +356,7 @@ fn curves_are_labels_and_values_and_nothing_else() {
         (Plot::Teleplot, ">speed_mm_s:0\r\n>tool_deg:45\r\n>beam_broken:0\r\n>windows:0\r\n"),
     ] {
         let mut line = Line::new();
-        reply::write_plot(&machine, plot, &mut line);
+        say::write_plot(&machine, plot, &mut line);
         assert_eq!(said(line), expected);
     }
 }

@@ -10,15 +10,17 @@
 
 use control::{
     alarm::Alarm,
-    classifier::Nearest,
-    controller::{Controller, Edge, Readings, State, WakeUp},
-    examples::EXAMPLES,
+    ground::{examples::EXAMPLES, nearest::Nearest},
+    measure::{
+        quadrature::{Quadrature, Step},
+        readings::{Edge, Readings, WakeUp},
+        reset::Cause,
+    },
     memory::Volatile,
-    quadrature::{Quadrature, Step},
-    reset::Cause,
-    servo,
+    operate::{servo, state::State},
     settings::Setting,
     units::{Instant, Interval, Position},
+    weeder::Controller,
 };
 use expect_test::{ExpectFile, expect_file};
 use rand::{RngExt, SeedableRng};

@@ -5,14 +5,15 @@ mod common;
 use common::{ByWidth, Machine, machine, readings, woken_up};
 use control::{
     alarm::{Alarm, Warning},
-    controller::{Controller, Edge, Orders, Readings, Reason, State},
-    event::Event,
+    measure::{
+        readings::{Edge, Readings},
+        reset::Cause,
+    },
     memory::Volatile,
-    refusal::Refusal,
-    reset::Cause,
-    saved::SavedSettings,
+    operate::{event::Event, refusal::Refusal, saved::SavedSettings, state::State},
     settings::{Contradiction, Setting, Settings},
     units::{Instant, Interval, Position, Ticks},
+    weeder::{Controller, Orders, Reason},
 };
 
 /// Ticks a metre of the default wheel.
@@ -163,7 +164,7 @@ fn what_stood_in_the_beam_when_the_encoder_fell_silent_is_a_plant_however_narrow
         Event::Object { vote, .. } => Some(vote.class),
         _ => None,
     });
-    assert_eq!(told, Some(control::classifier::Class::Unknown));
+    assert_eq!(told, Some(control::ground::class::Class::Unknown));
     assert_eq!(drive.machine.windows(), 1);
 }
 

@@ -6,18 +6,24 @@
 use bolero::{TypeGenerator, check};
 use control::{
     alarm::Alarm,
-    classifier::{Classifier, Nearest},
-    console::{LineBuffer, Word},
-    controller::{Controller, Readings, State, WakeUp},
-    examples::EXAMPLES,
-    line::Line,
+    ground::{class::Classifier, examples::EXAMPLES, field_examples, nearest::Nearest},
+    measure::{
+        readings::{Readings, WakeUp},
+        reset::Cause,
+    },
     memory::{ERASED, Memory, SIZE, Volatile},
-    reply::{self, Answer, LINE},
-    reset::Cause,
-    saved::{COPY, SavedSettings},
+    operate::{
+        saved::{COPY, SavedSettings},
+        state::State,
+    },
+    say::{
+        self, Answer, LINE,
+        command::{LineBuffer, Word},
+        line::Line,
+    },
     settings::{Setting, Settings},
-    taught,
     units::{Instant, Position},
+    weeder::Controller,
 };
 
 /// The machine as the firmware has it, with these contents of its EEPROM's halves.
@@ -70,7 +76,7 @@ fn every_line_that_comes_is_answered_by_lines_that_fit_and_one_verdict() {
         for (turn, byte) in (0_u32..).zip(bytes) {
             machine.turn(Readings::new(Instant::new(turn * 125), Position::new(turn.cast_signed() / 4)), []);
             let Some(command) = line.take(byte) else { continue };
-            let mut answer = reply::answer(command, &mut machine);
+            let mut answer = say::execute(command, &mut machine);
             while !machine.carry_on() {}
             let mut verdicts = 0;
             while !answer.is_done() {
@@ -86,7 +92,7 @@ fn every_line_that_comes_is_answered_by_lines_that_fit_and_one_verdict() {
             assert_eq!((verdicts, answer), (1, Answer::Done), "{command:?}");
             while let Some(event) = machine.next_event() {
                 let mut out = Line::new();
-                reply::write_event(&event, &mut out);
+                say::write_event(&event, &mut out);
                 let out: Vec<u8> = out.collect();
                 assert!(out.len() <= LINE && out.ends_with(b"\r\n"), "{}", out.escape_ascii());
             }
@@ -167,7 +173,7 @@ fn whatever_the_eeprom_holds_the_machine_wakes_up_with_whole_settings_or_none_an
         {
             assert_eq!(found, Some(settings(last)), "what was saved last is not there");
         }
-        assert!(machine.classifier().spoiled() <= taught::CAPACITY);
+        assert!(machine.classifier().spoiled() <= field_examples::CAPACITY);
         let mut place = 0;
         while let Some((_, next)) = machine.classifier().listed(place) {
             assert!(next > place);

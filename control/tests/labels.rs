@@ -4,16 +4,13 @@
 mod readings;
 
 use control::{
-    classifier::{Class, Nearest},
-    console::LineBuffer,
-    controller::{Controller, Edge},
-    examples::EXAMPLES,
-    line::Line,
+    ground::{class::Class, examples::EXAMPLES, nearest::Nearest},
+    measure::{readings::Edge, reset::Cause},
     memory::Volatile,
-    reply,
-    reset::Cause,
+    say::{self, command::LineBuffer, line::Line},
     settings::Setting,
     units::Position,
+    weeder::Controller,
 };
 use readings::{readings, woken_up};
 
@@ -65,7 +62,7 @@ impl Rolling {
     fn ask(&mut self, line: &str) -> String {
         let mut typed = LineBuffer::new();
         let said = line.bytes().chain(*b"\n").find_map(|byte| typed.take(byte)).expect("a line that says something");
-        let mut answer = reply::answer(said, &mut self.machine);
+        let mut answer = say::execute(said, &mut self.machine);
         let mut written = Line::new();
         while !answer.is_done() {
             written = Line::new();

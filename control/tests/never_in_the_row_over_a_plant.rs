@@ -7,9 +7,8 @@ mod common;
 
 use common::{machine, readings};
 use control::{
-    controller::Edge,
-    event::Event,
-    servo,
+    measure::readings::Edge,
+    operate::{event::Event, servo},
     settings::Setting,
     units::{Position, Ticks},
 };

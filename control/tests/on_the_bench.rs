@@ -5,14 +5,18 @@ mod common;
 use common::{Machine, machine, readings};
 use control::{
     alarm::Alarm,
-    calibration::{Leads, Outcome, Unfit},
-    controller::{Edge, Orders, Readings, State},
-    event::Event,
-    plot::Plot,
-    refusal::Refusal,
-    servo,
+    measure::readings::{Edge, Readings},
+    operate::{
+        calibration::{Leads, Outcome, Unfit},
+        event::Event,
+        plot::Plot,
+        refusal::Refusal,
+        servo,
+        state::State,
+    },
     settings::{Setting, Settings},
     units::Position,
+    weeder::Orders,
 };
 
 /// Steps the machine, standing at a count, through so many milliseconds; returns the last orders.

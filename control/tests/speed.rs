@@ -1,7 +1,7 @@
 //! The speed from readings as the main loop makes them: now and then, and not in step with the encoder.
 
 use control::{
-    speed::SpeedMeter,
+    measure::speed::SpeedMeter,
     units::{Instant, Interval, Position},
 };
 use proptest::prelude::*;

@@ -1,7 +1,7 @@
 //! The console's grammar, as it comes over the serial line.
 
 use crate::common::{exchange, refusal, run_for_ms, status, value, woken_up};
-use control::console::Word;
+use control::say::command::Word;
 use control::settings::Setting;
 use field::wiring;
 use uno::Uno;

@@ -1,8 +1,8 @@
 //! Examples taught in the field: they change what the next object is taken for, and outlive the power.
 
 use crate::common::{ask, elf, refusal, run_for_ms, woken_up};
+use control::ground::field_examples::{self, FieldExamples};
 use control::memory::{ERASED, SIZE, Volatile};
-use control::taught::{self, FieldExamples};
 use field::machine::Machine;
 use field::motion::Motion;
 use field::row::{Row, Thing};
@@ -42,7 +42,7 @@ fn greeted(uno: &mut Uno) {
 fn full_eeprom() -> Vec<u8> {
     let mut store = FieldExamples::asleep(Volatile::new());
     store.wake_up();
-    for number in 0..taught::CAPACITY {
+    for number in 0..field_examples::CAPACITY {
         store.add(Example::new([number, 1, 2, 3, 4], number % 2)).expect("there is room");
     }
     while !store.carry_on() {}
@@ -129,10 +129,10 @@ fn what_was_taught_survives_a_loss_of_power_and_a_spoiled_one_is_dropped_and_cou
 #[test]
 fn examples_are_forgotten_one_by_one_or_all_at_once() {
     let mut uno = waking_up_with(&full_eeprom());
-    assert_eq!(field_examples(&mut uno).len(), usize::from(taught::CAPACITY));
+    assert_eq!(field_examples(&mut uno).len(), usize::from(field_examples::CAPACITY));
     ask(&mut uno, "forget 31");
     assert_eq!(refusal(&mut uno, "forget 31"), "error: no field example has this number, examples lists them");
-    assert_eq!(field_examples(&mut uno).len(), usize::from(taught::CAPACITY) - 1);
+    assert_eq!(field_examples(&mut uno).len(), usize::from(field_examples::CAPACITY) - 1);
     ask(&mut uno, "forget all");
     assert!(field_examples(&mut uno).is_empty());
     assert!(uno.eeprom()[SLOTS_BEGIN..SLOTS_BEGIN + 256].iter().all(|&byte| byte == 0xFF));

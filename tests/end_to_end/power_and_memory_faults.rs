@@ -6,7 +6,7 @@ use crate::common::{
     number, refusal, run_for_ms, status, steady, trial, value, woken_up,
 };
 use control::memory::{SIZE, Volatile};
-use control::saved::{COPY, SavedSettings};
+use control::operate::saved::{COPY, SavedSettings};
 use control::settings::{Setting, Settings};
 use field::motion::mm_s;
 use field::row::{Row, Thing};

@@ -5,7 +5,7 @@
 //! interrupts take of it included.
 
 use crate::common::{Run, run_for_ms, steady, trial, woken_up};
-use control::console::{LINE_LENGTH, Word};
+use control::say::command::{LINE_LENGTH, Word};
 use control::settings::Setting;
 use field::planting::Planting;
 use link::settings::name;

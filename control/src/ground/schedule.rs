@@ -8,7 +8,7 @@
 //! Windows need not be merged: two that overlap close the ground between them, and a gap too short to swing in and out
 //! again is closed by the length of the stretch that the tool asks about.
 
-use super::{reach::Geometry, watch::Object};
+use super::{object::Object, reach::Geometry};
 use crate::units::{Length, Place, Ticks};
 use heapless::Vec;
 

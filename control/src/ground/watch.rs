@@ -10,35 +10,8 @@
 //! watching begins, and where it has to forget, an object is open of which nothing is known but that it may be the rest of
 //! a canopy. What an object is, plant or weed, is not decided here.
 
+use super::object::Object;
 use crate::units::{Length, Place};
-
-/// A stretch of ground over which the beam was broken.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Object {
-    /// Where the beam broke.
-    pub leading: Place,
-    /// Where the beam cleared, at or ahead of `leading`.
-    pub trailing: Place,
-    /// Whether its beginning was not seen, so that it may be the rest of something wider.
-    pub cut: bool,
-}
-
-impl Object {
-    /// What may stand at a place of which nothing has been seen.
-    const fn cut_at(place: Place) -> Self {
-        Self { leading: place, trailing: place, cut: true }
-    }
-
-    /// How far the machine rolled while the beam was broken, the paper's `t S`.
-    pub fn width(&self) -> Length {
-        self.trailing - self.leading
-    }
-
-    /// Whether nothing was there after all.
-    fn is_nothing(&self) -> bool {
-        self.cut && self.leading == self.trailing
-    }
-}
 
 /// Watches the row through the beam.
 #[derive(Clone, Debug)]

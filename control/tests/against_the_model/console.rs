@@ -1,11 +1,7 @@
 //! The console as the firmware's main loop has it: a line is carried out once the one before it has been answered.
 
 use crate::decisions::Weeder;
-use control::{
-    console::LineBuffer,
-    line::Line,
-    reply::{self, Answer, LINE},
-};
+use control::say::{self, Answer, LINE, command::LineBuffer, line::Line};
 use proptest::prelude::*;
 use std::collections::VecDeque;
 use walks::machine::Checked;
@@ -37,7 +33,7 @@ impl Console {
             && let Some(byte) = self.typed.pop_front()
         {
             if let Some(command) = self.line.take(byte) {
-                self.answer = reply::answer(command, machine);
+                self.answer = say::execute(command, machine);
                 return Some(self.lines.pop_front().unwrap_or_default());
             }
         }
@@ -51,9 +47,9 @@ impl Console {
         } else if !self.answer.is_done() {
             self.answer.write_line(machine, &mut line);
         } else if let Some(event) = machine.next_event() {
-            reply::write_event(&event, &mut line);
+            say::write_event(&event, &mut line);
         } else if let Some(plot) = machine.next_plot() {
-            reply::write_plot(machine, plot, &mut line);
+            say::write_plot(machine, plot, &mut line);
         }
         let written: String = line.map(char::from).collect();
         check_length(&written)?;

@@ -6,15 +6,21 @@ use crate::{
     eeprom::{Eeprom, Half},
 };
 use control::{
-    classifier::{Class, Classifier, Full, Listed, Nearest, Vote},
-    controller::{Controller, Edge, Orders, Readings, Reason, State, WakeUp},
-    examples::EXAMPLES,
-    features::Features,
-    quadrature::Odometer,
-    reset::Cause,
-    servo,
+    ground::{
+        class::{Class, Classifier, Full, Listed, Vote},
+        examples::EXAMPLES,
+        features::Features,
+        nearest::Nearest,
+    },
+    measure::{
+        quadrature::Odometer,
+        readings::{Edge, Readings, WakeUp},
+        reset::Cause,
+    },
+    operate::{servo, state::State},
     settings::{Setting, Settings},
     units::{Instant, Interval, Position},
+    weeder::{Controller, Orders, Reason},
 };
 use knn::Example;
 use proptest::prelude::*;

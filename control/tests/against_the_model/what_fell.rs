@@ -1,7 +1,7 @@
 //! What once fell, by name: the very lines and rolls that showed it, and their like on both sides, held against the model.
 
 use crate::decisions::Decisions;
-use control::{alarm::Alarm, controller::State};
+use control::{alarm::Alarm, operate::state::State};
 use walks::{
     Failure, drive,
     walk::{Happening, Walk},

@@ -5,11 +5,13 @@ mod readings;
 pub use readings::{readings, woken_up};
 
 use control::{
-    classifier::{Class, Classifier, Full, Listed, Vote},
-    controller::Controller,
-    features::Features,
+    ground::{
+        class::{Class, Classifier, Full, Listed, Vote},
+        features::Features,
+    },
+    measure::reset::Cause,
     memory::Volatile,
-    reset::Cause,
+    weeder::Controller,
 };
 
 /// Takes for a weed what is narrower than 60 mm.

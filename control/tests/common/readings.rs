@@ -1,8 +1,10 @@
 //! What a machine reads, for tests whether or not they have a classifier of their own.
 
 use control::{
-    controller::{Readings, WakeUp},
-    reset::Cause,
+    measure::{
+        readings::{Readings, WakeUp},
+        reset::Cause,
+    },
     units::{Instant, Interval, Position},
 };
 

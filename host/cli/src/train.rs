@@ -19,7 +19,7 @@ use study::training::{
 #[command(after_help = "\
 Examples:
   weeder train field.csv --picture field.svg                    say how well it would do, and draw it
-  weeder train field.csv --out control/src/examples/table.rs    have the next `weeder flash` take it along
+  weeder train field.csv --out control/src/ground/examples/table.rs    have the next `weeder flash` take it along
   weeder train --synthetic                                      the built-in table, from simulated rows")]
 pub struct Arguments {
     /// CSV files with the columns speed_mm_s,spacing_mm,delay_mm,hold_mm,actuation_mm,label; label is plant or weed;

@@ -167,7 +167,7 @@ fn every_command_in_the_manual_exists_with_its_options() {
 #[test]
 fn commands_in_the_manual_that_need_no_uno_do_what_they_say() {
     let folder = TempDir::new().expect("a folder");
-    fs::create_dir_all(folder.path().join("control/src/examples")).expect("a folder in it");
+    fs::create_dir_all(folder.path().join("control/src/ground/examples")).expect("a folder in it");
     fs::write(folder.path().join("field.csv"), OBJECTS).expect("a file in it");
     fs::create_dir(folder.path().join("docs")).expect("a folder in it");
     let example = "docs/trial-example.csv";

@@ -7,7 +7,7 @@ use study::training::MOST_EXAMPLES;
 use tempfile::TempDir;
 
 /// The table that the firmware is built from.
-const BUILT_IN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../control/src/examples/table.rs");
+const BUILT_IN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../control/src/ground/examples/table.rs");
 
 const HEADER: &str = "speed_mm_s,spacing_mm,delay_mm,hold_mm,actuation_mm,label\n";
 

@@ -17,7 +17,7 @@ use crate::servo::Servo;
 use crate::stand::Stem;
 use crate::trial::Trial;
 use crate::twin::{Sensors, ServoLine};
-use control::servo;
+use control::operate::servo;
 use signal::Pulse;
 use std::ops::Range;
 

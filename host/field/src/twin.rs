@@ -10,17 +10,21 @@
 use crate::machine::{Machine, time_at_s};
 use crate::motion::{Course, marks};
 use crate::trial::{Start, Trial};
-use control::classifier::Nearest;
-use control::console::LineBuffer;
-use control::controller::{Controller, Edge, Readings, State, WakeUp};
-use control::examples::EXAMPLES;
-use control::features;
-use control::line::Line;
+use control::ground::examples::EXAMPLES;
+use control::ground::features;
+use control::ground::nearest::Nearest;
+use control::measure::reset::Cause;
 use control::memory::Volatile;
-use control::reply;
-use control::reset::Cause;
-use control::servo::{self, Action, FRAME, HalfMicros};
+use control::operate::servo::{self, Action, FRAME, HalfMicros};
+use control::say;
+use control::say::command::LineBuffer;
+use control::say::line::Line;
 use control::units::{Instant, Interval, Position};
+use control::{
+    measure::readings::{Edge, Readings, WakeUp},
+    operate::state::State,
+    weeder::Controller,
+};
 use signal::{CYCLES_PER_SECOND, PinChange, Pulse};
 use thiserror::Error;
 
@@ -205,7 +209,7 @@ fn instant(turn: u64) -> Instant {
 fn type_line(weeder: &mut Weeder, command: &str) -> Result<(), Refused> {
     let mut line = LineBuffer::new();
     let Some(typed) = command.bytes().chain(*b"\n").find_map(|byte| line.take(byte)) else { return Ok(()) };
-    let mut answer = reply::answer(typed, weeder);
+    let mut answer = say::execute(typed, weeder);
     let mut said = String::new();
     while !answer.is_done() {
         let mut written = Line::new();

@@ -1,7 +1,7 @@
 //! Completion of a command as it is typed, from the firmware's own words and its table of settings.
 
 use super::settings::{Setting, name};
-use control::console::Word;
+use control::say::command::Word;
 
 /// All lines that a begun line can become by completing its last word, in the order of the firmware's tables.
 pub fn complete(line: &str) -> Vec<String> {

@@ -29,7 +29,7 @@ pub use self::lines::LineReader;
 pub use self::port::{find_uno, try_port};
 pub use self::said::{Said, Shown};
 pub use self::told::{Mode, Status, Timed, Told, Values};
-pub use control::classifier::Class;
+pub use control::ground::class::Class;
 
 use std::collections::VecDeque;
 use std::io::{self, Read, Write};
@@ -37,7 +37,7 @@ use std::time::{Duration, Instant};
 use thiserror::Error;
 
 /// Characters that the firmware takes in a line.
-pub const COMMAND_LENGTH: usize = control::console::LINE_LENGTH;
+pub const COMMAND_LENGTH: usize = control::say::command::LINE_LENGTH;
 
 /// Reads in which nothing came, after which an answer is given up: two seconds.
 const SILENT_READS: usize = 100;

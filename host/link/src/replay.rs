@@ -2,7 +2,7 @@
 //!
 //! A log holds where the beam broke and cleared, place and speed ten times a second, the settings, the examples and what was
 //! typed. From these [`replay`] rebuilds the machine's way and the beam's edges, tick by tick, has
-//! [`control::controller::Controller`] decide anew, and compares what it tells with what the log tells: each object with its
+//! [`control::weeder::Controller`] decide anew, and compares what it tells with what the log tells: each object with its
 //! class and votes, each swing with its place, each alarm.
 //!
 //! # How near it is
@@ -26,8 +26,8 @@ use self::player::Player;
 use super::log::{Entry, Kind};
 use super::settings::{Setting, Settings, shown};
 use super::{Said, Status, Told};
-use control::classifier::label;
-use control::features;
+use control::ground::class::label;
+use control::ground::features;
 use knn::Example;
 use std::collections::VecDeque;
 use std::fmt;

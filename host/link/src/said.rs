@@ -5,7 +5,7 @@
 //! stand in the line, they are taken from there and not from this version's table.
 
 use super::{Status, Told};
-use control::classifier::Class;
+use control::ground::class::Class;
 
 /// What a line says.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -180,14 +180,17 @@ mod tests {
     use super::*;
     use crate::Mode;
     use crate::settings::{self, Setting};
-    use control::classifier::{Nearest, label};
-    use control::console;
-    use control::controller::{Controller, Readings, WakeUp};
-    use control::line::Line;
+    use control::ground::{class::label, nearest::Nearest};
+    use control::measure::reset::Cause;
     use control::memory::Volatile;
-    use control::reply;
-    use control::reset::Cause;
+    use control::say;
+    use control::say::command;
+    use control::say::line::Line;
     use control::units::{Instant, Position};
+    use control::{
+        measure::readings::{Readings, WakeUp},
+        weeder::Controller,
+    };
     use knn::Example;
 
     #[test]
@@ -250,7 +253,7 @@ mod tests {
         };
         let examples = [Example::new([1, 2, 3, 4, 5], label::PLANT), Example::new([9, 8, 7, 6, 5], label::WEED)];
         let mut controller = Controller::new(Nearest::new(&examples[..], Volatile::new()), Volatile::new(), wake_up);
-        let mut answer = reply::answer(console::parse(command.as_bytes()), &mut controller);
+        let mut answer = say::execute(command::parse(command.as_bytes()), &mut controller);
         let mut said = String::new();
         while !answer.is_done() {
             let mut line = Line::new();

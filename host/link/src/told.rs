@@ -4,9 +4,9 @@
 //! more; a line that lacks one of its keys, or has a value that is none, is no such line.
 
 use control::alarm::{Alarm, Warning};
-use control::classifier::Class;
+use control::ground::class::Class;
 
-/// Something that the machine told by itself, as [`control::event::Event`] was written.
+/// Something that the machine told by itself, as [`control::operate::event::Event`] was written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Told {
     /// An object was seen in full and classified.
@@ -209,13 +209,13 @@ impl Status {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use control::calibration::{Leads, Outcome};
-    use control::classifier::Vote;
-    use control::controller::State;
-    use control::event::Event;
+    use control::ground::class::Vote;
     use control::ground::schedule::Plan;
-    use control::line::Line;
-    use control::reply::write_event;
+    use control::operate::calibration::{Leads, Outcome};
+    use control::operate::event::Event;
+    use control::operate::state::State;
+    use control::say::line::Line;
+    use control::say::write_event;
     use control::units::{Position, Ticks};
 
     /// The event as the firmware writes it.

@@ -1,6 +1,6 @@
 //! The console for the page: what a line says, and in which order settings can be sent.
 
-use control::classifier::Class;
+use control::ground::class::Class;
 use link::settings::{Setting, Settings, explain, name, steps};
 use link::{Said, Shown, Status, Timed, Told, Values};
 use serde::Deserialize;

@@ -10,7 +10,7 @@ pub mod table;
 pub mod total;
 
 use crate::evaluation::PlotRecord;
-use control::controller::State;
+use control::operate::state::State;
 use field::bound::undamaged_share;
 use field::conditions::Conditions;
 use field::driving::{Drive, drive};

@@ -19,8 +19,8 @@ pub use knn::MAX_K;
 
 use comfy_table::{CellAlignment, Table, presets};
 use condense::TooMany;
-use control::{
-    classifier::{Class, label},
+use control::ground::{
+    class::{Class, label},
     examples,
     features::{COUNT, Features},
 };
@@ -62,7 +62,7 @@ pub const fn class_of<const CLASSES: usize>(answer: &Answer<CLASSES>) -> Class {
     }
 }
 
-/// A classifier that is ready for use: what `control::examples` holds, with the k that goes with it.
+/// A classifier that is ready for use: what `control::ground::examples` holds, with the k that goes with it.
 #[derive(Clone, Debug)]
 pub struct Model {
     /// From features to bytes.

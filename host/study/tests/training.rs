@@ -1,8 +1,11 @@
 //! The training: what it learns from simulated rows, what it makes of noise, and what it says to tables that are wrong.
 
-use control::classifier::{Class, Classifier, Nearest};
-use control::examples::{EXAMPLES, K};
-use control::features::{Features, SPEED_CLASSES_MM_S};
+use control::ground::examples::{EXAMPLES, K};
+use control::ground::features::{Features, SPEED_CLASSES_MM_S};
+use control::ground::{
+    class::{Class, Classifier},
+    nearest::Nearest,
+};
 use control::memory::Volatile;
 use field::row::Kind;
 use std::io::Write;

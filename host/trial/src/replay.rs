@@ -5,7 +5,7 @@
 
 use crate::console::Status;
 use crate::run::{TrialError, boot};
-use control::quadrature::{Channels, Quadrature, Step};
+use control::measure::quadrature::{Channels, Quadrature, Step};
 use field::wiring;
 use signal::{CYCLES_PER_SECOND, PinChange};
 use std::path::Path;

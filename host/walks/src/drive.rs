@@ -11,11 +11,12 @@ use crate::{
 };
 use control::{
     alarm::Alarm,
-    classifier::Listed,
-    controller::{Reason, State},
-    reset::Cause,
+    ground::class::Listed,
+    measure::reset::Cause,
+    operate::state::State,
     settings::{Setting, Settings},
     units::Grain,
+    weeder::Reason,
 };
 use proptest::prelude::*;
 

@@ -5,10 +5,7 @@
 
 use crate::walk::Beginning;
 use control::{
-    classifier::Listed,
-    controller::{Reason, State},
-    reset::Cause,
-    settings::Settings,
+    ground::class::Listed, measure::reset::Cause, operate::state::State, settings::Settings, weeder::Reason,
 };
 use proptest::test_runner::TestCaseError;
 

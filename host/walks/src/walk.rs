@@ -1,6 +1,6 @@
 //! Walks: a machine, a row, and what happens to the machine on it, one thing after the other, as a person would say it.
 
-use control::reset::Cause;
+use control::measure::reset::Cause;
 use proptest::prelude::*;
 use std::fmt;
 

@@ -6,7 +6,7 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
-use control::features;
+use control::ground::features;
 use knn::Example;
 
 /// Queries of each task.

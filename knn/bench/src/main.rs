@@ -12,7 +12,7 @@
 mod examples;
 
 use avr_progmem::progmem;
-use control::{
+use control::ground::{
     examples::{RADIUS, scale},
     features::{self, Features, SPEED_CLASSES_MM_S},
 };

@@ -7,13 +7,16 @@
 
 use crate::common::{elf, number, value};
 use control::alarm::Alarm;
-use control::classifier::{Classifier, Listed, Nearest};
-use control::console::{Command, parse};
-use control::controller::{Reason, State};
-use control::examples::EXAMPLES;
+use control::ground::examples::EXAMPLES;
+use control::ground::{
+    class::{Classifier, Listed},
+    nearest::Nearest,
+};
+use control::measure::reset::Cause;
 use control::memory::{SIZE, Volatile};
-use control::reset::Cause;
+use control::say::command::{Command, parse};
 use control::settings::{Setting, Settings};
+use control::{operate::state::State, weeder::Reason};
 use field::wiring;
 use signal::{CYCLES_PER_SECOND, Pin, PinChange};
 use std::collections::VecDeque;

@@ -5,8 +5,11 @@
 //! between two speed classes it may have been in either. So an object is judged in every speed class that the machine may have
 //! been in, and the log's vote stands where one of them gives it.
 
-use control::classifier::{Class, Classifier, Full, Listed, Nearest, Vote};
-use control::features::{self, Features};
+use control::ground::features::{self, Features};
+use control::ground::{
+    class::{Class, Classifier, Full, Listed, Vote},
+    nearest::Nearest,
+};
 use control::memory::Volatile;
 use knn::Example;
 use std::cell::{Cell, RefCell};
@@ -120,13 +123,13 @@ impl Classifier for Judge<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use control::classifier::label;
-    use control::examples::EXAMPLES;
+    use control::ground::class::label;
+    use control::ground::examples::EXAMPLES;
 
     #[test]
     fn a_label_is_refused_by_the_built_in_examples_alone() {
         let plant = Features::describe(556, 500, 150);
-        let taught = Example::new(control::examples::scale().quantise(&plant.values()), label::WEED);
+        let taught = Example::new(control::ground::examples::scale().quantise(&plant.values()), label::WEED);
         let examples = [&EXAMPLES[..], &[taught; 5]].concat();
         let judge = Judge::new(&examples, EXAMPLES.len(), Rc::new(Witness::default()));
         assert_eq!(judge.classify(&plant, 3).class, Class::Weed, "the field has taught it so");

@@ -5,13 +5,17 @@ use super::{Happened, Heard, OBJECT_TICKS, Stretch};
 use crate::settings::{Setting, steps};
 use crate::{Mode, Status, Told};
 use control::alarm::Alarm;
-use control::classifier::Vote;
-use control::console::{self, Command};
-use control::controller::{Controller, Edge, Readings, State, WakeUp};
-use control::event::Event;
+use control::ground::class::Vote;
+use control::measure::reset::Cause;
 use control::memory::Volatile;
-use control::reset::Cause;
+use control::operate::event::Event;
+use control::say::command::{self, Command};
 use control::units::{Instant, Interval, Position, Ticks, TicksPerSecond};
+use control::{
+    measure::readings::{Edge, Readings, WakeUp},
+    operate::state::State,
+    weeder::Controller,
+};
 use std::rc::Rc;
 
 /// Time between two steps of a machine at rest.
@@ -259,7 +263,7 @@ impl<'a> Player<'a> {
 
     /// Carries out what was typed; false where that cannot be replayed.
     pub(super) fn command(&mut self, line: &str) -> bool {
-        match console::parse(line.as_bytes()) {
+        match command::parse(line.as_bytes()) {
             Ok(Command::Start { now }) => {
                 let _ = self.controller.start(now);
             }
@@ -321,7 +325,7 @@ fn canopies(stretch: &Stretch) -> Vec<Canopy> {
             }
             Happened::Command { line, is_refused: false } => {
                 // The holds behind it have the new margin.
-                if let Ok(Command::Set(setting, value)) = console::parse(line.as_bytes()) {
+                if let Ok(Command::Set(setting, value)) = command::parse(line.as_bytes()) {
                     let _ = settings.set(setting, value);
                 }
             }

@@ -14,8 +14,8 @@
 //! Where several objects would do, the first in the list does.
 
 use super::{answer_of_others, class_of};
-use control::{
-    classifier::{Class, label},
+use control::ground::{
+    class::{Class, label},
     features::COUNT,
 };
 use knn::{Example, Kind, classify, squared_distance};

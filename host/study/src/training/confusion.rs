@@ -4,7 +4,7 @@
 //! taken for a plant or for unknown is left standing.
 
 use comfy_table::{CellAlignment, Table, presets};
-use control::classifier::Class;
+use control::ground::class::Class;
 use field::row::Kind;
 use std::fmt;
 

@@ -4,7 +4,7 @@
 //! read. The compiler turns them into bytes.
 
 use super::{Labelled, Training, label_of, table};
-use control::classifier::label;
+use control::ground::class::label;
 use std::fmt::Write;
 use std::io;
 
@@ -19,7 +19,7 @@ use crate::features::COUNT as FEATURES;
 use knn::Range;
 ";
 
-/// The table as `control/src/examples/table.rs`, in the shape that rustfmt gives it. `how` is the command that wrote it.
+/// The table as `control/src/ground/examples/table.rs`, in the shape that rustfmt gives it. `how` is the command that wrote it.
 pub fn rust(training: &Training, how: &str) -> String {
     let Training { ranges, radius, k, kept, .. } = training;
     let mut text = HEAD.replace("{how}", how);

@@ -5,8 +5,8 @@
 //! actuation follow from the other features, so that nothing is hidden behind the two that are drawn.
 
 use super::{Labelled, Model, Training};
-use control::classifier::Class;
-use control::features::{Features, SPEED_CLASSES_MM_S, speed_class};
+use control::ground::class::Class;
+use control::ground::features::{Features, SPEED_CLASSES_MM_S, speed_class};
 use drawing::{INK, Legend, MARK_SIZE, PALE_INK, document, line, paper, rectangle, swatch, tenth, words};
 use field::row::Kind;
 use std::ops::Range;

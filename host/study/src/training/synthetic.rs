@@ -12,13 +12,16 @@
 //! that the spacing of the next one is counted from a plant.
 
 use super::Labelled;
-use control::classifier::{Class, Classifier, Full, Listed, Vote};
-use control::controller::{Controller, Edge, Readings, WakeUp};
-use control::features::{Features, SPEED_CLASSES_MM_S};
+use control::ground::class::{Class, Classifier, Full, Listed, Vote};
+use control::ground::features::{Features, SPEED_CLASSES_MM_S};
+use control::measure::quadrature::{Quadrature, Step};
+use control::measure::reset::Cause;
 use control::memory::Volatile;
-use control::quadrature::{Quadrature, Step};
-use control::reset::Cause;
 use control::units::{Instant, Interval, Position, Ticks};
+use control::{
+    measure::readings::{Edge, Readings, WakeUp},
+    weeder::Controller,
+};
 use field::machine::Machine;
 use field::motion::Motion;
 use field::planting::{Planting, PlantingError};

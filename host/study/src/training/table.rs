@@ -5,7 +5,7 @@
 //! `weed`, or empty where nobody said what it was.
 
 use super::Labelled;
-use control::features::Features;
+use control::ground::features::Features;
 use field::row::Kind;
 use files::csv_table::{CsvTable, Line};
 use std::path::{Path, PathBuf};

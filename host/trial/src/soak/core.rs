@@ -4,18 +4,21 @@
 
 use super::{Plan, SoakError, Tally, count};
 use control::{
-    classifier::{Class, Nearest},
-    console::LineBuffer,
-    controller::{Controller, Edge, Readings, State, WakeUp},
-    event::Event,
-    examples::EXAMPLES,
-    line::Line,
+    ground::{class::Class, examples::EXAMPLES, nearest::Nearest},
+    measure::{
+        readings::{Edge, Readings, WakeUp},
+        reset::Cause,
+    },
     memory::{Memory, Volatile},
-    reply,
-    reset::Cause,
-    saved::{COPY, SavedSettings},
+    operate::{
+        event::Event,
+        saved::{COPY, SavedSettings},
+        state::State,
+    },
+    say::{self, command::LineBuffer, line::Line},
     settings::{Setting, Settings},
     units::{Instant, Position},
+    weeder::Controller,
 };
 use field::machine::Machine;
 use field::motion::mm_s;
@@ -527,7 +530,7 @@ impl Field {
 
     fn type_byte(&mut self, byte: u8) {
         if let Some(command) = self.line.take(byte) {
-            let mut answer = reply::answer(command, &mut self.weeder);
+            let mut answer = say::execute(command, &mut self.weeder);
             while !answer.is_done() {
                 let mut line = Line::new();
                 answer.write_line(&self.weeder, &mut line);

@@ -1,0 +1,141 @@
+//! The built-in examples: plants and tall weeds at the paper's four speeds.
+//!
+//! They were trained on simulated rows: `examples/table.rs` is what `weeder train --synthetic` wrote, in physical units.
+//! The compiler turns it into bytes. The result is a plain constant, so that it costs nothing where it is not used: the
+//! firmware lays it into flash, the host reads it as it is.
+
+mod table;
+
+use crate::ground::features;
+use knn::{Example, Scale};
+
+avr_progmem::progmem! {
+    static progmem SCALE_IN_FLASH: Scale<{ features::COUNT }> = SCALE;
+}
+
+/// [`SCALE`], from where it costs no SRAM.
+pub fn scale() -> Scale<{ features::COUNT }> {
+    SCALE_IN_FLASH.load()
+}
+
+/// From a feature's value to a byte.
+pub const SCALE: Scale<{ features::COUNT }> = Scale::new(table::RANGES);
+
+/// The ranges of [`SCALE`] as bytes: what an example's bytes stand for.
+pub const SCALE_BYTES: [u8; 8 * features::COUNT] = {
+    let mut bytes = [0; 8 * features::COUNT];
+    let mut feature = 0;
+    while feature < features::COUNT {
+        let (_, behind) = bytes.split_at_mut(8 * feature);
+        let (lowest, behind) = behind.split_at_mut(4);
+        lowest.copy_from_slice(&table::RANGES[feature].lowest.to_le_bytes());
+        behind.split_at_mut(4).0.copy_from_slice(&table::RANGES[feature].highest.to_le_bytes());
+        feature += 1;
+    }
+    bytes
+};
+
+/// Squared distance beyond which an object is like no example.
+pub const RADIUS: u32 = table::RADIUS;
+
+/// Examples that vote, as the table was trained.
+pub const K: u8 = table::K;
+
+/// Most examples that the flash below the older bootloader has room for, at 6 bytes each.
+pub const CAPACITY: usize = 72;
+
+/// Examples in the table.
+pub const COUNT: usize = table::TAUGHT.len();
+
+const _: () = assert!(COUNT <= CAPACITY, "too many examples for the flash budget");
+
+/// The table, but in another order: trained ones lie beside their likes, so that a search would come ever nearer, and each of them
+/// would find a place among the nearest for a while. Each is as many places behind the one before it as [`STEP`] says.
+pub const EXAMPLES: [Example<{ features::COUNT }>; COUNT] = {
+    let mut examples = [Example::new([0; features::COUNT], 0); COUNT];
+    let mut index = 0;
+    while index < COUNT {
+        let (features, label) = &table::TAUGHT[index * STEP % COUNT];
+        examples[index] = Example::new(SCALE.quantise(features), *label);
+        index += 1;
+    }
+    examples
+};
+
+/// Some five eighths of the table, and without a divisor in common with its length, so that none is left out.
+const STEP: usize = {
+    let mut step = COUNT * 5 / 8;
+    while greatest_common_divisor(step, COUNT) != 1 {
+        step += 1;
+    }
+    step
+};
+
+const fn greatest_common_divisor(one: usize, other: usize) -> usize {
+    if other == 0 { one } else { greatest_common_divisor(other, one % other) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        ground::{
+            class::{Class, Classifier},
+            features::{Features, SPEED_CLASSES_MM_S},
+            nearest::Nearest,
+        },
+        memory::Volatile,
+        settings::Setting,
+    };
+
+    fn class(speed: i16, spacing_mm: i16, width_mm: i16) -> Class {
+        Nearest::new(EXAMPLES, Volatile::new())
+            .classify(&Features::describe(speed, spacing_mm, width_mm), table::K)
+            .class
+    }
+
+    #[test]
+    fn every_example_of_the_table_is_among_the_built_in_ones() {
+        for (features, label) in &table::TAUGHT {
+            assert!(EXAMPLES.contains(&Example::new(SCALE.quantise(features), *label)), "{features:?}");
+        }
+    }
+
+    #[test]
+    fn the_settings_begin_with_the_k_of_the_training() {
+        assert_eq!(Setting::K.description().default, u16::from(K));
+    }
+
+    #[test]
+    fn plants_of_every_canopy_at_every_speed_are_plants() {
+        for speed in SPEED_CLASSES_MM_S {
+            for width_mm in 95..=190 {
+                for spacing_mm in (470..=1240).step_by(10) {
+                    assert_ne!(class(speed, spacing_mm, width_mm), Class::Weed, "{speed} {spacing_mm} {width_mm}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn tall_weeds_between_the_plants_are_weeds() {
+        for speed in SPEED_CLASSES_MM_S {
+            for width_mm in 12..=20 {
+                for spacing_mm in 60..=700 {
+                    assert_eq!(class(speed, spacing_mm, width_mm), Class::Weed, "{speed} {spacing_mm} {width_mm}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_neither_is_never_taken_for_a_weed() {
+        for speed in SPEED_CLASSES_MM_S {
+            for width_mm in (35..=90).chain([250, 400, 1000, 30_000]) {
+                for spacing_mm in (0..=2000).step_by(5) {
+                    assert_ne!(class(speed, spacing_mm, width_mm), Class::Weed, "{speed} {spacing_mm} {width_mm}");
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,322 @@
+//! Examples taught in the field, in memory that outlives the power.
+//!
+//! Each of [`CAPACITY`] examples has a slot of eight bytes: five features, the label, and a CRC-16 of both and of the scale
+//! by which the features became bytes, as under another scale they would mean something else. An erased slot reads as ones.
+//! A slot whose CRC does not fit, because the power went away while it was written or a bit fell over, is dropped, and
+//! counted so that it can be told. Which slots hold an example is kept in SRAM, as checking them all takes longer than
+//! searching them. The bytes of a slot go to the memory one at a time, whenever it can take one.
+
+use crate::{
+    ground::{examples, features},
+    memory::{CHECK, ERASED, Memory},
+};
+use knn::{Example, Examples, Neighbour};
+
+/// Examples that can be taught.
+pub const CAPACITY: u8 = 32;
+
+/// Bytes of a slot.
+const SLOT: usize = features::COUNT + 3;
+
+/// An example as it was taught.
+type Taught = Example<{ features::COUNT }>;
+
+/// Stands for the scale in each slot's CRC.
+const SCALE_MARK: [u8; 2] = CHECK.checksum(&examples::SCALE_BYTES).to_le_bytes();
+
+/// The store of examples taught in the field.
+#[derive(Clone, Debug)]
+pub struct FieldExamples<M> {
+    memory: M,
+    slots: [Slot; CAPACITY as usize],
+    spoiled: u8,
+    /// The slot that is being written.
+    writing: u8,
+    bytes: [u8; SLOT],
+    /// Bytes of it that are still to go.
+    left: u8,
+}
+
+/// What a slot is known to be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Slot {
+    /// Free.
+    Free,
+    /// It holds an example.
+    Held,
+    /// Its example is forgotten and yet to be erased.
+    Forgotten,
+}
+
+impl<M: Memory> FieldExamples<M> {
+    /// The store in a memory that nobody has looked through.
+    pub const fn asleep(memory: M) -> Self {
+        let slots = [Slot::Free; CAPACITY as usize];
+        Self { memory, slots, spoiled: 0, writing: 0, bytes: [0; SLOT], left: 0 }
+    }
+
+    /// Looks through the memory for the examples that it holds.
+    #[inline(never)]
+    pub fn wake_up(&mut self) {
+        self.spoiled = 0;
+        for number in 0..CAPACITY {
+            let bytes = self.read(number);
+            if bytes == encode(example_in(bytes)) {
+                self.slots[usize::from(number)] = Slot::Held;
+            } else if bytes != [ERASED; SLOT] {
+                self.spoiled += 1;
+            }
+        }
+    }
+
+    /// Slots that were found spoiled.
+    pub fn spoiled(&self) -> u8 {
+        self.spoiled
+    }
+
+    /// The example in a slot.
+    pub fn slot(&self, number: u8) -> Option<Taught> {
+        match self.slots.get(usize::from(number)) {
+            Some(Slot::Held) => Some(example_in(self.read(number))),
+            _ => None,
+        }
+    }
+
+    /// Adds an example; returns its slot. What is still being written is finished first, which may take time: ask
+    /// [`carry_on`](Self::carry_on) before.
+    ///
+    /// # Errors
+    /// The example, when all slots are taken.
+    #[inline(never)]
+    pub fn add(&mut self, example: Taught) -> Result<u8, Taught> {
+        let Some(number) = self.slots.iter().position(|&slot| slot != Slot::Held) else {
+            return Err(example);
+        };
+        while !self.write_next_byte() {}
+        self.slots[number] = Slot::Held;
+        self.begin(number as u8, encode(example));
+        Ok(number as u8)
+    }
+
+    /// Forgets the example in a slot, which [`carry_on`](Self::carry_on) will erase; whether there was one.
+    pub fn forget(&mut self, number: u8) -> bool {
+        match self.slots.get_mut(usize::from(number)) {
+            Some(slot @ Slot::Held) => {
+                *slot = Slot::Forgotten;
+                true
+            }
+            _ => false,
+        }
+    }
+
+    /// Carries on with what is to be written, without waiting; whether all has been.
+    pub fn carry_on(&mut self) -> bool {
+        if !self.write_next_byte() {
+            return false;
+        }
+        match self.slots.iter().position(|&slot| slot == Slot::Forgotten) {
+            Some(number) => {
+                self.slots[number] = Slot::Free;
+                self.begin(number as u8, [ERASED; SLOT]);
+                false
+            }
+            None => true,
+        }
+    }
+
+    /// The memory, to be looked at or put into another machine.
+    pub fn into_memory(self) -> M {
+        self.memory
+    }
+
+    /// What lies in a slot, or will lie there once it is written.
+    fn read(&self, number: u8) -> [u8; SLOT] {
+        if self.left > 0 && number == self.writing {
+            return self.bytes;
+        }
+        let mut bytes = [0; SLOT];
+        for (address, byte) in (address(number)..).zip(&mut bytes) {
+            *byte = self.memory.read(address);
+        }
+        bytes
+    }
+
+    #[inline(never)]
+    fn begin(&mut self, number: u8, bytes: [u8; SLOT]) {
+        self.writing = number;
+        self.bytes = bytes;
+        self.left = SLOT as u8;
+    }
+
+    /// Writes a byte if the memory can take one; whether the last one has been written.
+    fn write_next_byte(&mut self) -> bool {
+        if !self.memory.is_ready() {
+            return false;
+        }
+        let Some(left) = self.left.checked_sub(1) else {
+            return true;
+        };
+        let place = SLOT as u8 - self.left;
+        self.memory.write(address(self.writing) + u16::from(place), self.bytes[usize::from(place)]);
+        self.left = left;
+        false
+    }
+}
+
+/// Where a slot begins.
+const fn address(number: u8) -> u16 {
+    number as u16 * SLOT as u16
+}
+
+impl<M: Memory> Examples<{ features::COUNT }> for FieldExamples<M> {
+    fn len(&self) -> usize {
+        self.slots.iter().filter(|&&slot| slot == Slot::Held).count()
+    }
+
+    fn example(&self, index: usize) -> Option<Taught> {
+        (0..CAPACITY).filter_map(|slot| self.slot(slot)).nth(index)
+    }
+
+    /// Reads each slot once.
+    fn keep_nearest(
+        &self,
+        query: &[u8; features::COUNT],
+        nearest: &mut [Neighbour],
+        level: &mut impl FnMut(Neighbour),
+    ) {
+        for (number, &slot) in (0..).zip(&self.slots) {
+            if slot == Slot::Held {
+                example_in(self.read(number)).neighbour_of(query).join(nearest, level);
+            }
+        }
+    }
+}
+
+fn encode(example: Taught) -> [u8; SLOT] {
+    let [a, b, c, d, e] = example.features;
+    let [mark, scale] = SCALE_MARK;
+    let [low, high] = CHECK.checksum(&[a, b, c, d, e, example.label, mark, scale]).to_le_bytes();
+    [a, b, c, d, e, example.label, low, high]
+}
+
+/// What a slot's bytes say, right or not.
+fn example_in(bytes: [u8; SLOT]) -> Taught {
+    let [a, b, c, d, e, label, ..] = bytes;
+    Example::new([a, b, c, d, e], label)
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use crate::memory::Volatile;
+    use std::vec::Vec;
+
+    fn store() -> FieldExamples<Volatile> {
+        wake_up(Volatile::new())
+    }
+
+    fn wake_up(memory: Volatile) -> FieldExamples<Volatile> {
+        let mut store = FieldExamples::asleep(memory);
+        store.wake_up();
+        store
+    }
+
+    fn example(number: u8) -> Taught {
+        Example::new([number, 2, 3, 4, 5], number % 2)
+    }
+
+    fn restart(store: FieldExamples<Volatile>) -> FieldExamples<Volatile> {
+        wake_up(store.into_memory().with_power())
+    }
+
+    #[test]
+    fn what_was_taught_is_there_after_a_restart() {
+        let mut store = store();
+        for number in 0..CAPACITY {
+            assert_eq!(store.add(example(number)), Ok(number));
+        }
+        assert_eq!(store.add(example(99)), Err(example(99)), "a full store hands the example back");
+        while !store.carry_on() {}
+        let mut store = restart(store);
+        assert_eq!(store.len(), usize::from(CAPACITY));
+        assert!(store.forget(7));
+        assert!(!store.forget(7) && !store.forget(CAPACITY));
+        while !store.carry_on() {}
+        let mut store = restart(store);
+        assert_eq!((store.slot(7), store.slot(8)), (None, Some(example(8))));
+        assert_eq!(store.add(example(50)), Ok(7), "the free slot is taken again");
+    }
+
+    #[test]
+    fn power_lost_at_any_byte_costs_at_most_the_example_being_written() {
+        for power in 0..=SLOT {
+            for forgetting in [false, true] {
+                let mut store = store();
+                for number in 0..4 {
+                    store.add(example(number)).unwrap();
+                }
+                while !store.carry_on() {}
+                store.memory.lose_power_after(power);
+                if forgetting {
+                    store.forget(2);
+                } else {
+                    store.add(example(4)).unwrap();
+                }
+                while !store.carry_on() {}
+                let store = restart(store);
+                for number in [0, 1, 3] {
+                    assert_eq!(store.slot(number), Some(example(number)), "{power} {forgetting}");
+                }
+                let (slot, before, after) =
+                    if forgetting { (2, Some(example(2)), None) } else { (4, None, Some(example(4))) };
+                let now = store.slot(slot);
+                match power {
+                    0 => assert_eq!((now, store.spoiled()), (before, 0)),
+                    SLOT => assert_eq!((now, store.spoiled()), (after, 0)),
+                    _ => assert!(now.is_none() || now == before, "{power} {forgetting}: {now:?}"),
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_spoiled_byte_drops_its_example_and_is_counted() {
+        for byte in 0..SLOT {
+            for bit in 0..8 {
+                let mut store = store();
+                store.add(example(0)).unwrap();
+                store.add(example(1)).unwrap();
+                while !store.carry_on() {}
+                store.memory.bytes[byte] ^= 1 << bit;
+                let store = restart(store);
+                assert_eq!((store.slot(0), store.slot(1), store.spoiled()), (None, Some(example(1)), 1));
+            }
+        }
+    }
+
+    #[test]
+    fn an_example_of_another_scale_is_spoiled() {
+        let mut store = store();
+        store.add(example(0)).unwrap();
+        while !store.carry_on() {}
+        let [a, b, c, d, e, label, ..] = store.read(0);
+        let [low, high] = CHECK.checksum(&[a, b, c, d, e, label, !SCALE_MARK[0], SCALE_MARK[1]]).to_le_bytes();
+        store.memory.bytes[6..SLOT].copy_from_slice(&[low, high]);
+        let store = restart(store);
+        assert_eq!((store.slot(0), store.spoiled()), (None, 1));
+    }
+
+    #[test]
+    fn field_examples_are_searched_like_any_others() {
+        let mut store = store();
+        for number in 0..10 {
+            store.add(example(number)).unwrap();
+        }
+        store.forget(3);
+        let plain: Vec<_> = (0..10).filter(|&number| number != 3).map(example).collect();
+        let query = [4, 2, 3, 4, 9];
+        let answer = knn::classify::<{ features::COUNT }, 2>(&store, &query, 3, 1000);
+        assert_eq!(answer, knn::classify(&plain[..], &query, 3, 1000));
+    }
+}

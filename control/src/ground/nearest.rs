@@ -1,0 +1,160 @@
+//! What an object is: the vote of the nearest labelled examples.
+//!
+//! The examples are feature vectors in bytes, scaled by [`examples::scale`] and searched by the
+//! crate `knn` wherever they lie. Whatever the answer leaves open, a tie, a stranger, a table with fewer examples than
+//! are to vote, is [`Class::Unknown`], which everyone treats as a plant.
+
+use crate::{
+    ground::{
+        class::{Class, Classifier, Full, Listed, Vote, label},
+        examples,
+        features::{self, Features},
+        field_examples::{self, FieldExamples},
+    },
+    memory::Memory,
+};
+use knn::{Answer, Example, Examples, Kind, Neighbour};
+
+/// Classifies by the nearest of the built-in examples in `B` and those taught in the field, kept in `M`.
+#[derive(Clone, Debug)]
+pub struct Nearest<B, M> {
+    built_in: B,
+    field: FieldExamples<M>,
+}
+
+impl<B: Examples<{ features::COUNT }>, M: Memory> Nearest<B, M> {
+    /// A classifier with the built-in examples and those that the memory holds.
+    pub fn new(built_in: B, memory: M) -> Self {
+        let mut nearest = Self::asleep(built_in, memory);
+        nearest.wake_up();
+        nearest
+    }
+
+    /// A classifier that has not looked at its memory yet.
+    pub const fn asleep(built_in: B, memory: M) -> Self {
+        Self { built_in, field: FieldExamples::asleep(memory) }
+    }
+
+    /// Asks the `k` nearest of the built-in examples and, `with_field`, of those from the field.
+    #[inline(never)]
+    fn vote(&self, features: &Features, k: u8, with_field: bool) -> Vote {
+        let query = examples::scale().quantise(&features.values());
+        let all = (&self.built_in, FromField { examples: &self.field, vote: with_field });
+        let answer = knn::classify::<{ features::COUNT }, { label::COUNT }>(&all, &query, k, examples::RADIUS);
+        let Ok(Answer { label, votes, kind, .. }) = answer else {
+            return Vote { class: Class::Unknown, votes: 0 };
+        };
+        let class = match (kind, label) {
+            (Kind::Known, label::PLANT) => Class::Plant,
+            (Kind::Known, label::WEED) => Class::Weed,
+            _ => Class::Unknown,
+        };
+        let votes = votes.get(usize::from(label)).copied().unwrap_or(0);
+        Vote { class, votes: votes as u8 }
+    }
+}
+
+/// The examples from the field, which may have no vote.
+struct FromField<'a, M> {
+    examples: &'a FieldExamples<M>,
+    vote: bool,
+}
+
+impl<M: Memory> Examples<{ features::COUNT }> for FromField<'_, M> {
+    fn len(&self) -> usize {
+        if self.vote { self.examples.len() } else { 0 }
+    }
+
+    fn example(&self, index: usize) -> Option<Example<{ features::COUNT }>> {
+        self.examples.example(index).filter(|_| self.vote)
+    }
+
+    fn keep_nearest(
+        &self,
+        query: &[u8; features::COUNT],
+        nearest: &mut [Neighbour],
+        level: &mut impl FnMut(Neighbour),
+    ) {
+        if self.vote {
+            self.examples.keep_nearest(query, nearest, level);
+        }
+    }
+}
+
+impl<B: Examples<{ features::COUNT }>, M: Memory> Classifier for Nearest<B, M> {
+    fn wake_up(&mut self) {
+        self.field.wake_up();
+    }
+
+    fn classify(&self, features: &Features, k: u8) -> Vote {
+        self.vote(features, k, true)
+    }
+
+    fn built_in_class(&self, features: &Features) -> Class {
+        // As many vote as when they were trained, whatever the settings say for all together.
+        self.vote(features, examples::K, false).class
+    }
+
+    fn teach(&mut self, features: &Features, label: u8) -> Result<(), Full> {
+        let example = Example::new(examples::scale().quantise(&features.values()), label);
+        self.field.add(example).map(|_| ()).map_err(|_| Full)
+    }
+
+    fn forget(&mut self, number: u8) -> bool {
+        self.field.forget(number)
+    }
+
+    fn listed(&self, place: u8) -> Option<(Listed, u8)> {
+        let built_in = self.built_in.len() as u8;
+        if let Some(example) = self.built_in.example(usize::from(place)) {
+            return Some((Listed { from_field: false, number: place, example }, place + 1));
+        }
+        for number in place - built_in..field_examples::CAPACITY {
+            if let Some(example) = self.field.slot(number) {
+                return Some((Listed { from_field: true, number, example }, built_in + number + 1));
+            }
+        }
+        None
+    }
+
+    fn spoiled(&self) -> u8 {
+        self.field.spoiled()
+    }
+
+    fn carry_on(&mut self) -> bool {
+        self.field.carry_on()
+    }
+}
+
+const _: () =
+    assert!(examples::COUNT + field_examples::CAPACITY as usize <= u8::MAX as usize, "a byte counts the examples");
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::memory::Volatile;
+
+    #[test]
+    fn examples_in_flash_and_from_the_field_are_searched_as_one_set() {
+        // As many of both as there may ever be: weeds built in, and the field teaches that the same object is a plant.
+        let features = Features::describe(556, 300, 60);
+        let bytes = examples::scale().quantise(&features.values());
+        let mut nearest = Nearest::new([Example::new(bytes, label::WEED); examples::CAPACITY], Volatile::new());
+        assert_eq!(nearest.classify(&features, 3), Vote { class: Class::Weed, votes: examples::CAPACITY as u8 });
+        for _ in 0..field_examples::CAPACITY {
+            assert_eq!(nearest.teach(&features, label::PLANT), Ok(()));
+        }
+        assert_eq!(nearest.teach(&features, label::PLANT), Err(Full));
+        let mut listed = 0;
+        let mut place = 0;
+        while let Some((example, next)) = nearest.listed(place) {
+            assert_eq!(example.from_field, example.example.label == label::PLANT);
+            (listed, place) = (listed + 1, next);
+        }
+        assert_eq!(listed, examples::CAPACITY + usize::from(field_examples::CAPACITY));
+        // All are level with the k-th nearest, so all vote, those from the field too.
+        let all = (&nearest.built_in, &nearest.field);
+        let answer = knn::classify::<{ features::COUNT }, { label::COUNT }>(&all, &bytes, 3, examples::RADIUS).unwrap();
+        assert_eq!(answer.votes.map(usize::from), [examples::CAPACITY, usize::from(field_examples::CAPACITY)]);
+    }
+}

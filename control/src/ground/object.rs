@@ -1,0 +1,31 @@
+//! An object: a stretch of ground that stood in the beam.
+
+use crate::units::{Length, Place};
+
+/// A stretch of ground over which the beam was broken.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Object {
+    /// Where the beam broke.
+    pub leading: Place,
+    /// Where the beam cleared, at or ahead of `leading`.
+    pub trailing: Place,
+    /// Whether its beginning was not seen, so that it may be the rest of something wider.
+    pub cut: bool,
+}
+
+impl Object {
+    /// What may stand at a place of which nothing has been seen.
+    pub(super) const fn cut_at(place: Place) -> Self {
+        Self { leading: place, trailing: place, cut: true }
+    }
+
+    /// How far the machine rolled while the beam was broken, the paper's `t S`.
+    pub fn width(&self) -> Length {
+        self.trailing - self.leading
+    }
+
+    /// Whether nothing was there after all.
+    pub(super) fn is_nothing(&self) -> bool {
+        self.cut && self.leading == self.trailing
+    }
+}

@@ -1,0 +1,274 @@
+//! What encoder and beam show when they fail.
+//!
+//! Neither sensor says that it is broken; it shows in what they say together. A machine that rolls makes progress, so edges
+//! of the encoder that lead nowhere come from one live channel, and plants that pass a machine at rest come from a dead
+//! encoder. A machine has a mass, so an encoder that falls silent without having become slow has failed, and one that is as
+//! fast again behind a gap as it was before has lost what lies between. A canopy has so many leaves and no more, so a beam that
+//! flickers sees dust. These monitors count; what a fault means for the tool is decided by the
+//! [`weeder`](crate::weeder).
+//!
+//! What small faults lose adds up until it has rolled by: [`EncoderMonitor`] holds it against what the tool may be astray by.
+
+use crate::{
+    alarm::Alarm,
+    units::{Coarse, Instant, Position},
+};
+
+/// The time in which edges are counted.
+const PERIOD: u16 = Coarse::steps_in_ms(500);
+
+/// Edges without progress in a period that no tremble gives: one channel alone shows them from 0.6 km/h on, and an
+/// engine's vibration of 50 Hz, which makes 50 of them, does not.
+const DEAD_CHANNEL_EDGES: u8 = 80;
+
+/// Without progress for so long, the machine stands: slower than 0.05 km/h.
+const STANDS: u16 = Coarse::steps_in_ms(150);
+
+/// Times that the beam may break while the machine stands: leaves move in the wind, but plants do not pass.
+const BREAKS: u8 = 3;
+
+/// The time of a progress in steps of 256 us: all that tells slow rolling from standing fits into a byte.
+type Short = u8;
+
+/// When the speed meter begins to take silence for slowness, and leads shrink: from here on until it is clear what the silence
+/// is, a tool that is out stays out.
+const QUIET: Short = (crate::measure::speed::SPACING >> 2) as Short;
+
+/// A machine rolls steadily where a progress takes no longer than this, 15.4 ms: from 0.5 km/h on with ticks of 0.5 mm or finer.
+/// Coarser ones need four ticks in this time, and are not known to fall silent at less.
+///
+/// Who brakes with 3 m/s2, as hard as a walking person can, takes longer for the last progress but one before the standstill.
+/// So behind a shorter one there is another, and it comes within 2.42 times this one: where the way to the standstill is `x` of
+/// them, x - 1 or more being left, `sqrt(x) - sqrt(x - 1)` is at most so many times `sqrt(x + 1) - sqrt(x)`.
+const STEADY: Short = 59;
+
+/// What a turn of the loop at either end may add to a time: 1 ms, or the turn and a step where it is longer.
+const TURN: Short = 4;
+
+const fn grace(turn: Short) -> u16 {
+    if turn < TURN { TURN as u16 } else { turn as u16 + 1 }
+}
+
+/// Silences in steady rolling that are an alarm, where none is farther behind the other than so many times the progress, 10 m. A
+/// sound encoder has none; one may be a wheel that a stone caught. Each costs the ground from beam to tool.
+const SILENCES: u8 = 3;
+const SILENCES_WITHIN: u16 = 5000;
+
+/// What is lost is told in quarters of a progress, which are ticks where the encoder is no finer than 0.4 mm.
+const PROGRESS: u8 = 4;
+
+/// Lost with half a pulse of a channel: where one does not come, the other channel counts a tick back and on again instead, and
+/// the wheel seems to turn round twice.
+const TURNED_ROUND: u8 = 2;
+
+/// One that may be lost is paid for by so many times the progress, 32 quarters: who loses three in a hundred goes on.
+const PAID_BY: u8 = 8;
+
+/// More than this unpaid, 25 mm or half of the usual margin, is an alarm.
+const DEBT: u8 = 48;
+
+/// A time in shorter form, or the longest that there is.
+#[inline(never)]
+const fn shortened(time: u16) -> Short {
+    if time < 1 << 10 { (time >> 2) as Short } else { Short::MAX }
+}
+
+/// Whether progress that takes `time` is more than unsteady beside one that takes `steady`.
+const fn is_gap(time: Short, steady: Short, turn: Short) -> bool {
+    time as u16 > (steady + steady / 4) as u16 + grace(turn)
+}
+
+/// Whether no machine can have braked so hard that progress takes `time` behind one that took `steady`.
+const fn is_silence(time: Short, steady: Short, turn: Short) -> bool {
+    time as u16 > (2 * steady + steady / 2) as u16 + 2 * grace(turn)
+}
+
+/// Watches the encoder.
+#[derive(Clone, Debug)]
+pub struct EncoderMonitor {
+    /// Where the machine last made progress, and when: lower halves are enough.
+    anchor: u16,
+    progress_at: Coarse,
+    /// How long that progress took, and the one before it.
+    took: Short,
+    took_before: Short,
+    /// Whether it was made backwards.
+    backwards: bool,
+    /// Whether the machine stands since, whether it became quiet, and whether it fell silent too suddenly.
+    stands: bool,
+    quiet: bool,
+    silent: bool,
+    /// The last reading.
+    last: u16,
+    read_at: Coarse,
+    /// Edges since the period began, all of them without progress.
+    edges: u8,
+    /// Times that the beam broke since the machine stands.
+    breaks: u8,
+    period_since: Coarse,
+    /// What may be lost and has not been paid for.
+    debt: u8,
+    /// Silences, and progress since the last one, modulo 137 m.
+    silences: u8,
+    since_silence: u16,
+}
+
+impl EncoderMonitor {
+    /// A monitor that nobody has read.
+    pub const NONE: Self = Self { took: 0, took_before: 0, ..Self::new(Instant::ZERO, Position::new(0)) };
+
+    /// A monitor for a machine that stands at `position`.
+    pub const fn new(now: Instant, position: Position) -> Self {
+        Self {
+            anchor: position.count() as u16,
+            progress_at: now.coarse(),
+            took: Short::MAX,
+            took_before: Short::MAX,
+            backwards: false,
+            stands: false,
+            quiet: false,
+            silent: false,
+            last: position.count() as u16,
+            read_at: now.coarse(),
+            edges: 0,
+            breaks: 0,
+            period_since: now.coarse(),
+            debt: 0,
+            silences: 0,
+            since_silence: 0,
+        }
+    }
+
+    /// Takes a reading, with the ticks that came by jumps and are not believed; returns the fault that it shows.
+    ///
+    /// `progress` is a distance of some two millimetres, so that it means the same for every encoder, and four ticks at least. That
+    /// is a whole cycle of both channels, over which it does not matter that an encoder spaces its edges unevenly, and more
+    /// than a wheel makes that trembles on an edge, or one dead channel.
+    #[inline(never)]
+    pub fn read(&mut self, now: Instant, position: Position, doubted: u8, progress: u8) -> Option<Alarm> {
+        let now = now.coarse();
+        let place = position.count() as u16;
+        if now.since(self.period_since) >= PERIOD {
+            self.period_since = now;
+            self.edges = 0;
+            if self.stands {
+                self.debt = 0;
+            }
+        }
+        let step = place.wrapping_sub(self.last).cast_signed();
+        let turn = shortened(now.since(self.read_at));
+        (self.last, self.read_at) = (place, now);
+        let moved = place.wrapping_sub(self.anchor).cast_signed();
+        let time = now.since(self.progress_at);
+        let short = shortened(time);
+        let mut lost = doubted;
+        let mut alarm = Alarm::EncoderJumps;
+        if moved.unsigned_abs() >= progress.into() {
+            let (before, gap) = (self.took_before, self.took);
+            // Where the machine stood, the clock may have run round; else it may have come there as early as the turn began.
+            self.took = if self.stands { Short::MAX } else { short - turn };
+            self.took_before = gap;
+            (self.anchor, self.progress_at) = (place, now);
+            self.backwards = moved < 0;
+            (self.stands, self.quiet, self.silent) = (false, false, false);
+            (self.edges, self.breaks) = (0, 0);
+            self.since_silence = self.since_silence.wrapping_add(1);
+            if (self.since_silence as u8).is_multiple_of(PAID_BY) {
+                self.debt -= u8::from(self.debt > 0);
+            }
+            // As fast again behind the gap as before it, the machine has not been slow in between.
+            let steady = before.max(self.took);
+            if steady <= STEADY && is_gap(gap, steady, turn) {
+                alarm = Alarm::EncoderSilent;
+                if is_silence(gap, steady, turn) {
+                    // The ground is forgotten already.
+                    self.silences = if self.since_silence > SILENCES_WITHIN { 1 } else { self.silences + 1 };
+                    self.since_silence = 0;
+                    if self.silences >= SILENCES {
+                        lost += DEBT + 1;
+                    }
+                } else {
+                    lost += PROGRESS;
+                }
+            }
+        } else {
+            let steady = self.took <= STEADY;
+            self.quiet = steady && short >= QUIET;
+            self.silent |= steady && is_silence(short, self.took, turn);
+            self.stands |= time >= STANDS;
+            if step != 0 {
+                self.edges = self.edges.wrapping_add(1);
+                // No wheel turns back from steady rolling within a tick or two.
+                if steady && !self.silent && (step < 0) != self.backwards {
+                    (self.anchor, self.progress_at) = (place, now);
+                    self.backwards = !self.backwards;
+                    alarm = Alarm::EncoderChannelDead;
+                    lost += TURNED_ROUND;
+                }
+            }
+            if self.edges > DEAD_CHANNEL_EDGES {
+                return Some(Alarm::EncoderChannelDead);
+            }
+        }
+        self.debt += lost;
+        if self.debt <= DEBT {
+            return None;
+        }
+        (self.debt, self.silences) = (0, 0);
+        Some(alarm)
+    }
+
+    /// The beam broke; returns the fault that this shows.
+    pub fn beam_broke(&mut self) -> Option<Alarm> {
+        if !self.stands {
+            return None;
+        }
+        // Behind the alarm nobody counts on before the machine has rolled.
+        self.breaks += u8::from(self.breaks < BREAKS);
+        (self.breaks >= BREAKS).then_some(Alarm::EncoderSilent)
+    }
+
+    /// Whether the encoder has just become quiet, and nobody knows yet whether the machine brakes or the encoder has died.
+    pub const fn is_quiet(&self) -> bool {
+        self.quiet
+    }
+
+    /// Whether the encoder fell silent from one moment to the next: nobody knows how far the machine has rolled since.
+    pub const fn is_silent(&self) -> bool {
+        self.silent
+    }
+
+    /// Whether the machine may roll although the encoder says that it stands: it fell silent, or the beam has been broken since.
+    pub const fn is_doubtful(&self) -> bool {
+        self.silent || self.breaks > 0
+    }
+}
+
+/// The time in which the beam's edges are counted.
+const FLICKER_PERIOD: u16 = Coarse::steps_in_ms(100);
+
+/// Edges in that time that no canopy makes: at 10 km/h a clear stretch every 14 mm.
+const FLICKER_EDGES: u8 = 40;
+
+/// Watches the beam.
+#[derive(Clone, Debug)]
+pub struct BeamMonitor {
+    edges: u8,
+    since: Coarse,
+}
+
+impl BeamMonitor {
+    /// A monitor that has seen no edge.
+    pub const fn new(now: Instant) -> Self {
+        Self { edges: 0, since: now.coarse() }
+    }
+
+    /// The beam's level changed; returns the fault that this shows.
+    pub fn edge(&mut self, now: Instant) -> Option<Alarm> {
+        if now.coarse().since(self.since) >= FLICKER_PERIOD {
+            *self = Self::new(now);
+        }
+        self.edges += u8::from(self.edges <= FLICKER_EDGES);
+        (self.edges > FLICKER_EDGES).then_some(Alarm::BeamFlickers)
+    }
+}

@@ -1,0 +1,129 @@
+//! The settings in use, beside those that are saved: how the operator changes them, keeps them and takes them back.
+
+use crate::{
+    alarm::Alarm,
+    memory::Memory,
+    operate::{refusal::Refusal, saved::SavedSettings},
+    settings::{Setting, Settings},
+};
+
+/// The settings in use and those that are saved.
+#[derive(Clone, Debug)]
+pub struct Configuration<M> {
+    settings: Settings,
+    /// Whether what follows from them is yet to be worked out.
+    changed: bool,
+    saved: SavedSettings<M>,
+}
+
+impl<M: Memory> Configuration<M> {
+    /// A configuration that nobody has loaded.
+    pub const fn new(memory: M) -> Self {
+        Self { settings: Settings::NONE, changed: false, saved: SavedSettings::new(memory) }
+    }
+
+    /// Loads what is saved, or the defaults; returns what is wrong with it.
+    pub fn load(&mut self) -> Option<Alarm> {
+        let loaded = self.saved.load();
+        let fault = match &loaded {
+            None => Some(Alarm::SettingsLost),
+            Some(settings) => settings.contradiction().map(|_| Alarm::SettingsContradict),
+        };
+        self.settings = loaded.unwrap_or_default();
+        fault
+    }
+
+    /// The settings in use.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// The value of a setting in use.
+    pub fn get(&self, setting: Setting) -> u16 {
+        self.settings.get(setting)
+    }
+
+    /// The value of a setting that is saved, if any is.
+    pub fn saved(&self, setting: Setting) -> Option<u16> {
+        self.saved.value(setting)
+    }
+
+    /// Whether the settings have changed since what follows from them was worked out.
+    pub fn has_changed(&self) -> bool {
+        self.changed
+    }
+
+    /// What follows from the settings is worked out.
+    pub fn follow(&mut self) {
+        self.changed = false;
+    }
+
+    /// Sets several settings, or none of them; `is_working` tells whether the machine is.
+    ///
+    /// # Errors
+    /// [`Refusal::NotInHold`], [`Refusal::OutOfRange`], and [`Refusal::Contradiction`] where there was none before; nothing
+    /// is changed then.
+    #[inline(never)]
+    pub fn change(&mut self, changes: &[(Setting, u16)], is_working: bool) -> Result<(), Refusal> {
+        let mut settings = self.settings.clone();
+        for &(setting, value) in changes {
+            if setting.description().hold_only && is_working {
+                return Err(Refusal::NotInHold);
+            }
+            settings.set(setting, value).map_err(|_| Refusal::OutOfRange)?;
+            // Another wheel is one that has not been measured.
+            if setting.is_of_the_wheel() {
+                let _ = settings.set(Setting::TicksPerM, 0);
+            }
+        }
+        // Settings that contradict each other already are mended one at a time.
+        if let Some(contradiction) = settings.contradiction()
+            && self.settings.contradiction().is_none()
+        {
+            return Err(Refusal::Contradiction(contradiction));
+        }
+        self.settings = settings;
+        self.changed = true;
+        Ok(())
+    }
+
+    /// Takes the defaults back.
+    pub fn take_defaults(&mut self) {
+        self.settings = Settings::new();
+        self.changed = true;
+    }
+
+    /// Takes the settings back that are saved.
+    ///
+    /// # Errors
+    /// [`Refusal::NothingSaved`].
+    pub fn take_saved(&mut self) -> Result<(), Refusal> {
+        self.settings = self.saved.settings().ok_or(Refusal::NothingSaved)?;
+        self.changed = true;
+        Ok(())
+    }
+
+    /// Begins to save the settings, which [`carry_on`](Self::carry_on) finishes.
+    ///
+    /// # Errors
+    /// [`Refusal::Contradiction`].
+    pub fn save(&mut self) -> Result<(), Refusal> {
+        self.expect_no_contradiction()?;
+        self.saved.save(&self.settings);
+        Ok(())
+    }
+
+    /// Carries on with a save, without waiting; whether all has been written.
+    pub fn carry_on(&mut self) -> bool {
+        self.saved.carry_on()
+    }
+
+    /// Nothing, if the settings can be right together.
+    ///
+    /// # Errors
+    /// [`Refusal::Contradiction`].
+    #[inline(never)]
+    pub fn expect_no_contradiction(&self) -> Result<(), Refusal> {
+        self.settings.contradiction().map_or(Ok(()), |contradiction| Err(Refusal::Contradiction(contradiction)))
+    }
+}

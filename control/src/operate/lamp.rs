@@ -1,0 +1,50 @@
+//! The status LED: steady at work, a short flash a second in hold, and an alarm's code in flashes: the first digit, a
+//! short dark, the second digit, a long dark.
+
+use crate::{operate::state::State, units::Instant};
+
+/// Dark between the two digits of a code, and behind it, in quarters of a second. A flash is one of light and one of dark.
+const GAP: u16 = 2;
+const PAUSE: u16 = 6;
+
+/// Whether the LED shines.
+pub fn is_lit(state: State, now: Instant) -> bool {
+    // Shifts stand for divisions: 2^16 steps of 4 us are 262 ms.
+    let quarter = (now.steps() >> 16) as u16;
+    match state {
+        State::Work => true,
+        State::Hold => quarter.is_multiple_of(4) && now.steps() & 0x8000 == 0,
+        State::Alarm(alarm) => {
+            let first = 2 * u16::from(alarm.code() / 10);
+            let second = 2 * u16::from(alarm.code() % 10);
+            let step = quarter % (first + GAP + second + PAUSE);
+            let is_flashing = step < first || (first + GAP..first + GAP + second).contains(&step);
+            is_flashing && step.is_multiple_of(2)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use crate::{alarm::Alarm, units::Interval};
+    use std::{string::String, vec::Vec};
+
+    #[test]
+    fn an_alarm_is_blinked_as_its_codes_two_digits() {
+        for alarm in (0..).map_while(Alarm::from_index) {
+            let lit = |step: u32| is_lit(State::Alarm(alarm), Instant::default() + Interval::from_steps(step << 16));
+            let (first, second) = (alarm.code() / 10, alarm.code() % 10);
+            let length = u32::from(2 * u16::from(first + second) + GAP + PAUSE);
+            let seen: String = (0..2 * length).map(|step| if lit(step) { '*' } else { ' ' }).collect();
+            let flashes = |digit: u8| "* ".repeat(usize::from(digit));
+            let code = flashes(first) + "  " + &flashes(second) + "      ";
+            assert_eq!(seen, code.repeat(2), "{alarm:?}");
+            // As a person counts: what is parted by more than one dark quarter is another digit.
+            let counted: Vec<usize> =
+                seen.split("  ").map(|digit| digit.matches('*').count()).filter(|&n| n > 0).collect();
+            assert_eq!(counted, [first, second, first, second].map(usize::from));
+        }
+    }
+}

@@ -1,0 +1,76 @@
+//! The tool, as the servo was told to have it: where, since when, and whether that was in time.
+
+use crate::{
+    operate::servo::HalfMicros,
+    units::{Instant, Interval, count},
+};
+
+/// The tool.
+#[derive(Clone, Debug)]
+pub struct Tool {
+    out: bool,
+    /// The servo's pulse, and since when it has been that.
+    pulse: HalfMicros,
+    since: Instant,
+    /// Whether the ground for which it was sent out of the row is yet to come.
+    awaits_ground: bool,
+    late: u16,
+}
+
+impl Tool {
+    /// A tool of which nobody knows anything.
+    pub const NONE: Self = Self { out: false, pulse: 0, since: Instant::ZERO, awaits_ground: false, late: 0 };
+
+    /// The machine has woken up, with the tool out of the row.
+    pub const fn wake_up(&mut self, now: Instant) {
+        (self.out, self.since) = (true, now);
+    }
+
+    /// Whether it is to be out of the row.
+    pub const fn is_out(&self) -> bool {
+        self.out
+    }
+
+    /// Sends it out of the row or back into it; `for_ground` tells whether that is for ground which is yet to come.
+    pub const fn send(&mut self, out: bool, for_ground: bool) {
+        (self.out, self.awaits_ground) = (out, for_ground);
+    }
+
+    /// Gives the servo a pulse.
+    pub const fn order(&mut self, pulse: HalfMicros, now: Instant) {
+        if pulse != self.pulse {
+            (self.pulse, self.since) = (pulse, now);
+        }
+    }
+
+    /// Whether the servo has had this pulse for so long.
+    pub fn has_had(&self, pulse: HalfMicros, now: Instant, milliseconds: u16) -> bool {
+        pulse == self.pulse && self.is_settled(now, milliseconds)
+    }
+
+    /// Closed ground has reached it; whether that was sooner than a tool that needs so long could be out.
+    pub fn is_late(&mut self, now: Instant, milliseconds: u16) -> bool {
+        self.awaits_ground = false;
+        let is_late = !self.is_settled(now, milliseconds);
+        if is_late {
+            count(&mut self.late);
+        }
+        is_late
+    }
+
+    /// Whether the ground for which it was sent out is yet to come.
+    pub const fn awaits_ground(&self) -> bool {
+        self.awaits_ground
+    }
+
+    /// Times that closed ground came sooner than it could be out.
+    pub const fn late(&self) -> u16 {
+        self.late
+    }
+
+    /// Whether the servo has had its pulse for so long.
+    #[inline(never)]
+    fn is_settled(&self, now: Instant, milliseconds: u16) -> bool {
+        now - self.since >= Interval::from_ms(milliseconds.into())
+    }
+}

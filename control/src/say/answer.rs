@@ -1,0 +1,151 @@
+//! Answers, a line at a time.
+
+use super::{
+    command::{Command, Mistake, Word},
+    errors::{write_mistake, write_refusal},
+    line::Line,
+    packed::Text,
+    status::{write_counts, write_example, write_object, write_setting, write_state, write_status},
+    texts,
+};
+use crate::{
+    ground::class::Classifier, memory::Memory, operate::refusal::Refusal, settings::Setting, weeder::Controller,
+};
+
+/// The part of an answer that has not been written yet.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+// The greeting is 0, as the memory is before anybody has woken up.
+#[repr(u8)]
+pub enum Answer {
+    /// The greeting after a reset.
+    Greeting,
+    /// Nothing.
+    #[default]
+    Done,
+    /// Whatever answers this, which has not been carried out yet.
+    Said(Result<Command, Mistake>),
+    /// The commands, from the one at this place on.
+    Help(u8),
+    /// What a setting is.
+    Explain(Setting),
+    /// The status: where the machine is.
+    Status,
+    /// The status: what was counted.
+    Counts,
+    /// A setting's value.
+    Get(Setting),
+    /// All settings, from the one at this place on.
+    GetAll(u8),
+    /// All examples, from the one at this place on.
+    Examples(u8),
+    /// The heading of the last objects.
+    DumpHeading,
+    /// The last objects, from the one at this place on.
+    Dump(u8),
+    /// The firmware's name.
+    Version,
+    /// `ok`.
+    Ok,
+    /// What was wrong with the line.
+    Wrong(Mistake),
+    /// Why the command was refused.
+    Refused(Refusal, Option<Setting>),
+}
+
+impl Answer {
+    /// Whether there is nothing left to write.
+    pub fn is_done(&self) -> bool {
+        *self == Self::Done
+    }
+
+    /// Puts the next line together, with its end.
+    #[inline(never)]
+    pub fn write_line<C: Classifier, M: Memory>(&mut self, controller: &Controller<C, M>, line: &mut Line) {
+        *self = match *self {
+            Self::Done | Self::Said(_) => return,
+            Self::Greeting => {
+                line.say(texts::WEEDER);
+                line.say(texts::RESET_BY);
+                line.say(controller.cause().text());
+                line.say(texts::STATE);
+                write_state(controller.state(), texts::BLANK, line);
+                line.say(texts::TOOL_OUT);
+                Self::Done
+            }
+            Self::Help(place) => {
+                if let Some(word) = Word::from_index(place) {
+                    explain(word.usage(), word.help(), line);
+                }
+                if place + 1 < Word::COUNT { Self::Help(place + 1) } else { Self::Ok }
+            }
+            Self::Explain(setting) => {
+                explain(setting.text(), setting.help(), line);
+                Self::Get(setting)
+            }
+            Self::Status => {
+                write_status(controller, line);
+                Self::Counts
+            }
+            Self::Counts => {
+                write_counts(controller, line);
+                Self::Ok
+            }
+            Self::Get(setting) => {
+                write_setting(controller, setting, line);
+                Self::Ok
+            }
+            Self::GetAll(place) => {
+                if let Some(setting) = Setting::from_index(place) {
+                    write_setting(controller, setting, line);
+                }
+                if place + 1 < Setting::COUNT { Self::GetAll(place + 1) } else { Self::Ok }
+            }
+            Self::Examples(place) => match controller.classifier().listed(place) {
+                Some((listed, next)) => {
+                    write_example(&listed, line);
+                    Self::Examples(next)
+                }
+                None => {
+                    line.say(texts::SPOILED);
+                    line.counted(controller.classifier().spoiled().into());
+                    Self::Ok
+                }
+            },
+            Self::DumpHeading => {
+                line.say(texts::DUMP);
+                if controller.objects().is_empty() { Self::Ok } else { Self::Dump(0) }
+            }
+            Self::Dump(place) => {
+                let place = usize::from(place);
+                if let Some(object) = controller.objects().get(place) {
+                    write_object(object, line);
+                }
+                if place + 1 < controller.objects().len() { Self::Dump(place as u8 + 1) } else { Self::Ok }
+            }
+            Self::Version => {
+                line.say(texts::WEEDER);
+                Self::Ok
+            }
+            Self::Ok => {
+                line.say(texts::OK);
+                Self::Done
+            }
+            Self::Wrong(mistake) => {
+                write_mistake(mistake, line);
+                Self::Done
+            }
+            Self::Refused(refusal, setting) => {
+                write_refusal(refusal, setting, line);
+                Self::Done
+            }
+        };
+        line.say(texts::END);
+    }
+}
+
+/// A name and what it stands for.
+fn explain(name: Text, explanation: Text, line: &mut Line) {
+    line.say(name);
+    line.say(texts::DASH);
+    line.say(explanation);
+}

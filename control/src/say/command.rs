@@ -1,0 +1,484 @@
+//! The console's grammar: bytes to lines, lines to commands.
+//!
+//! A line is at most 80 characters and ends with CR, LF or both; backspace works, because serial terminals send it. Words
+//! are separated by blanks. A line that cannot be understood becomes one [`Mistake`] and changes nothing. How commands
+//! are carried out and answered is the business of [`say`](crate::say).
+
+use crate::{ground::class::label, operate::plot::Plot, settings::Setting};
+use heapless::Vec;
+
+/// Characters that a line may have.
+pub const LINE_LENGTH: usize = 80;
+
+/// What stands in the stream of bytes where some were lost: ASCII's own character for it, SUB.
+pub const GAP_MARK: u8 = 0x1A;
+
+/// The first word of a command.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Word {
+    /// Lists the commands, or explains a setting.
+    Help,
+    /// One line of figures.
+    Status,
+    /// Shows one setting or all.
+    Get,
+    /// Changes a setting.
+    Set,
+    /// Keeps the settings.
+    Save,
+    /// Takes the settings back that are kept.
+    Revert,
+    /// Takes the settings back that a new machine has.
+    Defaults,
+    /// Measures the wheel or the servo.
+    Calibrate,
+    /// Moves the tool by hand.
+    Servo,
+    /// Swings the tool as for a row.
+    Test,
+    /// Goes to work.
+    Start,
+    /// Takes the tool out.
+    Hold,
+    /// Clears an alarm.
+    Clear,
+    /// Tells what happens, or stops telling.
+    Events,
+    /// Draws curves on a plotter.
+    Plot,
+    /// Says what the last object was, and teaches it.
+    Label,
+    /// Lists the examples.
+    Examples,
+    /// Forgets examples from the field.
+    Forget,
+    /// Lists the last objects.
+    Dump,
+    /// Names the firmware.
+    Version,
+}
+
+/// A line that was understood.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Command {
+    /// `help`.
+    Help,
+    /// `help name`.
+    Explain(Setting),
+    /// `status`.
+    Status,
+    /// `get`.
+    GetAll,
+    /// `get name`.
+    Get(Setting),
+    /// `set name value`.
+    Set(Setting, u16),
+    /// `save`.
+    Save,
+    /// `revert`.
+    Revert,
+    /// `defaults`.
+    Defaults,
+    /// `calibrate start`.
+    CalibrateStart,
+    /// `calibrate MM`, or `calibrate MM force`.
+    Calibrate {
+        /// The distance that was rolled since the start.
+        distance_mm: u16,
+        /// However far the result is from what the wheel's diameter gives.
+        force: bool,
+    },
+    /// `calibrate servo`.
+    CalibrateServo,
+    /// `servo in`.
+    ServoIn,
+    /// `servo out`.
+    ServoOut,
+    /// `servo US`, in microseconds.
+    Servo(u16),
+    /// `test row`, or `test row MM_S`.
+    TestRow {
+        /// The speed of the machine that is played, in mm/s.
+        speed_mm_s: u16,
+    },
+    /// `start`, or `start now`.
+    Start {
+        /// At once, over unseen ground.
+        now: bool,
+    },
+    /// `hold`.
+    Hold,
+    /// `clear`.
+    Clear,
+    /// `events on|off`.
+    Events(bool),
+    /// `plot on|off|teleplot`.
+    Plot(Plot),
+    /// `label plant|weed`, or `label plant|weed force`.
+    Label {
+        /// The [`label`].
+        label: u8,
+        /// Whatever the built-in examples say.
+        force: bool,
+    },
+    /// `examples`.
+    Examples,
+    /// `forget N`.
+    Forget(u8),
+    /// `forget all`.
+    ForgetAll,
+    /// `dump`.
+    Dump,
+    /// `version`.
+    Version,
+}
+
+/// Speed at which a row is played unless another is given: 1.8 km/h.
+const TEST_SPEED_MM_S: u16 = 500;
+
+/// Why a line was not understood.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mistake {
+    /// More than [`LINE_LENGTH`] characters.
+    TooLong,
+    /// Characters other than printable ASCII.
+    NotText,
+    /// Characters went missing before they could be read.
+    CharactersLost,
+    /// No command begins like this.
+    UnknownCommand,
+    /// The command takes other words than these.
+    Usage(Word),
+    /// No setting has this name.
+    UnknownSetting,
+    /// The setting takes a whole number within its range.
+    Value(Setting),
+}
+
+/// A word that a command may take.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Argument {
+    /// Of `start`.
+    Now,
+    /// Of `events`, and of settings that are switched.
+    On,
+    /// As `on`.
+    Off,
+    /// Of `forget`.
+    All,
+    /// Of `calibrate`.
+    Start,
+    /// Of `calibrate`.
+    Servo,
+    /// Of `calibrate` and `label`.
+    Force,
+    /// Of `servo`.
+    In,
+    /// Of `servo`.
+    Out,
+    /// Of `test`.
+    Row,
+    /// Of `plot`.
+    Teleplot,
+    /// Of `label`.
+    Plant,
+    /// Of `label`.
+    Weed,
+}
+
+/// Reads a line.
+///
+/// # Errors
+/// A [`Mistake`] that says what would have been right.
+#[inline(never)]
+pub fn parse(line: &[u8]) -> Result<Command, Mistake> {
+    let (word, rest) = split_word(line);
+    let word = Word::find(word).ok_or(Mistake::UnknownCommand)?;
+    let usage = Err(Mistake::Usage(word));
+    let (first, rest) = split_word(rest);
+    let (second, rest) = split_word(rest);
+    // Few commands take two words, and `set` nothing less.
+    let fits = match word {
+        Word::Set => !second.is_empty(),
+        Word::Calibrate | Word::Test | Word::Label => true,
+        _ => second.is_empty(),
+    };
+    if !fits || !split_word(rest).0.is_empty() {
+        return usage;
+    }
+    if first.is_empty() {
+        return match word {
+            Word::Help => Ok(Command::Help),
+            Word::Status => Ok(Command::Status),
+            Word::Get => Ok(Command::GetAll),
+            Word::Save => Ok(Command::Save),
+            Word::Revert => Ok(Command::Revert),
+            Word::Defaults => Ok(Command::Defaults),
+            Word::Start => Ok(Command::Start { now: false }),
+            Word::Hold => Ok(Command::Hold),
+            Word::Clear => Ok(Command::Clear),
+            Word::Examples => Ok(Command::Examples),
+            Word::Dump => Ok(Command::Dump),
+            Word::Version => Ok(Command::Version),
+            _ => usage,
+        };
+    }
+    if let Word::Help | Word::Get | Word::Set = word {
+        let setting = Setting::find(first).ok_or(Mistake::UnknownSetting)?;
+        return match word {
+            Word::Help => Ok(Command::Explain(setting)),
+            Word::Get => Ok(Command::Get(setting)),
+            _ => value(setting, second).map(|value| Command::Set(setting, value)).ok_or(Mistake::Value(setting)),
+        };
+    }
+    // What is refused because it looks wrong can be insisted on.
+    let force = Argument::find(second) == Some(Argument::Force);
+    if !second.is_empty() && !force && word != Word::Test {
+        return usage;
+    }
+    let command = match (word, Argument::find(first), number(first)) {
+        (Word::Start, Some(Argument::Now), _) => Command::Start { now: true },
+        (Word::Events, Some(Argument::On), _) => Command::Events(true),
+        (Word::Events, Some(Argument::Off), _) => Command::Events(false),
+        (Word::Plot, Some(Argument::On), _) => Command::Plot(Plot::Arduino),
+        (Word::Plot, Some(Argument::Off), _) => Command::Plot(Plot::Off),
+        (Word::Plot, Some(Argument::Teleplot), _) => Command::Plot(Plot::Teleplot),
+        (Word::Label, Some(Argument::Plant), _) => Command::Label { label: label::PLANT, force },
+        (Word::Label, Some(Argument::Weed), _) => Command::Label { label: label::WEED, force },
+        (Word::Forget, Some(Argument::All), _) => Command::ForgetAll,
+        (Word::Forget, _, Some(number @ 0..=255)) => Command::Forget(number as u8),
+        (Word::Servo, Some(Argument::In), _) => Command::ServoIn,
+        (Word::Servo, Some(Argument::Out), _) => Command::ServoOut,
+        (Word::Servo, _, Some(pulse_us)) => Command::Servo(pulse_us),
+        (Word::Calibrate, _, Some(distance_mm)) => Command::Calibrate { distance_mm, force },
+        (Word::Calibrate, Some(Argument::Start), _) if !force => Command::CalibrateStart,
+        (Word::Calibrate, Some(Argument::Servo), _) if !force => Command::CalibrateServo,
+        (Word::Test, Some(Argument::Row), _) if second.is_empty() => Command::TestRow { speed_mm_s: TEST_SPEED_MM_S },
+        (Word::Test, Some(Argument::Row), _) => match number(second) {
+            Some(speed_mm_s) => Command::TestRow { speed_mm_s },
+            None => return usage,
+        },
+        _ => return usage,
+    };
+    Ok(command)
+}
+
+/// What a word says for a setting: a number, or `on` or `off` for one that is switched.
+fn value(setting: Setting, word: &[u8]) -> Option<u16> {
+    match Argument::find(word) {
+        Some(Argument::On) if setting.is_switched() => Some(1),
+        Some(Argument::Off) if setting.is_switched() => Some(0),
+        _ => number(word),
+    }
+}
+
+/// The next word of a line, empty at its end, and what follows it.
+#[inline(never)]
+fn split_word(line: &[u8]) -> (&[u8], &[u8]) {
+    let start = line.iter().position(|byte| !is_blank(byte)).unwrap_or(line.len());
+    let line = &line[start..];
+    line.split_at(line.iter().position(is_blank).unwrap_or(line.len()))
+}
+
+fn is_blank(byte: &u8) -> bool {
+    matches!(byte, b' ' | b'\t')
+}
+
+/// A whole number in 16 bits, digits only.
+fn number(digits: &[u8]) -> Option<u16> {
+    digits.iter().try_fold(0_u16, |number, &digit| {
+        let digit = digit.wrapping_sub(b'0');
+        (digit <= 9).then_some(())?;
+        number.checked_mul(10)?.checked_add(u16::from(digit))
+    })
+}
+
+/// Collects bytes to lines.
+#[derive(Clone, Debug, Default)]
+pub struct LineBuffer {
+    characters: Vec<u8, LINE_LENGTH, u8>,
+    mistake: Option<Mistake>,
+}
+
+impl LineBuffer {
+    /// An empty line.
+    pub const fn new() -> Self {
+        Self { characters: Vec::new(), mistake: None }
+    }
+
+    /// Takes a byte. At a line's end, returns what the line says; an empty line says nothing.
+    #[inline(never)]
+    pub fn take(&mut self, byte: u8) -> Option<Result<Command, Mistake>> {
+        match byte {
+            b'\r' | b'\n' => return self.end(),
+            0x08 | 0x7F => {
+                self.characters.pop();
+            }
+            b'\t' | b' '..=b'~' => {
+                if self.characters.push(byte).is_err() {
+                    self.spoil(Mistake::TooLong);
+                }
+            }
+            GAP_MARK => self.spoil(Mistake::CharactersLost),
+            _ => self.spoil(Mistake::NotText),
+        }
+        None
+    }
+
+    fn spoil(&mut self, mistake: Mistake) {
+        self.mistake.get_or_insert(mistake);
+    }
+
+    fn end(&mut self) -> Option<Result<Command, Mistake>> {
+        let said = match self.mistake.take() {
+            Some(mistake) => Some(Err(mistake)),
+            None if split_word(&self.characters).0.is_empty() => None,
+            None => Some(parse(&self.characters)),
+        };
+        self.characters.clear();
+        said
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use std::vec::Vec;
+
+    fn answers(bytes: &[u8]) -> Vec<Result<Command, Mistake>> {
+        let mut line = LineBuffer::new();
+        bytes.iter().filter_map(|&byte| line.take(byte)).collect()
+    }
+
+    #[test]
+    fn every_command_is_understood_with_its_words() {
+        for (line, command) in [
+            (&b"help"[..], Command::Help),
+            (b"help k", Command::Explain(Setting::K)),
+            (b"status", Command::Status),
+            (b"get", Command::GetAll),
+            (b"get wheel_mm", Command::Get(Setting::WheelMm)),
+            (b"set wheel_mm 405", Command::Set(Setting::WheelMm, 405)),
+            (b"  set \t wheel_mm   405 ", Command::Set(Setting::WheelMm, 405)),
+            (b"set end_switch on", Command::Set(Setting::EndSwitch, 1)),
+            (b"set end_switch off", Command::Set(Setting::EndSwitch, 0)),
+            (b"set end_switch 1", Command::Set(Setting::EndSwitch, 1)),
+            (b"save", Command::Save),
+            (b"revert", Command::Revert),
+            (b"defaults", Command::Defaults),
+            (b"calibrate start", Command::CalibrateStart),
+            (b"calibrate 10000", Command::Calibrate { distance_mm: 10_000, force: false }),
+            (b"calibrate 10000 force", Command::Calibrate { distance_mm: 10_000, force: true }),
+            (b"calibrate servo", Command::CalibrateServo),
+            (b"servo in", Command::ServoIn),
+            (b"servo out", Command::ServoOut),
+            (b"servo 1750", Command::Servo(1750)),
+            (b"test row", Command::TestRow { speed_mm_s: 500 }),
+            (b"test row 700", Command::TestRow { speed_mm_s: 700 }),
+            (b"plot on", Command::Plot(Plot::Arduino)),
+            (b"plot off", Command::Plot(Plot::Off)),
+            (b"plot teleplot", Command::Plot(Plot::Teleplot)),
+            (b"start", Command::Start { now: false }),
+            (b"start now", Command::Start { now: true }),
+            (b"hold", Command::Hold),
+            (b"clear", Command::Clear),
+            (b"events on", Command::Events(true)),
+            (b"events off", Command::Events(false)),
+            (b"label plant", Command::Label { label: label::PLANT, force: false }),
+            (b"label weed", Command::Label { label: label::WEED, force: false }),
+            (b"label weed force", Command::Label { label: label::WEED, force: true }),
+            (b"examples", Command::Examples),
+            (b"forget 31", Command::Forget(31)),
+            (b"forget all", Command::ForgetAll),
+            (b"dump", Command::Dump),
+            (b"version", Command::Version),
+        ] {
+            assert_eq!(parse(line), Ok(command), "{}", line.escape_ascii());
+        }
+    }
+
+    #[test]
+    fn a_line_that_is_not_understood_says_what_would_be_right() {
+        for (line, mistake) in [
+            (&b"hepl"[..], Mistake::UnknownCommand),
+            (b"HELP", Mistake::UnknownCommand),
+            (b"help me now", Mistake::Usage(Word::Help)),
+            (b"help me", Mistake::UnknownSetting),
+            (b"status please", Mistake::Usage(Word::Status)),
+            (b"set wheel_mm", Mistake::Usage(Word::Set)),
+            (b"set wheel_mm 400 mm", Mistake::Usage(Word::Set)),
+            (b"set wheel 400", Mistake::UnknownSetting),
+            (b"set wheel_mm 4oo", Mistake::Value(Setting::WheelMm)),
+            (b"set wheel_mm -400", Mistake::Value(Setting::WheelMm)),
+            (b"set wheel_mm on", Mistake::Value(Setting::WheelMm)),
+            (b"set end_switch yes", Mistake::Value(Setting::EndSwitch)),
+            (b"set wheel_mm 65936", Mistake::Value(Setting::WheelMm)),
+            (b"start later", Mistake::Usage(Word::Start)),
+            (b"events", Mistake::Usage(Word::Events)),
+            (b"events maybe", Mistake::Usage(Word::Events)),
+            (b"calibrate", Mistake::Usage(Word::Calibrate)),
+            (b"calibrate me", Mistake::Usage(Word::Calibrate)),
+            (b"calibrate start force", Mistake::Usage(Word::Calibrate)),
+            (b"calibrate servo force", Mistake::Usage(Word::Calibrate)),
+            (b"test row force", Mistake::Usage(Word::Test)),
+            (b"calibrate 10000 faster", Mistake::Usage(Word::Calibrate)),
+            (b"calibrate start now", Mistake::Usage(Word::Calibrate)),
+            (b"calibrate 70000", Mistake::Usage(Word::Calibrate)),
+            (b"servo", Mistake::Usage(Word::Servo)),
+            (b"servo up", Mistake::Usage(Word::Servo)),
+            (b"servo in now", Mistake::Usage(Word::Servo)),
+            (b"test", Mistake::Usage(Word::Test)),
+            (b"test plants", Mistake::Usage(Word::Test)),
+            (b"test row fast", Mistake::Usage(Word::Test)),
+            (b"plot", Mistake::Usage(Word::Plot)),
+            (b"plot start", Mistake::Usage(Word::Plot)),
+            (b"label tree", Mistake::Usage(Word::Label)),
+            (b"label weed now", Mistake::Usage(Word::Label)),
+            (b"label weed force now", Mistake::Usage(Word::Label)),
+            (b"label force", Mistake::Usage(Word::Label)),
+            (b"forget", Mistake::Usage(Word::Forget)),
+            (b"forget 256", Mistake::Usage(Word::Forget)),
+        ] {
+            assert_eq!(parse(line), Err(mistake), "{}", line.escape_ascii());
+        }
+    }
+
+    #[test]
+    fn carriage_return_line_feed_or_both_end_a_line() {
+        let twice = [Ok(Command::Hold), Ok(Command::Clear)];
+        for text in [&b"hold\rclear\r"[..], b"hold\nclear\n", b"hold\r\nclear\r\n", b"\n\nhold\r\r\n \nclear\n"] {
+            assert_eq!(answers(text), twice, "{}", text.escape_ascii());
+        }
+    }
+
+    #[test]
+    fn backspace_takes_back_the_last_character() {
+        assert_eq!(answers(b"hole\x08d\n\x7F\x7Fclear\n"), [Ok(Command::Hold), Ok(Command::Clear)]);
+    }
+
+    #[test]
+    fn a_spoiled_line_is_one_mistake_and_the_next_line_is_read() {
+        let mut text = [b'x'; 300].to_vec();
+        text.extend(b"\nstatus\n");
+        assert_eq!(answers(&text), [Err(Mistake::TooLong), Ok(Command::Status)]);
+        assert_eq!(answers(b"\xFF\0\x1Bhold\nhold\n"), [Err(Mistake::NotText), Ok(Command::Hold)]);
+    }
+
+    #[test]
+    fn a_line_of_eighty_characters_is_not_too_long() {
+        let mut text = b"hold".to_vec();
+        text.resize(80, b' ');
+        text.push(b'\n');
+        assert_eq!(answers(&text), [Ok(Command::Hold)]);
+        text.insert(4, b' ');
+        assert_eq!(answers(&text), [Err(Mistake::TooLong)]);
+    }
+
+    #[test]
+    fn a_line_that_lost_characters_is_not_carried_out() {
+        assert_eq!(answers(b"set k 1\x1A\nhold\n"), [Err(Mistake::CharactersLost), Ok(Command::Hold)]);
+    }
+}

@@ -1,0 +1,159 @@
+//! A line on its way to the terminal: its texts, and the numbers for the `#` in them.
+//!
+//! A line is put together at once, so that what it tells belongs together, and goes out a character at a time, as the main
+//! loop has time for no more: a text is unpacked and a number divided into its digits only as far as the next character.
+
+use crate::say::packed::{Characters, Text};
+use ufmt::{Formatter, uDisplay, uWrite};
+
+/// Texts that a line may have; one that shows a setting has ten. A power of two, for short arithmetic.
+const TEXTS: usize = 16;
+
+/// Numbers that it may have; one that shows an object has six. A power of two as well.
+const NUMBERS: usize = 8;
+
+/// A line, or what is left of it.
+#[derive(Clone, Debug)]
+pub struct Line {
+    /// The rest of the text that was begun last, and of the number in it.
+    characters: Characters,
+    /// Texts and numbers of the line, and how many of them have been begun.
+    texts: u8,
+    texts_begun: u8,
+    numbers: u8,
+    numbers_begun: u8,
+    text: [Text; TEXTS],
+    number: [i32; NUMBERS],
+}
+
+impl Line {
+    /// An empty line.
+    pub const fn new() -> Self {
+        Self {
+            characters: Characters::NONE,
+            texts: 0,
+            texts_begun: 0,
+            numbers: 0,
+            numbers_begun: 0,
+            text: [Text::FIRST; TEXTS],
+            number: [0; NUMBERS],
+        }
+    }
+
+    /// Whether there is nothing left of it.
+    pub fn is_done(&self) -> bool {
+        self.texts == 0
+    }
+
+    /// A text, in which each `#` stands for the next of the line's numbers.
+    #[inline(never)]
+    pub(crate) fn say(&mut self, text: Text) {
+        debug_assert!(usize::from(self.texts) < TEXTS, "a line has {TEXTS} texts at most");
+        self.text[usize::from(self.texts) % TEXTS] = text;
+        self.texts += 1;
+    }
+
+    /// A number for a `#` that is never negative.
+    #[inline(never)]
+    pub(crate) fn counted(&mut self, number: u16) {
+        self.number(number.into());
+    }
+
+    /// A number for a `#`.
+    #[inline(never)]
+    pub(crate) fn number(&mut self, number: i32) {
+        debug_assert!(usize::from(self.numbers) < NUMBERS, "a line has {NUMBERS} numbers at most");
+        self.number[usize::from(self.numbers) % NUMBERS] = number;
+        self.numbers += 1;
+    }
+}
+
+impl Iterator for Line {
+    type Item = u8;
+
+    /// The next character, ASCII. Behind the last one the line is empty, and another can be put together.
+    #[inline(never)]
+    fn next(&mut self) -> Option<u8> {
+        loop {
+            match self.characters.next() {
+                Some(b'#') => {
+                    let number = self.number[usize::from(self.numbers_begun) % NUMBERS];
+                    self.numbers_begun += 1;
+                    self.characters.insert(number);
+                }
+                Some(character) => return Some(character),
+                None if self.texts_begun == self.texts => break,
+                None => {
+                    let text = self.text[usize::from(self.texts_begun) % TEXTS];
+                    self.texts_begun += 1;
+                    self.characters.begin(text);
+                }
+            }
+        }
+        (self.texts, self.texts_begun, self.numbers, self.numbers_begun) = (0, 0, 0, 0);
+        None
+    }
+}
+
+/// What is left of a line, for whoever can wait for all of it.
+impl uDisplay for Line {
+    fn fmt<W: uWrite + ?Sized>(&self, out: &mut Formatter<'_, W>) -> Result<(), W::Error> {
+        self.clone().try_for_each(|character| out.write_char(character.into()))
+    }
+}
+
+impl Default for Line {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use crate::say::texts;
+    use std::string::{String, ToString};
+
+    fn written(mut line: Line) -> String {
+        let mut shown = String::new();
+        ufmt::uwrite!(&mut shown, "{}", line).expect("a string takes all");
+        let written = String::from_utf8(line.by_ref().collect()).expect("ASCII");
+        assert_eq!(shown, written);
+        assert!(line.is_done());
+        written
+    }
+
+    #[test]
+    fn every_number_reads_as_it_should() {
+        let powers = (0..10).map(|exponent| 10_i32.pow(exponent)).flat_map(|power| [power - 1, power, power + 1]);
+        let ends = [i32::MIN, i32::MIN + 1, i32::MAX, 2_000_000_000, 65_535];
+        for number in powers.chain(ends).flat_map(|number| [number, number.wrapping_neg()]) {
+            let mut line = Line::new();
+            line.say(texts::NUMBER);
+            line.number(number);
+            assert_eq!(written(line), number.to_string());
+        }
+    }
+
+    #[test]
+    fn a_line_is_its_texts_with_the_numbers_in_their_places() {
+        let mut line = Line::new();
+        line.say(texts::OK);
+        line.say(texts::RANGE);
+        line.number(-1);
+        line.number(20);
+        line.say(texts::END);
+        assert!(!line.is_done());
+        assert_eq!(written(line), "ok from -1 to 20\r\n");
+    }
+
+    #[test]
+    fn a_line_that_was_written_makes_room_for_the_next() {
+        let mut line = Line::new();
+        for _ in 0..3 {
+            (0..TEXTS).for_each(|_| line.say(texts::OK));
+            assert_eq!(Iterator::count(line.by_ref()), 2 * TEXTS);
+        }
+    }
+}

@@ -1,0 +1,132 @@
+//! Lines that show the machine: its status, its curves, its settings, examples and objects.
+
+use super::names::{class_name, label_name, place_name, state_name};
+use crate::{
+    alarm::Warning,
+    ground::class::{Classifier, Listed},
+    memory::Memory,
+    operate::{objects::Judged, plot::Plot, state::State},
+    say::{command::Argument, line::Line, packed::Text, texts},
+    settings::Setting,
+    weeder::Controller,
+};
+
+/// The state, and which alarm, with a text between them.
+pub(super) fn write_state(state: State, between: Text, line: &mut Line) {
+    line.say(state_name(state));
+    if let State::Alarm(alarm) = state {
+        line.say(between);
+        line.say(alarm.text());
+    }
+}
+
+pub(super) fn write_status<C: Classifier, M: Memory>(controller: &Controller<C, M>, line: &mut Line) {
+    line.say(texts::STATE_IS);
+    write_state(controller.state(), texts::ALARM_IS, line);
+    line.say(texts::TOOL_IS);
+    line.say(place_name(controller.tool_out()));
+    if let Some(reason) = controller.reason() {
+        line.say(texts::FOR);
+        line.say(reason.text());
+    }
+    line.say(texts::PLACE);
+    line.number(controller.readings().position.count());
+    line.number(controller.speed_mm_s().into());
+    line.counted(controller.windows().into());
+    line.number(controller.unseen_mm().into());
+}
+
+pub(super) fn write_counts<C: Classifier, M: Memory>(controller: &Controller<C, M>, line: &mut Line) {
+    let readings = controller.readings();
+    line.say(texts::COUNTS);
+    line.counted(readings.lost);
+    line.counted(readings.jumps);
+    line.counted(controller.late());
+    line.counted(controller.events_missed());
+    line.counted(controller.mistakes());
+    line.counted(readings.stack_free);
+    line.say(controller.cause().text());
+    if controller.sees_no_plants() {
+        line.say(texts::WARNING_IS);
+        line.say(Warning::NoPlants.text());
+    }
+}
+
+/// Puts the next points of a plotter's curves together, each `label:value`.
+#[inline(never)]
+pub fn write_plot<C: Classifier, M: Memory>(controller: &Controller<C, M>, plot: Plot, line: &mut Line) {
+    line.say(if plot == Plot::Teleplot { texts::TELEPLOT } else { texts::SERIAL_PLOTTER });
+    line.number(controller.speed_mm_s().into());
+    line.number(if controller.tool_out() { 45 } else { 0 });
+    line.counted(controller.beam_is_broken().into());
+    line.counted(controller.windows().into());
+    line.say(texts::END);
+}
+
+#[inline(never)]
+pub(super) fn write_setting<C: Classifier, M: Memory>(
+    controller: &Controller<C, M>,
+    setting: Setting,
+    line: &mut Line,
+) {
+    let value = controller.settings().get(setting);
+    line.say(setting.text());
+    write_value(texts::IS, setting, value, line);
+    line.say(setting.unit());
+    write_range(setting, line);
+    write_value(texts::DEFAULT, setting, setting.description().default, line);
+    match controller.saved(setting) {
+        None => line.say(texts::NOT_SAVED),
+        Some(saved) if saved == value => {}
+        Some(saved) => write_value(texts::SAVED, setting, saved, line),
+    }
+}
+
+/// A text and a setting's value after it.
+#[inline(never)]
+fn write_value(text: Text, setting: Setting, value: u16, line: &mut Line) {
+    line.say(text);
+    if !setting.is_switched() {
+        line.say(texts::NUMBER);
+        return line.counted(value);
+    }
+    line.say(if value == 0 { Argument::Off } else { Argument::On }.text());
+}
+
+fn write_range(setting: Setting, line: &mut Line) {
+    if setting.is_switched() {
+        return line.say(texts::ON_OR_OFF);
+    }
+    let description = setting.description();
+    line.say(texts::RANGE);
+    line.counted(description.least);
+    line.counted(description.greatest);
+}
+
+/// What may be given for a setting, or for something else that has the same range.
+#[inline(never)]
+pub(super) fn write_allowed(name: Text, setting: Setting, line: &mut Line) {
+    line.say(name);
+    line.say(if setting.is_switched() { texts::TAKES } else { texts::TAKES_A_NUMBER });
+    write_range(setting, line);
+}
+
+pub(super) fn write_example(listed: &Listed, line: &mut Line) {
+    line.say(if listed.from_field { texts::FIELD } else { texts::BUILT_IN });
+    line.say(texts::EXAMPLE);
+    line.counted(listed.number.into());
+    line.say(label_name(listed.example.label));
+    line.say(texts::FEATURES);
+    listed.example.features.iter().for_each(|&feature| line.counted(feature.into()));
+}
+
+pub(super) fn write_object(object: &Judged, line: &mut Line) {
+    line.say(texts::DUMPED);
+    object.features().values().iter().for_each(|&value| line.number(value));
+    line.say(class_name(object.vote.class));
+    line.say(texts::VOTES);
+    line.counted(object.vote.votes.into());
+    if let Some(label) = object.label {
+        line.say(label_name(label));
+    }
+}

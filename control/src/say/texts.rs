@@ -1,0 +1,192 @@
+//! Everything that the machine says, but for what its settings' table has of them and for the [words](crate::say::words) that it also
+//! reads.
+//!
+//! A `#` in a text stands for a number of its line.
+
+use crate::{
+    alarm::{Alarm, Warning},
+    measure::reset::Cause,
+    say::{
+        command::{Argument, Word},
+        packed::Text,
+    },
+    settings::{self, Setting},
+    weeder::Reason,
+};
+
+/// All texts of the machine, from which the table in flash is made.
+pub(crate) const GROUPS: &[&[&str]] = &[
+    SAID,
+    USAGES,
+    HELPS,
+    settings::UNITS,
+    settings::HELPS,
+    Setting::WORDS,
+    Word::WORDS,
+    Argument::WORDS,
+    Alarm::WORDS,
+    Warning::WORDS,
+    Reason::WORDS,
+    Cause::WORDS,
+];
+
+/// Names for texts.
+macro_rules! said {
+    ($($NAME:ident = $text:expr;)*) => {
+        const SAID: &[&str] = &[$($text),*];
+
+        said!(Text::first_of(SAID); $($NAME)*);
+    };
+    ($place:expr; $NAME:ident $($rest:ident)*) => {
+        pub(crate) const $NAME: Text = $place;
+
+        said!($NAME.plus(1); $($rest)*);
+    };
+    ($place:expr;) => {};
+}
+
+said! {
+    END = "\r\n";
+    OK = "ok";
+    ERROR = "error: ";
+    WEEDER = concat!("weeder ", env!("CARGO_PKG_VERSION"));
+    RESET_BY = ", reset by ";
+    STATE = ", state ";
+    TOOL_OUT = ", tool out; help lists the commands";
+    DASH = " - ";
+    BLANK = " ";
+    NUMBER = "#";
+    IS = "=";
+    DEFAULT = ", default ";
+    SAVED = ", saved ";
+    NOT_SAVED = ", not saved";
+    RANGE = " from # to #";
+    ON_OR_OFF = " on or off";
+    TAKES = " takes";
+    TAKES_A_NUMBER = " takes a whole number";
+    STATE_IS = "state=";
+    ALARM_IS = " alarm=";
+    TOOL_IS = " tool=";
+    FOR = " for=";
+    PLACE = " pos=# speed_mm_s=# windows=# unseen_mm=#";
+    COUNTS = "lost=# jumps=# late=# missed=# mistakes=# stack_free=# reset=";
+    WARNING_IS = " warning=";
+    OBJECT = " pos=# votes=# spacing=# delay=# hold=# actuation=#";
+    SWING = "swing tool=";
+    POS = " pos=#";
+    STATE_EVENT = "state is=";
+    WARNING = "warning name=";
+    CALIBRATED = "calibrated lead_out_ms=# lead_in_ms=#";
+    SET = " set=yes";
+    NOT_SET = " set=no";
+    CALIBRATED_BY_EYE = "calibrated by=eye, set lead_out_ms and lead_in_ms to what you saw";
+    NOT_CALIBRATED = "calibrated by=none, the end switch did not follow";
+    ALARM = "alarm name=";
+    CODE = " code=#";
+    SERIAL_PLOTTER = "speed_mm_s:#,tool_deg:#,beam_broken:#,windows:#";
+    TELEPLOT = ">speed_mm_s:#\r\n>tool_deg:#\r\n>beam_broken:#\r\n>windows:#";
+    FIELD = "field";
+    BUILT_IN = "built_in";
+    EXAMPLE = " # ";
+    FEATURES = " # # # # #";
+    SPOILED = "spoiled=#";
+    DUMPED = "#,#,#,#,#,";
+    VOTES = ",#,";
+    DUMP = "speed_mm_s,spacing_mm,delay_mm,hold_mm,actuation_mm,answer,votes,label";
+    WORK = "work";
+    UNKNOWN = "unknown";
+    IN_ALARM = "alarm";
+    TOO_LONG = "send 80 characters at most";
+    NOT_TEXT = "send letters, digits and blanks only";
+    CHARACTERS_LOST = "characters were lost, send the line again";
+    UNKNOWN_COMMAND = "no such command, help lists them all";
+    UNKNOWN_SETTING = "no such setting, get lists them all";
+    USAGE = "the words do not fit, the command is ";
+    HOLD_TO_SET = " changes where the tool is, hold first";
+    HOLD_FIRST = "the machine is at work, hold first";
+    PULSES_EQUAL = "servo_in_us and servo_out_us would be equal, and the tool would not move";
+    BEAM_TOO_NEAR = "margin, leads and top speed would need beam_to_tool_mm # or more, change one of them first";
+    NOTHING_TO_LABEL = "there is no object without a label, let the beam see one first";
+    NOTHING_SAVED = "no settings are saved, save does it";
+    NOT_BEGUN = "calibrate start first, then roll";
+    TOO_SHORT = "roll 1000 mm at least, 10000 are better";
+    WHEEL_DIFFERS = "that would be ticks_per_m #, the wheel has #";
+    TAKEN_FOR = "the built-in examples say ";
+    LOOK_AGAIN = ", look again, or add force";
+    TEST_SPEED = "test row takes a speed in mm/s from 100 to #";
+    EXAMPLES_FULL = "all 32 places are taken, forget one first";
+    NO_SUCH_EXAMPLE = "no field example has this number, examples lists them";
+    ALARM_LATCHED = "an alarm is latched, see status, then clear it";
+}
+
+/// The one table of what is said about the commands.
+macro_rules! commands {
+    ($($Word:ident $usage:literal, $help:literal;)*) => {
+        const USAGES: &[&str] = &[$($usage),*];
+        const HELPS: &[&str] = &[$($help),*];
+
+        const _: () = {
+            let mut place = 0;
+            $(
+                assert!(Word::$Word as u8 == place, "the commands stand here in the order of their words");
+                place += 1;
+            )*
+            assert!(place == Word::COUNT);
+        };
+    };
+}
+
+impl Word {
+    /// The command with the words that it takes.
+    pub(crate) fn usage(self) -> Text {
+        const { Text::first_of(USAGES) }.plus(self as u8)
+    }
+
+    /// What it does.
+    pub(crate) fn help(self) -> Text {
+        const { Text::first_of(HELPS) }.plus(self as u8)
+    }
+}
+
+commands! {
+    Help "help [name]",
+        "this list, or what a setting is";
+    Status "status",
+        "where the machine is, and what was counted";
+    Get "get [name]",
+        "one setting, or all";
+    Set "set name value",
+        "change a setting; save keeps it";
+    Save "save",
+        "keep the settings for good";
+    Revert "revert",
+        "take the saved settings back";
+    Defaults "defaults",
+        "take a new machine's settings back";
+    Calibrate "calibrate start|servo|MM [force]",
+        "start, roll a measured distance, give it; or time the servo";
+    Servo "servo in|out|US",
+        "move the tool by hand";
+    Test "test row [MM_S]",
+        "swing as for a row of plants, without a sensor";
+    Start "start [now]",
+        "weed; now, at once over ground the beam has not seen";
+    Hold "hold",
+        "take the tool out of the row";
+    Clear "clear",
+        "clear an alarm";
+    Events "events on|off",
+        "tell of plants, swings and alarms as they come";
+    Plot "plot on|off|teleplot",
+        "curves for the Arduino Serial Plotter, or Teleplot";
+    Label "label plant|weed [force]",
+        "say what the last object was, and teach it";
+    Examples "examples",
+        "all examples, with source and class";
+    Forget "forget N|all",
+        "forget examples from the field";
+    Dump "dump",
+        "the last 16 objects as CSV";
+    Version "version",
+        "name the firmware";
+}

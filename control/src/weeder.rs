@@ -1,0 +1,312 @@
+//! The front door: edges, readings and commands go in, the tool's place and the lamp come out.
+//!
+//! One [`Controller::turn`] a turn of the main loop: take the edges of the beam that the machine has rolled past, measure the
+//! speed, roll the watched ground on, ask the schedule whether the tool may be in the row. Nothing in here waits,
+//! and nothing remembers a time at which something ought to happen: the answer is worked out anew each time, from where
+//! the machine is and how fast it rolls.
+
+mod bench;
+mod commands;
+mod faults;
+mod shown;
+
+pub use self::shown::Reason;
+
+use self::faults::{Limits, NoPlants};
+use crate::{
+    alarm::Alarm,
+    ground::{
+        Ground,
+        class::{Class, Classifier, Vote},
+        features::{self, Features},
+        object::Object,
+    },
+    measure::{
+        monitor::{BeamMonitor, EncoderMonitor},
+        quadrature::Odometer,
+        readings::{Edge, Readings, WakeUp},
+        reset::Cause,
+        speed::SpeedMeter,
+        switch::Switch,
+    },
+    memory::Memory,
+    operate::{
+        bench::Bench,
+        calibration::Distance,
+        configuration::Configuration,
+        event::{Event, Events},
+        objects::{Judged, Objects},
+        plot::Curves,
+        servo::{self, HalfMicros},
+        state::State,
+        tool::Tool,
+    },
+    settings::Setting,
+    units::{Instant, Position},
+};
+
+/// What the machine is to do after a turn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Orders {
+    /// The servo's pulse width.
+    pub pulse: HalfMicros,
+    /// The pulse width that has the tool out, for an emergency in which nobody can be asked.
+    pub pulse_out: HalfMicros,
+    /// The shortest gap between servo pulses in milliseconds; 0 for fixed frames.
+    pub gap_ms: u8,
+    /// Whether an object was judged: that is enough for a turn of the loop.
+    pub has_judged: bool,
+}
+
+/// The machine's decisions and all that they rest on.
+#[derive(Clone, Debug)]
+pub struct Controller<C, M> {
+    classifier: C,
+    configuration: Configuration<M>,
+    ground: Ground,
+    limits: Limits,
+    cause: Cause,
+    readings: Readings,
+    switch: Switch,
+    end_switch: Switch,
+    odometer: Odometer,
+    encoder: EncoderMonitor,
+    beam: BeamMonitor,
+    beam_broken: bool,
+    bench: Bench,
+    distance: Distance,
+    meter: SpeedMeter,
+    state: State,
+    tool: Tool,
+    /// Whether an object was judged in this turn.
+    has_judged: bool,
+    /// Lines that were not understood, or came with a hole in them.
+    mistakes: u16,
+    no_plants: NoPlants,
+    objects: Objects,
+    events: Events,
+    curves: Curves,
+}
+
+/// A controller before the machine has woken up: nothing but zeros and what it is made of, so that a `static` can hold it
+/// without a copy in flash, and it is woken up where it lies.
+#[derive(Debug)]
+pub struct Asleep<C, M>(Controller<C, M>);
+
+impl<C: Classifier, M: Memory> Asleep<C, M> {
+    /// A controller with a classifier and a memory of which nobody has read anything.
+    pub const fn new(classifier: C, memory: M) -> Self {
+        let (start, place) = (Instant::ZERO, Position::new(0));
+        Self(Controller {
+            classifier,
+            ground: Ground::NONE,
+            limits: Limits::NONE,
+            configuration: Configuration::new(memory),
+            cause: Cause::PowerOn,
+            readings: Readings { stack_free: 0, ..Readings::new(start, place) },
+            switch: Switch::new(false),
+            end_switch: Switch::new(false),
+            odometer: Odometer::new(place, 0),
+            encoder: EncoderMonitor::NONE,
+            beam: BeamMonitor::new(start),
+            beam_broken: false,
+            bench: Bench::Idle,
+            distance: Distance::NONE,
+            meter: SpeedMeter::NONE,
+            state: State::Hold,
+            tool: Tool::NONE,
+            has_judged: false,
+            mistakes: 0,
+            no_plants: NoPlants::since(place),
+            objects: Objects::NONE,
+            events: Events::NONE,
+            curves: Curves::NONE,
+        })
+    }
+
+    /// Wakes the machine up: in HOLD, with the tool out, and with no ground known. Where the memory holds no settings, or some
+    /// that cannot be right, that is an alarm.
+    pub fn wake_up(&mut self, wake_up: WakeUp) -> &mut Controller<C, M> {
+        let WakeUp { readings, beam_broken, cause } = wake_up;
+        let Readings { now, position, jumps, .. } = readings;
+        let controller = &mut self.0;
+        controller.classifier.wake_up();
+        controller.state = controller.configuration.load().map_or(State::Hold, State::Alarm);
+        controller.follow_settings();
+        controller.ground.begin(controller.configuration.settings(), position, beam_broken);
+        (controller.cause, controller.readings, controller.beam_broken) = (cause, readings, beam_broken);
+        controller.switch = Switch::new(readings.switch_on);
+        controller.end_switch = Switch::new(readings.end_switch_on);
+        controller.odometer = Odometer::new(position, jumps);
+        controller.encoder = EncoderMonitor::new(now, position);
+        controller.beam = BeamMonitor::new(now);
+        controller.meter = SpeedMeter::new(position, now);
+        controller.tool.wake_up(now);
+        controller.no_plants = NoPlants::since(position);
+        controller.curves.wake_up(now);
+        controller
+    }
+}
+
+impl<C: Classifier, M: Memory> Controller<C, M> {
+    /// A controller for a machine that just woke up, see [`Asleep::wake_up`].
+    pub fn new(classifier: C, memory: M, wake_up: WakeUp) -> Self {
+        let mut asleep = Asleep::new(classifier, memory);
+        asleep.wake_up(wake_up);
+        asleep.0
+    }
+
+    /// A turn of the loop: takes what came from the beam since the last one, in its order, then the machine's readings, and decides
+    /// where the tool is to be. No edge is farther than the readings of the next turn.
+    #[inline(always)]
+    pub fn turn(&mut self, readings: Readings, edges: impl IntoIterator<Item = Edge>) -> Orders {
+        edges.into_iter().for_each(|edge| self.take_edge(edge));
+        self.step(readings)
+    }
+
+    /// The first part of a [`turn`](Self::turn), for a test that looks in between.
+    #[inline(always)]
+    pub fn take_edge(&mut self, edge: Edge) {
+        match edge {
+            Edge::Seen { position, broken } => self.beam_edge(position, broken),
+            Edge::Lost { broken } => self.beam_edges_lost(broken),
+        }
+    }
+
+    /// Takes an edge of the beam, with the position at which it came.
+    fn beam_edge(&mut self, position: Position, broken: bool) {
+        self.beam_broken = broken;
+        if let Some(alarm) = self.beam.edge(self.readings.now) {
+            self.raise(alarm);
+        }
+        if broken
+            && self.is_working()
+            && let Some(alarm) = self.encoder.beam_broke()
+        {
+            self.raise(alarm);
+        }
+        if let Some(object) = self.ground.edge(self.odometer.place(position), broken) {
+            self.judge(object);
+        }
+    }
+
+    /// Edges of the beam were lost: what stood there is not known, and neither is the beam's level, which is now `broken`.
+    fn beam_edges_lost(&mut self, broken: bool) {
+        self.beam_broken = broken;
+        self.ground.lose_edges(broken);
+        self.raise(Alarm::BeamEdgesLost);
+    }
+
+    /// The last part of a [`turn`](Self::turn), for a test that looks in between.
+    #[inline(never)]
+    pub fn step(&mut self, readings: Readings) -> Orders {
+        self.readings = readings;
+        let doubted = self.odometer.read(readings.position, readings.jumps, self.believes_jumps());
+        let position = self.odometer.place(readings.position);
+        self.readings.position = position;
+        if let Some(speed) = self.meter.read(readings.now, position) {
+            self.ground.lead(self.configuration.settings(), speed);
+        }
+        match self.switch.read(readings.now, readings.switch_on) {
+            // An alarm wants to be cleared first, if by nothing else then by the switch going off.
+            Some(true) if matches!(self.state, State::Hold) => self.go_to_work(),
+            Some(false) => self.enter(State::Hold),
+            _ => {}
+        }
+        if let Some(object) = self.ground.roll_to(position) {
+            self.judge(object);
+        }
+        // Either takes half of what a turn may take.
+        if self.configuration.has_changed() && !self.has_judged {
+            self.follow_settings();
+        }
+        if let Some(alarm) = self.fault(doubted) {
+            self.raise(alarm);
+        }
+        let out = self.try_out().unwrap_or(!self.is_working() || self.must_be_out());
+        if out != self.tool.is_out() {
+            self.tool.send(out, out && self.is_working() && !self.encoder.is_doubtful());
+            self.events.add(Event::Swing { out, position });
+        }
+        let orders = self.orders();
+        self.tool.order(orders.pulse, readings.now);
+        self.warn();
+        self.has_judged = false;
+        orders
+    }
+
+    /// What the machine is to do as of the last turn.
+    pub fn orders(&self) -> Orders {
+        let pulse = if self.tool.is_out() { Setting::ServoOutUs } else { Setting::ServoInUs };
+        let pulse_of = |setting| servo::from_us(self.configuration.get(setting));
+        Orders {
+            pulse: self.bench.pulse().unwrap_or_else(|| pulse_of(pulse)),
+            pulse_out: pulse_of(Setting::ServoOutUs),
+            gap_ms: self.configuration.get(Setting::ServoGapMs) as u8,
+            has_judged: self.has_judged,
+        }
+    }
+
+    /// Whether the encoder's silence or the ground keeps the tool out of the row.
+    fn must_be_out(&self) -> bool {
+        let out = self.tool.is_out();
+        self.encoder.is_doubtful() || out && self.encoder.is_quiet() || self.ground.must_be_out(out)
+    }
+
+    /// Classifies a complete object and remembers it unless it is a weed.
+    fn judge(&mut self, object: Object) {
+        self.has_judged = true;
+        let position = self.readings.position;
+        self.no_plants = NoPlants::since(position);
+        let spacing = self.ground.spacing(&object);
+        let speed_class_mm_s = features::speed_class(self.speed_mm_s());
+        let (spacing_mm, width_mm) =
+            (self.ground.millimetres(spacing), self.ground.millimetres(self.ground.ticks(object.width())));
+        // What is left of an object whose beginning was not seen may be as narrow as a weed.
+        let vote = if object.cut {
+            Vote { class: Class::Unknown, votes: 0 }
+        } else {
+            let features = Features::describe(speed_class_mm_s, spacing_mm, width_mm);
+            self.classifier.classify(&features, self.configuration.get(Setting::K) as u8)
+        };
+        self.objects.remember(Judged { speed_class_mm_s, spacing_mm, width_mm, vote, label: None });
+        let leading = self.ground.position_of(object.leading, position);
+        self.events.add(Event::Object { vote, leading, spacing, plan: self.ground.plan(&object) });
+        if vote.class != Class::Weed && self.ground.keep(object).is_err() {
+            self.raise(Alarm::ScheduleFull);
+        }
+    }
+
+    /// Latches an alarm. What was seen can no longer be trusted.
+    fn raise(&mut self, alarm: Alarm) {
+        self.ground.forget();
+        let nobody_asks = alarm.is_of_a_sensor() && self.bench.needs_no_sensor();
+        if nobody_asks || matches!(self.state, State::Alarm(_)) {
+            return;
+        }
+        self.events.add(Event::Alarm { alarm, position: self.readings.position });
+        self.enter(State::Alarm(alarm));
+    }
+
+    fn is_working(&self) -> bool {
+        matches!(self.state, State::Work)
+    }
+
+    fn go_to_work(&mut self) {
+        if self.configuration.expect_no_contradiction().is_err() {
+            self.raise(Alarm::SettingsContradict);
+            return;
+        }
+        self.no_plants = NoPlants::since(self.readings.position);
+        self.enter(State::Work);
+    }
+
+    fn enter(&mut self, state: State) {
+        // What is tried ends by `hold` as well, and by the switch going off.
+        self.bench = Bench::Idle;
+        if state != self.state {
+            self.state = state;
+            self.events.add(Event::State(state));
+        }
+    }
+}

@@ -1,0 +1,132 @@
+//! What the operator tries on the bench: the tool by hand, the servo's times, the wheel's ticks, and the swings of a row.
+
+use super::Controller;
+use crate::measure::readings::Readings;
+use crate::operate::state::State;
+use crate::{
+    ground::class::Classifier,
+    memory::Memory,
+    operate::{
+        bench::Bench,
+        calibration::{Leads, Outcome, Swings},
+        event::Event,
+        refusal::Refusal,
+        rehearsal::Rehearsal,
+        servo,
+    },
+    settings::Setting,
+};
+
+impl<C: Classifier, M: Memory> Controller<C, M> {
+    /// Gives the servo a pulse by hand, in microseconds.
+    ///
+    /// # Errors
+    /// [`Refusal::NotInHold`], [`Refusal::AlarmLatched`], and [`Refusal::OutOfRange`] for what is no servo's pulse.
+    #[inline(never)]
+    pub fn servo_by_hand(&mut self, pulse_us: u16) -> Result<(), Refusal> {
+        self.expect_hold()?;
+        let range = Setting::ServoOutUs.description();
+        if !(range.least..=range.greatest).contains(&pulse_us) {
+            return Err(Refusal::OutOfRange);
+        }
+        self.bench = Bench::ByHand(servo::from_us(pulse_us));
+        Ok(())
+    }
+
+    /// Moves the tool into the row by hand.
+    ///
+    /// # Errors
+    /// As [`servo_by_hand`](Self::servo_by_hand).
+    pub fn servo_in(&mut self) -> Result<(), Refusal> {
+        self.servo_by_hand(self.configuration.get(Setting::ServoInUs))
+    }
+
+    /// Ends what was tried: the tool goes out of the row.
+    ///
+    /// # Errors
+    /// [`Refusal::NotInHold`] and [`Refusal::AlarmLatched`].
+    pub fn servo_out(&mut self) -> Result<(), Refusal> {
+        self.expect_hold()?;
+        self.bench = Bench::Idle;
+        Ok(())
+    }
+
+    /// Begins to time the servo; an event tells how it ends.
+    ///
+    /// # Errors
+    /// [`Refusal::NotInHold`] and [`Refusal::AlarmLatched`].
+    pub fn calibrate_servo(&mut self) -> Result<(), Refusal> {
+        self.expect_hold()?;
+        let watched = self.configuration.get(Setting::EndSwitch) != 0;
+        let gap_ms = self.configuration.get(Setting::ServoGapMs);
+        self.bench = Bench::Swings(Swings::new(self.readings.now, watched, gap_ms as u8));
+        Ok(())
+    }
+
+    /// Begins to measure a distance, from where the machine stands.
+    ///
+    /// # Errors
+    /// [`Refusal::NotInHold`] and [`Refusal::AlarmLatched`].
+    pub fn calibrate_start(&mut self) -> Result<(), Refusal> {
+        self.expect_hold()?;
+        self.distance.begin(self.readings.position);
+        Ok(())
+    }
+
+    /// Sets the wheel's ticks a metre by a distance that was rolled since [`calibrate_start`](Self::calibrate_start).
+    ///
+    /// # Errors
+    /// [`Refusal::Unfit`], [`Refusal::NotInHold`], [`Refusal::OutOfRange`] and [`Refusal::Contradiction`]; nothing is changed then.
+    pub fn calibrate(&mut self, distance_mm: u16, force: bool) -> Result<(), Refusal> {
+        let nominal = self.configuration.settings().nominal_wheel().ticks(1000).0 as u16;
+        let ended = self.distance.end(self.readings.position, distance_mm, nominal, force);
+        self.set(Setting::TicksPerM, ended.map_err(Refusal::Unfit)?)
+    }
+
+    /// Swings the tool as for a row of plants, at a speed in mm/s.
+    ///
+    /// # Errors
+    /// [`Refusal::NotInHold`], [`Refusal::AlarmLatched`], [`Refusal::Contradiction`], and [`Refusal::TestSpeed`] for what
+    /// the machine would not work at.
+    pub fn test_row(&mut self, speed_mm_s: u16) -> Result<(), Refusal> {
+        self.expect_hold()?;
+        self.configuration.expect_no_contradiction()?;
+        let fastest = self.configuration.get(Setting::TopSpeedMmS);
+        if !(Setting::TopSpeedMmS.description().least..=fastest).contains(&speed_mm_s) {
+            return Err(Refusal::TestSpeed { fastest });
+        }
+        self.bench = Bench::Row(Rehearsal::new(self.readings.now, speed_mm_s, self.configuration.settings()));
+        Ok(())
+    }
+
+    /// Carries on with what is being tried; whether it has the tool out, if it says.
+    pub(super) fn try_out(&mut self) -> Option<bool> {
+        let Readings { now, end_switch_on, .. } = self.readings;
+        let (out, outcome) = self.bench.carry_on(now, end_switch_on, self.tool.is_out());
+        if let Some(outcome) = outcome {
+            self.finish_swings(outcome);
+        }
+        out
+    }
+
+    /// Sets the leads by what was measured, if they fit, and tells how it ended.
+    fn finish_swings(&mut self, outcome: Outcome) {
+        let fits = match outcome {
+            Outcome::Measured(Leads { out_ms, in_ms }) => self
+                .configuration
+                .change(&[(Setting::LeadOutMs, out_ms), (Setting::LeadInMs, in_ms)], self.is_working())
+                .is_ok(),
+            _ => false,
+        };
+        self.events.announce(Event::Calibrated { outcome, fits });
+    }
+
+    #[inline(never)]
+    fn expect_hold(&self) -> Result<(), Refusal> {
+        match self.state {
+            State::Hold => Ok(()),
+            State::Work => Err(Refusal::NotInHold),
+            State::Alarm(_) => Err(Refusal::AlarmLatched),
+        }
+    }
+}

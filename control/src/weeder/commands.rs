@@ -1,0 +1,156 @@
+//! What the operator may ask of the machine, by switch or console.
+
+use super::{Controller, faults::Limits};
+use crate::operate::state::State;
+use crate::{
+    ground::{
+        class::{Class, Classifier, Full, label},
+        field_examples,
+    },
+    memory::Memory,
+    operate::{plot::Plot, refusal::Refusal},
+    settings::Setting,
+    units::count,
+};
+
+impl<C: Classifier, M: Memory> Controller<C, M> {
+    /// Goes to work; with `now`, at once and over ground that the beam has not seen.
+    ///
+    /// # Errors
+    /// [`Refusal::AlarmLatched`] while an alarm is, and [`Refusal::Contradiction`].
+    pub fn start(&mut self, now: bool) -> Result<(), Refusal> {
+        if let State::Alarm(_) = self.state {
+            return Err(Refusal::AlarmLatched);
+        }
+        self.configuration.expect_no_contradiction()?;
+        if self.configuration.has_changed() {
+            self.follow_settings();
+        }
+        if now {
+            self.ground.trust();
+        }
+        self.go_to_work();
+        Ok(())
+    }
+
+    /// Takes the tool out of the row. A latched alarm stays.
+    pub fn hold(&mut self) {
+        if !matches!(self.state, State::Alarm(_)) {
+            self.enter(State::Hold);
+        }
+    }
+
+    /// Clears an alarm; the machine is in HOLD afterwards.
+    pub fn clear(&mut self) {
+        if let State::Alarm(_) = self.state {
+            self.enter(State::Hold);
+        }
+    }
+
+    /// Sets a setting.
+    ///
+    /// # Errors
+    /// [`Refusal::NotInHold`], [`Refusal::OutOfRange`], and [`Refusal::Contradiction`] where there was none before; nothing
+    /// is changed then.
+    pub fn set(&mut self, setting: Setting, value: u16) -> Result<(), Refusal> {
+        self.configuration.change(&[(setting, value)], self.is_working())
+    }
+
+    /// Takes all settings back that a new machine has; [`save`](Self::save) makes it last.
+    ///
+    /// # Errors
+    /// [`Refusal::NotInHold`].
+    pub fn take_defaults(&mut self) -> Result<(), Refusal> {
+        if self.is_working() {
+            return Err(Refusal::NotInHold);
+        }
+        self.configuration.take_defaults();
+        Ok(())
+    }
+
+    /// Takes all settings back that are saved.
+    ///
+    /// # Errors
+    /// [`Refusal::NotInHold`] and [`Refusal::NothingSaved`].
+    pub fn take_saved(&mut self) -> Result<(), Refusal> {
+        if self.is_working() {
+            return Err(Refusal::NotInHold);
+        }
+        self.configuration.take_saved()
+    }
+
+    /// Works out what follows from the settings. That takes half a millisecond, so the turn in which they are set leaves it to
+    /// the next one.
+    #[inline(never)]
+    pub(super) fn follow_settings(&mut self) {
+        self.configuration.follow();
+        let settings = self.configuration.settings();
+        self.limits = Limits::of(settings);
+        self.ground.follow(settings, self.readings.position, self.meter.speed());
+    }
+
+    /// Begins to save the settings, which [`carry_on`](Self::carry_on) finishes.
+    ///
+    /// # Errors
+    /// [`Refusal::NotInHold`] and [`Refusal::Contradiction`].
+    pub fn save(&mut self) -> Result<(), Refusal> {
+        if self.is_working() {
+            return Err(Refusal::NotInHold);
+        }
+        self.configuration.save()
+    }
+
+    /// Carries on with what is being kept for good, settings and examples, without waiting; whether all has been written.
+    pub fn carry_on(&mut self) -> bool {
+        self.configuration.carry_on() && self.classifier.carry_on()
+    }
+
+    /// Labels the last object and teaches it to the classifier; if it is `forced`, against the built-in examples too.
+    ///
+    /// # Errors
+    /// [`Refusal::NothingToLabel`], [`Refusal::TakenFor`] and [`Refusal::ExamplesFull`]; the object has no label then.
+    pub fn label(&mut self, label: u8, forced: bool) -> Result<(), Refusal> {
+        let object = self.objects.unlabelled().ok_or(Refusal::NothingToLabel)?;
+        let features = object.features();
+        // A label that is wrong would turn the class of all that come after it, and nobody would see why.
+        if !forced {
+            let taken_for = self.classifier.built_in_class(&features);
+            if taken_for == if label == label::PLANT { Class::Weed } else { Class::Plant } {
+                return Err(Refusal::TakenFor(taken_for));
+            }
+        }
+        self.classifier.teach(&features, label).map_err(|Full| Refusal::ExamplesFull)?;
+        object.label = Some(label);
+        Ok(())
+    }
+
+    /// Forgets an example from the field.
+    ///
+    /// # Errors
+    /// [`Refusal::NoSuchExample`].
+    pub fn forget(&mut self, number: u8) -> Result<(), Refusal> {
+        if self.classifier.forget(number) { Ok(()) } else { Err(Refusal::NoSuchExample) }
+    }
+
+    /// Forgets all examples from the field.
+    pub fn forget_all(&mut self) {
+        for number in 0..field_examples::CAPACITY {
+            self.classifier.forget(number);
+        }
+    }
+
+    /// Turns the telling of events on or off.
+    pub fn tell_events(&mut self, on: bool) {
+        self.events.turn(on);
+    }
+
+    /// Draws curves for a plotter, or no longer.
+    pub fn set_plot(&mut self, plot: Plot) {
+        self.curves.set(plot);
+    }
+
+    /// Counts a line that was not understood.
+    pub fn count_mistake(&mut self) {
+        count(&mut self.mistakes);
+    }
+}

@@ -1,0 +1,152 @@
+//! What the machine shows of itself: its state, what it has counted, and what there is to tell.
+
+use super::Controller;
+use crate::measure::readings::Readings;
+use crate::operate::state::State;
+use crate::{
+    ground::class::Classifier,
+    measure::reset::Cause,
+    memory::Memory,
+    operate::{event::Event, lamp, objects::Judged, plot::Plot},
+    settings::{Setting, Settings},
+    units::Ticks,
+};
+
+/// A wheel whose edges come less than 50 us apart, in ticks a second: faster than any weeder with an encoder of 0.2 mm or more.
+const FAST: u16 = 20_000;
+
+/// Why the tool is out of the row while the machine works.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Reason {
+    /// A plant is there, or comes up.
+    Plant,
+    /// The beam has not seen the ground.
+    UnseenGround,
+    /// A plant just behind the beam would be reached before the tool is out.
+    TooFast,
+    /// The encoder fell silent while the machine rolled, or the beam broke while it stands.
+    EncoderDoubtful,
+}
+
+impl<C: Classifier, M: Memory> Controller<C, M> {
+    /// What the machine is doing.
+    pub fn state(&self) -> State {
+        self.state
+    }
+
+    /// Why the tool is out of the row although the machine works.
+    pub fn reason(&self) -> Option<Reason> {
+        if !self.is_working() || !self.tool.is_out() {
+            None
+        } else if self.encoder.is_doubtful() || self.encoder.is_quiet() {
+            Some(Reason::EncoderDoubtful)
+        } else if self.ground.is_unseen() {
+            Some(Reason::UnseenGround)
+        } else if self.ground.outruns_the_beam(true) {
+            Some(Reason::TooFast)
+        } else {
+            Some(Reason::Plant)
+        }
+    }
+
+    /// The machine's speed in millimetres a second, negative backwards.
+    pub fn speed_mm_s(&self) -> i16 {
+        self.ground.millimetres(Ticks(self.meter.speed().0))
+    }
+
+    /// Windows at the tool or ahead of it, the one still being seen included.
+    pub fn windows(&self) -> u8 {
+        self.ground.windows()
+    }
+
+    /// How far the machine has to roll until ground that the beam has seen reaches the tool, in millimetres.
+    pub fn unseen_mm(&self) -> i16 {
+        self.ground.millimetres(self.ground.unseen())
+    }
+
+    /// Whether the encoder fell silent from one moment to the next, so that nobody knows how far the machine has rolled since.
+    pub fn encoder_is_silent(&self) -> bool {
+        self.encoder.is_silent()
+    }
+
+    /// Whether the wheel turns so fast that an edge may be missed, and both channels may have changed at once.
+    pub fn believes_jumps(&self) -> bool {
+        self.meter.speed().is_beyond(FAST)
+    }
+
+    /// Whether the beam is broken.
+    pub fn beam_is_broken(&self) -> bool {
+        self.beam_broken
+    }
+
+    /// Whether the status LED shines: while the servo is being tried, it marks the commands.
+    pub fn lamp_is_lit(&self) -> bool {
+        if self.bench.swings() { self.tool.is_out() } else { lamp::is_lit(self.state, self.readings.now) }
+    }
+
+    /// Whether the tool is to be out of the row.
+    pub fn tool_out(&self) -> bool {
+        self.tool.is_out()
+    }
+
+    /// The last readings.
+    pub fn readings(&self) -> &Readings {
+        &self.readings
+    }
+
+    /// The settings in use.
+    pub fn settings(&self) -> &Settings {
+        self.configuration.settings()
+    }
+
+    /// The value of a setting that is saved, if any is.
+    pub fn saved(&self, setting: Setting) -> Option<u16> {
+        self.configuration.saved(setting)
+    }
+
+    /// What tells plants from weeds.
+    pub fn classifier(&self) -> &C {
+        &self.classifier
+    }
+
+    /// The last objects, the oldest first.
+    pub fn objects(&self) -> &[Judged] {
+        self.objects.all()
+    }
+
+    /// Why the machine was reset.
+    pub fn cause(&self) -> Cause {
+        self.cause
+    }
+
+    /// Times that closed ground reached the tool sooner than it could be out.
+    pub fn late(&self) -> u16 {
+        self.tool.late()
+    }
+
+    /// Lines that were not understood.
+    pub fn mistakes(&self) -> u16 {
+        self.mistakes
+    }
+
+    /// Events that found no room to wait in.
+    pub fn events_missed(&self) -> u16 {
+        self.events.missed()
+    }
+
+    /// Whether the machine has worked for a long way without seeing a plant.
+    pub fn sees_no_plants(&self) -> bool {
+        self.no_plants.has_warned()
+    }
+
+    /// The next event to be told.
+    pub fn next_event(&mut self) -> Option<Event> {
+        self.events.next()
+    }
+
+    /// The curves of which the next points are due, which are due 20 times a second.
+    pub fn next_plot(&mut self) -> Option<Plot> {
+        self.curves.next(self.readings.now)
+    }
+}
