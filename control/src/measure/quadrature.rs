@@ -72,6 +72,10 @@ impl Quadrature {
 /// at the least: so many ticks then come 12 us apart, where the interrupt looks again within 8.
 const CAN_BE_MISSED: u16 = 16;
 
+/// A wheel that turns faster may have an edge missed, so that its jumps are believed: edges come less than 50 us apart, in ticks a second.
+/// That is faster than any weeder with an encoder of 0.2 mm or more.
+pub const FAST: u16 = 20_000;
+
 /// More ticks than this are not told to be in doubt: it is enough.
 const ENOUGH: u16 = 32;
 

@@ -87,13 +87,13 @@ impl<M: Memory> Configuration<M> {
         Ok(())
     }
 
-    /// Takes the defaults back.
+    /// Goes back to the settings of a new machine.
     pub fn take_defaults(&mut self) {
         self.settings = Settings::new();
         self.changed = true;
     }
 
-    /// Takes the settings back that are saved.
+    /// Goes back to the saved settings.
     ///
     /// # Errors
     /// [`Refusal::NothingSaved`].

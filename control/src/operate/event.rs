@@ -87,7 +87,7 @@ impl Events {
 
     /// The next one to be told.
     #[inline(never)]
-    pub fn next(&mut self) -> Option<Event> {
+    pub fn take(&mut self) -> Option<Event> {
         (!self.waiting.is_empty()).then(|| self.waiting.remove(0))
     }
 

@@ -39,7 +39,7 @@ impl Curves {
     }
 
     /// The curves of which the next points are due, 20 times a second.
-    pub fn next(&mut self, now: Instant) -> Option<Plot> {
+    pub fn due(&mut self, now: Instant) -> Option<Plot> {
         if self.plot == Plot::Off || now.coarse().since(self.drawn_at) < PERIOD {
             return None;
         }

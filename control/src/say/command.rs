@@ -27,9 +27,9 @@ pub enum Word {
     Set,
     /// Keeps the settings.
     Save,
-    /// Takes the settings back that are kept.
+    /// Goes back to the saved settings.
     Revert,
-    /// Takes the settings back that a new machine has.
+    /// Goes back to the settings of a new machine.
     Defaults,
     /// Measures the wheel or the servo.
     Calibrate,

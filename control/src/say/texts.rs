@@ -160,9 +160,9 @@ commands! {
     Save "save",
         "keep the settings for good";
     Revert "revert",
-        "take the saved settings back";
+        "go back to the saved settings";
     Defaults "defaults",
-        "take a new machine's settings back";
+        "go back to the settings of a new machine";
     Calibrate "calibrate start|servo|MM [force]",
         "start, roll a measured distance, give it; or time the servo";
     Servo "servo in|out|US",

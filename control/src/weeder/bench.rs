@@ -1,10 +1,9 @@
 //! What the operator tries on the bench: the tool by hand, the servo's times, the wheel's ticks, and the swings of a row.
 
 use super::Controller;
-use crate::measure::readings::Readings;
-use crate::operate::state::State;
 use crate::{
     ground::class::Classifier,
+    measure::readings::Readings,
     memory::Memory,
     operate::{
         bench::Bench,
@@ -13,6 +12,7 @@ use crate::{
         refusal::Refusal,
         rehearsal::Rehearsal,
         servo,
+        state::State,
     },
     settings::Setting,
 };

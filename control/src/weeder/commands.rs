@@ -1,14 +1,13 @@
 //! What the operator may ask of the machine, by switch or console.
 
 use super::{Controller, faults::Limits};
-use crate::operate::state::State;
 use crate::{
     ground::{
         class::{Class, Classifier, Full, label},
         field_examples,
     },
     memory::Memory,
-    operate::{plot::Plot, refusal::Refusal},
+    operate::{plot::Plot, refusal::Refusal, state::State},
     settings::Setting,
     units::count,
 };
@@ -56,7 +55,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         self.configuration.change(&[(setting, value)], self.is_working())
     }
 
-    /// Takes all settings back that a new machine has; [`save`](Self::save) makes it last.
+    /// Goes back to the settings of a new machine; [`save`](Self::save) makes it last.
     ///
     /// # Errors
     /// [`Refusal::NotInHold`].
@@ -68,7 +67,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         Ok(())
     }
 
-    /// Takes all settings back that are saved.
+    /// Goes back to the saved settings.
     ///
     /// # Errors
     /// [`Refusal::NotInHold`] and [`Refusal::NothingSaved`].

@@ -1,10 +1,10 @@
 //! Faults and warnings: what the readings show that the machine cannot work with, and what the operator should know.
 
 use super::Controller;
-use crate::measure::readings::Readings;
 use crate::{
     alarm::{Alarm, Warning},
     ground::class::Classifier,
+    measure::readings::Readings,
     memory::Memory,
     operate::event::Event,
     settings::{Setting, Settings},

@@ -1,19 +1,14 @@
 //! What the machine shows of itself: its state, what it has counted, and what there is to tell.
 
 use super::Controller;
-use crate::measure::readings::Readings;
-use crate::operate::state::State;
 use crate::{
     ground::class::Classifier,
-    measure::reset::Cause,
+    measure::{quadrature, readings::Readings, reset::Cause},
     memory::Memory,
-    operate::{event::Event, lamp, objects::Judged, plot::Plot},
+    operate::{event::Event, lamp, objects::Judged, plot::Plot, state::State},
     settings::{Setting, Settings},
     units::Ticks,
 };
-
-/// A wheel whose edges come less than 50 us apart, in ticks a second: faster than any weeder with an encoder of 0.2 mm or more.
-const FAST: u16 = 20_000;
 
 /// Why the tool is out of the row while the machine works.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -72,7 +67,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// Whether the wheel turns so fast that an edge may be missed, and both channels may have changed at once.
     pub fn believes_jumps(&self) -> bool {
-        self.meter.speed().is_beyond(FAST)
+        self.meter.speed().is_beyond(quadrature::FAST)
     }
 
     /// Whether the beam is broken.
@@ -142,11 +137,11 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// The next event to be told.
     pub fn next_event(&mut self) -> Option<Event> {
-        self.events.next()
+        self.events.take()
     }
 
     /// The curves of which the next points are due, which are due 20 times a second.
     pub fn next_plot(&mut self) -> Option<Plot> {
-        self.curves.next(self.readings.now)
+        self.curves.due(self.readings.now)
     }
 }
