@@ -131,8 +131,10 @@ const _: () =
 
 #[cfg(test)]
 mod tests {
+    extern crate std;
     use super::*;
     use crate::memory::Volatile;
+    use std::vec::Vec;
 
     #[test]
     fn examples_in_flash_and_from_the_field_are_searched_as_one_set() {
@@ -156,5 +158,36 @@ mod tests {
         let all = (&nearest.built_in, &nearest.field);
         let answer = knn::classify::<{ features::COUNT }, { label::COUNT }>(&all, &bytes, 3, examples::RADIUS).unwrap();
         assert_eq!(answer.votes.map(usize::from), [examples::CAPACITY, usize::from(field_examples::CAPACITY)]);
+    }
+
+    #[test]
+    fn what_is_forgotten_is_listed_no_longer_and_votes_no_longer() {
+        let features = Features::describe(556, 300, 60);
+        let bytes = examples::scale().quantise(&features.values());
+        let mut nearest = Nearest::new([Example::new(bytes, label::WEED); 2], Volatile::new());
+        for label in [label::PLANT, label::WEED, label::PLANT] {
+            assert_eq!(nearest.teach(&features, label), Ok(()));
+        }
+        let listed = |nearest: &Nearest<_, _>| {
+            let mut next = Some(0);
+            core::iter::from_fn(|| {
+                let (listed, behind) = nearest.listed(next?)?;
+                next = Some(behind);
+                Some((listed.from_field, listed.number, listed.example.label))
+            })
+            .collect::<Vec<_>>()
+        };
+        let [built_in, second] = [(false, 0, label::WEED), (false, 1, label::WEED)];
+        let field = [(true, 0, label::PLANT), (true, 1, label::WEED), (true, 2, label::PLANT)];
+        assert_eq!(listed(&nearest), [built_in, second, field[0], field[1], field[2]]);
+        assert_eq!(nearest.classify(&features, 1), Vote { class: Class::Weed, votes: 3 });
+        assert!(nearest.forget(1) && !nearest.forget(1), "it is there once");
+        assert_eq!(listed(&nearest), [built_in, second, field[0], field[2]]);
+        assert_eq!(nearest.classify(&features, 1).class, Class::Unknown, "two against two");
+        assert!(nearest.forget(0));
+        assert_eq!(listed(&nearest), [built_in, second, field[2]]);
+        assert_eq!(nearest.classify(&features, 1), Vote { class: Class::Weed, votes: 2 });
+        assert!(!nearest.forget(field_examples::CAPACITY));
+        assert_eq!(nearest.built_in_class(&features), Class::Unknown, "two examples are fewer than are to vote");
     }
 }

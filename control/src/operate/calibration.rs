@@ -176,6 +176,7 @@ mod tests {
         assert_eq!(counted(18_900, 10_000, false), Ok(1890));
         assert_eq!(counted(-18_900, 10_000, false), Ok(1890));
         assert_eq!(counted(1905, 1000, false), Ok(1905));
+        assert_eq!([18_904, 18_905].map(|ticks| counted(ticks, 10_000, false)), [Ok(1890), Ok(1891)], "rounded");
     }
 
     #[test]
@@ -222,7 +223,8 @@ mod tests {
     fn a_switch_that_does_not_follow_fails_and_none_at_all_shows_the_swings() {
         assert_eq!(run(true, [60, 180, 60, 9999, 60, 180]).0, Outcome::Failed);
         assert_eq!(run(true, [9999, 180, 60, 180, 60, 180]).0, Outcome::Failed);
-        assert_eq!(run(true, [0, 180, 60, 180, 60, 180]).0, Outcome::Failed);
+        assert_eq!(run(true, [4, 180, 60, 180, 60, 180]).0, Outcome::Failed);
+        assert_eq!(run(true, [5, 180, 60, 180, 60, 180]).0, Outcome::Measured(Leads { out_ms: 180 + 11, in_ms: 5 }));
         assert_eq!(run(false, [0; 6]), (Outcome::Shown, 9000));
     }
 }
