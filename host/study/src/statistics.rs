@@ -49,7 +49,36 @@ impl Design {
     pub fn plots(&self) -> usize {
         self.speeds_km_h.len()
     }
+
+    /// The columns of a model with all factors that vary, and a remark on each that does not.
+    ///
+    /// # Errors
+    /// Where the plots carry none.
+    fn columns(&self) -> Result<(Vec<Column>, Vec<Remark>), NoModel> {
+        let mut columns = vec![("constant", vec![1.0; self.plots()])];
+        let mut remarks = Vec::new();
+        let factors =
+            [("speed", &self.speeds_km_h, Remark::OneSpeed), ("spacing", &self.spacings_cm, Remark::OneSpacing)];
+        for (name, levels, constant) in factors {
+            if varies(levels) {
+                columns.push((name, levels.clone()));
+            } else {
+                remarks.push(constant);
+            }
+        }
+        match columns.as_slice() {
+            [_] => Err(NoModel::OneTreatment),
+            [_, (_, speeds), (_, spacings)] if is_collinear(speeds, spacings) => Err(NoModel::Inseparable),
+            _ if self.plots() <= columns.len() => {
+                Err(NoModel::TooFewPlots { plots: self.plots(), parameters: columns.len() })
+            }
+            _ => Ok((columns, remarks)),
+        }
+    }
 }
+
+/// A model's column: its name, and its value in each plot.
+type Column = (&'static str, Vec<f64>);
 
 /// The plots carry no model.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Serialize)]

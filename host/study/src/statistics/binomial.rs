@@ -7,7 +7,7 @@
 //! Plots of one field differ by more than the counting does. [`BinomialModel::dispersion`] says by how much, and where it is
 //! above 1 standard errors are as much too small as its root says; they are left as R's binomial family has them.
 
-use super::{Design, NoModel, Remark, is_collinear, varies};
+use super::{Column, Design, NoModel, Remark};
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, Normal};
@@ -85,25 +85,7 @@ impl BinomialModel {
         if all == 0.0 || all == of {
             return Err(NoModel::Constant { value: if all == 0.0 { 0.0 } else { 100.0 } });
         }
-        let mut columns = vec![("constant", vec![1.0; counts.len()])];
-        let mut remarks = Vec::new();
-        let factors =
-            [("speed", &design.speeds_km_h, Remark::OneSpeed), ("spacing", &design.spacings_cm, Remark::OneSpacing)];
-        for (name, levels, constant) in factors {
-            if varies(levels) {
-                columns.push((name, levels.clone()));
-            } else {
-                remarks.push(constant);
-            }
-        }
-        match columns.as_slice() {
-            [_] => return Err(NoModel::OneTreatment),
-            [_, (_, speeds), (_, spacings)] if is_collinear(speeds, spacings) => return Err(NoModel::Inseparable),
-            _ if counts.len() <= columns.len() => {
-                return Err(NoModel::TooFewPlots { plots: counts.len(), parameters: columns.len() });
-            }
-            _ => {}
-        }
+        let (columns, mut remarks) = design.columns()?;
         let matrix = DMatrix::from_fn(counts.len(), columns.len(), |plot, column| columns[column].1[plot]);
         let fit = fit(&matrix, counts).ok_or(NoModel::OneSided)?;
         let share = all / of;
@@ -112,7 +94,7 @@ impl BinomialModel {
         if dispersion > OVERDISPERSED {
             remarks.push(Remark::Overdispersed { factor: dispersion.sqrt() });
         }
-        let term = |(index, (name, _)): (usize, &(&'static str, Vec<f64>))| {
+        let term = |(index, (name, _)): (usize, &Column)| {
             let (estimate, standard_error) = (fit.coefficients[index], fit.covariance[(index, index)].sqrt());
             let z = estimate / standard_error;
             OddsTerm { name, estimate, standard_error, z, p: 2.0 * Normal::standard().sf(z.abs()) }

@@ -1,6 +1,6 @@
 //! The linear model of a response on speed and spacing, by least squares.
 
-use super::{Design, NoModel, Remark, is_collinear, is_zero, mean, scatter, varies};
+use super::{Column, Design, NoModel, Remark, is_zero, mean, scatter};
 use linregress::fit_low_level_regression_model;
 use serde::Serialize;
 
@@ -54,25 +54,7 @@ impl LinearModel {
         if is_zero(total, values) {
             return Err(NoModel::Constant { value: mean(values) });
         }
-        let mut columns = vec![("constant", vec![1.0; values.len()])];
-        let mut remarks = Vec::new();
-        let factors =
-            [("speed", &design.speeds_km_h, Remark::OneSpeed), ("spacing", &design.spacings_cm, Remark::OneSpacing)];
-        for (name, levels, constant) in factors {
-            if varies(levels) {
-                columns.push((name, levels.clone()));
-            } else {
-                remarks.push(constant);
-            }
-        }
-        match columns.as_slice() {
-            [_] => return Err(NoModel::OneTreatment),
-            [_, (_, speeds), (_, spacings)] if is_collinear(speeds, spacings) => return Err(NoModel::Inseparable),
-            _ if values.len() <= columns.len() => {
-                return Err(NoModel::TooFewPlots { plots: values.len(), parameters: columns.len() });
-            }
-            _ => {}
-        }
+        let (columns, mut remarks) = design.columns()?;
 
         let row = |plot: usize| [values[plot]].into_iter().chain(columns.iter().map(move |(_, column)| column[plot]));
         let rows: Vec<f64> = (0..values.len()).flat_map(row).collect();
@@ -84,7 +66,7 @@ impl LinearModel {
         if !scatters {
             remarks.push(Remark::NoScatter);
         }
-        let term = |(index, (name, _)): (usize, &(&'static str, Vec<f64>))| {
+        let term = |(index, (name, _)): (usize, &Column)| {
             let (estimate, standard_error) = (fit.parameters()[index], fit.se()[index]);
             let t = scatters.then(|| estimate / standard_error);
             Term { name, estimate, standard_error, t, p: scatters.then(|| fit.p_values()[index]) }
