@@ -14,8 +14,8 @@ const HEAD: &str = "\
 //!
 //! Written by `{how}`. Do not edit it: train it anew.
 
-use crate::classifier::label;
-use crate::features::COUNT as FEATURES;
+use crate::ground::class::label;
+use crate::ground::features::COUNT as FEATURES;
 use knn::Range;
 ";
 
