@@ -31,6 +31,26 @@ fn the_interval_of_a_share_is_that_of_r() {
 }
 
 /// ```r
+/// q <- function(x, n) 100 * c(qbeta(0.025, x, n - x + 1), qbeta(0.975, x + 1, n - x))
+/// q(500, 1e6); q(4e4, 1e5); q(5e5, 1e6); q(1e9, 4e9); q(2147483646, 2147483647)
+/// ```
+#[test]
+fn counts_of_thousands_of_millions_have_an_interval_as_well() {
+    for (count, of, least, greatest) in [
+        (500_u64, 1_000_000_u64, 0.0457138148558, 0.0545796765654),
+        (40_000, 100_000, 39.6961573510, 40.3044227659),
+        (500_000, 1_000_000, 49.9019519195, 50.0980480805),
+        (1_000_000_000, 4_000_000_000, 24.9986581100, 25.0013419262),
+        (2_147_483_646, 2_147_483_647, 99.9999997406, 99.9999999988),
+    ] {
+        let share = Share::of(count, of);
+        let tolerance = (greatest - least) / 100.0;
+        assert!((share.least_percent - least).abs() < tolerance, "{share:?}");
+        assert!((share.greatest_percent - greatest).abs() < tolerance, "{share:?}");
+    }
+}
+
+/// ```r
 /// binom.test(0, 4566, alternative = "less")$conf.int[2]
 /// binom.test(5, 5, alternative = "greater")$conf.int[1]
 /// ```
@@ -55,6 +75,16 @@ fn the_interval_of_a_mean_is_that_of_r_and_a_single_value_has_none() {
     assert_close(mean.mean - mean.within.unwrap(), 42.048833453228);
     assert_close(mean.mean + mean.within.unwrap(), 45.0844998801054);
     assert_eq!(Mean::of(&[43.7]), Mean { mean: 43.7, within: None });
+}
+
+#[test]
+fn a_mean_of_any_number_of_replications_has_an_interval_that_shrinks() {
+    let within = |count: u32| {
+        let values: Vec<f64> = (0..count).map(|replication| f64::from(replication % 2)).collect();
+        Mean::of(&values).within.expect("more than one value")
+    };
+    let within: Vec<f64> = (1..=500).map(|pairs| within(2 * pairs)).collect();
+    assert!(within.is_sorted_by(|more, fewer| more > fewer), "{within:?}");
 }
 
 /// A plot: its speed and spacing, and how many plants of how many were damaged.

@@ -6,7 +6,7 @@
 //! `3 / n`". A mean's interval is Student's, as R's `t.test` has it, over replications that are taken for independent.
 
 use serde::Serialize;
-use statrs::distribution::{Beta, ContinuousCDF, StudentsT};
+use statrs::distribution::{Beta, ContinuousCDF, Normal, StudentsT};
 use std::fmt::{self, Display, Formatter};
 
 /// How probable it is at least that an interval covers the true figure.
@@ -31,9 +31,7 @@ impl Share {
         let (count, of) = (count.into(), of.into());
         let chance = 1.0 - CONFIDENCE;
         let (hits, misses) = (count as f64, of.saturating_sub(count) as f64);
-        let quantile = |a: f64, b: f64, probability: f64| {
-            Beta::new(a, b).ok().map_or(f64::NAN, |distribution| 100.0 * distribution.inverse_cdf(probability))
-        };
+        let quantile = |a: f64, b: f64, probability: f64| 100.0 * beta_quantile(a, b, probability);
         // None and all leave one side only, and there the quantile has a closed form.
         let one_sided = || -100.0 * (chance.ln() / of.max(1) as f64).exp_m1();
         let (least_percent, greatest_percent) = match (count, of) {
@@ -49,6 +47,32 @@ impl Share {
     pub fn percent(&self) -> f64 {
         100.0 * self.count as f64 / self.of.max(1) as f64
     }
+}
+
+/// Halvings after which the quantile of any count of fewer than 2^64 is known to the last of a number's digits.
+const HALVINGS: usize = 120;
+
+/// Counts from which on the library's distribution is not exact any more, while the normal one is to a thousandth of the interval.
+const MANY: f64 = 1e6;
+
+/// The share that a beta distribution stays below with such a probability, 0 to 1. By halving, which always ends: the library's
+/// own quantile never comes back from counts of thousands of millions.
+fn beta_quantile(a: f64, b: f64, probability: f64) -> f64 {
+    if a.min(b) > MANY {
+        let (mean, all) = (a / (a + b), a + b);
+        return mean + Normal::standard().inverse_cdf(probability) * (mean * (1.0 - mean) / all).sqrt();
+    }
+    let Ok(distribution) = Beta::new(a, b) else { return f64::NAN };
+    let (mut least, mut greatest) = (0.0, 1.0);
+    for _ in 0..HALVINGS {
+        let middle = f64::midpoint(least, greatest);
+        if distribution.cdf(middle) < probability {
+            least = middle;
+        } else {
+            greatest = middle;
+        }
+    }
+    greatest
 }
 
 /// The interval, as it stands behind a share: `below 0.07` where none was counted, else `0.53 to 1.68`.
