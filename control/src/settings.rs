@@ -103,8 +103,8 @@ settings! {
     MaxWidthMm "max_width_mm" in "mm": 20 to 1500, 400, false,
         "a beam broken over more ground than this raises an alarm";
     /// Gaps in a canopy shorter than this belong to it.
-    MergeGapTicks "merge_gap_ticks" in "ticks": 0 to 2000, 40, false,
-        "clear stretches shorter than this, in ticks, belong to the canopy";
+    MergeGapMm "merge_gap_mm" in "mm": 0 to 1000, 21, false,
+        "clear stretches shorter than this belong to the canopy";
     /// The sensor's response time.
     BeamResponseMs "beam_response_ms" in "ms": 0 to 50, 1, false,
         "time the beam's sensor takes to answer";

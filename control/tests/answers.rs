@@ -300,7 +300,7 @@ fn get_and_help_tell_the_unit_as_a_word_of_its_own() {
             assert!(answer[answer.len() - 2].starts_with(shown), "{answer:?}");
         };
         tells("top_speed_mm_s", "top_speed_mm_s=1400 mm/s from 100 to 3000, default 1400");
-        tells("merge_gap_ticks", "merge_gap_ticks=40 ticks from 0 to 2000, default 40");
+        tells("merge_gap_mm", "merge_gap_mm=21 mm from 0 to 1000, default 21");
         tells("ticks_per_rev", "ticks_per_rev=2400 from 100 to 10000, default 2400");
         tells("end_switch", "end_switch=off on or off, default off");
     }

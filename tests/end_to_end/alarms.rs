@@ -92,7 +92,7 @@ fn more_plants_than_the_schedule_holds_are_an_alarm() {
     let plants = (0..20).map(|number| Thing::plant(300.0 + 110.0 * f64::from(number), 90.0));
     let row = Row::new(plants.collect()).expect("the plants stand apart");
     let machine = Machine { beam_to_tool_mm: 2000.0, ..Machine::default() };
-    let mut run = Run::begin(Trial { machine, ..trial(row, steady(mm_s(2.5), 2300.0)) }, &["set merge_gap_ticks 5"]);
+    let mut run = Run::begin(Trial { machine, ..trial(row, steady(mm_s(2.5), 2300.0)) }, &["set merge_gap_mm 3"]);
     run.roll_to_the_end();
     assert_alarm(&mut run, "schedule_full", 33);
     assert_blinks(&mut run.uno, [3, 3]);

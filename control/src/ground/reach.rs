@@ -2,7 +2,7 @@
 
 use crate::{
     settings::{Setting, Settings},
-    units::{Grain, Length, Ticks, TicksPerSecond, Wheel},
+    units::{Grain, Length, TicksPerSecond, Wheel},
 };
 
 /// How far the machine may be rolled back with the ground still remembered, in metres. Together with twice the longest X and
@@ -52,7 +52,7 @@ impl Geometry {
             beam_to_tool: length(Setting::BeamToToolMm),
             margin: length(Setting::MarginMm),
             max_width: length(Setting::MaxWidthMm),
-            merge_gap: grain.length(Ticks(settings.get(Setting::MergeGapTicks).into())),
+            merge_gap: length(Setting::MergeGapMm),
             memory: Length(grain.length(metre).0 * MEMORY_M),
         }
     }

@@ -9,7 +9,7 @@ use files::whole_file;
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 use thiserror::Error;
-use toml_edit::{Decor, Document, DocumentMut, Item, TomlError, Value};
+use toml_edit::{Decor, Document, DocumentMut, Item, Key, TomlError, Value};
 
 /// Why a settings file cannot be used.
 #[derive(Debug, Error)]
@@ -41,6 +41,9 @@ const HEAD: &str = "\
 # Settings of a weeder. `weeder settings push` sends them to the machine, `weeder settings diff` compares.
 # What is not named here is left as it is.
 ";
+
+/// How files of before 0.2 name `merge_gap_mm`, which was in ticks of the encoder.
+const OLD_MERGE_GAP: &str = "merge_gap_ticks";
 
 /// Reads a file's settings, each within its range.
 ///
@@ -83,9 +86,16 @@ fn parse(path: &Path, text: &str) -> Result<Vec<(Setting, u16)>, SettingsFileErr
     let broken = |error: TomlError| at(error.span().map_or(0, |span| span.start), error.message().replace('\n', ", "));
     let document = Document::parse(text).map_err(broken)?;
     let mut settings = Vec::new();
+    let mut old_merge_gap = None;
     for (key, item) in document.as_table().iter() {
         let start = document.as_table().key(key).and_then(|key| key.span()).or_else(|| item.span());
         let wrong = |problem| at(start.map_or(0, |span| span.start), problem);
+        if key == OLD_MERGE_GAP {
+            let ticks = item.as_integer().and_then(|ticks| u16::try_from(ticks).ok()).filter(|&ticks| ticks <= 2000);
+            let right = || wrong(format!("{key} has to be a whole number, 0 to 2000; now it is merge_gap_mm, in mm"));
+            old_merge_gap = Some(ticks.ok_or_else(right)?);
+            continue;
+        }
         let Some(setting) = Setting::find(key.as_bytes()) else {
             let known: Vec<String> = Setting::all().map(name).collect();
             return Err(wrong(format!("there is no setting `{key}`: there are {}", known.join(", "))));
@@ -94,7 +104,20 @@ fn parse(path: &Path, text: &str) -> Result<Vec<(Setting, u16)>, SettingsFileErr
             .ok_or_else(|| wrong(format!("{key} is `{}`: it has to be {}", item.to_string().trim(), right(setting))))?;
         settings.push((setting, value));
     }
+    if let Some(ticks) = old_merge_gap.filter(|_| settings.iter().all(|&(setting, _)| setting != Setting::MergeGapMm)) {
+        settings.push((Setting::MergeGapMm, merge_gap_mm(ticks, &settings)));
+    }
     Ok(settings)
+}
+
+/// So many ticks in millimetres of the wheel that these settings give, what they leave out being as by default.
+fn merge_gap_mm(ticks: u16, settings: &[(Setting, u16)]) -> u16 {
+    let mut all = Settings::new();
+    for &(setting, value) in settings {
+        all.set(setting, value).expect("what a file says has been checked");
+    }
+    let millimetres = f64::from(ticks) * 1000.0 / f64::from(all.wheel().ticks(1000).0);
+    millimetres.round().min(Setting::MergeGapMm.description().greatest.into()) as u16
 }
 
 /// What an item says for a setting, if it says something that is right.
@@ -127,6 +150,10 @@ fn updated(path: &Path, old: &str, settings: &Settings) -> Result<String, Settin
     } else {
         ""
     };
+    if let Some((key, item)) = document.remove_entry(OLD_MERGE_GAP) {
+        // Its comments go with it.
+        document.insert_formatted(&Key::new(name(Setting::MergeGapMm)).with_leaf_decor(key.leaf_decor().clone()), item);
+    }
     for setting in Setting::all() {
         let name = name(setting);
         let value = settings.get(setting);
@@ -203,6 +230,19 @@ mod tests {
             let error = parsed(text).unwrap_err();
             assert!(error.contains(wrong), "{text:?}: {error}");
         }
+    }
+
+    #[test]
+    fn a_merge_gap_in_ticks_is_read_in_millimetres_of_the_files_own_wheel() {
+        let gap = |text| parsed(text).unwrap().into_iter().find(|(setting, _)| *setting == Setting::MergeGapMm);
+        assert_eq!(gap("merge_gap_ticks = 40"), Some((Setting::MergeGapMm, 21)));
+        assert_eq!(gap("merge_gap_ticks = 40\nticks_per_m = 1000"), Some((Setting::MergeGapMm, 40)));
+        assert_eq!(gap("merge_gap_ticks = 2000\nticks_per_m = 500"), Some((Setting::MergeGapMm, 1000)));
+        assert_eq!(gap("merge_gap_ticks = 40\nmerge_gap_mm = 5"), Some((Setting::MergeGapMm, 5)));
+        assert!(parsed("merge_gap_ticks = 2001").unwrap_err().contains("now it is merge_gap_mm"));
+        let old = "# ragged leaves\nmerge_gap_ticks = 60 # three were too few\n";
+        let new = updated(Path::new("machine.toml"), old, &Settings::new()).unwrap();
+        assert!(new.starts_with("# ragged leaves\nmerge_gap_mm = 21 # three were too few\n"), "{new}");
     }
 
     #[test]

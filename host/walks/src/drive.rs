@@ -384,7 +384,7 @@ impl<M: Machine> Drive<M> {
         self.turns += 1;
         let before = self.world;
         let wheel = self.machine.settings().wheel();
-        let merge_gap = i64::from(self.machine.settings().get(Setting::MergeGapTicks));
+        let merge_gap = self.machine.settings().ticks(Setting::MergeGapMm).0.into();
         self.model.follow(self.here(), merge_gap, wheel.ticks(1000).0.into());
         self.model.leave_narrow(wheel.ticks(M::NARROW_MM).0.into());
 

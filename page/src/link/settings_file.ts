@@ -6,6 +6,9 @@ import type { Setting } from "./grammar.ts";
 /** What is wrong with a settings file, and what would be right. */
 export class SettingsFileError extends Error {}
 
+/** How files of before 0.2 name `merge_gap_mm`, which was in ticks of the encoder. */
+const OLD_MERGE_GAP = "merge_gap_ticks";
+
 /** What a setting may be. */
 export function range({ isSwitched, least, greatest, unit, default: usual }: Setting): string {
     if (isSwitched) return `true or false, default ${usual === 1}`;
@@ -27,11 +30,18 @@ export function write(settings: readonly Setting[], help: ReadonlyMap<string, st
 /** The values that a file names, by the names of settings. Throws a SettingsFileError. */
 export function parse(text: string, settings: readonly Setting[]): Map<string, number> {
     const values = new Map<string, number>();
+    let oldMergeGap: number | undefined;
     for (const [index, line] of text.split(/\r?\n/).entries()) {
         if (/^\s*(#.*)?$/.test(line)) continue;
         const refuse = (problem: string) => new SettingsFileError(`line ${index + 1} of the file: ${problem}`);
         const [, name = "", word = ""] = /^\s*(\w+)\s*=\s*([^\s#]+)\s*(?:#.*)?$/.exec(line) ?? [];
         if (name === "") throw refuse("it has to be a setting's name, =, and its value");
+        if (name === OLD_MERGE_GAP) {
+            if (!/^\d{1,4}$/.test(word) || Number(word) > 2000)
+                throw refuse(`${name} has to be a whole number, 0 to 2000; now it is merge_gap_mm, in mm`);
+            oldMergeGap = Number(word);
+            continue;
+        }
         const setting = settings.find((setting) => setting.name === name);
         if (!setting)
             throw refuse(`there is no setting ${name}: there are ${settings.map(({ name }) => name).join(", ")}`);
@@ -43,7 +53,15 @@ export function parse(text: string, settings: readonly Setting[]): Map<string, n
             );
         values.set(name, value);
     }
+    if (oldMergeGap !== undefined && !values.has("merge_gap_mm"))
+        values.set("merge_gap_mm", Math.min(1000, Math.round(oldMergeGap / ticksPerMm(values, settings))));
     if (values.size === 0)
         throw new SettingsFileError("the file names no setting: is it one that `weeder settings pull` has written?");
     return values;
+}
+
+/** Ticks in a millimetre with these values; what they leave out is as the machine has it. */
+function ticksPerMm(values: ReadonlyMap<string, number>, settings: readonly Setting[]): number {
+    const value = (name: string) => values.get(name) ?? settings.find((setting) => setting.name === name)?.value ?? 0;
+    return value("ticks_per_m") / 1000 || value("ticks_per_rev") / (Math.PI * value("wheel_mm"));
 }

@@ -1,0 +1,31 @@
+// Settings files, read as the panel reads them.
+
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import type { Setting } from "../src/link/grammar.ts";
+import { parse, SettingsFileError } from "../src/link/settings_file.ts";
+
+const setting = (name: string, value: number, greatest: number): Setting => ({
+    name,
+    value,
+    least: 0,
+    greatest,
+    unit: "mm",
+    default: value,
+    isSwitched: false,
+});
+const SETTINGS = [
+    setting("ticks_per_rev", 2400, 10000),
+    setting("wheel_mm", 400, 800),
+    setting("ticks_per_m", 0, 20000),
+    setting("merge_gap_mm", 21, 1000),
+];
+
+test("a merge gap in ticks, as older files have it, is read in millimetres", () => {
+    const gap = (text: string) => parse(text, SETTINGS).get("merge_gap_mm");
+    assert.equal(gap("merge_gap_ticks = 40"), 21);
+    assert.equal(gap("merge_gap_ticks = 40\nticks_per_m = 1000"), 40);
+    assert.equal(gap("ticks_per_m = 500\nmerge_gap_ticks = 2000"), 1000);
+    assert.equal(gap("merge_gap_ticks = 40\nmerge_gap_mm = 5"), 5);
+    assert.throws(() => gap("merge_gap_ticks = 2001"), SettingsFileError);
+});
