@@ -1,5 +1,5 @@
 //! What the operator does with the machine, and what shows it: [`state`] and lamp, the settings and how they are saved
-//! ([`configuration`], [`saved`]), what is tried by hand ([`bench`], [`calibration`], [`rehearsal`]), the [`tool`] and its [`servo`],
+//! ([`configuration`], [`saved`]), what is tried by hand ([`mod@bench`], [`calibration`], [`rehearsal`]), the [`tool`] and its [`servo`],
 //! and what waits to be told or looked at ([`event`], [`plot`], [`objects`]). Each keeps its own; [`weeder`](crate::weeder) has them
 //! work together.
 

@@ -9,8 +9,8 @@ use field::verdict::Timing;
 use std::process::Command;
 use uno::elf::{Image, Size};
 
-/// The flash below the bootloader that came before the Uno's, 30 KiB.
-const FLASH_BYTES: u64 = 30 * 1024;
+/// The flash below the Uno's bootloader, less a reserve of 1 KiB.
+const FLASH_BYTES: u64 = 32_256 - 1024;
 
 /// 1 KiB of the 2 KiB of SRAM; the rest is for the stack.
 const SRAM_BYTES: u64 = 1024;

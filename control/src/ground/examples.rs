@@ -50,7 +50,7 @@ pub const COUNT: usize = table::TAUGHT.len();
 const _: () = assert!(COUNT <= CAPACITY, "too many examples for the flash budget");
 
 /// The table, but in another order: trained ones lie beside their likes, so that a search would come ever nearer, and each of them
-/// would find a place among the nearest for a while. Each is as many places behind the one before it as [`STEP`] says.
+/// would find a place among the nearest for a while. Each is as many places behind the one before it as `STEP` says.
 pub const EXAMPLES: [Example<{ features::COUNT }>; COUNT] = {
     let mut examples = [Example::new([0; features::COUNT], 0); COUNT];
     let mut index = 0;

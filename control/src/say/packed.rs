@@ -1,10 +1,10 @@
 //! Text that lies in flash.
 //!
 //! An AVR keeps Rust's string literals in SRAM, of which there are 2 KiB. So all that the machine says lies in flash, in one
-//! table, and a [`Text`] is no more than its number there: one byte. What is said stands in [`said`](crate::say::texts), and the words for
-//! the machine's alarms, settings and the like in [`words`](crate::say::words).
+//! table, and a [`Text`] is no more than its number there: one byte. What is said stands in `texts`, and the words for
+//! the machine's alarms, settings and the like in `words`.
 //!
-//! The texts are packed: [`FRAGMENTS`] that come again and again are one byte each. A fragment is a pair of bytes, each of
+//! The texts are packed: `FRAGMENTS` that come again and again are one byte each. A fragment is a pair of bytes, each of
 //! which is a character or stands for another fragment, so that nothing is searched where one is unpacked. The compiler
 //! packs, and [`Characters`] unpacks.
 

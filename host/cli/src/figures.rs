@@ -1,10 +1,6 @@
 //! `weeder figures`: the figures that stand in the manual, each from the command that stands above it.
 //!
-//! A figure is a fenced block right behind a comment that names its command:
-//!
-//!     <!-- figures: weeder trial --speeds 1,2 -->
-//!     ```text
-//!
+//! A figure is a fenced block right behind a comment that names its command, such as `<!-- figures: weeder trial --speeds 1,2 -->`.
 //! The command is run, and what it prints becomes the block. What it prints of the time that it took, a line that begins with
 //! `Pace`, is left out: everything else is the same on every machine.
 

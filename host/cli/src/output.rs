@@ -9,7 +9,7 @@ use std::env;
 use std::fmt::Arguments;
 use std::io::{self, ErrorKind, Write};
 
-/// Prints a line of a result; takes what `println!` does, and returns what [`print`] does.
+/// Prints a line of a result; takes what `println!` does, and returns what [`print()`] does.
 macro_rules! say {
     ($($words:tt)*) => { $crate::output::print(format_args!("{}\n", format_args!($($words)*))) };
 }

@@ -17,7 +17,7 @@ pub fn file(name: &str) -> Result<PathBuf, String> {
 /// What a word names that is a file, or else has a meaning of its own, such as a preset.
 ///
 /// # Errors
-/// As [`file`].
+/// As [`file()`].
 pub fn named(name: &str) -> Result<String, String> {
     match name {
         #[cfg(unix)]

@@ -1,8 +1,8 @@
-//! The wiring: which contact of the Uno goes where, as the one table behind the manual's table and its diagram.
+//! The wiring: which contact of the Uno goes where, as the one table behind the manual's; its diagram, docs/wiring.svg, is held to it.
 //!
 //! The firmware's own pins stand in its peripherals' files; the constants here say the same for the simulated machine, which the
 //! firmware is tested on, so that a pin that is wrong here fails there. Supply and ground are no contacts of the table: the
-//! diagram draws them.
+//! diagram shows them.
 
 use signal::{Pin, Wire};
 use std::fmt::Write;

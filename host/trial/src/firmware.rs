@@ -63,7 +63,7 @@ pub fn build() -> Result<PathBuf, BuildError> {
     BUILT.get_or_init(|| FIRMWARE.build()).clone()
 }
 
-/// Builds the classifier's bench, which [`trial::bench`] runs, and returns the path of its ELF.
+/// Builds the classifier's bench, which [`bench`](mod@crate::bench) runs, and returns the path of its ELF.
 ///
 /// # Errors
 ///

@@ -5,7 +5,6 @@
 //! - [`console`] talks to it as an operator would, and [`port`] makes it a port for the [`link`].
 //! - [`live`] runs it in real time, at a serial port that other programs open.
 //! - [`soak`] has everything go wrong now and then, for hours; [`mod@bench`] counts cycles and bytes.
-//! - [`wiring_diagram`] draws what is wired to the Uno.
 //!
 //! What the machine does and what a verdict is stands in [`field`], how the chip works in [`uno`]. Many rows are not compared here.
 
@@ -19,7 +18,6 @@ pub mod replay;
 pub mod report;
 mod run;
 pub mod soak;
-pub mod wiring_diagram;
 
 pub use field::trial::{Start, Trial};
 pub use port::UnoPort;

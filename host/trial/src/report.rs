@@ -19,8 +19,8 @@ use uno::elf::Size;
 /// Width that the machine weeds with its inter-row tools (the paper's chapter on the tines: 40 cm).
 const WORKING_WIDTH_MM: f64 = 400.0;
 
-/// Flash that the older and larger of the Uno's bootloaders leaves, and SRAM, of the ATmega328P (its data sheet, section 8).
-const FLASH_BYTES: u64 = 32_768 - 2048;
+/// Flash that the Uno's bootloader leaves, and SRAM, of the ATmega328P (its data sheet, section 8).
+const FLASH_BYTES: u64 = 32_768 - 512;
 const SRAM_BYTES: u64 = 2048;
 
 /// One line per plant: where it stood, where the tool was clear of the row and where it came back, and the verdict.
@@ -309,7 +309,7 @@ pub(crate) mod tests {
             "100.0 % of the row's 1.00 m",
             "none was commanded for a plant",
             "position 99 ticks, -2 from where the machine is; 2 counts lost",
-            "20000 of 30720 bytes of flash, 800 of 2048 bytes of SRAM",
+            "20000 of 32256 bytes of flash, 800 of 2048 bytes of SRAM",
         ] {
             assert!(totals.contains(words), "{words:?} is not in\n{totals}");
         }

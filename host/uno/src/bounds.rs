@@ -1,8 +1,8 @@
 //! What a firmware for the ATmega328P can need at most, proved from its ELF: stack, handlers, stretches without interrupts, and how
 //! fast the edges of an input may follow each other.
 //!
-//! [`prove`] follows every path of the program in flash ([`flow`]), from the reset vector and from every interrupt's, and
-//! takes the deepest and the longest ([`cycles`]). Nothing is run and nothing is sampled, so what it says holds for every input,
+//! [`prove`] follows every path of the program in flash (`flow`), from the reset vector and from every interrupt's, and
+//! takes the deepest and the longest (`cycles`). Nothing is run and nothing is sampled, so what it says holds for every input,
 //! every phase and every layout. It knows nothing of what the firmware is for.
 //!
 //! What it takes for granted: a program without indirect calls, without recursion and without handlers that turn interrupts on
