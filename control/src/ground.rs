@@ -22,7 +22,7 @@ pub mod watch;
 use self::{
     object::Object,
     reach::{Geometry, Leads},
-    schedule::{Full, Plan, Schedule},
+    schedule::{Plan, Schedule, ScheduleFull},
     watch::Watch,
 };
 use crate::{
@@ -144,8 +144,8 @@ impl Ground {
     /// Remembers an object as a plant.
     ///
     /// # Errors
-    /// [`Full`] when more plants stand between beam and tool than can be remembered.
-    pub fn keep(&mut self, plant: Object) -> Result<(), Full> {
+    /// [`ScheduleFull`] when more plants stand between beam and tool than can be remembered.
+    pub fn keep(&mut self, plant: Object) -> Result<(), ScheduleFull> {
         self.last_plant = plant.leading;
         self.schedule.push(plant, self.tool(), self.geometry.margin)
     }

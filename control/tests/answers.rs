@@ -15,7 +15,7 @@ use control::{
     },
     memory::Volatile,
     operate::{
-        calibration::{Leads, Outcome},
+        calibration::{Outcome, SwingTimes},
         event::Event,
         plot::Plot,
         state::State,
@@ -199,7 +199,7 @@ fn every_event_fits_on_a_line() {
         Event::State(State::Hold),
     ];
     events.extend((0..).map_while(Warning::from_index).map(Event::Warning));
-    let longest = Outcome::Measured(Leads { out_ms: u16::MAX, in_ms: u16::MAX });
+    let longest = Outcome::Measured(SwingTimes { out_ms: u16::MAX, in_ms: u16::MAX });
     events.extend([longest, Outcome::Shown, Outcome::Failed].map(|outcome| Event::Calibrated { outcome, fits: false }));
     events.extend((0..).map_while(Alarm::from_index).map(|alarm| Event::Alarm { alarm, position: far }));
     for event in events {

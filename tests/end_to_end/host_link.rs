@@ -7,7 +7,7 @@ use field::motion::Motion;
 use field::row::{Row, Thing};
 use field::wiring;
 use link::settings::{self, SettingsError};
-use link::{Link, LinkError, Mode, Status, Told};
+use link::{EventLine, Link, LinkError, Mode, Status};
 use trial::UnoPort;
 use uno::Uno;
 
@@ -103,10 +103,10 @@ fn every_line_of_a_row_being_weeded_is_understood() {
 
     let (mut objects, mut swings) = (0, 0);
     for _ in 0..500 {
-        match link.next_line().expect("the port stays").as_deref().map(Told::parse) {
+        match link.next_line().expect("the port stays").as_deref().map(EventLine::parse) {
             None => {}
-            Some(Some(Told::Object { .. })) => objects += 1,
-            Some(Some(Told::Swing { .. })) => swings += 1,
+            Some(Some(EventLine::Object { .. })) => objects += 1,
+            Some(Some(EventLine::Swing { .. })) => swings += 1,
             other => panic!("{other:?}"),
         }
     }

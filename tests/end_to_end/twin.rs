@@ -32,7 +32,7 @@ fn random_row(seed: u64) -> Trial {
         motion: drive.motion,
         timing: conditions.timing(),
         start: Start::Command,
-        settings: conditions.told(),
+        settings: conditions.firmware_settings(),
     }
 }
 

@@ -49,7 +49,7 @@ pub struct Listed {
 
 /// All places for examples from the field are taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Full;
+pub struct ExamplesFull;
 
 /// Tells plants from weeds, and may be taught.
 pub trait Classifier {
@@ -65,8 +65,8 @@ pub trait Classifier {
     /// Adds an object as an example of the class `label`, to be kept over a loss of power.
     ///
     /// # Errors
-    /// [`Full`]; one has to be forgotten first.
-    fn teach(&mut self, features: &Features, label: u8) -> Result<(), Full>;
+    /// [`ExamplesFull`]; one has to be forgotten first.
+    fn teach(&mut self, features: &Features, label: u8) -> Result<(), ExamplesFull>;
 
     /// Forgets the example from the field with this number; whether there was one.
     fn forget(&mut self, number: u8) -> bool;

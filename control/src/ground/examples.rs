@@ -45,7 +45,7 @@ pub const K: u8 = table::K;
 pub const CAPACITY: usize = 72;
 
 /// Examples in the table.
-pub const COUNT: usize = table::TAUGHT.len();
+pub const COUNT: usize = table::TRAINED.len();
 
 const _: () = assert!(COUNT <= CAPACITY, "too many examples for the flash budget");
 
@@ -55,7 +55,7 @@ pub const EXAMPLES: [Example<{ features::COUNT }>; COUNT] = {
     let mut examples = [Example::new([0; features::COUNT], 0); COUNT];
     let mut index = 0;
     while index < COUNT {
-        let (features, label) = &table::TAUGHT[index * STEP % COUNT];
+        let (features, label) = &table::TRAINED[index * STEP % COUNT];
         examples[index] = Example::new(SCALE.quantise(features), *label);
         index += 1;
     }
@@ -96,7 +96,7 @@ mod tests {
 
     #[test]
     fn every_example_of_the_table_is_among_the_built_in_ones() {
-        for (features, label) in &table::TAUGHT {
+        for (features, label) in &table::TRAINED {
             assert!(EXAMPLES.contains(&Example::new(SCALE.quantise(features), *label)), "{features:?}");
         }
     }

@@ -6,7 +6,7 @@
 
 use crate::{
     ground::{
-        class::{Class, Classifier, Full, Listed, Vote, label},
+        class::{Class, Classifier, ExamplesFull, Listed, Vote, label},
         examples,
         features::{self, Features},
         field_examples::{self, FieldExamples},
@@ -95,9 +95,9 @@ impl<B: Examples<{ features::COUNT }>, M: Memory> Classifier for Nearest<B, M> {
         self.vote(features, examples::K, false).class
     }
 
-    fn teach(&mut self, features: &Features, label: u8) -> Result<(), Full> {
+    fn teach(&mut self, features: &Features, label: u8) -> Result<(), ExamplesFull> {
         let example = Example::new(examples::scale().quantise(&features.values()), label);
-        self.field.add(example).map(|_| ()).map_err(|_| Full)
+        self.field.add(example).map(|_| ()).map_err(|_| ExamplesFull)
     }
 
     fn forget(&mut self, number: u8) -> bool {
@@ -146,7 +146,7 @@ mod tests {
         for _ in 0..field_examples::CAPACITY {
             assert_eq!(nearest.teach(&features, label::PLANT), Ok(()));
         }
-        assert_eq!(nearest.teach(&features, label::PLANT), Err(Full));
+        assert_eq!(nearest.teach(&features, label::PLANT), Err(ExamplesFull));
         let mut listed = 0;
         let mut place = 0;
         while let Some((example, next)) = nearest.listed(place) {

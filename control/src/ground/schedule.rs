@@ -38,7 +38,7 @@ pub struct Schedule {
 
 /// The schedule holds as many canopies ahead of the tool as it can; one more would have to be forgotten.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Full;
+pub struct ScheduleFull;
 
 impl Schedule {
     /// A schedule of no ground.
@@ -74,17 +74,17 @@ impl Schedule {
     /// end with it.
     ///
     /// # Errors
-    /// [`Full`] when even the oldest window lies at the tool or ahead of it; the canopy is then not added.
-    pub fn push(&mut self, canopy: Object, tool: Place, margin: Length) -> Result<(), Full> {
+    /// [`ScheduleFull`] when even the oldest window lies at the tool or ahead of it; the canopy is then not added.
+    pub fn push(&mut self, canopy: Object, tool: Place, margin: Length) -> Result<(), ScheduleFull> {
         if self.canopies.is_full() {
-            let oldest = self.canopies.first().ok_or(Full)?;
+            let oldest = self.canopies.first().ok_or(ScheduleFull)?;
             if !tool.is_ahead_of(oldest.trailing + margin) {
-                return Err(Full);
+                return Err(ScheduleFull);
             }
             let place = oldest.trailing;
             self.leave(place);
         }
-        self.canopies.push(canopy).map_err(|_| Full)
+        self.canopies.push(canopy).map_err(|_| ScheduleFull)
     }
 
     /// Forgets what ends at a place or behind it: the machine has left it behind.
@@ -180,7 +180,7 @@ mod tests {
         for plant in 0..CAPACITY as i16 {
             schedule.push(canopy(plant * 1000, plant * 1000 + 200), Place::new(0), MARGIN).unwrap();
         }
-        assert_eq!(schedule.push(canopy(20_000, 20_200), Place::new(295), MARGIN), Err(Full));
+        assert_eq!(schedule.push(canopy(20_000, 20_200), Place::new(295), MARGIN), Err(ScheduleFull));
         assert_eq!(schedule.push(canopy(20_000, 20_200), Place::new(296), MARGIN), Ok(()));
         assert!(schedule.has_left(Place::new(199)) && !schedule.has_left(Place::new(200)));
         assert!(closed(&schedule, 294, 294), "what was forgotten is unknown");

@@ -77,7 +77,7 @@ const FRAME_MS: u8 = 20;
 
 /// The servo's times, measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Leads {
+pub struct SwingTimes {
     /// The longest time from the command until the tool was out, and a little more.
     pub out_ms: u16,
     /// The shortest time from the command until the tool began to come back.
@@ -88,7 +88,7 @@ pub struct Leads {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
     /// The end switch told the times.
-    Measured(Leads),
+    Measured(SwingTimes),
     /// There is no end switch to tell them.
     Shown,
     /// The end switch did not follow a swing.
@@ -106,7 +106,7 @@ pub struct Swings {
     watched: bool,
     /// What the longest way out may have missed of a command that comes when it is least welcome.
     spare_ms: u8,
-    leads: Leads,
+    leads: SwingTimes,
 }
 
 impl Swings {
@@ -120,7 +120,7 @@ impl Swings {
             followed: false,
             watched,
             spare_ms: SPARE_MS + wait_ms,
-            leads: Leads { out_ms: 0, in_ms: u16::MAX },
+            leads: SwingTimes { out_ms: 0, in_ms: u16::MAX },
         }
     }
 
@@ -215,7 +215,7 @@ mod tests {
     #[test]
     fn the_end_switch_tells_the_longest_way_out_and_the_shortest_way_in() {
         let (outcome, lasted_ms) = run(true, [61, 180, 57, 195, 70, 170]);
-        assert_eq!(outcome, Outcome::Measured(Leads { out_ms: 195 + 11, in_ms: 57 }));
+        assert_eq!(outcome, Outcome::Measured(SwingTimes { out_ms: 195 + 11, in_ms: 57 }));
         assert_eq!(lasted_ms, 9000);
     }
 
@@ -224,7 +224,10 @@ mod tests {
         assert_eq!(run(true, [60, 180, 60, 9999, 60, 180]).0, Outcome::Failed);
         assert_eq!(run(true, [9999, 180, 60, 180, 60, 180]).0, Outcome::Failed);
         assert_eq!(run(true, [4, 180, 60, 180, 60, 180]).0, Outcome::Failed);
-        assert_eq!(run(true, [5, 180, 60, 180, 60, 180]).0, Outcome::Measured(Leads { out_ms: 180 + 11, in_ms: 5 }));
+        assert_eq!(
+            run(true, [5, 180, 60, 180, 60, 180]).0,
+            Outcome::Measured(SwingTimes { out_ms: 180 + 11, in_ms: 5 })
+        );
         assert_eq!(run(false, [0; 6]), (Outcome::Shown, 9000));
     }
 }

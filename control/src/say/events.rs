@@ -3,7 +3,7 @@
 use super::names::{class_name, place_name, state_name};
 use crate::{
     operate::{
-        calibration::{Leads, Outcome},
+        calibration::{Outcome, SwingTimes},
         event::Event,
     },
     say::{line::Line, texts},
@@ -37,7 +37,7 @@ pub fn write_event(event: &Event, line: &mut Line) {
             line.say(texts::WARNING);
             line.say(warning.text());
         }
-        Event::Calibrated { outcome: Outcome::Measured(Leads { out_ms, in_ms }), fits } => {
+        Event::Calibrated { outcome: Outcome::Measured(SwingTimes { out_ms, in_ms }), fits } => {
             line.say(texts::CALIBRATED);
             line.counted(out_ms);
             line.counted(in_ms);

@@ -7,7 +7,7 @@ use crate::{
     memory::Memory,
     operate::{
         bench::Bench,
-        calibration::{Leads, Outcome, Swings},
+        calibration::{Outcome, SwingTimes, Swings},
         event::Event,
         refusal::Refusal,
         rehearsal::Rehearsal,
@@ -112,7 +112,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// Sets the leads by what was measured, if they fit, and tells how it ended.
     fn finish_swings(&mut self, outcome: Outcome) {
         let fits = match outcome {
-            Outcome::Measured(Leads { out_ms, in_ms }) => self
+            Outcome::Measured(SwingTimes { out_ms, in_ms }) => self
                 .configuration
                 .change(&[(Setting::LeadOutMs, out_ms), (Setting::LeadInMs, in_ms)], self.is_working())
                 .is_ok(),

@@ -3,7 +3,7 @@
 use super::{Controller, faults::Limits};
 use crate::{
     ground::{
-        class::{Class, Classifier, Full, label},
+        class::{Class, Classifier, ExamplesFull, label},
         field_examples,
     },
     memory::Memory,
@@ -118,7 +118,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
                 return Err(Refusal::TakenFor(taken_for));
             }
         }
-        self.classifier.teach(&features, label).map_err(|Full| Refusal::ExamplesFull)?;
+        self.classifier.teach(&features, label).map_err(|ExamplesFull| Refusal::ExamplesFull)?;
         object.label = Some(label);
         Ok(())
     }

@@ -7,7 +7,7 @@ use crate::{
 };
 use control::{
     ground::{
-        class::{Class, Classifier, Full, Listed, Vote},
+        class::{Class, Classifier, ExamplesFull, Listed, Vote},
         examples::EXAMPLES,
         features::Features,
         nearest::Nearest,
@@ -62,7 +62,7 @@ impl Classifier for ByWidth {
         Class::Unknown
     }
 
-    fn teach(&mut self, features: &Features, label: u8) -> Result<(), Full> {
+    fn teach(&mut self, features: &Features, label: u8) -> Result<(), ExamplesFull> {
         self.nearest.teach(features, label)
     }
 

@@ -6,7 +6,7 @@ pub use readings::{readings, woken_up};
 
 use control::{
     ground::{
-        class::{Class, Classifier, Full, Listed, Vote},
+        class::{Class, Classifier, ExamplesFull, Listed, Vote},
         features::Features,
     },
     measure::reset::Cause,
@@ -30,8 +30,8 @@ impl Classifier for ByWidth {
         Class::Unknown
     }
 
-    fn teach(&mut self, _: &Features, _: u8) -> Result<(), Full> {
-        Err(Full)
+    fn teach(&mut self, _: &Features, _: u8) -> Result<(), ExamplesFull> {
+        Err(ExamplesFull)
     }
 
     fn forget(&mut self, _: u8) -> bool {

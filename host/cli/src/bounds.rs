@@ -50,13 +50,13 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     if arguments.json {
         say!("{:#}", json!({ "bounds": bounds, "budgets": held, "keeps": keeps }))?;
     } else {
-        print(format_args!("{}", told(&bounds, &held, arguments.loops)))?;
+        print(format_args!("{}", report(&bounds, &held, arguments.loops)))?;
     }
     Ok(if keeps { Finding::Good } else { Finding::Bad })
 }
 
 /// The bounds in words and tables.
-fn told(bounds: &Bounds, held: &[Held], every_loop: bool) -> String {
+fn report(bounds: &Bounds, held: &[Held], every_loop: bool) -> String {
     let mut text = "Proved from the ELF, for whatever comes in at whatever moment:\n\n".to_owned();
     let rows = held.iter().map(|Held { name, proved, budget, keeps }| {
         let unit = name.replace('_', " ");

@@ -156,8 +156,8 @@ impl Conditions {
         let scatter = Scatter { dead_time_ms: dead_time_scatter_ms, load: load_kg_cm / stall_kg_cm, seed };
         // The stroke is what the firmware is told of it.
         let default = Servo::default();
-        let in_us = self.told_or(Setting::ServoInUs, default.in_us);
-        let out_us = self.told_or(Setting::ServoOutUs, default.out_us);
+        let in_us = self.setting_or(Setting::ServoInUs, default.in_us);
+        let out_us = self.setting_or(Setting::ServoOutUs, default.out_us);
         Machine {
             beam_to_tool_mm,
             arm_mm,
@@ -173,21 +173,21 @@ impl Conditions {
     /// Margin and leads that the firmware is told.
     pub fn timing(&self) -> Timing {
         let default = Timing::default();
-        let told = |setting: Setting, otherwise: u32| self.told_or(setting, f64::from(otherwise)) as u32;
+        let of = |setting: Setting, otherwise: u32| self.setting_or(setting, f64::from(otherwise)) as u32;
         Timing {
-            margin_mm: told(Setting::MarginMm, default.margin_mm),
-            lead_out_ms: told(Setting::LeadOutMs, default.lead_out_ms),
-            lead_in_ms: told(Setting::LeadInMs, default.lead_in_ms),
+            margin_mm: of(Setting::MarginMm, default.margin_mm),
+            lead_out_ms: of(Setting::LeadOutMs, default.lead_out_ms),
+            lead_in_ms: of(Setting::LeadInMs, default.lead_in_ms),
         }
     }
 
-    /// What the firmware is told of a setting, or what it is otherwise.
-    fn told_or(&self, setting: Setting, otherwise: f64) -> f64 {
+    /// A setting of the firmware, or what it is otherwise.
+    fn setting_or(&self, setting: Setting, otherwise: f64) -> f64 {
         self.settings.get(&setting.text().to_string()).map_or(otherwise, |&value| value.into())
     }
 
-    /// The firmware's settings that are told beside those of machine and timing.
-    pub fn told(&self) -> Vec<(Setting, u16)> {
+    /// The firmware's settings beside those of machine and timing.
+    pub fn firmware_settings(&self) -> Vec<(Setting, u16)> {
         let timing = [Setting::MarginMm, Setting::LeadOutMs, Setting::LeadInMs];
         self.settings
             .iter()
@@ -220,14 +220,14 @@ mod tests {
         expected.set("plot.rows", 2.0).unwrap();
         expected.set("k", 5.0).unwrap();
         assert_eq!(conditions, expected);
-        assert_eq!(conditions.told(), [(Setting::K, 5)]);
+        assert_eq!(conditions.firmware_settings(), [(Setting::K, 5)]);
     }
 
     #[test]
     fn margin_and_leads_are_told_once_as_the_timing() {
         let conditions = parse("[settings]\nlead_out_ms = 200\nmargin_mm = 40\n").unwrap();
         assert_eq!(conditions.timing(), Timing { lead_out_ms: 200, margin_mm: 40, ..Timing::default() });
-        assert!(conditions.told().is_empty());
+        assert!(conditions.firmware_settings().is_empty());
     }
 
     #[test]

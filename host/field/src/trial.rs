@@ -75,8 +75,8 @@ impl Trial {
         Self { row, machine, motion, timing, start: Start::Command, settings: Vec::new() }
     }
 
-    /// All that the firmware is told, in an order in which machine and timing do not contradict each other on the way.
-    pub fn told(&self) -> Vec<(Setting, u16)> {
+    /// The settings that the firmware gets, in an order in which machine and timing do not contradict each other on the way.
+    pub fn firmware_settings(&self) -> Vec<(Setting, u16)> {
         let Machine { wheel_mm, ticks_per_rev, beam_to_tool_mm, servo, .. } = self.machine;
         let Timing { margin_mm, lead_out_ms, lead_in_ms } = self.timing;
         let notice_mm = beam_to_tool_mm - f64::from(margin_mm) - 2.0;
@@ -84,7 +84,7 @@ impl Trial {
         let notice_s = f64::from(lead_out_ms) * 1.125e-3 + 0.002;
         let wanted_mm_s = (1.25 * self.motion.top_speed_mm_s()).max(SLOWEST_TOP_SPEED_MM_S);
         let top_speed_mm_s = wanted_mm_s.min(notice_mm / notice_s).min(TOP_SPEED_MM_S);
-        let mut told = vec![
+        let mut settings = vec![
             (Setting::TopSpeedMmS, SLOWEST_TOP_SPEED_MM_S as u16),
             (Setting::TicksPerRev, ticks_per_rev as u16),
             (Setting::WheelMm, wheel_mm.round() as u16),
@@ -96,7 +96,7 @@ impl Trial {
             (Setting::ServoOutUs, servo.out_us.round() as u16),
             (Setting::TopSpeedMmS, top_speed_mm_s as u16),
         ];
-        told.extend(&self.settings);
-        told
+        settings.extend(&self.settings);
+        settings
     }
 }

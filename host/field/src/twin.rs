@@ -179,7 +179,7 @@ pub fn weed(trial: &Trial) -> Result<Weeded, Refused> {
     let classifier = Nearest::new(&EXAMPLES[..], Volatile::new());
     let mut weeder: Weeder = Controller::new(classifier, Volatile::new(), wake_up);
     type_line(&mut weeder, "clear")?;
-    for (setting, value) in trial.told() {
+    for (setting, value) in trial.firmware_settings() {
         type_line(&mut weeder, &format!("set {} {value}", setting.text()))?;
     }
     type_line(&mut weeder, if trial.start == Start::Now { "start now" } else { "start" })?;

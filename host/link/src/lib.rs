@@ -13,6 +13,7 @@
 
 pub mod advice;
 pub mod completion;
+mod event_line;
 mod lines;
 pub mod log;
 #[cfg(not(target_arch = "wasm32"))]
@@ -22,13 +23,12 @@ mod said;
 pub mod session;
 pub mod settings;
 pub mod settings_file;
-mod told;
 
+pub use self::event_line::{EventLine, Mode, Status, Timed, Values};
 pub use self::lines::LineReader;
 #[cfg(not(target_arch = "wasm32"))]
 pub use self::port::{find_uno, try_port};
 pub use self::said::{Said, Shown};
-pub use self::told::{Mode, Status, Timed, Told, Values};
 pub use control::ground::class::Class;
 
 use std::collections::VecDeque;
@@ -153,7 +153,7 @@ pub struct Link {
     port: Box<dyn Port>,
     lines: LineReader,
     /// Lines that came before an answer and belong to none.
-    told: VecDeque<String>,
+    events: VecDeque<String>,
     version: String,
 }
 
@@ -177,7 +177,7 @@ impl Link {
     /// Where the port is gone, or something else than the weeder's firmware is at its other end.
     pub fn over(port: impl Port + 'static, resets: bool) -> Result<Self, LinkError> {
         let mut link =
-            Self { port: Box::new(port), lines: LineReader::new(), told: VecDeque::new(), version: String::new() };
+            Self { port: Box::new(port), lines: LineReader::new(), events: VecDeque::new(), version: String::new() };
         link.wait_for_greeting(if resets { BOOT_READS } else { 0 })?;
         // Whatever was typed before ends here, and its answer is nobody's.
         link.type_line("")?;
@@ -229,7 +229,7 @@ impl Link {
                 Said::Refused(_) => return Err(LinkError::Refused { command: command.to_owned(), answer: line }),
                 Said::Greeting { .. } => return Err(LinkError::Restarted(command.to_owned())),
                 // Events come before an answer, and never within it.
-                Said::Told(_) if answer.is_empty() => self.told.push_back(line),
+                Said::Event(_) if answer.is_empty() => self.events.push_back(line),
                 _ => answer.push(line),
             }
         }
@@ -259,7 +259,7 @@ impl Link {
     /// # Errors
     /// Where the port is gone.
     pub fn next_line(&mut self) -> Result<Option<String>, LinkError> {
-        if let Some(line) = self.told.pop_front() {
+        if let Some(line) = self.events.pop_front() {
             return Ok(Some(line));
         }
         match self.hear()? {

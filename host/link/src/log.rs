@@ -137,7 +137,7 @@ impl LogWriter {
             }
             Happening::Lost(why) => self.line(Kind::Lost, why),
             Happening::Status(_, line) => self.line(Kind::Status, line),
-            Happening::Told(_, line) => self.line(Kind::Event, line),
+            Happening::Event(_, line) => self.line(Kind::Event, line),
             Happening::Command(line) => self.line(Kind::Command, line),
             Happening::Answer(line) => self.line(Kind::Answer, line),
             // They follow from the commands.

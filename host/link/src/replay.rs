@@ -25,7 +25,7 @@ use self::compare::{Bounds, Heard, compare};
 use self::player::Player;
 use super::log::{Entry, Kind};
 use super::settings::{Setting, Settings, shown};
-use super::{Said, Status, Told};
+use super::{EventLine, Said, Status};
 use control::ground::class::label;
 use control::ground::features;
 use knn::Example;
@@ -123,7 +123,7 @@ pub fn replay(log: &[Entry]) -> Result<Replayed, ReplayError> {
 /// What happened at one place of the log.
 enum Happened<'a> {
     Status(Status),
-    Told(Told),
+    Event(EventLine),
     Command {
         line: &'a str,
         /// Whether the firmware answered by an error, and so did nothing.
@@ -168,8 +168,8 @@ impl<'a> Stretch<'a> {
                     happened.push((entry, Happened::Status(status)));
                 }
                 Kind::Event => {
-                    let told = Told::parse(&entry.text).ok_or_else(|| wrong("no event"))?;
-                    happened.push((entry, Happened::Told(told)));
+                    let event = EventLine::parse(&entry.text).ok_or_else(|| wrong("no event"))?;
+                    happened.push((entry, Happened::Event(event)));
                 }
                 Kind::Command => {
                     unanswered.push_back(happened.len());
@@ -212,23 +212,23 @@ impl<'a> Stretch<'a> {
                     })?;
                     last = (status.clone(), entry.time_ms);
                 }
-                Happened::Told(told) => {
+                Happened::Event(event) => {
                     let mut is_given = false;
                     // Both places of a change of state are known once its swing is.
-                    if let Told::State(_) | Told::Alarm { .. } = told
+                    if let EventLine::State(_) | EventLine::Alarm { .. } = event
                         && let Some(at) = self.place_of_change(place)
                     {
                         player.roll_to(at, &last.0, self.next_status(place));
                         last.0.position = at;
                         last.0.speed_mm_s = player.speed_mm_s;
                     }
-                    match told {
-                        Told::State(mode) => player.enter(*mode),
-                        Told::Alarm { .. } => is_given = player.raise(),
-                        Told::Swing { .. } => is_given = self.follows_change(place),
+                    match event {
+                        EventLine::State(mode) => player.enter(*mode),
+                        EventLine::Alarm { .. } => is_given = player.raise(),
+                        EventLine::Swing { .. } => is_given = self.follows_change(place),
                         _ => {}
                     }
-                    logged.push(Heard { line: entry.number, told: *told, speed: player.speed().0, is_given });
+                    logged.push(Heard { line: entry.number, event: *event, speed: player.speed().0, is_given });
                 }
                 Happened::Command { is_refused: true, .. } => {}
                 Happened::Command { line, .. } => {
@@ -266,7 +266,7 @@ impl<'a> Stretch<'a> {
     fn in_the_beam_at_first(&self) -> Option<(i32, i32)> {
         let widest = self.settings.ticks(Setting::MaxWidthMm).0;
         self.happened.iter().find_map(|(_, happened)| match happened {
-            Happened::Told(Told::Object { position, hold, .. }) => {
+            Happened::Event(EventLine::Object { position, hold, .. }) => {
                 let before = self.first.position.wrapping_sub(*position);
                 (0..=widest).contains(&before).then_some((*position, position.wrapping_add(*hold)))
             }
@@ -300,11 +300,11 @@ impl<'a> Stretch<'a> {
 
     /// Where the state changed that a line tells of: at an alarm's own place, or that of the swing that follows.
     fn place_of_change(&self, place: usize) -> Option<i32> {
-        if let Happened::Told(Told::Alarm { position, .. }) = &self.happened[place].1 {
+        if let Happened::Event(EventLine::Alarm { position, .. }) = &self.happened[place].1 {
             return Some(*position);
         }
         self.happened[place + 1..].iter().find_map(|(_, happened)| match happened {
-            Happened::Told(Told::Swing { position, .. }) => Some(Some(*position)),
+            Happened::Event(EventLine::Swing { position, .. }) => Some(Some(*position)),
             Happened::Status(_) => Some(None),
             _ => None,
         })?
@@ -314,8 +314,8 @@ impl<'a> Stretch<'a> {
     fn follows_change(&self, place: usize) -> bool {
         let before = self.happened[..place].iter().rev().map(|(_, happened)| happened);
         before
-            .take_while(|happened| !matches!(happened, Happened::Status(_) | Happened::Told(Told::Swing { .. })))
-            .any(|happened| matches!(happened, Happened::Told(Told::State(_))))
+            .take_while(|happened| !matches!(happened, Happened::Status(_) | Happened::Event(EventLine::Swing { .. })))
+            .any(|happened| matches!(happened, Happened::Event(EventLine::State(_))))
     }
 
     fn next_status(&self, place: usize) -> Option<&Status> {

@@ -4,7 +4,7 @@
 //! one of its parts is [`Said::Other`]. Nothing here knows which command a line answers. Where a setting's name, range and unit
 //! stand in the line, they are taken from there and not from this version's table.
 
-use super::{Status, Told};
+use super::{EventLine, Status};
 use control::ground::class::Class;
 
 /// What a line says.
@@ -44,7 +44,7 @@ pub enum Said {
         label: Class,
     },
     /// What the machine tells by itself.
-    Told(Told),
+    Event(EventLine),
     /// Something else.
     Other,
 }
@@ -78,7 +78,7 @@ impl Said {
         if let Some(error) = line.strip_prefix("error:") {
             return Self::Refused(error.trim().to_owned());
         }
-        let by_itself = || Told::parse(line).map(Self::Told);
+        let by_itself = || EventLine::parse(line).map(Self::Event);
         let answer = || Status::parse(line).map(Self::Status);
         let shown = || Shown::parse(line).map(Self::Setting);
         by_itself()
@@ -237,7 +237,10 @@ mod tests {
         assert_eq!(Said::parse("get [name] - shows settings"), help);
         let status = "state=work tool=in pos=1 speed_mm_s=2 windows=1 unseen_mm=0";
         assert!(matches!(Said::parse(status), Said::Status(Status { mode: Mode::Work, .. })));
-        assert!(matches!(Said::parse("swing tool=in pos=3"), Said::Told(Told::Swing { out: false, position: 3 })));
+        assert!(matches!(
+            Said::parse("swing tool=in pos=3"),
+            Said::Event(EventLine::Swing { out: false, position: 3 })
+        ));
         for line in ["", "okay", "weeder", "weeder ", "weeder 1, reset by ", "field 7 grass 1", "field x weed 1", "k=3"]
         {
             assert_eq!(Said::parse(line), Said::Other, "{line:?}");

@@ -6,7 +6,7 @@
 //! command that changes settings it asks for them anew.
 
 use super::settings::{self, Settings, SettingsError};
-use super::{Link, LinkError, Said, Status, Told, is_greeting};
+use super::{EventLine, Link, LinkError, Said, Status, is_greeting};
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
@@ -42,7 +42,7 @@ pub enum Happening {
     /// The machine's status.
     Status(Status, String),
     /// The machine told something by itself.
-    Told(Told, String),
+    Event(EventLine, String),
     /// A command was typed.
     Command(String),
     /// A line of the answer to it, the last of which is `ok` or begins with `error:`.
@@ -194,9 +194,9 @@ impl Session {
     /// Takes a line, and knows whose it is.
     fn take(&mut self, line: String) {
         let said = Said::parse(&line);
-        if let Said::Told(told) = said {
-            self.settings_changed |= matches!(told, Told::Calibrated { .. });
-            self.happened.push_back(Happening::Told(told, line));
+        if let Said::Event(event) = said {
+            self.settings_changed |= matches!(event, EventLine::Calibrated { .. });
+            self.happened.push_back(Happening::Event(event, line));
             return;
         }
         let is_end = matches!(said, Said::Done | Said::Refused(_));

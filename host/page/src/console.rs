@@ -2,7 +2,7 @@
 
 use control::ground::class::Class;
 use link::settings::{Setting, Settings, explain, name, steps};
-use link::{Said, Shown, Status, Timed, Told, Values};
+use link::{EventLine, Said, Shown, Status, Timed, Values};
 use serde::Deserialize;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -20,14 +20,14 @@ pub fn read(line: &str) -> Value {
         Said::Example { from_field, number, label } => {
             json!({ "is": "example", "fromField": from_field, "number": number, "label": class(label) })
         }
-        Said::Told(told) => read_told(&told, line),
+        Said::Event(event) => read_event(&event, line),
         Said::Other => json!({ "is": "other" }),
     }
 }
 
-fn read_told(told: &Told, line: &str) -> Value {
-    match *told {
-        Told::Object { class: taken_for, position, votes, spacing, delay, hold, .. } => json!({
+fn read_event(event: &EventLine, line: &str) -> Value {
+    match *event {
+        EventLine::Object { class: taken_for, position, votes, spacing, delay, hold, .. } => json!({
             "is": "object",
             "seen": {
                 "class": class(taken_for),
@@ -38,11 +38,11 @@ fn read_told(told: &Told, line: &str) -> Value {
                 "hold": hold,
             },
         }),
-        Told::Swing { out, .. } => json!({ "is": "swing", "out": out }),
-        Told::State(mode) => json!({ "is": "state", "mode": mode.name() }),
-        Told::Alarm { .. } => json!({ "is": "alarm", "name": Values(line).text("name") }),
-        Told::Warning(_) => json!({ "is": "warning", "name": Values(line).text("name") }),
-        Told::Calibrated { by, is_set } => {
+        EventLine::Swing { out, .. } => json!({ "is": "swing", "out": out }),
+        EventLine::State(mode) => json!({ "is": "state", "mode": mode.name() }),
+        EventLine::Alarm { .. } => json!({ "is": "alarm", "name": Values(line).text("name") }),
+        EventLine::Warning(_) => json!({ "is": "warning", "name": Values(line).text("name") }),
+        EventLine::Calibrated { by, is_set } => {
             let by = match by {
                 Timed::EndSwitch => "end switch",
                 Timed::Eye => "eye",
@@ -50,7 +50,7 @@ fn read_told(told: &Told, line: &str) -> Value {
             };
             json!({ "is": "calibrated", "by": by, "isSet": is_set })
         }
-        Told::Plot => json!({ "is": "plot" }),
+        EventLine::Plot => json!({ "is": "plot" }),
     }
 }
 

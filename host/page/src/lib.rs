@@ -1,7 +1,7 @@
 //! What the page asks of this project's Rust, so that nothing of it is written twice: what a line of the console means, in
 //! which order settings can be sent, and what became of the plants of a row.
 //!
-//! [`answer`] takes a question as JSON and gives its answer as JSON: [`console`] and [`row`] say what they look like, and
+//! [`answer`] takes a question as JSON and gives its answer as JSON: `console` and `row` say what they look like, and
 //! `page/src/link/` and `page/src/try/` have their types. In a browser, where this is WebAssembly, both pass through one buffer
 //! (`exports`). Nothing is remembered from one question to the next.
 

@@ -363,7 +363,7 @@ impl Experiment {
             motion: drive.motion.clone(),
             timing: self.conditions.timing(),
             start: Start::Command,
-            settings: self.conditions.told(),
+            settings: self.conditions.firmware_settings(),
         };
         Ok((stand, drive, trial))
     }

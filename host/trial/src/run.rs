@@ -149,7 +149,7 @@ pub fn run(trial: &Trial, elf: &Path, mut progress: impl FnMut(f64)) -> Result<O
 /// # Errors
 /// Where it refuses one of them, or does not answer.
 pub fn set_up(trial: &Trial, uno: &mut Uno) -> Result<(), ConsoleError> {
-    for (setting, value) in trial.told() {
+    for (setting, value) in trial.firmware_settings() {
         ask(uno, &format!("set {} {value}", name(setting)))?;
     }
     Ok(())

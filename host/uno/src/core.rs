@@ -427,7 +427,7 @@ impl Core {
         let avr = self.chip.as_ptr();
         // SAFETY: as in `step`; `external` is what this request takes, and simavr copies it.
         unsafe {
-            // Told so, simavr raises the pin to this level, not to its pull-up's, when the firmware writes the port.
+            // EventLine so, simavr raises the pin to this level, not to its pull-up's, when the firmware writes the port.
             let set_external = request(&[b'i', b'o', b'p', port as u8]);
             simavr::avr_ioctl(avr, set_external, (&raw mut external).cast());
             simavr::avr_raise_irq(pin_irq(avr, pin), high.into());

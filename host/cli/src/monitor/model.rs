@@ -4,7 +4,7 @@ use super::command_line::CommandLine;
 use link::advice;
 use link::session::Happening;
 use link::settings::{Setting, Settings};
-use link::{Class, Mode, Status, Told};
+use link::{Class, EventLine, Mode, Status};
 use std::collections::VecDeque;
 
 /// Objects and lines that are remembered.
@@ -86,7 +86,7 @@ impl Model {
                 self.connection = Connection::Down(why);
             }
             Happening::Status(status, _) => self.take_status(status),
-            Happening::Told(told, line) => self.take_told(told, line),
+            Happening::Event(event, line) => self.take_event(event, line),
             Happening::Command(line) => self.say(format!("> {line}")),
             Happening::Answer(line) => self.say(line),
             Happening::Settings(settings) => self.settings = settings,
@@ -118,9 +118,9 @@ impl Model {
         self.status = status;
     }
 
-    fn take_told(&mut self, told: Told, line: String) {
-        match told {
-            Told::Object { class, position, votes, spacing, hold, .. } => {
+    fn take_event(&mut self, event: EventLine, line: String) {
+        match event {
+            EventLine::Object { class, position, votes, spacing, hold, .. } => {
                 // The hold is the canopy and both margins.
                 let margins = self.settings.wheel().ticks(2 * self.settings.get(Setting::MarginMm)).0;
                 let width = hold.wrapping_sub(margins);
@@ -130,13 +130,13 @@ impl Model {
                 self.windows.push_front(seen);
                 self.windows.truncate(OBJECTS);
             }
-            Told::Alarm { .. } => self.windows.clear(),
-            Told::Warning(warning) => {
+            EventLine::Alarm { .. } => self.windows.clear(),
+            EventLine::Warning(warning) => {
                 self.advice =
                     Some(format!("warning {}: {}", name_of(warning.text().bytes()), advice::warning(warning)));
             }
-            Told::Plot => return,
-            Told::Swing { .. } | Told::State(_) | Told::Calibrated { .. } => {}
+            EventLine::Plot => return,
+            EventLine::Swing { .. } | EventLine::State(_) | EventLine::Calibrated { .. } => {}
         }
         self.say(line);
     }

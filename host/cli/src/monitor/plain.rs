@@ -65,7 +65,7 @@ fn talk(
                     ensure!(was_idle && !ended, "{why}");
                     tell!("{why}");
                 }
-                Happening::Told(_, line) => writeln!(output, "{line}")?,
+                Happening::Event(_, line) => writeln!(output, "{line}")?,
                 Happening::Answer(line) => {
                     statuses = 0;
                     if line.starts_with("error:") {

@@ -1,7 +1,7 @@
 //! What a log tells beside what its replay tells.
 
 use super::{Difference, OBJECT_TICKS, Replayed, SWING_MS, SWING_TICKS};
-use crate::{Class, Told};
+use crate::{Class, EventLine};
 
 /// Farther than any object's hold goes, 5 m at the default wheel.
 const FAR_TICKS: i32 = 10_000;
@@ -12,7 +12,7 @@ pub(super) struct Heard {
     /// The log's line; 0 for the replay.
     pub(super) line: u64,
     /// What.
-    pub(super) told: Told,
+    pub(super) event: EventLine,
     /// The machine's speed then, in ticks a second.
     pub(super) speed: i32,
     /// Whether its place is given, not decided.
@@ -31,42 +31,46 @@ pub(super) struct Bounds {
 
 /// Compares what both tell, each kind in its order, and notes the first difference.
 pub(super) fn compare(logged: &[Heard], replayed: &[Heard], bounds: &Bounds, result: &mut Replayed) {
-    let kinds: [fn(&Told) -> bool; 3] = [
-        |told| matches!(told, Told::Object { .. }),
-        |told| matches!(told, Told::Swing { .. }),
-        |told| matches!(told, Told::Alarm { .. }),
+    let kinds: [fn(&EventLine) -> bool; 3] = [
+        |event| matches!(event, EventLine::Object { .. }),
+        |event| matches!(event, EventLine::Swing { .. }),
+        |event| matches!(event, EventLine::Alarm { .. }),
     ];
-    let is_judged = |heard: &&Heard| match heard.told {
+    let is_judged = |heard: &&Heard| match heard.event {
         // What was in the beam when the log began is cut for the replay.
-        Told::Object { position, .. } => position.wrapping_sub(bounds.first) >= 0,
-        Told::Swing { position, .. } => position >= bounds.judged_from,
+        EventLine::Object { position, .. } => position.wrapping_sub(bounds.first) >= 0,
+        EventLine::Swing { position, .. } => position >= bounds.judged_from,
         _ => !heard.is_given,
     };
     // What is at the very end may come in the one and not yet in the other; an object is told some way behind it.
-    let is_at_end = |heard: &Heard| match heard.told {
-        Told::Swing { position, .. } => bounds.end.wrapping_sub(position).saturating_abs() <= swing_ticks(heard, heard),
-        Told::Object { position, hold, .. } => {
+    let is_at_end = |heard: &Heard| match heard.event {
+        EventLine::Swing { position, .. } => {
+            bounds.end.wrapping_sub(position).saturating_abs() <= swing_ticks(heard, heard)
+        }
+        EventLine::Object { position, hold, .. } => {
             (-FAR_TICKS..=OBJECT_TICKS).contains(&bounds.end.wrapping_sub(position.wrapping_add(hold)))
         }
         _ => false,
     };
     // What is at the very beginning may be judged in the one and come before that in the other.
-    let is_at_beginning = |heard: &Heard| match heard.told {
-        Told::Swing { position, .. } => {
+    let is_at_beginning = |heard: &Heard| match heard.event {
+        EventLine::Swing { position, .. } => {
             bounds.judged_from > i32::MIN
                 && position.wrapping_sub(bounds.judged_from).saturating_abs() <= swing_ticks(heard, heard)
         }
-        // Told by both it is, and only by one of them as judged.
-        Told::Object { position, .. } => {
-            let is_told = |told: &[Heard]| told.iter().any(|other| agree(heard, other));
-            position.wrapping_sub(bounds.first).saturating_abs() <= OBJECT_TICKS && is_told(logged) && is_told(replayed)
+        // EventLine by both it is, and only by one of them as judged.
+        EventLine::Object { position, .. } => {
+            let is_heard = |heard_there: &[Heard]| heard_there.iter().any(|other| agree(heard, other));
+            position.wrapping_sub(bounds.first).saturating_abs() <= OBJECT_TICKS
+                && is_heard(logged)
+                && is_heard(replayed)
         }
         _ => false,
     };
     let mut differences = Vec::new();
     for is_kind in kinds {
-        let mut ours = replayed.iter().filter(|heard| is_kind(&heard.told)).filter(is_judged).peekable();
-        let mut theirs = logged.iter().filter(|heard| is_kind(&heard.told)).filter(is_judged).peekable();
+        let mut ours = replayed.iter().filter(|heard| is_kind(&heard.event)).filter(is_judged).peekable();
+        let mut theirs = logged.iter().filter(|heard| is_kind(&heard.event)).filter(is_judged).peekable();
         let is_one_sided = match (theirs.peek(), ours.peek()) {
             (Some(logged), Some(replayed)) => !agree(logged, replayed),
             (logged, replayed) => logged.is_some() != replayed.is_some(),
@@ -95,10 +99,10 @@ pub(super) fn compare(logged: &[Heard], replayed: &[Heard], bounds: &Bounds, res
 impl Replayed {
     /// Counts what both agree on.
     fn count(&mut self, logged: &Heard, replayed: &Heard) {
-        match (logged.told, replayed.told) {
-            (Told::Object { .. }, _) => self.objects += 1,
-            (Told::Alarm { .. }, _) => self.alarms += 1,
-            (Told::Swing { position, .. }, Told::Swing { position: ours, .. }) => {
+        match (logged.event, replayed.event) {
+            (EventLine::Object { .. }, _) => self.objects += 1,
+            (EventLine::Alarm { .. }, _) => self.alarms += 1,
+            (EventLine::Swing { position, .. }, EventLine::Swing { position: ours, .. }) => {
                 self.swings += 1;
                 if !logged.is_given {
                     self.farthest_swing = self.farthest_swing.max(position.wrapping_sub(ours).saturating_abs());
@@ -117,27 +121,27 @@ fn swing_ticks(logged: &Heard, replayed: &Heard) -> i32 {
 /// Whether log and replay tell the same.
 fn agree(logged: &Heard, replayed: &Heard) -> bool {
     let near = |one: i32, other: i32, ticks: i32| one.wrapping_sub(other).saturating_abs() <= ticks;
-    match (logged.told, replayed.told) {
+    match (logged.event, replayed.event) {
         (
-            Told::Object { class, position, votes, hold, .. },
-            Told::Object { class: our_class, position: our_position, votes: our_votes, hold: our_hold, .. },
+            EventLine::Object { class, position, votes, hold, .. },
+            EventLine::Object { class: our_class, position: our_position, votes: our_votes, hold: our_hold, .. },
         ) => {
             (class, votes) == (our_class, our_votes)
                 && near(position, our_position, OBJECT_TICKS)
                 && near(hold, our_hold, OBJECT_TICKS)
         }
-        (Told::Swing { out, position }, Told::Swing { out: ours, position: our_position }) => {
+        (EventLine::Swing { out, position }, EventLine::Swing { out: ours, position: our_position }) => {
             out == ours && (logged.is_given || near(position, our_position, swing_ticks(logged, replayed)))
         }
-        (Told::Alarm { alarm, .. }, Told::Alarm { alarm: ours, .. }) => alarm == ours,
+        (EventLine::Alarm { alarm, .. }, EventLine::Alarm { alarm: ours, .. }) => alarm == ours,
         _ => false,
     }
 }
 
 fn describe(heard: Option<&Heard>) -> String {
     let Some(heard) = heard else { return "none".to_owned() };
-    match heard.told {
-        Told::Object { class, position, votes, hold, .. } => {
+    match heard.event {
+        EventLine::Object { class, position, votes, hold, .. } => {
             let class = match class {
                 Class::Plant => "plant",
                 Class::Weed => "weed",
@@ -145,11 +149,13 @@ fn describe(heard: Option<&Heard>) -> String {
             };
             format!("`{class} pos={position} votes={votes} hold={hold}`")
         }
-        Told::Swing { out, position } => format!("`swing tool={} pos={position}`", if out { "out" } else { "in" }),
-        Told::Alarm { alarm, position } => {
+        EventLine::Swing { out, position } => format!("`swing tool={} pos={position}`", if out { "out" } else { "in" }),
+        EventLine::Alarm { alarm, position } => {
             let name: String = alarm.text().bytes().map(char::from).collect();
             format!("`alarm name={name} pos={position}`")
         }
-        Told::State(_) | Told::Warning(_) | Told::Calibrated { .. } | Told::Plot => "something else".to_owned(),
+        EventLine::State(_) | EventLine::Warning(_) | EventLine::Calibrated { .. } | EventLine::Plot => {
+            "something else".to_owned()
+        }
     }
 }

@@ -7,7 +7,7 @@
 
 use control::ground::features::{self, Features};
 use control::ground::{
-    class::{Class, Classifier, Full, Listed, Vote},
+    class::{Class, Classifier, ExamplesFull, Listed, Vote},
     nearest::Nearest,
 };
 use control::memory::Volatile;
@@ -99,7 +99,7 @@ impl Classifier for Judge<'_> {
         self.built_in.built_in_class(&self.by_machine(features))
     }
 
-    fn teach(&mut self, features: &Features, label: u8) -> Result<(), Full> {
+    fn teach(&mut self, features: &Features, label: u8) -> Result<(), ExamplesFull> {
         self.nearest.teach(&self.by_machine(features), label)
     }
 

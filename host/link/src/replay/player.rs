@@ -3,7 +3,7 @@
 use super::judge::{Judge, Seen, Witness};
 use super::{Happened, Heard, OBJECT_TICKS, Stretch};
 use crate::settings::{Setting, steps};
-use crate::{Mode, Status, Told};
+use crate::{EventLine, Mode, Status};
 use control::alarm::Alarm;
 use control::ground::class::Vote;
 use control::measure::reset::Cause;
@@ -213,8 +213,8 @@ impl<'a> Player<'a> {
     fn listen(&mut self) {
         let speed = self.speed().0;
         while let Some(event) = self.controller.next_event() {
-            let told = match event {
-                Event::Object { vote, leading, spacing, plan } => Told::Object {
+            let event = match event {
+                Event::Object { vote, leading, spacing, plan } => EventLine::Object {
                     class: vote.class,
                     position: leading.count(),
                     votes: vote.votes,
@@ -223,13 +223,13 @@ impl<'a> Player<'a> {
                     hold: plan.hold.0,
                     actuation: plan.actuation().0,
                 },
-                Event::Swing { out, position } => Told::Swing { out, position: position.count() },
+                Event::Swing { out, position } => EventLine::Swing { out, position: position.count() },
                 Event::Alarm { .. } if std::mem::take(&mut self.swallows_alarm) => continue,
-                Event::Alarm { alarm, position } => Told::Alarm { alarm, position: position.count() },
+                Event::Alarm { alarm, position } => EventLine::Alarm { alarm, position: position.count() },
                 // They rest on time, which the log has only roughly; or follow from the others.
                 Event::State(_) | Event::Warning(_) | Event::Calibrated { .. } => continue,
             };
-            self.heard.push(Heard { line: 0, told, speed, is_given: false });
+            self.heard.push(Heard { line: 0, event, speed, is_given: false });
         }
     }
 
@@ -308,7 +308,7 @@ fn canopies(stretch: &Stretch) -> Vec<Canopy> {
     for (_, happened) in &stretch.happened {
         let wheel = settings.wheel();
         match happened {
-            Happened::Told(Told::Object { class, position, votes, spacing, hold, .. }) => {
+            Happened::Event(EventLine::Object { class, position, votes, spacing, hold, .. }) => {
                 let width = hold.wrapping_sub(wheel.ticks(2 * settings.get(Setting::MarginMm)).0);
                 let seen = Seen {
                     vote: Vote { class: *class, votes: *votes },
@@ -319,7 +319,7 @@ fn canopies(stretch: &Stretch) -> Vec<Canopy> {
                 canopies.push(Canopy { from: *position, to: position.wrapping_add(width), seen: Some(seen) });
             }
             // It is latched as soon as the object is wider than it may be.
-            Happened::Told(Told::Alarm { alarm: Alarm::BeamBlocked, position }) => {
+            Happened::Event(EventLine::Alarm { alarm: Alarm::BeamBlocked, position }) => {
                 let from = position.wrapping_sub(settings.ticks(Setting::MaxWidthMm).0 + 1);
                 canopies.push(Canopy { from, to: position.wrapping_add(1), seen: None });
             }

@@ -118,8 +118,8 @@ fn events_are_told_whatever_is_being_answered() {
     let now = Instant::now();
     second(&mut session, now);
     says.borrow_mut().extend(b"swing tool=out pos=9\r\n\xFF\xFE junk\r\n");
-    let told = Happening::Told(Told::Swing { out: true, position: 9 }, "swing tool=out pos=9".to_owned());
-    assert_eq!(second(&mut session, now + Duration::from_secs(1)), [told]);
+    let event = Happening::Event(EventLine::Swing { out: true, position: 9 }, "swing tool=out pos=9".to_owned());
+    assert_eq!(second(&mut session, now + Duration::from_secs(1)), [event]);
 }
 
 #[test]
@@ -136,7 +136,7 @@ fn settings_are_asked_for_again_whatever_has_changed_them() {
     }
     says.borrow_mut().extend(b"calibrated lead_out_ms=150 lead_in_ms=40\r\n");
     let happened = second(&mut session, now + Duration::from_secs(1));
-    assert!(matches!(happened.as_slice(), [Happening::Told(..), Happening::Settings(_)]), "{happened:?}");
+    assert!(matches!(happened.as_slice(), [Happening::Event(..), Happening::Settings(_)]), "{happened:?}");
     assert!(session.command("set wheel_mm 9"));
     let happened = second(&mut session, now + Duration::from_secs(2));
     assert!(matches!(happened.as_slice(), [Happening::Command(_), Happening::Answer(_)]), "{happened:?}");

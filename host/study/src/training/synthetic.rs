@@ -12,7 +12,7 @@
 //! that the spacing of the next one is counted from a plant.
 
 use super::Labelled;
-use control::ground::class::{Class, Classifier, Full, Listed, Vote};
+use control::ground::class::{Class, Classifier, ExamplesFull, Listed, Vote};
 use control::ground::features::{Features, SPEED_CLASSES_MM_S};
 use control::measure::quadrature::{Quadrature, Step};
 use control::measure::reset::Cause;
@@ -181,8 +181,8 @@ impl Classifier for &Recorder<'_> {
         Class::Unknown
     }
 
-    fn teach(&mut self, _features: &Features, _label: u8) -> Result<(), Full> {
-        Err(Full)
+    fn teach(&mut self, _features: &Features, _label: u8) -> Result<(), ExamplesFull> {
+        Err(ExamplesFull)
     }
 
     fn forget(&mut self, _number: u8) -> bool {

@@ -3,7 +3,7 @@
 use super::*;
 use link::session::Happening;
 use link::settings::Settings;
-use link::{Status, Told};
+use link::{EventLine, Status};
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
 use ratatui::crossterm::event::KeyCode;
@@ -22,9 +22,9 @@ fn machine(lines: &[&str]) -> Model {
     model.update(Happening::Connected { version, settings: Settings::new(), examples: Vec::new() });
     for line in lines {
         let line = (*line).to_owned();
-        model.update(match (Status::parse(&line), Told::parse(&line)) {
+        model.update(match (Status::parse(&line), EventLine::parse(&line)) {
             (Some(status), _) => Happening::Status(status, line),
-            (None, Some(told)) => Happening::Told(told, line),
+            (None, Some(event)) => Happening::Event(event, line),
             (None, None) => Happening::Answer(line),
         });
     }

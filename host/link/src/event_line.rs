@@ -8,7 +8,7 @@ use control::ground::class::Class;
 
 /// Something that the machine told by itself, as [`control::operate::event::Event`] was written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Told {
+pub enum EventLine {
     /// An object was seen in full and classified.
     Object {
         /// What it was taken for.
@@ -137,7 +137,7 @@ impl<'a> Values<'a> {
     }
 }
 
-impl Told {
+impl EventLine {
     /// Reads an event's line; none where it is not one.
     pub fn parse(line: &str) -> Option<Self> {
         if is_plot(line) {
@@ -211,7 +211,7 @@ mod tests {
     use super::*;
     use control::ground::class::Vote;
     use control::ground::schedule::Plan;
-    use control::operate::calibration::{Leads, Outcome};
+    use control::operate::calibration::{Outcome, SwingTimes};
     use control::operate::event::Event;
     use control::operate::state::State;
     use control::say::line::Line;
@@ -231,19 +231,26 @@ mod tests {
         for (class, votes) in [(Class::Plant, 3), (Class::Weed, 2), (Class::Unknown, 0)] {
             let vote = Vote { class, votes };
             let event = Event::Object { vote, leading: Position::new(-70_000), spacing: Ticks(1146), plan };
-            let expected =
-                Told::Object { class, position: -70_000, votes, spacing: 1146, delay: 668, hold: 477, actuation: 1145 };
-            assert_eq!(Told::parse(&line(event)), Some(expected));
+            let expected = EventLine::Object {
+                class,
+                position: -70_000,
+                votes,
+                spacing: 1146,
+                delay: 668,
+                hold: 477,
+                actuation: 1145,
+            };
+            assert_eq!(EventLine::parse(&line(event)), Some(expected));
         }
         let swing = Event::Swing { out: true, position: Position::new(12) };
-        assert_eq!(Told::parse(&line(swing)), Some(Told::Swing { out: true, position: 12 }));
-        assert_eq!(Told::parse(&line(Event::State(State::Work))), Some(Told::State(Mode::Work)));
+        assert_eq!(EventLine::parse(&line(swing)), Some(EventLine::Swing { out: true, position: 12 }));
+        assert_eq!(EventLine::parse(&line(Event::State(State::Work))), Some(EventLine::State(Mode::Work)));
         for alarm in (0..).map_while(Alarm::from_index) {
             let event = Event::Alarm { alarm, position: Position::new(1) };
-            assert_eq!(Told::parse(&line(event)), Some(Told::Alarm { alarm, position: 1 }));
-            assert_eq!(Told::parse(&line(Event::State(State::Alarm(alarm)))), Some(Told::State(Mode::Alarm)));
+            assert_eq!(EventLine::parse(&line(event)), Some(EventLine::Alarm { alarm, position: 1 }));
+            assert_eq!(EventLine::parse(&line(Event::State(State::Alarm(alarm)))), Some(EventLine::State(Mode::Alarm)));
         }
-        let measured = Outcome::Measured(Leads { out_ms: 150, in_ms: 40 });
+        let measured = Outcome::Measured(SwingTimes { out_ms: 150, in_ms: 40 });
         for (outcome, fits, by) in [
             (measured, true, Timed::EndSwitch),
             (measured, false, Timed::EndSwitch),
@@ -251,19 +258,19 @@ mod tests {
             (Outcome::Failed, false, Timed::None),
         ] {
             let calibrated = Event::Calibrated { outcome, fits };
-            assert_eq!(Told::parse(&line(calibrated)), Some(Told::Calibrated { by, is_set: fits }));
+            assert_eq!(EventLine::parse(&line(calibrated)), Some(EventLine::Calibrated { by, is_set: fits }));
         }
         let warning = Event::Warning(Warning::NoPlants);
-        assert_eq!(Told::parse(&line(warning)), Some(Told::Warning(Warning::NoPlants)));
+        assert_eq!(EventLine::parse(&line(warning)), Some(EventLine::Warning(Warning::NoPlants)));
     }
 
     #[test]
     fn points_of_curves_are_no_answer() {
         for line in ["speed_mm_s:-3,tool_deg:45,beam_broken:0,windows:2", ">tool_deg:0"] {
-            assert_eq!(Told::parse(line), Some(Told::Plot), "{line}");
+            assert_eq!(EventLine::parse(line), Some(EventLine::Plot), "{line}");
         }
         for line in ["error: 7", "error: no such command", ":", "a:b,c:1"] {
-            assert_eq!(Told::parse(line), None, "{line}");
+            assert_eq!(EventLine::parse(line), None, "{line}");
         }
     }
 
@@ -282,7 +289,7 @@ mod tests {
             "pos=1 swing tool=out",
             "plant pos=1 votes=300 spacing=1 delay=1 hold=1 actuation=1",
         ] {
-            assert_eq!(Told::parse(line), None, "{line}");
+            assert_eq!(EventLine::parse(line), None, "{line}");
         }
     }
 
