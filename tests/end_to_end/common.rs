@@ -84,7 +84,7 @@ pub fn throw_switch(uno: &mut Uno, work: bool) {
 
 /// Whether the servo's last pulse asks for the tool to be out.
 pub fn is_out_at_the_pin(uno: &Uno) -> bool {
-    let pulse = *uno.servo_pulses().last().expect("the servo has pulses");
+    let pulse = *uno.pulses(wiring::SERVO).last().expect("the servo has pulses");
     (pulse.width_us() - 2000.0).abs() < 1.0
 }
 
@@ -277,12 +277,12 @@ impl Run {
     /// What happened to the row.
     pub fn judgement(&self) -> Judgement {
         let Trial { row, machine, motion, timing, .. } = &self.trial;
-        judge(row, machine, motion, *timing, &self.uno.servo_pulses(), self.start_cycle)
+        judge(row, machine, motion, *timing, &self.uno.pulses(wiring::SERVO), self.start_cycle)
     }
 
     /// The commands at the servo's pin.
     pub fn commands(&self) -> Vec<Command> {
-        self.trial.machine.servo.commands(&self.uno.servo_pulses())
+        self.trial.machine.servo.commands(&self.uno.pulses(wiring::SERVO))
     }
 
     /// The first command after a cycle.

@@ -9,7 +9,7 @@ use uno::Uno;
 
 /// The last servo pulse's width.
 fn pulse_us(uno: &Uno) -> f64 {
-    uno.servo_pulses().last().expect("the servo has pulses").width_us().round()
+    uno.pulses(wiring::SERVO).last().expect("the servo has pulses").width_us().round()
 }
 
 #[test]
@@ -82,14 +82,14 @@ fn the_end_switch_times_the_servo() {
 fn a_row_without_sensors_swings_the_servo_for_each_plant() {
     let mut uno = woken_up();
     ask(&mut uno, "events on");
-    let before = uno.servo_pulses().len();
+    let before = uno.pulses(wiring::SERVO).len();
     ask(&mut uno, "test row 400");
     run_for_ms(&mut uno, 12_000);
     let told = uno.received();
     // The beginning of the first line may have come with the answer.
     assert!(told.lines().skip(1).all(|line| line.starts_with("swing ")), "{told}");
     assert_eq!(told.lines().count(), 14, "{told}");
-    let commands = Servo::default().commands(&uno.servo_pulses()[before..]);
+    let commands = Servo::default().commands(&uno.pulses(wiring::SERVO)[before..]);
     // Into the row, and out and in for each plant; out for good at the end.
     assert_eq!(commands.len(), 1 + 2 * 6 + 1, "{commands:?}");
     let said = status(&mut uno);

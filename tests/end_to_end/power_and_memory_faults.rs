@@ -27,7 +27,7 @@ const OUT_US: f64 = 2000.0;
 fn greeting_with_the_tool_out_since(uno: &mut Uno, cycle: u64) -> String {
     let greeting = uno.run_until_serial("commands\r\n", GREETING_CYCLES).expect("the firmware wakes up");
     run_for_ms(uno, 30);
-    let pulses = uno.servo_pulses();
+    let pulses = uno.pulses(wiring::SERVO);
     let since: Vec<f64> = pulses.iter().filter(|pulse| pulse.rise > cycle).map(|pulse| pulse.width_us()).collect();
     assert!(!since.is_empty() && since.iter().all(|width| (width - OUT_US).abs() < 1.0), "{since:?}");
     greeting
@@ -244,7 +244,7 @@ fn the_saved_pulse_has_the_tool_out_from_the_first_one_on() {
     let eeprom = eeprom_with(&[with(&[(Setting::ServoOutUs, 1000), (Setting::ServoInUs, 2000)])]);
     let (_, mut uno) = waking_up_with(&eeprom);
     run_for_ms(&mut uno, 50);
-    let widths: Vec<f64> = uno.servo_pulses().iter().map(|pulse| pulse.width_us()).collect();
+    let widths: Vec<f64> = uno.pulses(wiring::SERVO).iter().map(|pulse| pulse.width_us()).collect();
     assert!(!widths.is_empty() && widths.iter().all(|width| (width - 1000.0).abs() < 1.0), "{widths:?}");
 }
 

@@ -3,6 +3,7 @@
 use crate::common::{Run, ask, run_for_ms, steady, trial, woken_up};
 use field::motion::mm_s;
 use field::row::{Row, Thing};
+use field::wiring;
 use signal::{CYCLES_PER_SECOND, Pulse};
 use uno::Uno;
 
@@ -24,7 +25,7 @@ fn pulses_while_weeding(gap_ms: u32) -> Vec<Pulse> {
     run.roll_on_asking("get", 90);
     run.roll_to_the_end();
     assert!(run.commands().len() >= 6, "{:?}", run.commands());
-    run.uno.servo_pulses()
+    run.uno.pulses(wiring::SERVO)
 }
 
 /// Every pulse is whole; frames last 20 ms, but for those that a swing cut short after the gap.
@@ -65,7 +66,7 @@ fn settled_pulses(uno: &mut Uno) -> Vec<Pulse> {
     run_for_ms(uno, 50);
     let begin = uno.cycle();
     run_for_ms(uno, 300);
-    uno.servo_pulses().into_iter().filter(|pulse| pulse.rise > begin).collect()
+    uno.pulses(wiring::SERVO).into_iter().filter(|pulse| pulse.rise > begin).collect()
 }
 
 #[test]

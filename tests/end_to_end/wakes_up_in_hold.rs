@@ -40,7 +40,7 @@ fn a_switch_that_is_on_at_power_up_starts_nothing_until_it_has_been_off() {
     assert_in_hold_with_tool_out(&mut uno);
     throw_switch(&mut uno, false);
     assert_in_hold_with_tool_out(&mut uno);
-    assert!(uno.servo_pulses().iter().all(|pulse| (pulse.width_us() - 2000.0).abs() < 0.1));
+    assert!(uno.pulses(wiring::SERVO).iter().all(|pulse| (pulse.width_us() - 2000.0).abs() < 0.1));
 
     throw_switch(&mut uno, true);
     run_for_ms(&mut uno, FRAME_MS);
@@ -52,7 +52,7 @@ fn a_switch_that_is_on_at_power_up_starts_nothing_until_it_has_been_off() {
 #[test]
 fn the_servo_has_its_signal_from_the_first_frame_on() {
     let uno = woken_up();
-    let first = uno.servo_pulses()[0];
+    let first = uno.pulses(wiring::SERVO)[0];
     assert!((first.width_us() - 2000.0).abs() < 0.1, "{first:?}");
     assert!(first.rise < CYCLES_PER_SECOND / 10, "{first:?}");
 }
@@ -128,7 +128,7 @@ fn nothing_that_was_scheduled_survives_a_reset() {
         let after = status(&mut run.uno);
         assert_eq!((number(&after, "pos"), number(&after, "windows")), (0, 0), "{after}");
         assert_eq!(number(&after, "unseen_mm"), 400, "{after}");
-        let pulses = run.uno.servo_pulses();
+        let pulses = run.uno.pulses(wiring::SERVO);
         let mut since = pulses.iter().filter(|pulse| pulse.rise > cycle);
         assert!(since.all(|pulse| (pulse.width_us() - 2000.0).abs() < 0.1));
     }

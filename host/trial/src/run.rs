@@ -130,7 +130,7 @@ pub fn run(trial: &Trial, elf: &Path, mut progress: impl FnMut(f64)) -> Result<O
         return Err(TrialError::Restarted(uno.resets().len()));
     }
 
-    let pulses = uno.servo_pulses();
+    let pulses = uno.pulses(wiring::SERVO);
     inputs.extend_from_slice(uno.changes());
     Ok(Outcome {
         judgement: judge(row, machine, motion, trial.timing, &pulses, start_cycle),

@@ -145,8 +145,8 @@ impl Core {
             timer: unsafe { Timer1::of(avr) },
             // SAFETY: as above.
             eeprom: unsafe { Eeprom::of(avr) },
-            servo_high: false,
-            led_high: false,
+            d9_high: false,
+            d13_high: false,
             changes: Vec::new(),
             received: Vec::new(),
             resets: Vec::new(),

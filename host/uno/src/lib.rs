@@ -6,7 +6,7 @@
 //! [`capture`] reads a recording of them, and [`pty`] is a serial port that other programs open.
 //!
 //! [`Uno::boot`] powers it up, [`Uno::wired`] says what is at its pins. [`Uno::set`] and [`Uno::drive`] put levels on its inputs,
-//! [`Uno::send`] types into its serial line, [`Uno::run_until`] lets its clock run; [`Uno::changes`], [`Uno::servo_pulses`] and
+//! [`Uno::send`] types into its serial line, [`Uno::run_until`] lets its clock run; [`Uno::changes`], [`Uno::pulses`] and
 //! [`Uno::received`] say what it did. Time is the chip's own cycle count since the first power-up and goes on over resets; the host's clock plays no part. Every
 //! Uno is by itself, so that several can run in parallel threads.
 //!
@@ -21,7 +21,7 @@
 //!   edge that the firmware makes carries the cycle in which its instruction began.
 //! - OCR1A is double buffered in fast PWM: a new value counts from the next bottom (simavr: at once). Writing TCNT1 moves the
 //!   counter and leaves the pin and the prescaler alone (simavr: sets the pin where a match is to come, and rounds).
-//! - The servo's pin follows its timer while it is connected to it (simavr copies the timer's level into PORTB, where a firmware
+//! - D9 follows its timer while it is connected to it (simavr copies the timer's level into PORTB, where a firmware
 //!   that reads PORTB before an edge and writes it behind the edge takes the edge back).
 //! - A timer is stopped by a reset (simavr keeps its mode and its period).
 //! - An input keeps its level when the firmware writes its port (simavr raises pulled-up pins) and over a reset.
@@ -41,7 +41,7 @@
 //!
 //! - Writes that only erase or do not erase first take as long as the others. The EEPROM-ready interrupt comes only after a
 //!   write, and the core is not halted for the 2 to 4 cycles after an order to the EEPROM.
-//! - OCR1B and the compare registers of Timer0 and Timer2 are not double buffered. PORTB's bit of the servo reads as the
+//! - OCR1B and the compare registers of Timer0 and Timer2 are not double buffered. PORTB's bit of D9 reads as the
 //!   timer's level.
 //! - TCNT1 of a stopped timer counts for nothing: the timer starts at its bottom, with the pin's edge.
 //! - An edge reaches its interrupt at once; the chip's synchroniser takes two or three cycles more.
@@ -519,15 +519,15 @@ impl Uno {
         std::mem::take(&mut self.core.recorder_mut().changes)
     }
 
-    /// Every edge of the output pins (servo, LED) since the first power-up, oldest first.
+    /// Every edge of the output pins since the first power-up, oldest first.
     pub fn changes(&self) -> &[PinChange] {
         &self.core.recorder().changes
     }
 
-    /// The complete pulses on the servo's line since the first power-up, oldest first.
-    pub fn servo_pulses(&self) -> Vec<Pulse> {
-        let servo: Vec<_> = self.changes().iter().filter(|change| change.pin == Pin::D9).collect();
-        servo
+    /// The complete pulses on an output pin since the first power-up, oldest first.
+    pub fn pulses(&self, pin: Pin) -> Vec<Pulse> {
+        let edges: Vec<_> = self.changes().iter().filter(|change| change.pin == pin).collect();
+        edges
             .windows(2)
             .filter(|edges| edges[0].high && !edges[1].high)
             .map(|edges| Pulse { rise: edges[0].cycle, fall: edges[1].cycle })
@@ -599,7 +599,7 @@ impl Uno {
     }
 }
 
-/// The pins that are recorded as outputs: Timer1's output A, where a servo is, and the board's LED.
+/// The pins that are recorded as outputs: Timer1's output A, and the board's LED.
 const OUTPUTS: [Pin; 2] = [Pin::D9, Pin::D13];
 
 /// Whether the firmware drives the pin.

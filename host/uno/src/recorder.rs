@@ -40,8 +40,8 @@ pub(super) struct Recorder {
     pub(super) uart: *mut simavr::avr_uart_t,
     pub(super) timer: Timer1,
     pub(super) eeprom: Eeprom,
-    pub(super) servo_high: bool,
-    pub(super) led_high: bool,
+    pub(super) d9_high: bool,
+    pub(super) d13_high: bool,
     /// Edges of the output pins, oldest first.
     pub(super) changes: Vec<PinChange>,
     /// Bytes that the firmware has handed to its transmitter, oldest first.
@@ -58,8 +58,8 @@ impl Recorder {
     /// Records a level of an output pin, where it differs from the last one.
     pub(super) fn record_level(&mut self, pin: Pin, high: bool, cycle: u64) {
         let level = match pin {
-            Pin::D9 => &mut self.servo_high,
-            Pin::D13 => &mut self.led_high,
+            Pin::D9 => &mut self.d9_high,
+            Pin::D13 => &mut self.d13_high,
             _ => return,
         };
         if *level != high {
@@ -141,7 +141,7 @@ pub(super) unsafe extern "C" fn on_timer_output(_: *mut simavr::avr_irq_t, level
     unsafe {
         let recorder = &mut *recorder.cast::<Recorder>();
         recorder.timer.output_becomes(level & 1 != 0);
-        let high = recorder.timer.pin_is_high(recorder.chip, recorder.servo_high);
+        let high = recorder.timer.pin_is_high(recorder.chip, recorder.d9_high);
         recorder.record_level(Pin::D9, high, due_cycle(recorder.chip));
     }
 }

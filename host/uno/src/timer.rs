@@ -1,4 +1,4 @@
-//! Timer1's output A, which drives the servo, where simavr differs from the chip: the pin, OCR1A and TCNT1.
+//! Timer1's output A, where simavr differs from the chip: the pin, OCR1A and TCNT1.
 //!
 //! simavr's writers of OCR1A and TCNT1 are replaced. In fast PWM a new OCR1A only changes what the next bottom plans (data
 //! sheet, 16.9.3), and TCNT1 moves the counter: simavr's own writer does it, but exactly, with the pins disconnected and with the
@@ -103,7 +103,7 @@ impl Timer1 {
         }
     }
 
-    /// Level of the servo's pin, whose bit of PORTB is `port_high`.
+    /// Level of D9, whose bit of PORTB is `port_high`.
     ///
     /// # Safety
     ///

@@ -150,7 +150,7 @@ fn a_timer_pulse_is_exact_and_constant_while_the_core_is_busy() {
     let edges = (1..20_000).map(|count| PinChange { cycle: count * 799, pin: Pin::D2, high: count % 2 == 1 });
     uno.drive(edges);
     uno.run_for_ms(1000).unwrap();
-    let pulses = uno.servo_pulses();
+    let pulses = uno.pulses(Pin::D9);
     assert_eq!(pulses.len(), 50);
     for pair in pulses[1..].windows(2) {
         assert_eq!(pair[0].width_us(), 1500.0);
@@ -172,7 +172,7 @@ fn knock(uno: &mut Uno, pin: Pin, cycle: u64) {
 
 /// Rise and width in cycles of the pulses that began at or after a cycle.
 fn pulses_since(uno: &Uno, cycle: u64) -> Vec<(u64, u64)> {
-    let pulses = uno.servo_pulses();
+    let pulses = uno.pulses(Pin::D9);
     pulses.iter().filter(|pulse| pulse.rise >= cycle).map(|pulse| (pulse.rise, pulse.fall - pulse.rise)).collect()
 }
 
@@ -351,7 +351,7 @@ fn several_unos_run_in_parallel_and_do_not_meet() {
             high: count % 2 == 1,
         }));
         uno.run_for_ms(100).unwrap();
-        (uno.read("edges").unwrap().to_vec(), uno.servo_pulses(), uno.cycle())
+        (uno.read("edges").unwrap().to_vec(), uno.pulses(Pin::D9), uno.cycle())
     };
     let alone = run(3000);
     let together: Vec<_> = std::thread::scope(|scope| {

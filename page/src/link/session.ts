@@ -8,6 +8,9 @@
 import { isTold, read, type Said, type Setting, type Status } from "./grammar.ts";
 import { LineReader } from "./lines.ts";
 
+/** Types a command, and gives back its answer without the `ok`. Throws what the machine refuses by. */
+export type Ask = (command: string) => Promise<string[]>;
+
 /** A serial line to a machine. */
 export interface Wire {
     /** Hears what comes. */

@@ -2,9 +2,8 @@
 
 import type { Parts } from "../dom.ts";
 import { read, type Said } from "../link/grammar.ts";
-import { Refused } from "../link/session.ts";
+import { type Ask, Refused } from "../link/session.ts";
 import type { Machine } from "./machine.ts";
-import type { Ask } from "./panel.ts";
 
 /** Which of the servo's two places. */
 type Place = "in" | "out";

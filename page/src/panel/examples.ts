@@ -2,9 +2,8 @@
 
 import { make, type Parts } from "../dom.ts";
 import { read } from "../link/grammar.ts";
-import { Refused } from "../link/session.ts";
+import { type Ask, Refused } from "../link/session.ts";
 import type { Machine } from "./machine.ts";
-import type { Ask } from "./panel.ts";
 
 /** Places for examples from the field. */
 const PLACES = 32;

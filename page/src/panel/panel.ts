@@ -5,16 +5,13 @@
 
 import { download, Parts } from "../dom.ts";
 import { Log } from "../link/log.ts";
-import { type Happening, NoMachine, Session, type Wire } from "../link/session.ts";
+import { type Ask, type Happening, NoMachine, Session, type Wire } from "../link/session.ts";
 import { Calibration } from "./calibration.ts";
 import { Console } from "./console.ts";
 import { Examples } from "./examples.ts";
 import { fault, Machine, sentence } from "./machine.ts";
 import { SettingsForm } from "./settings.ts";
 import { drawStrip } from "./strip.ts";
-
-/** Types a command, and gives back its answer without the `ok`. Throws what the machine refuses by. */
-export type Ask = (command: string) => Promise<string[]>;
 
 /** What stands beside what is needed at work, a tab each. */
 const TABS = ["settings", "calibrate", "examples", "console"] as const;

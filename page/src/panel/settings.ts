@@ -3,9 +3,9 @@
 
 import { download, make, type Parts } from "../dom.ts";
 import { steps as order, type Setting } from "../link/grammar.ts";
+import type { Ask } from "../link/session.ts";
 import { parse, range, SettingsFileError, write } from "../link/settings_file.ts";
 import { type Machine, sentence } from "./machine.ts";
-import type { Ask } from "./panel.ts";
 
 export class SettingsForm {
     readonly #parts: Parts;

@@ -52,7 +52,7 @@ pub fn jitter(elf: &Path, mut progress: impl FnMut(f64)) -> Result<Jitter, Bench
         progress((uno.cycle() - begin) as f64 / (end - begin) as f64);
     }
 
-    let mut pulses = uno.servo_pulses();
+    let mut pulses = uno.pulses(wiring::SERVO);
     pulses.retain(|pulse| pulse.rise >= begin);
     pulses.truncate(PULSES);
     let widths = pulses.iter().map(|pulse| pulse.fall - pulse.rise);

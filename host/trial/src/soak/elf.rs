@@ -164,7 +164,7 @@ fn work(rng: &mut ChaCha8Rng, plan: Plan, elf: &Path, tally: &mut Tally) -> Resu
         tally.violated(began_s + fails_at_s, format_args!("{fault:?} and resets {:?}", uno.resets()));
     }
 
-    let pulses: Vec<Pulse> = uno.servo_pulses();
+    let pulses: Vec<Pulse> = uno.pulses(wiring::SERVO);
     if was_reset {
         still_out(&pulses, fails_at, began_s + fails_at_s, tally);
     }
