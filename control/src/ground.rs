@@ -98,7 +98,8 @@ impl Ground {
         self.beam = self.geometry.grain.place(position);
         let memory = self.geometry.memory;
         // Ground ahead of the beam that lies so far ahead is seen anew when the machine comes back to it.
-        if self.watch.frontier() - self.beam > memory {
+        let is_beyond_memory = self.watch.frontier() - self.beam > memory;
+        if is_beyond_memory {
             self.begin_here();
         }
         let complete = self.watch.roll_to(self.beam - self.leads.response, self.geometry.merge_gap);
@@ -109,7 +110,7 @@ impl Ground {
         if farthest.is_ahead_of(self.last_plant) {
             self.last_plant = farthest;
         }
-        self.rolled_back_too_far = !had_left && self.schedule.has_left(self.tool());
+        self.rolled_back_too_far = is_beyond_memory || (!had_left && self.schedule.has_left(self.tool()));
         complete
     }
 
@@ -317,6 +318,67 @@ mod tests {
             open_from.is_some_and(|position| position - 1400 - beam_to_tool - margin <= 3 * grain),
             "{open_from:?}"
         );
+    }
+
+    #[test]
+    fn an_edge_lies_where_the_ground_was_when_the_beam_s_sensor_began_to_answer() {
+        let (mut ground, mut settings) = ground();
+        settings.set(Setting::BeamResponseMs, 10).expect("within its range");
+        ground.lead(&settings, SPEED);
+        ground.edge(Position::new(2000), true);
+        ground.edge(Position::new(2300), false);
+        assert!(!ground.is_unseen());
+        let merge_gap = 40;
+        assert_eq!(ground.roll_to(Position::new(2300 + merge_gap - 1)), None);
+        let here = Position::new(2300 + merge_gap);
+        let canopy = ground.roll_to(here).expect("the gap has been seen");
+        assert_eq!(ground.position_of(canopy.leading, here), Position::new(1990));
+        assert_eq!(ground.position_of(canopy.trailing, here), Position::new(2290));
+    }
+
+    #[test]
+    fn a_beam_is_blocked_that_is_broken_over_more_than_the_widest_canopy() {
+        let (mut ground, _) = ground();
+        let max_width = i32::from(ground.geometry.max_width.0);
+        ground.edge(Position::new(1500), true);
+        ground.roll_to(Position::new(1500 + max_width));
+        assert!(!ground.is_blocked());
+        ground.roll_to(Position::new(1500 + max_width + 1));
+        assert!(ground.is_blocked());
+        ground.edge(Position::new(1500 + max_width + 2), false);
+        assert!(!ground.is_blocked());
+    }
+
+    #[test]
+    fn ground_is_remembered_as_far_back_as_the_memory_reaches_and_told_once_where_it_ends() {
+        let (mut ground, _) = ground();
+        let memory = i32::from(ground.geometry.memory.0);
+        for position in (1400..=40_000).step_by(100) {
+            ground.roll_to(Position::new(position));
+            assert!(!ground.rolled_back_too_far());
+        }
+        for back in 0..=memory {
+            ground.roll_to(Position::new(40_000 - back));
+            assert!(!ground.rolled_back_too_far() && !ground.is_unseen(), "{back}");
+        }
+        ground.roll_to(Position::new(40_000 - memory - 1));
+        assert!(ground.rolled_back_too_far());
+        ground.roll_to(Position::new(40_000 - memory - 2));
+        assert!(!ground.rolled_back_too_far());
+    }
+
+    #[test]
+    fn the_beam_is_outrun_where_the_lead_reaches_from_the_tool_to_the_margin_of_what_it_has_not_seen() {
+        let (mut ground, _) = ground();
+        let reach = ground.geometry.beam_to_tool - ground.geometry.margin;
+        let outruns = |ground: &mut Ground, out, tool_out| {
+            ground.leads = Leads { out, ..Leads::NONE };
+            ground.outruns_the_beam(tool_out)
+        };
+        assert!(!outruns(&mut ground, reach - Length(1), false));
+        assert!(outruns(&mut ground, reach, false));
+        let trusted = (0..reach.0).rfind(|&out| !outruns(&mut ground, Length(out), true));
+        assert_eq!(trusted.map(|out| out + out / 8), Some(reach.0 - 1), "an eighth slower");
     }
 
     #[test]

@@ -268,6 +268,19 @@ fn rolling_back_to_forgotten_ground_is_an_alarm() {
 }
 
 #[test]
+fn rolling_back_farther_than_ground_is_remembered_is_an_alarm() {
+    let motion = Motion::starting_at(0.0)
+        .change_speed(mm_s(2.5), 1000.0)
+        .stop_at(9000.0, 1000.0)
+        .change_speed(-mm_s(2.5), 1000.0)
+        .stop_at(200.0, 1000.0);
+    let mut run = Run::begin(Trial { start: Start::Now, ..trial(bare_ground(), motion) }, &["set no_plant_m 0"]);
+    run.roll_to(8900.0);
+    assert_eq!(run.events("alarm"), [""; 0]);
+    assert_alarm(&mut run, "rolled_back_too_far", 32);
+}
+
+#[test]
 fn an_end_switch_that_does_not_follow_is_an_alarm() {
     // In HOLD the tool is out: the switch should be closed.
     let mut run = Run::begin(trial(bare_ground(), steady(mm_s(1.0), 100.0)), &["hold"]);

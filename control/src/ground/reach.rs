@@ -126,6 +126,23 @@ mod tests {
     }
 
     #[test]
+    fn a_lead_is_what_is_rolled_in_its_time_and_a_millisecond_and_none_is_none() {
+        let mut settings = Settings::new();
+        let leads = |settings: &Settings| {
+            let Leads { out, back, response } = Leads::at(TicksPerSecond(1000), settings, Grain::TICK);
+            (out, back, response)
+        };
+        for (setting, milliseconds) in
+            [(Setting::LeadOutMs, 180), (Setting::LeadInMs, 40), (Setting::BeamResponseMs, 7)]
+        {
+            settings.set(setting, milliseconds).expect("within its range");
+        }
+        assert_eq!(leads(&settings), (Length(181), Length(41), Length(7)));
+        settings.set(Setting::LeadOutMs, 0).expect("within its range");
+        assert_eq!(leads(&settings), (Length::ZERO, Length::ZERO, Length(7)));
+    }
+
+    #[test]
     fn lengths_of_every_wheel_fit_what_is_remembered() {
         for ticks_per_m in 40..=20_000 {
             let mut settings = Settings::new();
