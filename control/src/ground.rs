@@ -368,6 +368,25 @@ mod tests {
     }
 
     #[test]
+    fn ground_that_was_left_for_want_of_room_is_told_once_by_the_tool_that_comes_back_to_it() {
+        let mut ground = Ground::NONE;
+        ground.begin(&Settings::new(), Position::new(0), false);
+        let plants = 20;
+        for leading in (0..plants).map(|plant| 1000 + 400 * plant) {
+            ground.edge(Position::new(leading), true);
+            ground.edge(Position::new(leading + 100), false);
+            let canopy = ground.roll_to(Position::new(leading + 200)).expect("the gap has been seen");
+            ground.keep(canopy).expect("there is room");
+        }
+        let end = 1000 + 400 * plants;
+        let told = (0..end).rev().filter(|&position| {
+            ground.roll_to(Position::new(position));
+            ground.rolled_back_too_far()
+        });
+        assert_eq!(told.count(), 1);
+    }
+
+    #[test]
     fn the_beam_is_outrun_where_the_lead_reaches_from_the_tool_to_the_margin_of_what_it_has_not_seen() {
         let (mut ground, _) = ground();
         let reach = ground.geometry.beam_to_tool - ground.geometry.margin;

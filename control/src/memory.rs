@@ -1,7 +1,7 @@
 //! Memory that outlives the power, a byte at a time, and the check on what it keeps.
 //!
 //! The EEPROM takes 3.4 ms to write a byte. So whoever keeps something there writes one byte whenever the memory can take
-//! one, and nothing waits. What the bytes mean is the business of [`saved`](crate::operate::saved) and [`taught`](crate::ground::field_examples),
+//! one, and nothing waits. What the bytes mean is the business of [`saved`](crate::operate::saved) and [`field_examples`](crate::ground::field_examples),
 //! each of which has a memory of [`SIZE`] bytes to itself.
 
 use crc::{CRC_16_IBM_SDLC, Crc, NoTable};

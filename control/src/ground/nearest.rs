@@ -161,6 +161,30 @@ mod tests {
     }
 
     #[test]
+    fn examples_from_the_field_that_have_no_vote_are_not_there() {
+        let mut examples = FieldExamples::asleep(Volatile::new());
+        let taught = Example::new([7; features::COUNT], label::PLANT);
+        for _ in 0..3 {
+            examples.add(taught).expect("there is room");
+        }
+        let seen = |vote| {
+            let field = FromField { examples: &examples, vote };
+            (field.len(), field.example(2), field.example(3))
+        };
+        assert_eq!(seen(true), (3, Some(taught), None));
+        assert_eq!(seen(false), (0, None, None));
+    }
+
+    #[test]
+    fn spoiled_examples_from_the_field_are_counted_when_it_wakes_up() {
+        let mut memory = Volatile::new();
+        (memory.bytes[0], memory.bytes[100]) = (0, 0);
+        let mut nearest = Nearest::new([Example::new([0; features::COUNT], label::WEED); 1], memory);
+        nearest.wake_up();
+        assert_eq!(nearest.spoiled(), 2);
+    }
+
+    #[test]
     fn what_is_forgotten_is_listed_no_longer_and_votes_no_longer() {
         let features = Features::describe(556, 300, 60);
         let bytes = examples::scale().quantise(&features.values());

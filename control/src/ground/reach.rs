@@ -126,6 +126,17 @@ mod tests {
     }
 
     #[test]
+    fn the_ground_that_has_to_be_open_lies_between_the_leads_and_a_part_of_them_farther() {
+        let forward = Leads { out: Length(103), back: Length(60), response: Length::ZERO };
+        assert_eq!(forward.stretch(false), (Length(75), Length(103)));
+        assert_eq!(forward.stretch(true), (Length(75 - 16), Length(103 + 43 + 1)));
+        let late_back = Leads { back: Length(100), ..forward };
+        assert_eq!(late_back.stretch(true), (Length(103 - 21), Length(103 + 25 + 1)));
+        let backward = Leads { out: Length(-103), back: Length(-60), ..forward };
+        assert_eq!(backward.stretch(true), (Length(16 - 75), Length(-103 - 43 - 1)));
+    }
+
+    #[test]
     fn a_lead_is_what_is_rolled_in_its_time_and_a_millisecond_and_none_is_none() {
         let mut settings = Settings::new();
         let leads = |settings: &Settings| {

@@ -272,3 +272,44 @@ impl BeamMonitor {
         (self.edges > FLICKER_EDGES).then_some(Alarm::BeamFlickers)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::units::Interval;
+
+    #[test]
+    fn a_turn_at_either_end_of_a_time_is_allowed_for() {
+        assert_eq!([0, 3, 4, 5, 200].map(grace), [4, 4, 5, 6, 201]);
+    }
+
+    #[test]
+    fn a_time_too_long_for_the_short_form_is_the_longest() {
+        assert_eq!([0, 4, 1020, 1023, 1024, u16::MAX].map(shortened), [0, 1, 255, 255, 255, 255]);
+    }
+
+    #[test]
+    fn a_gap_is_a_quarter_longer_than_steady_progress_and_a_silence_one_and_a_half_times_longer() {
+        for (steady, turn, gap, silence) in [(40, 0, 40 + 10 + 4, 80 + 20 + 8), (59, 9, 59 + 14 + 10, 118 + 29 + 20)] {
+            assert_eq!([gap, gap + 1].map(|time| is_gap(time, steady, turn)), [false, true]);
+            assert_eq!([silence, silence + 1].map(|time| is_silence(time, steady, turn)), [false, true]);
+        }
+    }
+
+    /// Whether an edge to and one fro, so many milliseconds apart, are a dead channel within so many edges.
+    fn is_dead_channel(edge_ms: u32, edges: u32) -> bool {
+        let at = |ms: u32| Instant::new(Interval::from_ms(ms).steps());
+        let mut monitor = EncoderMonitor::new(at(0), Position::new(0));
+        (1..=edge_ms * edges).any(|ms| {
+            let position = Position::new((ms / edge_ms % 2) as i32);
+            monitor.read(at(ms), position, 0, 4) == Some(Alarm::EncoderChannelDead)
+        })
+    }
+
+    #[test]
+    fn edges_that_lead_nowhere_are_a_dead_channel_where_they_come_faster_than_any_tremble() {
+        assert!(!is_dead_channel(5, 80));
+        assert!(is_dead_channel(5, 81));
+        assert!(!is_dead_channel(7, 1000), "71 in half a second");
+    }
+}
