@@ -55,7 +55,6 @@ impl<M: Memory> SavedSettings<M> {
 
     /// [`load`](Self::load), without room for a copy on the stack; returns whether a copy is whole. Where none is, `settings` are worth
     /// nothing.
-    #[inline(never)]
     pub fn load_into(&mut self, settings: &mut Settings) -> bool {
         let sequence = |copy| self.memory.read(address(copy) + SEQUENCE);
         // Where only one copy is whole, it does not matter which of them is tried first.
@@ -81,7 +80,6 @@ impl<M: Memory> SavedSettings<M> {
     }
 
     /// Carries on with a save, without waiting; whether all has been written.
-    #[inline(never)]
     pub fn carry_on(&mut self) -> bool {
         if !self.memory.is_ready() {
             return false;

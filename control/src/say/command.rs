@@ -284,17 +284,20 @@ macro_rules! commands {
 }
 
 commands! {
+    // Whose lines have most words to be read stand first, as the search takes 70 cycles a row.
+    Label Plant => Command::Label { label: label::PLANT, force: false };
+    Label Weed => Command::Label { label: label::WEED, force: false };
+    Calibrate Start => Command::CalibrateStart;
+    Calibrate Servo => Command::CalibrateServo;
+    Test Row => Command::TestRow { speed_mm_s: TEST_SPEED_MM_S };
     Help => Command::Help;
     Status => Command::Status;
     Get => Command::GetAll;
     Save => Command::Save;
     Revert => Command::Revert;
     Defaults => Command::Defaults;
-    Calibrate Start => Command::CalibrateStart;
-    Calibrate Servo => Command::CalibrateServo;
     Servo In => Command::ServoIn;
     Servo Out => Command::ServoOut;
-    Test Row => Command::TestRow { speed_mm_s: TEST_SPEED_MM_S };
     Start => Command::Start { now: false };
     Start Now => Command::Start { now: true };
     Hold => Command::Hold;
@@ -304,8 +307,6 @@ commands! {
     Plot On => Command::Plot(Plot::Arduino);
     Plot Off => Command::Plot(Plot::Off);
     Plot Teleplot => Command::Plot(Plot::Teleplot);
-    Label Plant => Command::Label { label: label::PLANT, force: false };
-    Label Weed => Command::Label { label: label::WEED, force: false };
     Examples => Command::Examples;
     Forget All => Command::ForgetAll;
     Dump => Command::Dump;
