@@ -243,13 +243,8 @@ pub fn parse(line: &[u8]) -> Result<Command, Mistake> {
 /// What a word and the one behind it say, if anything.
 fn said(word: Word, argument: Option<Argument>) -> Option<Command> {
     let words = [word as u8, argument_number(argument)];
-    for place in 0..COMMANDS {
-        let row = TABLE.load_at(usize::from(place));
-        if row.words == words {
-            return Some(row.command);
-        }
-    }
-    None
+    let place = (0..ROWS).map(usize::from).find(|&place| WORDS.load_at(place) == words)?;
+    Some(COMMANDS.load_at(place))
 }
 
 /// A word behind a command's by its number, and none at all by the one behind them.
@@ -260,31 +255,24 @@ const fn argument_number(argument: Option<Argument>) -> u8 {
     }
 }
 
-/// A command that its words tell without a number or a setting.
-#[derive(Clone, Copy)]
-struct Row {
-    /// Numbers of the word and of the one behind it.
-    words: [u8; 2],
-    command: Command,
-}
-
-/// Makes the table of all such commands.
+/// Makes the tables of all commands that their words tell without a number or a setting: the numbers of a word and of the one behind
+/// it, and what they say. Two tables, as the first is read row by row.
 macro_rules! commands {
     () => { None };
     ($argument:ident) => { Some(Argument::$argument) };
     ($($word:ident $($argument:ident)? => $command:expr;)*) => {
-        const COMMANDS: u8 = [$(Word::$word),*].len() as u8;
+        const ROWS: u8 = [$(Word::$word),*].len() as u8;
 
         avr_progmem::progmem! {
-            static progmem TABLE: [Row; COMMANDS as usize] = [$(
-                Row { words: [Word::$word as u8, argument_number(commands!($($argument)?))], command: $command },
-            )*];
+            static progmem WORDS: [[u8; 2]; ROWS as usize] =
+                [$([Word::$word as u8, argument_number(commands!($($argument)?))]),*];
+            static progmem COMMANDS: [Command; ROWS as usize] = [$($command),*];
         }
     };
 }
 
 commands! {
-    // Whose lines have most words to be read stand first, as the search takes 70 cycles a row.
+    // Whose lines have most words to be read stand first, as the search takes 30 cycles a row.
     Label Plant => Command::Label { label: label::PLANT, force: false };
     Label Weed => Command::Label { label: label::WEED, force: false };
     Calibrate Start => Command::CalibrateStart;
