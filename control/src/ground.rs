@@ -58,7 +58,6 @@ impl Ground {
     };
 
     /// Ground of which nothing has been seen, with the beam at a position, broken or not.
-    #[inline(never)]
     pub fn begin(&mut self, settings: &Settings, position: Position, broken: bool) {
         self.geometry = Geometry::of(settings);
         self.beam = self.geometry.grain.place(position);
@@ -68,7 +67,6 @@ impl Ground {
     }
 
     /// Works out what follows from other settings. With another grain, what was seen means nothing any more.
-    #[inline(never)]
     pub fn follow(&mut self, settings: &Settings, position: Position, speed: TicksPerSecond) {
         let before = self.geometry.grain;
         self.geometry = Geometry::of(settings);
@@ -85,14 +83,12 @@ impl Ground {
     }
 
     /// Takes an edge of the beam, with the position at which it came; returns the object that was complete before it.
-    #[inline(never)]
     pub fn edge(&mut self, position: Position, broken: bool) -> Option<Object> {
         let place = self.geometry.grain.place(position) - self.leads.response;
         self.watch.edge(place, broken, self.geometry.merge_gap)
     }
 
     /// The machine has rolled to a position; returns the object that this completes.
-    #[inline(never)]
     pub fn roll_to(&mut self, position: Position) -> Option<Object> {
         let had_left = self.schedule.has_left(self.tool());
         self.beam = self.geometry.grain.place(position);

@@ -62,7 +62,6 @@ impl Console {
 
     /// Does the next thing for which a turn of the loop is long enough: has a byte kept for good, carries out what was typed, or
     /// puts the next line together. An answer comes in one piece, then what there is to tell, then the curves.
-    #[inline(never)]
     pub fn carry_on<C: Classifier, M: Memory>(&mut self, controller: &mut Controller<C, M>) {
         // An answer waits for what its command wrote to the EEPROM: `ok` means that it is there.
         if !self.line.is_done() || !controller.carry_on() {

@@ -198,7 +198,6 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     }
 
     /// The last part of a [`turn`](Self::turn), for a test that looks in between.
-    #[inline(never)]
     pub fn step(&mut self, readings: Readings) -> Orders {
         self.readings = readings;
         let doubted = self.odometer.read(readings.position, readings.jumps, self.believes_jumps());

@@ -117,35 +117,37 @@ fn search<const FEATURES: usize, const CLASSES: usize>(
     let Some(nearest @ [_, ..]) = nearest else { return Err(ClassifyError::KOutOfRange) };
     // Those that found no place although they are as far as the farthest that has one. Where a nearer one is the farthest
     // later on, they were none after all.
-    let mut level = Level { distance: 0, votes: [0; CLASSES], unknown: false };
+    let mut level = Level::at(Neighbour::FARTHEST);
     examples.keep_nearest(features, nearest, &mut |neighbour| level.count(neighbour));
-    let (Some(&last), Some(&first)) = (nearest.first(), nearest.last()) else {
+    let (Some(last), Some(first)) = (nearest.first(), nearest.last()) else {
         return Err(ClassifyError::KOutOfRange);
     };
-    if last == Neighbour::FARTHEST {
-        return Err(if first == last { ClassifyError::NoExamples } else { ClassifyError::TooFewExamples });
+    if last.is_none() {
+        return Err(if first.is_none() { ClassifyError::NoExamples } else { ClassifyError::TooFewExamples });
     }
-    if level.distance != last.distance() {
+    if !level.neighbour.is_as_far_as(last) {
         (level.votes, level.unknown) = ([0; CLASSES], false);
     }
     for neighbour in nearest.iter() {
         level.vote(neighbour.label());
     }
     let Level { votes, unknown: false, .. } = level else { return Err(ClassifyError::UnknownLabel) };
-    let (mut label, mut most, mut tie) = (0, 0, false);
-    for (class, &votes) in votes.iter().enumerate() {
-        if votes > most {
-            (label, most, tie) = (class as u8, votes, false);
-        } else if votes == most {
+    let (mut label, mut most, mut tie, mut class) = (0, votes[0], false, 0);
+    while class + 1 < CLASSES {
+        class += 1;
+        if votes[class] > most {
+            (label, most, tie) = (class as u8, votes[class], false);
+        } else if votes[class] == most {
             tie = true;
         }
     }
     if tie {
         // Neighbours are sorted by distance and then by label, and the examples that found no place are behind them
         // in the same order: the first leading class met this way is the nearest, and the smallest among equals.
-        // Where none is met, `label` is the smallest already.
+        // Where none is met, `label` is the smallest already. Of two classes, both lead.
         let mut labels = nearest.iter().rev().map(|neighbour| neighbour.label());
-        label = labels.find(|&label| votes.get(usize::from(label)) == Some(&most)).unwrap_or(label);
+        let mut leads = |label: &u8| CLASSES == 2 || votes.get(usize::from(*label)) == Some(&most);
+        label = labels.find(&mut leads).unwrap_or(label);
     }
     let nearest = first.distance();
     let kind = match (nearest > radius, tie) {
@@ -158,22 +160,37 @@ fn search<const FEATURES: usize, const CLASSES: usize>(
 
 /// The votes of those that are as far as the k-th nearest and found no place among them.
 struct Level<const CLASSES: usize> {
-    distance: u32,
+    /// One of them.
+    neighbour: Neighbour,
     votes: [usize; CLASSES],
     /// Whether a voter's label is not a class.
     unknown: bool,
 }
 
 impl<const CLASSES: usize> Level<CLASSES> {
+    /// None, at the distance of a neighbour.
+    #[inline(always)]
+    fn at(neighbour: Neighbour) -> Self {
+        Self { neighbour, votes: [0; CLASSES], unknown: false }
+    }
+
     fn count(&mut self, neighbour: Neighbour) {
-        if neighbour.distance() != self.distance {
-            *self = Self { distance: neighbour.distance(), votes: [0; CLASSES], unknown: false };
+        if !self.neighbour.is_as_far_as(&neighbour) {
+            *self = Self::at(neighbour);
         }
         self.vote(neighbour.label());
     }
 
     #[inline(always)]
     fn vote(&mut self, label: u8) {
+        if CLASSES == 2 {
+            // The chip asks which of two it is in fewer cycles than it takes to find the place.
+            match (label, self.votes.as_mut_slice()) {
+                (0, [votes, _]) | (1, [_, votes]) => *votes = votes.wrapping_add(1),
+                _ => self.unknown = true,
+            }
+            return;
+        }
         match self.votes.get_mut(usize::from(label)) {
             Some(votes) => *votes = votes.wrapping_add(1),
             None => self.unknown = true,

@@ -10,8 +10,8 @@ pub const MAX_FEATURES: usize = 258;
 pub(crate) const DISTANCE_LIMIT: u32 = 1 << 24;
 
 const _: () = assert!(
-    MAX_FEATURES as u64 * 255 * 255 < DISTANCE_LIMIT as u64 - 1,
-    "every distance is below 24 bits of ones, which stand for `no neighbour`"
+    MAX_FEATURES as u64 * 255 * 255 < DISTANCE_LIMIT as u64 - (1 << 8),
+    "in no distance are the upper two of three bytes all ones, which stands for `no neighbour`"
 );
 
 /// Squared Euclidean distance, from 0 to `FEATURES * 65_025`.

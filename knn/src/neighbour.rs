@@ -6,8 +6,11 @@
 use crate::distance::DISTANCE_LIMIT;
 
 /// An example as a search meets it: its squared distance, and its label.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Neighbour(u32);
+///
+/// Kept as the bytes of its [`key`](Self::key), the label first: an 8-bit processor looks at one of them faster than at a number of which
+/// it would be a part.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Neighbour([u8; 4]);
 
 impl Neighbour {
     /// Farther than every example: a place that nothing has taken yet.
@@ -17,35 +20,51 @@ impl Neighbour {
     #[inline]
     #[must_use]
     pub const fn new(distance: u32, label: u8) -> Self {
-        Self(distance << 8 | label as u32)
+        let [low, middle, high, _] = distance.to_le_bytes();
+        Self([label, low, middle, high])
     }
 
     /// A neighbour of another class that is as far.
     #[inline]
     #[must_use]
     pub const fn with_label(self, label: u8) -> Self {
-        Self(self.0 & !0xFF | label as u32)
+        let Self([_, low, middle, high]) = self;
+        Self([label, low, middle, high])
     }
 
     /// The distance in the upper 24 bits, the label in the lower 8.
     #[inline]
     #[must_use]
     pub const fn key(self) -> u32 {
-        self.0
+        u32::from_le_bytes(self.0)
     }
 
     /// The squared distance.
     #[inline]
     #[must_use]
     pub const fn distance(self) -> u32 {
-        self.0 >> 8
+        self.key() >> 8
     }
 
     /// The class.
     #[inline]
     #[must_use]
     pub const fn label(self) -> u8 {
-        self.0 as u8
+        self.0[0]
+    }
+
+    /// Whether it is no example, but [`FARTHEST`](Self::FARTHEST).
+    #[inline]
+    #[must_use]
+    pub const fn is_none(&self) -> bool {
+        // No example is so far that the distance's upper two bytes are all ones.
+        u16::from_le_bytes([self.0[2], self.0[3]]) == u16::MAX
+    }
+
+    /// Whether both are at the same distance.
+    #[inline]
+    pub(crate) const fn is_as_far_as(&self, other: &Self) -> bool {
+        self.0[1] == other.0[1] && self.0[2] == other.0[2] && self.0[3] == other.0[3]
     }
 
     /// Takes its place among the `nearest`, farthest first, where it is not too far for that.
@@ -70,24 +89,34 @@ impl Neighbour {
     /// ```
     #[inline]
     pub fn join(self, nearest: &mut [Self], level: &mut impl FnMut(Self)) {
+        let out = self.displace(nearest);
+        if !out.is_none() {
+            level(out);
+        }
+    }
+
+    /// [`join`](Self::join), but returns the one that is level; [`FARTHEST`](Self::FARTHEST) where none is.
+    ///
+    /// Out of line, as it takes more code than a call of it.
+    #[inline(never)]
+    fn displace(self, nearest: &mut [Self]) -> Self {
         let mut places = nearest.iter_mut();
-        let Some(mut place) = places.next() else { return };
-        let farthest = *place;
-        let out = if self >= farthest {
-            self
-        } else {
+        let Some(mut place) = places.next() else { return Self::FARTHEST };
+        let mut out = self;
+        if self.key() < place.key() {
+            out = *place;
             for nearer in places {
-                if self >= *nearer {
+                if self.key() >= nearer.key() {
                     break;
                 }
                 *place = *nearer;
                 place = nearer;
             }
             *place = self;
-            farthest
-        };
-        if nearest.first().is_some_and(|farthest| farthest.distance() == out.distance()) && out != Self::FARTHEST {
-            level(out);
+        }
+        match nearest.first() {
+            Some(farthest) if farthest.is_as_far_as(&out) => out,
+            _ => Self::FARTHEST,
         }
     }
 }

@@ -138,7 +138,7 @@ fn no_turn_takes_more_than_a_millisecond_whatever_is_typed_and_told() {
 }
 
 /// A turn on the move, at most: one that judges an object, or reads a line while the speed changes, is the longest.
-const JUDGING: u64 = TURN * 4 / 3;
+const JUDGING: u64 = TURN * 7 / 6;
 
 #[test]
 fn no_turn_takes_much_more_than_a_millisecond_while_a_row_rolls_by() {

@@ -56,7 +56,6 @@ impl<M: Memory> FieldExamples<M> {
     }
 
     /// Looks through the memory for the examples that it holds.
-    #[inline(never)]
     pub fn wake_up(&mut self) {
         self.spoiled = 0;
         for number in 0..CAPACITY {
@@ -87,7 +86,6 @@ impl<M: Memory> FieldExamples<M> {
     ///
     /// # Errors
     /// The example, when all slots are taken.
-    #[inline(never)]
     pub fn add(&mut self, example: Taught) -> Result<u8, Taught> {
         let Some(number) = self.slots.iter().position(|&slot| slot != Slot::Held) else {
             return Err(example);

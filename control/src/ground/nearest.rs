@@ -38,7 +38,7 @@ impl<B: Examples<{ features::COUNT }>, M: Memory> Nearest<B, M> {
     /// Asks the `k` nearest of the built-in examples and, `with_field`, of those from the field.
     #[inline(never)]
     fn vote(&self, features: &Features, k: u8, with_field: bool) -> Vote {
-        let query = examples::scale().quantise(&features.values());
+        let query = scaled(features);
         let all = (&self.built_in, FromField { examples: &self.field, vote: with_field });
         let answer = knn::classify::<{ features::COUNT }, { label::COUNT }>(&all, &query, k, examples::RADIUS);
         let Ok(Answer { label, votes, kind, .. }) = answer else {
@@ -52,6 +52,12 @@ impl<B: Examples<{ features::COUNT }>, M: Memory> Nearest<B, M> {
         let votes = votes.get(usize::from(label)).copied().unwrap_or(0);
         Vote { class, votes: votes as u8 }
     }
+}
+
+/// The features in bytes, by the scale of the examples.
+#[inline(never)]
+fn scaled(features: &Features) -> [u8; features::COUNT] {
+    examples::scale().quantise(&features.values())
 }
 
 /// The examples from the field, which may have no vote.
@@ -96,7 +102,7 @@ impl<B: Examples<{ features::COUNT }>, M: Memory> Classifier for Nearest<B, M> {
     }
 
     fn teach(&mut self, features: &Features, label: u8) -> Result<(), ExamplesFull> {
-        let example = Example::new(examples::scale().quantise(&features.values()), label);
+        let example = Example::new(scaled(features), label);
         self.field.add(example).map(|_| ()).map_err(|_| ExamplesFull)
     }
 

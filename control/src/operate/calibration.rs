@@ -9,8 +9,8 @@ use crate::units::{Instant, Interval, Position};
 /// The shortest stretch that tells the wheel to better than 0.1 %.
 pub const SHORTEST_MM: u16 = 1000;
 
-/// By how much a calibrated wheel may differ from what its diameter gives, in percent.
-const TOLERANCE_PERCENT: u32 = 30;
+/// By how much a calibrated wheel may differ from what its diameter gives, in tenths: 30 %.
+const TOLERANCE_TENTHS: u32 = 3;
 
 /// Why a stretch tells nothing of the wheel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,12 +54,13 @@ impl Distance {
         let length_mm = u32::from(length_mm);
         // Up to 4 million ticks, 250 m of the finest wheel, which nobody measures by hand.
         let ticks = (position - begin).0.unsigned_abs().min(u32::MAX / 1000 - 1);
-        let counted = ((ticks * 1000 + length_mm / 2) / length_mm).min(u16::MAX.into());
-        let differs = counted.abs_diff(nominal.into()) * 100 > u32::from(nominal) * TOLERANCE_PERCENT;
+        let counted = ((ticks * 1000 + length_mm / 2) / length_mm).min(u16::MAX.into()) as u16;
+        // Whole ticks differ by more than the tolerance where they do by more than its whole ticks.
+        let differs = counted.abs_diff(nominal) > (u32::from(nominal) * TOLERANCE_TENTHS / 10) as u16;
         if counted == 0 || differs && !forced {
-            return Err(Unfit::Differs { counted: counted as u16, nominal });
+            return Err(Unfit::Differs { counted, nominal });
         }
-        Ok(counted as u16)
+        Ok(counted)
     }
 }
 

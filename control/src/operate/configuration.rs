@@ -24,13 +24,11 @@ impl<M: Memory> Configuration<M> {
 
     /// Loads what is saved, or the defaults; returns what is wrong with it.
     pub fn load(&mut self) -> Option<Alarm> {
-        let loaded = self.saved.load();
-        let fault = match &loaded {
-            None => Some(Alarm::SettingsLost),
-            Some(settings) => settings.contradiction().map(|_| Alarm::SettingsContradict),
-        };
-        self.settings = loaded.unwrap_or_default();
-        fault
+        if self.saved.load_into(&mut self.settings) {
+            return self.settings.contradiction().map(|_| Alarm::SettingsContradict);
+        }
+        self.settings = Settings::new();
+        Some(Alarm::SettingsLost)
     }
 
     /// The settings in use.
@@ -98,7 +96,9 @@ impl<M: Memory> Configuration<M> {
     /// # Errors
     /// [`Refusal::NothingSaved`].
     pub fn take_saved(&mut self) -> Result<(), Refusal> {
-        self.settings = self.saved.settings().ok_or(Refusal::NothingSaved)?;
+        if !self.saved.restore(&mut self.settings) {
+            return Err(Refusal::NothingSaved);
+        }
         self.changed = true;
         Ok(())
     }

@@ -48,20 +48,26 @@ impl<M: Memory> SavedSettings<M> {
     }
 
     /// Loads the newest copy that is whole; `None` where neither is.
-    #[inline(never)]
     pub fn load(&mut self) -> Option<Settings> {
+        let mut settings = Settings::NONE;
+        self.load_into(&mut settings).then_some(settings)
+    }
+
+    /// [`load`](Self::load), without room for a copy on the stack; returns whether a copy is whole. Where none is, `settings` are worth
+    /// nothing.
+    pub fn load_into(&mut self, settings: &mut Settings) -> bool {
         let sequence = |copy| self.memory.read(address(copy) + SEQUENCE);
         // Where only one copy is whole, it does not matter which of them is tried first.
         let newer = u8::from(sequence(1).wrapping_sub(sequence(0)).cast_signed() > 0);
         for turn in 0..2 {
             let copy = newer ^ turn;
-            if let Some(settings) = self.read(copy) {
+            if self.read(copy, settings) {
                 self.exists = true;
                 (self.older, self.sequence) = (copy ^ 1, self.memory.read(address(copy) + SEQUENCE));
-                return Some(settings);
+                return true;
             }
         }
-        None
+        false
     }
 
     /// Begins to save the settings as they are now; [`carry_on`](Self::carry_on) finishes it.
@@ -74,7 +80,6 @@ impl<M: Memory> SavedSettings<M> {
     }
 
     /// Carries on with a save, without waiting; whether all has been written.
-    #[inline(never)]
     pub fn carry_on(&mut self) -> bool {
         if !self.memory.is_ready() {
             return false;
@@ -97,9 +102,18 @@ impl<M: Memory> SavedSettings<M> {
         self.exists.then(|| self.value_at(self.newest(), setting))
     }
 
-    /// The settings that are saved, if any are: of a copy that was whole when it was loaded, or was written since.
-    pub fn settings(&self) -> Option<Settings> {
-        if self.exists { self.values(self.newest()) } else { None }
+    /// Puts what is saved in the place of `settings`: a copy that was whole when it was loaded, or was written since. Returns whether
+    /// anything is; else they stay.
+    ///
+    /// Out of line, as there would be room for two more copies on the stack of whoever carries a command out.
+    #[inline(never)]
+    pub fn restore(&self, settings: &mut Settings) -> bool {
+        let mut saved = Settings::NONE;
+        let exists = self.exists && self.values(self.newest(), &mut saved);
+        if exists {
+            *settings = saved;
+        }
+        exists
     }
 
     /// The memory, to be looked at or put into another machine.
@@ -118,22 +132,17 @@ impl<M: Memory> SavedSettings<M> {
         u16::from_le_bytes([self.memory.read(place), self.memory.read(place + 1)])
     }
 
-    /// The values of the copy that begins at an address; `None` where one is out of its range.
+    /// Sets `settings` to the values of the copy that begins at an address; whether none is out of its range.
     #[inline(never)]
-    fn values(&self, copy: u16) -> Option<Settings> {
-        let mut settings = Settings::NONE;
-        for setting in Setting::all() {
-            settings.set(setting, self.value_at(copy, setting)).ok()?;
-        }
-        Some(settings)
+    fn values(&self, copy: u16, settings: &mut Settings) -> bool {
+        Setting::all().all(|setting| settings.set(setting, self.value_at(copy, setting)).is_ok())
     }
 
-    /// A copy; `None` unless it is whole.
-    fn read(&self, copy: u8) -> Option<Settings> {
+    /// Sets `settings` to a copy; whether it is whole.
+    fn read(&self, copy: u8, settings: &mut Settings) -> bool {
         let byte = |place| self.memory.read(address(copy) + place);
-        let settings = self.values(address(copy))?;
-        let is_whole = (0..).zip(image(&settings, byte(SEQUENCE))).all(|(place, right)| byte(place) == right);
-        is_whole.then_some(settings)
+        self.values(address(copy), settings)
+            && (0..).zip(image(settings, byte(SEQUENCE))).all(|(place, right)| byte(place) == right)
     }
 }
 

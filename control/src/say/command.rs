@@ -199,33 +199,14 @@ pub fn parse(line: &[u8]) -> Result<Command, Mistake> {
     let usage = Err(Mistake::Usage(word));
     let (first, rest) = split_word(rest);
     let (second, rest) = split_word(rest);
-    // Few commands take two words, and `set` nothing less.
-    let fits = match word {
-        Word::Set => !second.is_empty(),
-        Word::Calibrate | Word::Test | Word::Label => true,
-        _ => second.is_empty(),
-    };
-    if !fits || !split_word(rest).0.is_empty() {
+    if !split_word(rest).0.is_empty() {
         return usage;
     }
-    if first.is_empty() {
-        return match word {
-            Word::Help => Ok(Command::Help),
-            Word::Status => Ok(Command::Status),
-            Word::Get => Ok(Command::GetAll),
-            Word::Save => Ok(Command::Save),
-            Word::Revert => Ok(Command::Revert),
-            Word::Defaults => Ok(Command::Defaults),
-            Word::Start => Ok(Command::Start { now: false }),
-            Word::Hold => Ok(Command::Hold),
-            Word::Clear => Ok(Command::Clear),
-            Word::Examples => Ok(Command::Examples),
-            Word::Dump => Ok(Command::Dump),
-            Word::Version => Ok(Command::Version),
-            _ => usage,
-        };
-    }
-    if let Word::Help | Word::Get | Word::Set = word {
+    if let (Word::Help | Word::Get | Word::Set, false) = (word, first.is_empty()) {
+        // `set` takes two words, the others one.
+        if second.is_empty() == matches!(word, Word::Set) {
+            return usage;
+        }
         let setting = Setting::find(first).ok_or(Mistake::UnknownSetting)?;
         return match word {
             Word::Help => Ok(Command::Explain(setting)),
@@ -233,36 +214,91 @@ pub fn parse(line: &[u8]) -> Result<Command, Mistake> {
             _ => value(setting, second).map(|value| Command::Set(setting, value)).ok_or(Mistake::Value(setting)),
         };
     }
+    let argument = Argument::find(first);
     // What is refused because it looks wrong can be insisted on.
     let force = Argument::find(second) == Some(Argument::Force);
-    if !second.is_empty() && !force && word != Word::Test {
-        return usage;
-    }
-    let command = match (word, Argument::find(first), number(first)) {
-        (Word::Start, Some(Argument::Now), _) => Command::Start { now: true },
-        (Word::Events, Some(Argument::On), _) => Command::Events(true),
-        (Word::Events, Some(Argument::Off), _) => Command::Events(false),
-        (Word::Plot, Some(Argument::On), _) => Command::Plot(Plot::Arduino),
-        (Word::Plot, Some(Argument::Off), _) => Command::Plot(Plot::Off),
-        (Word::Plot, Some(Argument::Teleplot), _) => Command::Plot(Plot::Teleplot),
-        (Word::Label, Some(Argument::Plant), _) => Command::Label { label: label::PLANT, force },
-        (Word::Label, Some(Argument::Weed), _) => Command::Label { label: label::WEED, force },
-        (Word::Forget, Some(Argument::All), _) => Command::ForgetAll,
-        (Word::Forget, _, Some(number @ 0..=255)) => Command::Forget(number as u8),
-        (Word::Servo, Some(Argument::In), _) => Command::ServoIn,
-        (Word::Servo, Some(Argument::Out), _) => Command::ServoOut,
-        (Word::Servo, _, Some(pulse_us)) => Command::Servo(pulse_us),
-        (Word::Calibrate, _, Some(distance_mm)) => Command::Calibrate { distance_mm, force },
-        (Word::Calibrate, Some(Argument::Start), _) if !force => Command::CalibrateStart,
-        (Word::Calibrate, Some(Argument::Servo), _) if !force => Command::CalibrateServo,
-        (Word::Test, Some(Argument::Row), _) if second.is_empty() => Command::TestRow { speed_mm_s: TEST_SPEED_MM_S },
-        (Word::Test, Some(Argument::Row), _) => match number(second) {
-            Some(speed_mm_s) => Command::TestRow { speed_mm_s },
-            None => return usage,
-        },
-        _ => return usage,
+    let command = if first.is_empty() || argument.is_some() {
+        let Some(command) = said(word, argument) else { return usage };
+        command
+    } else {
+        match (word, number(first)) {
+            (Word::Forget, Some(number @ 0..=255)) => Command::Forget(number as u8),
+            (Word::Servo, Some(pulse_us)) => Command::Servo(pulse_us),
+            (Word::Calibrate, Some(distance_mm)) => Command::Calibrate { distance_mm, force },
+            _ => return usage,
+        }
     };
-    Ok(command)
+    match command {
+        Command::Label { label, .. } if force => Ok(Command::Label { label, force }),
+        Command::Calibrate { .. } if force => Ok(command),
+        Command::TestRow { .. } if !second.is_empty() => match number(second) {
+            Some(speed_mm_s) => Ok(Command::TestRow { speed_mm_s }),
+            None => usage,
+        },
+        _ if second.is_empty() => Ok(command),
+        _ => usage,
+    }
+}
+
+/// What a word and the one behind it say, if anything.
+fn said(word: Word, argument: Option<Argument>) -> Option<Command> {
+    let words = [word as u8, argument_number(argument)];
+    let place = (0..ROWS).map(usize::from).find(|&place| WORDS.load_at(place) == words)?;
+    Some(COMMANDS.load_at(place))
+}
+
+/// A word behind a command's by its number, and none at all by the one behind them.
+const fn argument_number(argument: Option<Argument>) -> u8 {
+    match argument {
+        Some(argument) => argument as u8,
+        None => Argument::COUNT,
+    }
+}
+
+/// Makes the tables of all commands that their words tell without a number or a setting: the numbers of a word and of the one behind
+/// it, and what they say. Two tables, as the first is read row by row.
+macro_rules! commands {
+    () => { None };
+    ($argument:ident) => { Some(Argument::$argument) };
+    ($($word:ident $($argument:ident)? => $command:expr;)*) => {
+        const ROWS: u8 = [$(Word::$word),*].len() as u8;
+
+        avr_progmem::progmem! {
+            static progmem WORDS: [[u8; 2]; ROWS as usize] =
+                [$([Word::$word as u8, argument_number(commands!($($argument)?))]),*];
+            static progmem COMMANDS: [Command; ROWS as usize] = [$($command),*];
+        }
+    };
+}
+
+commands! {
+    // Whose lines have most words to be read stand first, as the search takes 30 cycles a row.
+    Label Plant => Command::Label { label: label::PLANT, force: false };
+    Label Weed => Command::Label { label: label::WEED, force: false };
+    Calibrate Start => Command::CalibrateStart;
+    Calibrate Servo => Command::CalibrateServo;
+    Test Row => Command::TestRow { speed_mm_s: TEST_SPEED_MM_S };
+    Help => Command::Help;
+    Status => Command::Status;
+    Get => Command::GetAll;
+    Save => Command::Save;
+    Revert => Command::Revert;
+    Defaults => Command::Defaults;
+    Servo In => Command::ServoIn;
+    Servo Out => Command::ServoOut;
+    Start => Command::Start { now: false };
+    Start Now => Command::Start { now: true };
+    Hold => Command::Hold;
+    Clear => Command::Clear;
+    Events On => Command::Events(true);
+    Events Off => Command::Events(false);
+    Plot On => Command::Plot(Plot::Arduino);
+    Plot Off => Command::Plot(Plot::Off);
+    Plot Teleplot => Command::Plot(Plot::Teleplot);
+    Examples => Command::Examples;
+    Forget All => Command::ForgetAll;
+    Dump => Command::Dump;
+    Version => Command::Version;
 }
 
 /// What a word says for a setting: a number, or `on` or `off` for one that is switched.
