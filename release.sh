@@ -5,7 +5,7 @@
 #
 # weeder.hex          the firmware, for the page or avrdude to write
 # firmware.txt        its size, and what it can need at most of stack and time
-# page/               the page: open its index.html
+# page/               the page: open its index.html, or have `weeder serve` give it to a phone
 # weeder              the host tools, for computers like this one
 # manual/             README.md and all that it leads to
 # licences/           what is inside, by whom and under which licence, with the licences' texts

@@ -4,9 +4,11 @@
 import hex from "weeder.hex";
 import { Parts } from "./dom.ts";
 import { Flasher } from "./flasher/flasher.ts";
+import { isServed } from "./link/served.ts";
 import type { Wire } from "./link/session.ts";
 import { Connection } from "./panel/connection.ts";
 import { Panel } from "./panel/panel.ts";
+import { showServed } from "./panel/served.ts";
 import { Drawing } from "./try/drawing.ts";
 import { inWords } from "./try/outcome.ts";
 import { Trial } from "./try/trial.ts";
@@ -57,14 +59,37 @@ trialPanel.onHappening = (happening) => {
 /** What is waited for before the settings are saved. */
 let settleAt: "connected" | undefined;
 
-const workPanel = new Panel(find("work-panel", HTMLElement), "work");
-const connection = new Connection(new Parts(find("connection", HTMLElement)), workPanel);
+/** The panels of real machines. */
+let workPanels: Panel[] = [];
 const flasher = new Flasher(find("view-flash", HTMLElement), hex);
-flasher.onBegin = (port) => connection.release(port);
-flasher.onWork = (port) => {
-    location.hash = "#work";
-    void connection.connect(port);
-};
+if (isServed()) void workServed();
+else workHere();
+
+/** The machine at this computer's own port. */
+function workHere(): void {
+    const panel = new Panel(find("work-panel", HTMLElement), "work");
+    workPanels = [panel];
+    const connection = new Connection(new Parts(find("connection", HTMLElement)), panel);
+    flasher.onBegin = (port) => connection.release(port);
+    flasher.onWork = (port) => {
+        location.hash = "#work";
+        void connection.connect(port);
+    };
+}
+
+/** The machines at the ports of the computer that serves this page. */
+async function workServed(): Promise<void> {
+    const served = find("served", HTMLElement);
+    served.hidden = false;
+    for (const id of ["connection", "work-panel"]) find(id, HTMLElement).hidden = true;
+    try {
+        workPanels = await showServed(served);
+    } catch (error) {
+        served.append(
+            `The machines cannot be asked for: ${error instanceof Error ? error.message : error}. Load the page anew.`,
+        );
+    }
+}
 
 /** Shows what is chosen. */
 function choose(): void {
@@ -173,7 +198,7 @@ function frame(nowMs: number): void {
         }
         trialPanel.turn(trialMs());
         showTrial();
-    } else if (!find("view-work", HTMLElement).hidden) workPanel.show();
+    } else if (!find("view-work", HTMLElement).hidden) for (const panel of workPanels) panel.show();
     requestAnimationFrame(frame);
 }
 

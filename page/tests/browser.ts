@@ -49,8 +49,23 @@ export interface Opened {
     readonly errors: string[];
 }
 
+/** Opens an address, to which all requests go. */
+export async function openAt(browser: Browser, address: string, viewport = DESK): Promise<Opened> {
+    const opened = await blank(browser, viewport, new URL(address).origin);
+    await opened.page.goto(address);
+    return opened;
+}
+
 /** Opens the page at a view. `ports` are the serial ports from which the operator chooses one after the other; none: no Web Serial. */
 export async function open(browser: Browser, view: string, viewport = DESK, ports?: Device[]): Promise<Opened> {
+    const opened = await blank(browser, viewport, "file:");
+    if (ports) await offerPorts(opened.page, ports);
+    await opened.page.goto(`${pathToFileURL(resolve("dist/index.html")).href}#${view}`);
+    return opened;
+}
+
+/** A page that has opened nothing yet, and is to ask for nothing that does not begin like this. */
+async function blank(browser: Browser, viewport: typeof DESK, own: string): Promise<Opened> {
     const page = await browser.newPage({ viewport });
     page.setDefaultTimeout(PATIENCE_MS);
     const errors: string[] = [];
@@ -59,10 +74,9 @@ export async function open(browser: Browser, view: string, viewport = DESK, port
         if (message.type() === "error") errors.push(message.text());
     });
     page.on("request", (request) => {
-        if (!/^(file|blob|data):/.test(request.url())) errors.push(`asks for ${request.url()}`);
+        if (!request.url().startsWith(own) && !/^(blob|data):/.test(request.url()))
+            errors.push(`asks for ${request.url()}`);
     });
-    if (ports) await offerPorts(page, ports);
-    await page.goto(`${pathToFileURL(resolve("dist/index.html")).href}#${view}`);
     return { page, errors };
 }
 

@@ -25,6 +25,7 @@ mod plan;
 mod progress;
 mod record;
 mod replay;
+mod serve;
 mod settings;
 mod sim;
 mod soak;
@@ -81,6 +82,8 @@ enum Command {
     Classify(classify::Arguments),
     /// Watch the machine, and type into its console.
     Monitor(monitor::Arguments),
+    /// Serve the page to a phone: what the machines at this computer do, and HOLD.
+    Serve(serve::Arguments),
     /// Write down what the machine does, for as long as it does it.
     Record(record::Arguments),
     /// Decide anew on the host what a log's machine met, and say where that differs.
@@ -152,6 +155,7 @@ fn main() -> ExitCode {
         Command::Train(arguments) => train::run(&arguments),
         Command::Classify(arguments) => classify::run(&arguments),
         Command::Monitor(arguments) => monitor::run(&arguments),
+        Command::Serve(arguments) => serve::run(&arguments).map(|()| Finding::Good),
         Command::Record(arguments) => record::run(&arguments).map(|()| Finding::Good),
         Command::Replay(arguments) => replay::run(&arguments),
         Command::Settings(arguments) => settings::run(&arguments),

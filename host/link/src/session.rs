@@ -3,7 +3,8 @@
 //! [`Session::turn`] is called over and over. It types what was asked of it, one command at a time, asks for the status when
 //! nothing else is under way, and tells what happened. It waits no longer than a read does, except for the Uno to start where
 //! a port is opened. After every start of the Uno it asks for the settings and the examples and turns the events on; after every
-//! command that changes settings it asks for them anew.
+//! command that changes settings it asks for them anew. [`Session::hold`] waits for nobody. Where the Uno is lost, so is every
+//! command that was not answered.
 
 use super::settings::{self, Settings, SettingsError};
 use super::{EventLine, Link, LinkError, Said, Status, is_greeting};
@@ -18,6 +19,9 @@ const PATIENCE: Duration = Duration::from_secs(3);
 
 /// Time between two tries to open the port again.
 const RETRY: Duration = Duration::from_secs(1);
+
+/// The command that takes the tool out.
+const HOLD: &str = "hold";
 
 /// Most lines that are told of in one turn, so that a machine that says much cannot keep it from turning.
 const LINES: usize = 64;
@@ -51,12 +55,19 @@ pub enum Happening {
     Settings(Settings),
 }
 
-/// What the firmware is answering.
+/// What the firmware is to answer.
 enum Question {
     Status,
     Command,
     /// The settings, with the lines that have come.
     Settings(Vec<String>),
+}
+
+/// A question that was typed, and when.
+struct Asked {
+    question: Question,
+    line: String,
+    since: Instant,
 }
 
 /// A way to a link.
@@ -66,14 +77,17 @@ type Opener = Box<dyn FnMut() -> Result<Link, LinkError>>;
 pub struct Session {
     open: Opener,
     link: Option<Link>,
-    asked: Option<(Question, Instant)>,
-    /// The command that is being answered.
-    asked_for: String,
+    /// What is not answered yet, in the order of the answers: one question, and every `hold` that came behind it.
+    asked: VecDeque<Asked>,
     waiting: VecDeque<String>,
+    /// Whether the machine is to hold before anything else is typed.
+    is_to_hold: bool,
     /// Whether settings have changed since they were asked for.
     settings_changed: bool,
     poll_at: Option<Instant>,
     retry_at: Option<Instant>,
+    /// Whether nobody was told yet why there is no Uno.
+    is_lost_untold: bool,
     happened: VecDeque<Happening>,
 }
 
@@ -84,19 +98,25 @@ impl Session {
     /// Where the first link fails.
     pub fn open(mut open: impl FnMut() -> Result<Link, LinkError> + 'static) -> Result<Self, SettingsError> {
         let link = open()?;
-        let mut session = Self {
+        let mut session = Self::waiting_for(open);
+        session.connect(link)?;
+        Ok(session)
+    }
+
+    /// A session without a link: `open` is called by the turns, over and over until there is an Uno. Why there is none at first is told.
+    pub fn waiting_for(open: impl FnMut() -> Result<Link, LinkError> + 'static) -> Self {
+        Self {
             open: Box::new(open),
             link: None,
-            asked: None,
-            asked_for: String::new(),
+            asked: VecDeque::new(),
             waiting: VecDeque::new(),
+            is_to_hold: false,
             settings_changed: false,
             poll_at: None,
             retry_at: None,
+            is_lost_untold: true,
             happened: VecDeque::new(),
-        };
-        session.connect(link)?;
-        Ok(session)
+        }
     }
 
     /// Types a command as soon as those before it have been answered; whether it can be one and found a place to wait.
@@ -108,9 +128,18 @@ impl Session {
         fits
     }
 
+    /// Has the machine hold in the next turn, before all that waits, which is dropped: how many commands that were, the last ones.
+    /// What is being answered is answered to its end, and then the `hold`; one that is last of that already counts for this one too.
+    pub fn hold(&mut self) -> usize {
+        // The chip has room for few characters: one that is under way already is not typed again.
+        self.is_to_hold |= self.asked.back().is_none_or(|asked| asked.line != HOLD);
+        self.waiting.drain(..).count()
+    }
+
     /// Whether no command waits for its answer.
     pub fn is_idle(&self) -> bool {
-        self.waiting.is_empty() && !matches!(self.asked, Some((Question::Command, _)))
+        let is_command = |asked: &Asked| matches!(asked.question, Question::Command);
+        self.waiting.is_empty() && !self.is_to_hold && !self.asked.iter().any(is_command)
     }
 
     /// Whether the Uno is there.
@@ -124,9 +153,9 @@ impl Session {
             Some(link) => self.listen(link, now),
             None if self.retry_at.is_none_or(|at| now >= at) => {
                 self.retry_at = Some(now + RETRY);
+                let opened = (self.open)().map_err(SettingsError::from).and_then(|link| self.connect(link));
                 // Whatever is wrong with it now was said when it was lost.
-                let _ = (self.open)().map_err(SettingsError::from).and_then(|link| self.connect(link));
-                Ok(())
+                if self.is_lost_untold { opened } else { Ok(()) }
             }
             None => {
                 std::thread::sleep(Duration::from_millis(20));
@@ -134,12 +163,18 @@ impl Session {
             }
         };
         if let Err(error) = result {
-            self.asked = None;
-            self.waiting.clear();
             self.retry_at = Some(now + RETRY);
-            self.happened.push_back(Happening::Lost(error.to_string()));
+            self.lose(error.to_string());
         }
         self.happened.drain(..).collect()
+    }
+
+    /// The Uno is gone, or has started anew: nothing that was asked will be answered.
+    fn lose(&mut self, why: String) {
+        self.asked.clear();
+        self.waiting.clear();
+        (self.is_to_hold, self.is_lost_untold) = (false, false);
+        self.happened.push_back(Happening::Lost(why));
     }
 
     /// Takes a link whose firmware has just started.
@@ -153,7 +188,7 @@ impl Session {
         let status = status.into_iter().find_map(|line| Some((Status::parse(&line)?, line)));
         self.happened.extend(status.map(|(status, line)| Happening::Status(status, line)));
         self.link = Some(link);
-        (self.asked, self.poll_at, self.settings_changed) = (None, None, false);
+        (self.poll_at, self.settings_changed, self.is_lost_untold) = (None, false, false);
         Ok(())
     }
 
@@ -161,33 +196,37 @@ impl Session {
         for _ in 0..LINES {
             let Some(line) = link.next_line()? else { break };
             if is_greeting(&line) {
-                self.happened.push_back(Happening::Lost("the Uno was reset".to_owned()));
+                self.lose("the Uno was reset".to_owned());
                 return self.connect(link);
             }
             self.take(line);
         }
-        if self.asked.as_ref().is_some_and(|&(_, since)| now.saturating_duration_since(since) > PATIENCE) {
-            return Err(LinkError::Silent { command: self.asked_for.clone(), received: String::new() }.into());
+        let is_old = |asked: &&Asked| now.saturating_duration_since(asked.since) > PATIENCE;
+        if let Some(Asked { line, .. }) = self.asked.front().filter(is_old) {
+            return Err(LinkError::Silent { command: line.clone(), received: String::new() }.into());
         }
-        if self.asked.is_none() {
-            let question = if let Some(command) = self.waiting.pop_front() {
-                self.happened.push_back(Happening::Command(command.clone()));
-                Some((Question::Command, command))
+        if std::mem::take(&mut self.is_to_hold) {
+            self.type_line(&mut link, Question::Command, HOLD.to_owned(), now)?;
+        } else if self.asked.is_empty() {
+            if let Some(command) = self.waiting.pop_front() {
+                self.type_line(&mut link, Question::Command, command, now)?;
             } else if self.poll_at.is_none_or(|at| now >= at) {
                 self.poll_at = Some(now + POLL);
-                Some((Question::Status, "status".to_owned()))
+                self.type_line(&mut link, Question::Status, "status".to_owned(), now)?;
             } else if std::mem::take(&mut self.settings_changed) {
-                Some((Question::Settings(Vec::new()), "get".to_owned()))
-            } else {
-                None
-            };
-            if let Some((question, line)) = question {
-                link.send(&line)?;
-                self.asked = Some((question, now));
-                self.asked_for = line;
+                self.type_line(&mut link, Question::Settings(Vec::new()), "get".to_owned(), now)?;
             }
         }
         self.link = Some(link);
+        Ok(())
+    }
+
+    fn type_line(&mut self, link: &mut Link, question: Question, line: String, now: Instant) -> Result<(), LinkError> {
+        if let Question::Command = question {
+            self.happened.push_back(Happening::Command(line.clone()));
+        }
+        link.send(&line)?;
+        self.asked.push_back(Asked { question, line, since: now });
         Ok(())
     }
 
@@ -200,27 +239,27 @@ impl Session {
             return;
         }
         let is_end = matches!(said, Said::Done | Said::Refused(_));
-        match &mut self.asked {
-            Some((Question::Status, _)) => {
+        // The end of an answer that was given up is nobody's.
+        let Some(asked) = self.asked.front_mut() else { return };
+        match &mut asked.question {
+            Question::Status => {
                 if let Said::Status(status) = said {
                     self.happened.push_back(Happening::Status(status, line));
                 }
             }
-            Some((Question::Command, _)) => {
-                self.settings_changed |= said == Said::Done && changes_settings(&self.asked_for);
+            Question::Command => {
+                self.settings_changed |= said == Said::Done && changes_settings(&asked.line);
                 self.happened.push_back(Happening::Answer(line));
             }
-            Some((Question::Settings(lines), _)) if is_end => match settings::shown_by(lines) {
+            Question::Settings(lines) if is_end => match settings::shown_by(lines) {
                 Ok(settings) => self.happened.push_back(Happening::Settings(settings)),
                 // Noise has spoiled a line: once more.
                 Err(_) => self.settings_changed = true,
             },
-            Some((Question::Settings(lines), _)) => lines.push(line),
-            // The end of an answer that was given up.
-            None => {}
+            Question::Settings(lines) => lines.push(line),
         }
         if is_end {
-            self.asked = None;
+            self.asked.pop_front();
         }
     }
 }

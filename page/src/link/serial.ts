@@ -3,6 +3,7 @@
 // Every failure says its cause and the way out. The browser does not tell a port that is busy from one that may not be
 // opened: both are said then. What comes garbled is lost by the port and ends nothing; a pulled cable does.
 
+import { isServed } from "./served.ts";
 import type { Wire } from "./session.ts";
 
 /** What is wrong with a port, and what to do. */
@@ -17,6 +18,11 @@ const GONE = "the port is gone: its cable was pulled, or the Uno lost its power;
 
 /** Why this browser offers no serial port here, and the way that works; nothing where it does. */
 export function whyNoSerial(): string | undefined {
+    if (isServed())
+        return (
+            "This page comes from weeder serve, which has the machines' ports itself and flashes nothing; and over plain http a " +
+            "browser gives no page a serial port. To flash, end it and run weeder flash there, or open the page's folder on that computer."
+        );
     if (globalThis.isSecureContext === false)
         return (
             "This page came over plain http, and over that a browser gives no page a serial port. " +

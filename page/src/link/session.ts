@@ -17,6 +17,8 @@ export interface Wire {
     onText: (text: string) => void;
     /** The line is gone, and why; never called after `close`. */
     onEnd: (why: string) => void;
+    /** Hears the machine's status, where the wire tells that without being asked. */
+    onStatus?: (line: string) => void;
     send(text: string): void;
     close(): Promise<void>;
 }
@@ -25,6 +27,8 @@ export interface Wire {
 const POLL_MS = 100;
 /** Time after which an answer is given up: the longest, all examples, takes less than a second. */
 const PATIENCE_MS = 2000;
+/** The same where others type to the machine as well, and whoever asks it for all of them gives an answer in any case. */
+const SHARED_PATIENCE_MS = 35_000;
 /** Time in which the greeting comes after a reset, behind a bootloader: the old ones wait for two seconds. */
 const BOOT_MS = 3000;
 /** How often the firmware's name is asked for again. */
@@ -75,6 +79,8 @@ export class Session {
     #now = 0;
     #pollAt = Number.POSITIVE_INFINITY;
     #ended = false;
+    /** Whether the wire tells the status by itself, as one does at which there are others. */
+    #isShared = false;
     /** Until when a greeting is waited for. */
     #greetingBy: number;
     /** Something that has come and is no weeder's. */
@@ -87,6 +93,9 @@ export class Session {
         this.#greetingBy = resets ? now + BOOT_MS : now;
         wire.onText = (text) => this.#hear(text);
         wire.onEnd = (why) => this.#end(why);
+        if (!wire.onStatus) return;
+        this.#isShared = true;
+        wire.onStatus = (line) => this.#hearStatus(line);
     }
 
     /** Types a command for the operator when those before it are answered, and gives back its answer without the `ok`. */
@@ -111,9 +120,9 @@ export class Session {
             void this.#begin();
         }
         const [oldest] = this.#asked;
-        if (oldest && now - oldest.since > PATIENCE_MS) this.#giveUp(oldest);
+        if (oldest && now - oldest.since > (this.#isShared ? SHARED_PATIENCE_MS : PATIENCE_MS)) this.#giveUp(oldest);
         if (this.#asked.length > 0) return;
-        if (this.#waiting.length === 0 && now >= this.#pollAt) {
+        if (this.#waiting.length === 0 && now >= this.#pollAt && !this.#isShared) {
             this.#pollAt = now + POLL_MS;
             void this.#ask("status", false).catch(() => {});
         }
@@ -212,6 +221,11 @@ export class Session {
 
     #hear(text: string): void {
         for (const line of this.#lines.take(text)) this.#take(line);
+    }
+
+    #hearStatus(line: string): void {
+        const said = read(line);
+        if (this.isReady && said.is === "status") this.onHappening({ is: "status", status: said.status, line });
     }
 
     #take(line: string): void {

@@ -46,7 +46,7 @@ export class Examples {
         this.#parts.write("examples-count", `${field.length} of ${PLACES} places are taken.`);
         this.#parts.html("examples-list").replaceChildren(
             ...field.map(({ number, label }) => {
-                const forget = make("button", "", "Forget");
+                const forget = make("button", "needs-change", "Forget");
                 forget.type = "button";
                 forget.ariaLabel = `Forget example ${number}`;
                 forget.addEventListener("click", () => void this.#forget(String(number)));

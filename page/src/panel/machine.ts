@@ -34,6 +34,8 @@ const REASONS: Readonly<Record<string, string>> = {
 export class Machine {
     /** The firmware's version, where the machine is there. */
     version: string | undefined;
+    /** Whether it may be started from here. */
+    mayStart = true;
     /** Why it is not there. */
     lost = "No machine is connected.";
     mode: Mode = "hold";
@@ -158,7 +160,7 @@ export class Machine {
         if (this.mode === "alarm") return "The tool is out until the alarm is cleared.";
         if (this.mode === "hold")
             return this.toolOut
-                ? "The tool is out: the machine holds until it is started, by the work switch or here."
+                ? `The tool is out: the machine holds until it is started, by the work switch${this.mayStart ? " or here" : ""}.`
                 : "The tool is moved by hand. Keep clear of it.";
         if (!this.toolOut) return "The tool is in the row, and weeds.";
         const reason = this.status?.reason ?? "plant";

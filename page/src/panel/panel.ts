@@ -5,6 +5,7 @@
 
 import { download, Parts } from "../dom.ts";
 import { Log } from "../link/log.ts";
+import type { Allowed } from "../link/served.ts";
 import { type Ask, type Happening, NoMachine, Session, type Wire } from "../link/session.ts";
 import { Calibration } from "./calibration.ts";
 import { Console } from "./console.ts";
@@ -12,6 +13,9 @@ import { Examples } from "./examples.ts";
 import { fault, Machine, sentence } from "./machine.ts";
 import { SettingsForm } from "./settings.ts";
 import { drawStrip } from "./strip.ts";
+
+/** At a machine's own port. */
+const EVERYTHING: Allowed = { mayStart: true, mayChange: true };
 
 /** What stands beside what is needed at work, a tab each. */
 const TABS = ["settings", "calibrate", "examples", "console"] as const;
@@ -30,8 +34,8 @@ export class Panel {
     #session: Session | undefined;
     #now = 0;
 
-    /** Fills an element. `name` tells it from the page's other panels. */
-    constructor(into: HTMLElement, name: string) {
+    /** Fills an element. `name` tells it from the page's other panels, `allowed` says what may be typed from here. */
+    constructor(into: HTMLElement, name: string, allowed = EVERYTHING) {
         const template = document.getElementById("panel");
         if (!(template instanceof HTMLTemplateElement)) throw new Error("the page has no template #panel");
         into.append(template.content.cloneNode(true));
@@ -39,7 +43,7 @@ export class Panel {
         this.#parts = parts;
         const ask: Ask = (command) => this.ask(command);
         this.#console = new Console(parts, (line) => void ask(line).catch((error) => this.#cannot(error)));
-        this.#settings = new SettingsForm(parts, this.machine, ask);
+        this.#settings = new SettingsForm(parts, this.machine, ask, allowed.mayChange);
         this.#calibration = new Calibration(parts, this.machine, ask);
         this.#examples = new Examples(parts, this.machine, ask);
         this.#strip = parts.get("strip", SVGSVGElement);
@@ -53,7 +57,15 @@ export class Panel {
             // So that what comes can be replayed by itself.
             if (version !== undefined) this.#log.add({ is: "connected", version, settings, examples }, this.#now);
         });
-        this.#wireTabs(name);
+        this.machine.mayStart = allowed.mayStart;
+        into.classList.toggle("may-not-start", !allowed.mayStart);
+        into.classList.toggle("may-not-change", !allowed.mayChange);
+        parts.html("limits").hidden = allowed.mayChange;
+        parts.write("limits", limits(allowed));
+        this.#wireTabs(
+            name,
+            TABS.filter((tab) => allowed.mayChange || tab !== "calibrate"),
+        );
         this.#showConnected();
     }
 
@@ -175,17 +187,20 @@ export class Panel {
         this.#parts.write("drive-said", sentence(error instanceof Error ? error.message : String(error)));
     }
 
-    #wireTabs(name: string): void {
+    #wireTabs(name: string, tabs: readonly (typeof TABS)[number][]): void {
         const tab = (which: string) => this.#parts.get(`tab-${which}`, HTMLButtonElement);
         const body = (which: string) => this.#parts.html(`body-${which}`);
         const choose = (chosen: string) => {
-            for (const which of TABS) {
+            for (const which of tabs) {
                 tab(which).ariaSelected = String(which === chosen);
                 tab(which).tabIndex = which === chosen ? 0 : -1;
                 body(which).hidden = which !== chosen;
             }
         };
-        for (const [index, which] of TABS.entries()) {
+        for (const which of TABS) {
+            tab(which).hidden = body(which).hidden = !tabs.includes(which);
+        }
+        for (const [index, which] of tabs.entries()) {
             tab(which).id = `${name}-tab-${which}`;
             body(which).id = `${name}-body-${which}`;
             tab(which).setAttribute("aria-controls", body(which).id);
@@ -194,11 +209,19 @@ export class Panel {
             tab(which).addEventListener("keydown", ({ key }) => {
                 const by = { ArrowLeft: -1, ArrowRight: 1 }[key];
                 if (by === undefined) return;
-                const next = TABS[(index + by + TABS.length) % TABS.length] ?? which;
+                const next = tabs[(index + by + tabs.length) % tabs.length] ?? which;
                 choose(next);
                 tab(next).focus();
             });
         }
         choose("console");
     }
+}
+
+/** What may be done from here, and where the rest may. */
+function limits({ mayStart }: Allowed): string {
+    return mayStart
+        ? "From here the machine is watched, started and held. Settings, calibration and teaching are for the computer that has its port."
+        : "From here the machine is watched and held. It is started, and its alarms are cleared, at the machine itself, or from here " +
+              "where weeder serve was started with --allow-start. Settings, calibration and teaching are for the computer that has its port.";
 }

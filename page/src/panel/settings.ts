@@ -12,12 +12,13 @@ export class SettingsForm {
     readonly #machine: Machine;
     readonly #ask: Ask;
     readonly #list: HTMLElement;
+    readonly #mayChange: boolean;
     /** What the operator wants and the machine does not have, by name. */
     readonly #wanted = new Map<string, number>();
     readonly #problems = new Map<string, string>();
 
-    constructor(parts: Parts, machine: Machine, ask: Ask) {
-        [this.#parts, this.#machine, this.#ask] = [parts, machine, ask];
+    constructor(parts: Parts, machine: Machine, ask: Ask, mayChange: boolean) {
+        [this.#parts, this.#machine, this.#ask, this.#mayChange] = [parts, machine, ask, mayChange];
         this.#list = parts.html("settings-list");
         parts.button("settings-send", () => void this.#send());
         parts.button("settings-undo", () => this.#undo());
@@ -51,6 +52,7 @@ export class SettingsForm {
         const { name, unit, isSwitched, value, saved, least, greatest } = setting;
         const input = make("input", "");
         input.dataset.setting = name;
+        input.disabled = !this.#mayChange;
         const wanted = this.#wanted.get(name) ?? value;
         const change = (value: number) => {
             this.#problems.delete(name);

@@ -201,3 +201,63 @@ fn an_answer_that_does_not_come_is_given_up() {
     assert!(happened.iter().any(|happening| matches!(happening, Happening::Lost(_))), "{happened:?}");
     assert!(session.is_idle());
 }
+
+#[test]
+fn hold_is_typed_at_once_and_what_waits_is_dropped() {
+    let (mut session, _, says) = session();
+    let now = Instant::now();
+    second(&mut session, now);
+    // One that is being answered, and two that wait.
+    assert!(session.command("silence"));
+    session.turn(now + Duration::from_secs(1));
+    assert!(session.command("start") && session.command("start now"));
+    assert_eq!(session.hold(), 2);
+    assert!(!session.is_idle());
+    let now = now + Duration::from_secs(1);
+    assert_eq!(session.turn(now), [Happening::Command("hold".to_owned())]);
+    // What comes first is the answer to the first one. A second hold is not typed.
+    let ok = Happening::Answer("ok".to_owned());
+    assert_eq!(session.hold(), 0);
+    assert_eq!(session.turn(now), std::slice::from_ref(&ok));
+    says.borrow_mut().extend(b"ok\r\n");
+    assert_eq!(second(&mut session, now), [ok]);
+    assert!(session.is_idle());
+}
+
+#[test]
+fn what_was_typed_before_a_reset_is_not_carried_out_after_it() {
+    let (mut session, _, says) = session();
+    let now = Instant::now();
+    second(&mut session, now);
+    assert!(session.command("silence"));
+    session.turn(now + Duration::from_secs(1));
+    assert!(session.command("start"));
+    session.hold();
+    assert!(session.command("start"));
+    says.borrow_mut().extend(b"weeder 0.1.0, reset by brown_out, state hold, tool out; help lists the commands\r\n");
+    let happened = second(&mut session, now + Duration::from_secs(1));
+    assert!(matches!(happened.as_slice(), [Happening::Lost(_), Happening::Connected { .. }]), "{happened:?}");
+    assert!(session.is_idle());
+}
+
+#[test]
+fn a_session_without_an_uno_says_why_once_and_finds_it_later() {
+    let plugged_in = Rc::new(Cell::new(false));
+    let plug = Rc::clone(&plugged_in);
+    let open = move || {
+        if !plug.get() {
+            return Err(LinkError::Absent("it".to_owned()));
+        }
+        let (typed, to_read) = (Vec::new(), VecDeque::new());
+        let (plugged_in, says) = (Rc::clone(&plug), Says::default());
+        Link::over(Firmware { plugged_in, says, wheel_mm: 400, typed, to_read }, false)
+    };
+    let mut session = Session::waiting_for(open);
+    let now = Instant::now();
+    let lost = second(&mut session, now);
+    assert!(matches!(lost.as_slice(), [Happening::Lost(why)] if why.starts_with("there is no port it")), "{lost:?}");
+    assert_eq!(second(&mut session, now + Duration::from_secs(5)), []);
+    plugged_in.set(true);
+    let found = second(&mut session, now + Duration::from_secs(10));
+    assert!(matches!(found.as_slice(), [Happening::Connected { .. }]), "{found:?}");
+}

@@ -1,0 +1,307 @@
+//! The page over http, from the computer that has the serial ports of one machine or several to a phone in the cab.
+//!
+//! [`Server::open`] takes the addresses and starts the machines, [`Server::run`] serves until it is told to stop. What may be decided
+//! without a network is decided without one, in parts that know neither socket nor clock: [`door`] says which requests come in,
+//! [`pairing`] who may come in over the network, [`rules`] what may be typed from where. [`machine`] talks to one machine in a thread
+//! of its own, [`hub`] tells all pages what the machines say, and [`routes`] and this file are the shell round them.
+//!
+//! It is for a network that one trusts to be read: http is not encrypted. It flashes nothing, and gives no file away but the page's own.
+
+pub mod door;
+pub mod hub;
+pub mod machine;
+pub mod page;
+pub mod pairing;
+mod places;
+mod routes;
+pub mod rules;
+
+use self::door::Door;
+use self::hub::Hub;
+use self::machine::Machine;
+use self::page::Page;
+use self::pairing::{CODE_LENGTH, Code, Pairing};
+use self::places::Places;
+use self::routes::{Served, Visitor, routes};
+use axum::Extension;
+use axum::Router;
+use hyper::server::conn::http1;
+use hyper_util::rt::{TokioIo, TokioTimer};
+use hyper_util::service::TowerToHyperService;
+use link::{Link, LinkError};
+use std::io;
+use std::net::{Ipv4Addr, SocketAddr};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+use thiserror::Error;
+use tokio::net::{TcpListener, TcpSocket, TcpStream};
+use tokio::runtime::{self, Runtime};
+use tokio::time::sleep;
+use tokio_io_timeout::TimeoutStream;
+
+/// A way to a machine, tried again whenever it is lost.
+pub type Opener = Box<dyn FnMut() -> Result<Link, LinkError> + Send>;
+
+/// Says something to the operator at this computer.
+pub type Tell = Arc<dyn Fn(&str) + Send + Sync>;
+
+/// Time in which a request's head has to come, the time before it included.
+const HEAD_TIME: Duration = Duration::from_secs(10);
+
+/// Bytes of a request's head, and of an answer that waits for its reader, beside what the system keeps.
+const HEAD_BYTES: usize = 8 * 1024;
+
+/// Bytes that the system keeps for a reader, as it counts them.
+const UNREAD_BYTES: u32 = 16 * 1024;
+
+/// Time in which a reader has to take at least a byte of what waits for him.
+const READER_TIME: Duration = Duration::from_secs(5);
+
+/// Time between two looks at whether to stop.
+const LOOK: Duration = Duration::from_millis(100);
+
+/// What is to be served, where.
+pub struct Setup {
+    /// The machines: a name, and the way to each.
+    pub machines: Vec<(String, Opener)>,
+    /// The page.
+    pub page: Page,
+    /// The TCP port; 0 takes one that is free.
+    pub port: u16,
+    /// This computer's address in the network, if it is to be served there as well.
+    pub lan: Option<Ipv4Addr>,
+    /// Whether paired phones may start the machines.
+    pub may_start: bool,
+    /// Says something to the operator.
+    pub tell: Tell,
+}
+
+/// Why it is not served.
+#[derive(Debug, Error)]
+pub enum ServeError {
+    /// The computer is in no network.
+    #[error("this computer is in no network: join one, or name its address in one, as in `--lan 192.168.4.1`")]
+    NoNetwork,
+    /// It is in several.
+    #[error("this computer has several addresses: choose the one of the phone's network, as in `--lan {}`, of {}",
+        .0[0], .0.iter().map(Ipv4Addr::to_string).collect::<Vec<_>>().join(", "))]
+    SeveralNetworks(Vec<Ipv4Addr>),
+    /// An address that stands for all, or for this computer alone by its usual name.
+    #[error(
+        "{0} is no address for a phone to open: name this computer's own in the phone's network, or say --lan alone"
+    )]
+    NoAddress(Ipv4Addr),
+    /// Something else has the port.
+    #[error("port {} of {} is in use: end what has it, or choose another by --http-port", .0.port(), .0.ip())]
+    InUse(SocketAddr),
+    /// The address is another computer's.
+    #[error("{0} is none of this computer's addresses: say --lan alone, or name one that it has")]
+    NotMine(Ipv4Addr),
+    /// The address cannot be had.
+    #[error("{address} cannot be listened at")]
+    NotBound {
+        /// The address.
+        address: SocketAddr,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// The system lacks something.
+    #[error("the system gives no {0}")]
+    System(&'static str, #[source] io::Error),
+}
+
+/// Served machines.
+pub struct Server {
+    runtime: Runtime,
+    doors: Vec<(TcpListener, Door, Places)>,
+    routes: Router,
+    here: SocketAddr,
+    lan: Option<(SocketAddr, Code)>,
+}
+
+impl Server {
+    /// Takes the addresses, and starts to talk to the machines. A machine that is not there is waited for.
+    ///
+    /// # Errors
+    /// Where an address cannot be had.
+    pub fn open(setup: Setup) -> Result<Self, ServeError> {
+        let runtime = runtime::Builder::new_current_thread().enable_io().enable_time().build();
+        let runtime = runtime.map_err(|error| ServeError::System("way to wait for sockets", error))?;
+        let mut random = [0; CODE_LENGTH];
+        getrandom::fill(&mut random).map_err(|error| ServeError::System("randomness", error.into()))?;
+        let code = Code::new(random);
+
+        let listening = {
+            let _inside = runtime.enter();
+            listen(setup.lan, setup.port, setup.may_start)?
+        };
+        let Listening { doors, here, lan } = listening;
+        let hub = Arc::new(Hub::new(setup.machines.len()));
+        let start =
+            |(number, (name, open))| Machine::start(number, name, open, Arc::clone(&hub), Arc::clone(&setup.tell));
+        let machines = setup.machines.into_iter().enumerate().map(start).collect();
+        let pairing = Mutex::new(Pairing::new(code.clone()));
+        let routes = routes(Arc::new(Served { page: setup.page, machines, hub, pairing, tell: setup.tell }));
+        Ok(Self { runtime, doors, routes, here, lan: lan.map(|address| (address, code)) })
+    }
+
+    /// Where this computer itself opens the page.
+    pub fn here(&self) -> SocketAddr {
+        self.here
+    }
+
+    /// Where a phone opens it, and the code that it needs.
+    pub fn lan(&self) -> Option<(SocketAddr, &Code)> {
+        self.lan.as_ref().map(|(address, code)| (*address, code))
+    }
+
+    /// Serves until `stop` is set.
+    pub fn run(self, stop: &AtomicBool) {
+        for (listener, door, places) in self.doors {
+            self.runtime.spawn(attend(listener, Arc::new(door), places, self.routes.clone()));
+        }
+        self.runtime.block_on(async {
+            while !stop.load(Ordering::Relaxed) {
+                sleep(LOOK).await;
+            }
+        });
+        // Whoever listens is not waited for.
+        self.runtime.shutdown_background();
+    }
+}
+
+/// This computer's address in its network, where it is in one.
+///
+/// # Errors
+/// Where it is in none, or in several.
+pub fn find_lan() -> Result<Ipv4Addr, ServeError> {
+    let addresses = if_addrs::get_if_addrs().map_err(|error| ServeError::System("list of its addresses", error))?;
+    only_lan(addresses.into_iter().filter_map(|interface| match interface.ip() {
+        std::net::IpAddr::V4(address) => Some(address),
+        std::net::IpAddr::V6(_) => None,
+    }))
+}
+
+fn only_lan(addresses: impl Iterator<Item = Ipv4Addr>) -> Result<Ipv4Addr, ServeError> {
+    // Others are seen from everywhere, or by nobody else; whoever wants one of them names it.
+    let mut networks: Vec<Ipv4Addr> =
+        addresses.filter(|address| address.is_private() || address.is_link_local()).collect();
+    networks.dedup();
+    match networks.as_slice() {
+        [] => Err(ServeError::NoNetwork),
+        [only] => Ok(*only),
+        _ => Err(ServeError::SeveralNetworks(networks)),
+    }
+}
+
+/// The addresses, taken.
+struct Listening {
+    doors: Vec<(TcpListener, Door, Places)>,
+    here: SocketAddr,
+    lan: Option<SocketAddr>,
+}
+
+fn listen(lan: Option<Ipv4Addr>, port: u16, may_start: bool) -> Result<Listening, ServeError> {
+    let (listener, here) = bind(Ipv4Addr::LOCALHOST, port)?;
+    let mut doors = vec![(listener, Door::here(here.port()), Places::for_one())];
+    let Some(address) = lan else { return Ok(Listening { doors, here, lan: None }) };
+    if address.is_unspecified() || address.is_broadcast() || address.is_multicast() || address == Ipv4Addr::LOCALHOST {
+        return Err(ServeError::NoAddress(address));
+    }
+    let (listener, bound) = bind(address, here.port())?;
+    doors.push((listener, Door::lan(address, bound.port(), may_start), Places::for_many()));
+    Ok(Listening { doors, here, lan: Some(bound) })
+}
+
+/// Listens at an address, and says which port that was.
+fn bind(address: Ipv4Addr, port: u16) -> Result<(TcpListener, SocketAddr), ServeError> {
+    let asked = SocketAddr::from((address, port));
+    let bind = || {
+        let socket = TcpSocket::new_v4()?;
+        // As it is after the end of the one before, whose connections linger; on Windows it would share the port.
+        #[cfg(unix)]
+        socket.set_reuseaddr(true)?;
+        // Those that it accepts have the same.
+        socket.set_send_buffer_size(UNREAD_BYTES)?;
+        socket.bind(asked)?;
+        let listener = socket.listen(64)?;
+        let bound = listener.local_addr()?;
+        Ok((listener, bound))
+    };
+    bind().map_err(|error: io::Error| match error.kind() {
+        io::ErrorKind::AddrInUse => ServeError::InUse(asked),
+        io::ErrorKind::AddrNotAvailable => ServeError::NotMine(address),
+        _ => ServeError::NotBound { address: asked, source: error },
+    })
+}
+
+/// Takes connections at a door, as many as there are places.
+async fn attend(listener: TcpListener, door: Arc<Door>, places: Places, routes: Router) {
+    loop {
+        // One that has gone again is no reason to stop; where there are no more files, some end.
+        let Ok((stream, peer)) = listener.accept().await else {
+            sleep(LOOK).await;
+            continue;
+        };
+        let Some(place) = places.take(peer.ip()) else { continue };
+        let visitor = Visitor { address: peer.ip(), door: Arc::clone(&door) };
+        let routes = routes.clone().layer(Extension(visitor));
+        tokio::spawn(async move {
+            serve(stream, routes).await;
+            drop(place);
+        });
+    }
+}
+
+/// Serves a connection to its end. Whoever sends too slowly or does not read is let go of.
+async fn serve(stream: TcpStream, routes: Router) {
+    // It is only slower where it fails.
+    let _ = stream.set_nodelay(true);
+    let mut stream = TimeoutStream::new(stream);
+    stream.set_write_timeout(Some(READER_TIME));
+    let connection = http1::Builder::new()
+        .timer(TokioTimer::new())
+        .header_read_timeout(HEAD_TIME)
+        .max_buf_size(HEAD_BYTES)
+        .serve_connection(TokioIo::new(Box::pin(stream)), TowerToHyperService::new(routes));
+    // However it has ended, it has; the page comes again.
+    let _ = connection.await;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn found(addresses: &[[u8; 4]]) -> Result<Ipv4Addr, String> {
+        only_lan(addresses.iter().map(|&address| address.into())).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn the_only_address_in_a_network_is_found_among_others() {
+        assert_eq!(found(&[[127, 0, 0, 1], [192, 168, 4, 1], [8, 8, 8, 8]]), Ok([192, 168, 4, 1].into()));
+    }
+
+    #[test]
+    fn several_networks_have_to_be_told_apart_and_none_is_said_with_the_way_out() {
+        let error = found(&[[192, 168, 4, 1], [172, 17, 0, 1]]).unwrap_err();
+        assert!(error.ends_with("as in `--lan 192.168.4.1`, of 192.168.4.1, 172.17.0.1"), "{error}");
+        let error = found(&[[127, 0, 0, 1]]).unwrap_err();
+        assert!(error.contains("is in no network: join one"), "{error}");
+    }
+
+    #[test]
+    fn an_address_that_cannot_be_had_is_said_with_what_to_do() {
+        let runtime = runtime::Builder::new_current_thread().enable_io().build().unwrap();
+        let _inside = runtime.enter();
+        let error = |lan: [u8; 4], port| listen(Some(lan.into()), port, false).err().unwrap().to_string();
+        assert!(error([0, 0, 0, 0], 0).contains("no address for a phone to open"));
+        assert!(error([127, 0, 0, 1], 0).contains("no address for a phone to open"));
+        assert!(error([192, 0, 2, 1], 0).contains("192.0.2.1 is none of this computer's addresses"));
+        let taken = listen(None, 0, false).unwrap();
+        assert!(
+            error([127, 0, 0, 2], taken.here.port())
+                .contains("is in use: end what has it, or choose another by --http-port")
+        );
+    }
+}

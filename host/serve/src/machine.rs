@@ -1,0 +1,361 @@
+//! A machine at a serial port, in a thread of its own: it types what it is asked to, one line after the other whoever asks, gives the
+//! answers back, and has the hub tell all else. It decides nothing: what may be typed is decided before.
+
+use super::hub::Hub;
+use super::{Opener, Tell};
+use link::Said;
+use link::session::{Happening, Session};
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::thread;
+use std::time::Instant;
+use tokio::sync::mpsc::error::TryRecvError;
+use tokio::sync::{mpsc, oneshot};
+
+/// Commands that wait to be typed at the most, and as many that wait to hold.
+const WAITING: usize = 64;
+
+/// Lines of an answer that are kept: the longest one has not a tenth of them.
+const LINES: usize = 1000;
+
+/// What came of a line that was to be typed.
+#[derive(Clone, Debug)]
+pub enum Typed {
+    /// The machine's answer; its last line is `ok`, or begins with `error:`.
+    Answered(Vec<String>),
+    /// Somebody had the machine hold first.
+    Dropped,
+    /// The machine was lost before it had answered.
+    Lost(String),
+    /// Too much waits already.
+    Busy,
+}
+
+/// Something to type, and who asks for it.
+struct Line {
+    text: String,
+    asker: oneshot::Sender<Typed>,
+}
+
+/// A machine, for those who want something of it.
+pub struct Machine {
+    /// What the operator calls it.
+    pub name: String,
+    commands: mpsc::Sender<Line>,
+    holds: mpsc::Sender<oneshot::Sender<Typed>>,
+}
+
+impl Machine {
+    /// Starts its thread, which ends when the machine is dropped.
+    pub fn start(number: usize, name: String, open: Opener, hub: Arc<Hub>, tell: Tell) -> Self {
+        let (commands, commands_to_type) = mpsc::channel(WAITING);
+        let (holds, holds_to_type) = mpsc::channel(WAITING);
+        let named = name.clone();
+        thread::spawn(move || {
+            let talk = Talk { number, name: named, hub, tell, asked: VecDeque::new() };
+            talk.run(Session::waiting_for(open), commands_to_type, holds_to_type);
+        });
+        Self { name, commands, holds }
+    }
+
+    /// Types a command when those before it are answered.
+    pub async fn command(&self, text: String) -> Typed {
+        let (asker, answer) = oneshot::channel();
+        match self.commands.try_send(Line { text, asker }) {
+            Ok(()) => answer.await.unwrap_or(Typed::Busy),
+            Err(_) => Typed::Busy,
+        }
+    }
+
+    /// Has it hold, before all that waits.
+    pub async fn hold(&self) -> Typed {
+        let (asker, answer) = oneshot::channel();
+        match self.holds.try_send(asker) {
+            Ok(()) => answer.await.unwrap_or(Typed::Busy),
+            Err(_) => Typed::Busy,
+        }
+    }
+}
+
+/// A line that the session has and is not answered yet.
+#[derive(Default)]
+struct Asked {
+    askers: Vec<oneshot::Sender<Typed>>,
+    is_hold: bool,
+    answer: Vec<String>,
+}
+
+impl Asked {
+    fn end(self, typed: &Typed) {
+        for asker in self.askers {
+            // One that has gone does not want to know.
+            let _ = asker.send(typed.clone());
+        }
+    }
+}
+
+struct Talk {
+    number: usize,
+    name: String,
+    hub: Arc<Hub>,
+    tell: Tell,
+    /// What the session has, in its order.
+    asked: VecDeque<Asked>,
+}
+
+impl Talk {
+    fn run(
+        mut self,
+        mut session: Session,
+        mut commands: mpsc::Receiver<Line>,
+        mut holds: mpsc::Receiver<oneshot::Sender<Typed>>,
+    ) {
+        loop {
+            // Before the commands are: whatever was sent before a hold is among those then, and is dropped by it.
+            let to_hold: Vec<_> = std::iter::from_fn(|| holds.try_recv().ok()).collect();
+            loop {
+                match commands.try_recv() {
+                    Ok(line) => self.command(&mut session, line),
+                    Err(TryRecvError::Empty) => break,
+                    Err(TryRecvError::Disconnected) => return,
+                }
+            }
+            for asker in to_hold {
+                self.hold(&mut session, asker);
+            }
+            for happening in session.turn(Instant::now()) {
+                self.take(happening);
+            }
+        }
+    }
+
+    fn command(&mut self, session: &mut Session, Line { text, asker }: Line) {
+        let asked = Asked { askers: vec![asker], ..Asked::default() };
+        // What is typed to a machine that is not there must not wait until it is.
+        if !session.is_connected() {
+            asked.end(&self.not_there());
+        } else if session.command(&text) {
+            self.asked.push_back(asked);
+        } else {
+            asked.end(&Typed::Busy);
+        }
+    }
+
+    fn hold(&mut self, session: &mut Session, asker: oneshot::Sender<Typed>) {
+        let asked = Asked { askers: vec![asker], is_hold: true, ..Asked::default() };
+        if !session.is_connected() {
+            asked.end(&self.not_there());
+            return;
+        }
+        for _ in 0..session.hold() {
+            if let Some(dropped) = self.asked.pop_back() {
+                dropped.end(&Typed::Dropped);
+            }
+        }
+        match self.asked.back_mut() {
+            // One that is under way counts for this one too, as it does for the session.
+            Some(last) if last.is_hold => last.askers.extend(asked.askers),
+            _ => self.asked.push_back(asked),
+        }
+    }
+
+    fn not_there(&self) -> Typed {
+        Typed::Lost(self.hub.why_lost(self.number).unwrap_or_else(|| "the machine is not there".to_owned()))
+    }
+
+    fn take(&mut self, happening: Happening) {
+        match happening {
+            Happening::Connected { version, .. } => {
+                self.hub.there(self.number, &version);
+                (self.tell)(&format!("{}: weeder {version} is there.", self.name));
+            }
+            Happening::Lost(why) => {
+                self.hub.lost(self.number, &why);
+                (self.tell)(&format!("{}: {why}.", self.name));
+                for asked in self.asked.drain(..) {
+                    asked.end(&Typed::Lost(why.clone()));
+                }
+            }
+            Happening::Status(_, line) => self.hub.status(self.number, line),
+            Happening::Event(_, line) => self.hub.event(self.number, &line),
+            Happening::Answer(line) => {
+                let is_end = matches!(Said::parse(&line), Said::Done | Said::Refused(_));
+                let Some(asked) = self.asked.front_mut() else { return };
+                if is_end || asked.answer.len() < LINES {
+                    asked.answer.push(line);
+                }
+                if is_end && let Some(mut asked) = self.asked.pop_front() {
+                    let answer = std::mem::take(&mut asked.answer);
+                    asked.end(&Typed::Answered(answer));
+                }
+            }
+            // Each page asks for what it needs.
+            Happening::Command(_) | Happening::Settings(_) => {}
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use link::settings::{Setting, name};
+    use link::{Link, LinkError};
+    use std::io::{self, Read, Write};
+    use std::sync::Mutex;
+    use std::sync::atomic::{AtomicBool, Ordering};
+    use std::time::Duration;
+    use tokio::runtime;
+    use tokio::time::{sleep, timeout};
+
+    /// What was typed to a firmware for somebody, whether it answers `dump` by now, and whether its cable is plugged in.
+    #[derive(Clone, Default)]
+    struct Desk {
+        typed: Arc<Mutex<Vec<String>>>,
+        answers_dump: Arc<AtomicBool>,
+        is_there: Arc<AtomicBool>,
+    }
+
+    impl Desk {
+        fn typed(&self) -> Vec<String> {
+            self.typed.lock().unwrap().clone()
+        }
+    }
+
+    /// A firmware in hold.
+    struct Firmware {
+        desk: Desk,
+        line: Vec<u8>,
+        owes_dump: bool,
+        to_read: VecDeque<u8>,
+    }
+
+    impl Read for Firmware {
+        fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+            if !self.desk.is_there.load(Ordering::Relaxed) {
+                return Ok(0);
+            }
+            if self.owes_dump && self.desk.answers_dump.load(Ordering::Relaxed) {
+                self.owes_dump = false;
+                let behind = std::mem::take(&mut self.to_read);
+                self.to_read = b"dumped\nok\n".iter().copied().chain(behind).collect();
+            }
+            if self.to_read.is_empty() || self.owes_dump {
+                thread::sleep(Duration::from_millis(1));
+                return Err(io::ErrorKind::TimedOut.into());
+            }
+            self.to_read.read(buffer)
+        }
+    }
+
+    impl Write for Firmware {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            for &byte in bytes {
+                if byte != b'\n' {
+                    self.line.push(byte);
+                    continue;
+                }
+                let line = String::from_utf8(std::mem::take(&mut self.line)).unwrap();
+                let setting = |setting: Setting| format!("{}={}\n", name(setting), setting.description().default);
+                let answer = match line.as_str() {
+                    "" => continue,
+                    "version" => "weeder 0.1.0\n".to_owned(),
+                    "get" => Setting::all().map(setting).collect(),
+                    "status" => "state=hold tool=out pos=7 speed_mm_s=0 windows=0 unseen_mm=400\n".to_owned(),
+                    "examples" | "events on" => String::new(),
+                    "dump" => {
+                        self.desk.typed.lock().unwrap().push(line);
+                        self.owes_dump = true;
+                        continue;
+                    }
+                    _ => {
+                        self.desk.typed.lock().unwrap().push(line);
+                        String::new()
+                    }
+                };
+                self.to_read.extend((answer + "ok\n").bytes());
+            }
+            Ok(bytes.len())
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    /// A machine that is there.
+    fn machine() -> (Machine, Arc<Hub>, Desk) {
+        let desk = Desk::default();
+        desk.is_there.store(true, Ordering::Relaxed);
+        let (hub, at_port) = (Arc::new(Hub::new(1)), desk.clone());
+        let open = move || {
+            if !at_port.is_there.load(Ordering::Relaxed) {
+                return Err(LinkError::Absent("it".to_owned()));
+            }
+            let (line, to_read) = (Vec::new(), VecDeque::new());
+            Link::over(Firmware { desk: at_port.clone(), line, owes_dump: false, to_read }, false)
+        };
+        let machine = Machine::start(0, "uno".to_owned(), Box::new(open), Arc::clone(&hub), Arc::new(|_| {}));
+        (machine, hub, desk)
+    }
+
+    /// Waits until this is so.
+    async fn until(is_so: impl Fn() -> bool) {
+        let look = async {
+            while !is_so() {
+                sleep(Duration::from_millis(1)).await;
+            }
+        };
+        timeout(Duration::from_secs(60), look).await.expect("it comes to be so");
+    }
+
+    fn run(test: impl Future<Output = ()>) {
+        runtime::Builder::new_current_thread().enable_time().build().unwrap().block_on(test);
+    }
+
+    #[test]
+    fn hold_drops_what_others_have_waiting_and_is_typed_once_for_all_who_ask() {
+        run(async {
+            let (machine, hub, desk) = machine();
+            until(|| hub.why_lost(0).is_none()).await;
+            let others = async {
+                until(|| desk.typed() == ["dump"]).await;
+                let (started, one, two) =
+                    tokio::join!(machine.command("start".to_owned()), machine.hold(), machine.hold());
+                assert!(matches!(started, Typed::Dropped), "{started:?}");
+                for held in [one, two] {
+                    assert!(matches!(&held, Typed::Answered(lines) if *lines == ["ok"]), "{held:?}");
+                }
+            };
+            // It does not wait for the answer that is under way.
+            let answered_later = async {
+                until(|| desk.typed() == ["dump", "hold"]).await;
+                desk.answers_dump.store(true, Ordering::Relaxed);
+            };
+            let (dumped, (), ()) = tokio::join!(machine.command("dump".to_owned()), others, answered_later);
+            assert!(matches!(&dumped, Typed::Answered(lines) if *lines == ["dumped", "ok"]), "{dumped:?}");
+            assert_eq!(desk.typed(), ["dump", "hold"]);
+        });
+    }
+
+    #[test]
+    fn what_is_typed_to_a_machine_that_is_lost_is_not_typed_when_it_is_back() {
+        run(async {
+            let (machine, hub, desk) = machine();
+            until(|| hub.why_lost(0).is_none()).await;
+            let pulled = async {
+                until(|| desk.typed() == ["dump"]).await;
+                desk.is_there.store(false, Ordering::Relaxed);
+            };
+            let (dumped, ()) = tokio::join!(machine.command("dump".to_owned()), pulled);
+            assert!(matches!(&dumped, Typed::Lost(why) if why.contains("the port is gone")), "{dumped:?}");
+            for typed in [machine.command("start".to_owned()).await, machine.hold().await] {
+                assert!(matches!(typed, Typed::Lost(_)), "{typed:?}");
+            }
+            desk.is_there.store(true, Ordering::Relaxed);
+            until(|| hub.why_lost(0).is_none()).await;
+            let cleared = machine.command("clear".to_owned()).await;
+            assert!(matches!(cleared, Typed::Answered(_)), "{cleared:?}");
+            assert_eq!(desk.typed(), ["dump", "clear"]);
+        });
+    }
+}

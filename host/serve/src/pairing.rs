@@ -1,0 +1,225 @@
+//! Pairing: a code that stands on the terminal, typed or scanned on a phone once, for a token that its browser shows from then on.
+//!
+//! Code and tokens come from outside, out of the system's randomness; so does the time. Both are compared in a time that
+//! says nothing of how much was right. After five wrong codes no code is taken for a minute, the right one included, whoever
+//! types it: an address is easily changed. The code has 40 bits, of which that leaves nobody more than a guess in a hundred million a day.
+
+use std::collections::VecDeque;
+use std::time::{Duration, Instant};
+use subtle::{Choice, ConstantTimeEq};
+
+/// Characters of a code: no I, L, O and U, which are taken for others.
+const ALPHABET: &[u8; 32] = b"0123456789ABCDEFGHJKMNPQRSTVWXYZ";
+
+/// Characters in a code.
+pub const CODE_LENGTH: usize = 8;
+
+/// Bytes in a token.
+pub const TOKEN_LENGTH: usize = 32;
+
+/// Wrong codes after which none is taken for a while.
+const TRIES: u32 = 5;
+
+/// For how long none is taken then.
+const LOCKED_FOR: Duration = Duration::from_secs(60);
+
+/// Phones that are paired at the most; where another comes, the one that came first has to pair again.
+const PHONES: usize = 32;
+
+/// What a browser shows once it is paired.
+pub type Token = [u8; TOKEN_LENGTH];
+
+/// A pairing code.
+#[derive(Clone)]
+pub struct Code([u8; CODE_LENGTH]);
+
+impl Code {
+    /// The code of some random bytes.
+    pub fn new(random: [u8; CODE_LENGTH]) -> Self {
+        // 32 characters: each of them is as likely as the others.
+        Self(random.map(|byte| ALPHABET[usize::from(byte) % ALPHABET.len()]))
+    }
+
+    /// The code as it is put into an address.
+    pub fn text(&self) -> String {
+        self.0.iter().copied().map(char::from).collect()
+    }
+
+    /// The code as it is read out and typed: K7QM-2F9X.
+    pub fn spelled(&self) -> String {
+        let text = self.text();
+        format!("{}-{}", &text[..CODE_LENGTH / 2], &text[CODE_LENGTH / 2..])
+    }
+
+    /// Whether this was typed: letters of either size, with blanks and dashes, and what is easily taken for another.
+    fn is(&self, typed: &str) -> bool {
+        let mut characters =
+            typed.bytes().filter(|byte| !matches!(byte, b' ' | b'-')).map(|byte| match byte.to_ascii_uppercase() {
+                b'O' => b'0',
+                b'I' | b'L' => b'1',
+                other => other,
+            });
+        let mut read = [0; CODE_LENGTH];
+        read.fill_with(|| characters.next().unwrap_or_default());
+        bool::from(self.0.ct_eq(&read)) && characters.next().is_none()
+    }
+}
+
+/// What came of a try.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Try {
+    /// It was the code.
+    Right,
+    /// It was not, and so many wrong ones may follow before codes are locked out; none: they are now.
+    Wrong {
+        /// Tries that are left.
+        left: u32,
+    },
+    /// No code is taken for so long.
+    Locked(Duration),
+}
+
+/// Who is paired, and who tries to be.
+pub struct Pairing {
+    code: Code,
+    wrong: u32,
+    locked_until: Option<Instant>,
+    paired: VecDeque<Token>,
+}
+
+impl Pairing {
+    /// Nobody is paired yet.
+    pub fn new(code: Code) -> Self {
+        Self { code, wrong: 0, locked_until: None, paired: VecDeque::new() }
+    }
+
+    /// Somebody types a code. Where it is right, he is to be given a [`token`](Self::pair).
+    pub fn try_code(&mut self, typed: &str, now: Instant) -> Try {
+        if let Some(until) = self.locked_until {
+            if now < until {
+                return Try::Locked(until - now);
+            }
+            (self.locked_until, self.wrong) = (None, 0);
+        }
+        if self.code.is(typed) {
+            self.wrong = 0;
+            return Try::Right;
+        }
+        self.wrong += 1;
+        if self.wrong == TRIES {
+            self.locked_until = Some(now + LOCKED_FOR);
+        }
+        Try::Wrong { left: TRIES - self.wrong }
+    }
+
+    /// Pairs whoever has this token from now on; returns how many are paired.
+    pub fn pair(&mut self, token: Token) -> usize {
+        if self.paired.len() == PHONES {
+            self.paired.pop_front();
+        }
+        self.paired.push_back(token);
+        self.paired.len()
+    }
+
+    /// Whether this is the token of somebody who is paired, in 64 hexadecimal digits.
+    pub fn is_paired(&self, shown: &str) -> bool {
+        let shown = shown.as_bytes();
+        // All are compared, to the end.
+        let equal = |token: &Token| hexadecimal(token).as_bytes().ct_eq(shown);
+        self.paired.iter().map(equal).fold(Choice::from(0), |one, other| one | other).into()
+    }
+}
+
+/// A token as a cookie has it.
+pub fn hexadecimal(token: &Token) -> String {
+    token.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn pairing() -> Pairing {
+        Pairing::new(Code::new([19, 7 + 32, 22, 20 + 64, 2, 15, 9, 29]))
+    }
+
+    #[test]
+    fn a_code_is_right_however_it_is_typed() {
+        let code = pairing().code;
+        assert_eq!((code.text().as_str(), code.spelled().as_str()), ("K7PM2F9X", "K7PM-2F9X"));
+        for typed in ["K7PM2F9X", "k7pm-2f9x", " K7PM 2F9X "] {
+            assert_eq!(pairing().try_code(typed, Instant::now()), Try::Right, "{typed}");
+        }
+        let ambiguous = Code::new([0, 1, 1, 0, 0, 0, 0, 0]);
+        assert!(ambiguous.is("oIl0-0000"));
+    }
+
+    #[test]
+    fn a_code_is_wrong_by_any_character_more_or_less() {
+        for typed in
+            ["", "K", "K7PM2F9", "K7PM2F9XX", "K7PM2F9Y", "A7PM2F9X", "K7PM2F9X0", "\0\0\0\0\0\0\0\0", "Ķ7PM2F9X"]
+        {
+            assert_eq!(pairing().try_code(typed, Instant::now()), Try::Wrong { left: 4 }, "{typed:?}");
+        }
+    }
+
+    #[test]
+    fn after_five_wrong_codes_none_is_taken_for_a_minute_the_right_one_included() {
+        let (mut pairing, start) = (pairing(), Instant::now());
+        for left in (0..5).rev() {
+            assert_eq!(pairing.try_code("00000000", start), Try::Wrong { left });
+        }
+        for seconds in [0, 1, 59] {
+            let now = start + Duration::from_secs(seconds);
+            assert_eq!(pairing.try_code("K7PM2F9X", now), Try::Locked(Duration::from_secs(60 - seconds)));
+        }
+        let later = start + Duration::from_secs(60);
+        assert_eq!(pairing.try_code("00000000", later), Try::Wrong { left: 4 });
+        assert_eq!(pairing.try_code("K7PM2F9X", later), Try::Right);
+    }
+
+    #[test]
+    fn tries_that_are_locked_out_do_not_lengthen_it() {
+        let (mut pairing, start) = (pairing(), Instant::now());
+        for _ in 0..5 {
+            pairing.try_code("00000000", start);
+        }
+        for seconds in 1..60 {
+            pairing.try_code("00000000", start + Duration::from_secs(seconds));
+        }
+        assert_eq!(pairing.try_code("K7PM2F9X", start + LOCKED_FOR), Try::Right);
+    }
+
+    #[test]
+    fn a_right_code_forgives_the_wrong_ones_before_it() {
+        let (mut pairing, now) = (pairing(), Instant::now());
+        for _ in 0..3 {
+            for _ in 0..4 {
+                pairing.try_code("00000000", now);
+            }
+            assert_eq!(pairing.try_code("K7PM2F9X", now), Try::Right);
+        }
+    }
+
+    #[test]
+    fn who_shows_a_token_is_paired_and_nobody_else() {
+        let mut pairing = pairing();
+        assert!(!pairing.is_paired("") && !pairing.is_paired(&"0".repeat(64)));
+        assert_eq!((pairing.pair([1; TOKEN_LENGTH]), pairing.pair([2; TOKEN_LENGTH])), (1, 2));
+        assert!(pairing.is_paired(&"01".repeat(32)) && pairing.is_paired(&"02".repeat(32)));
+        for wrong in ["", "01", &"01".repeat(31), &"01".repeat(33), &"03".repeat(32), &"10".repeat(32)] {
+            assert!(!pairing.is_paired(wrong), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn of_too_many_phones_the_first_has_to_pair_again() {
+        let mut pairing = pairing();
+        for number in 0..=PHONES {
+            pairing.pair([number as u8; TOKEN_LENGTH]);
+        }
+        assert!(!pairing.is_paired(&hexadecimal(&[0; TOKEN_LENGTH])));
+        assert!(pairing.is_paired(&hexadecimal(&[1; TOKEN_LENGTH])));
+        assert!(pairing.is_paired(&hexadecimal(&[PHONES as u8; TOKEN_LENGTH])));
+    }
+}

@@ -1,0 +1,339 @@
+//! What is at which path. Who comes in is the [`door`](super::door)'s business, and what may be typed that of the
+//! [`rules`](super::rules): here they are only asked.
+//!
+//! | path | gives |
+//! | --- | --- |
+//! | `/` | the page, or the form for the code; `/page.css`, `/page.js`, `/pair.css`, `/pair.js` are theirs |
+//! | `POST /pair` | a cookie for the code that is in the body |
+//! | `/machines` | their names, and what may be typed from there, as JSON |
+//! | `/events` | what all machines are and say, as server-sent events |
+//! | `POST /machines/N/command` | the answer to the line that is in the body, a line each |
+//!
+//! There is no path to any other file, and none that flashes.
+
+use super::door::{Door, Knock};
+use super::hub::{Hub, Message};
+use super::machine::{Machine, Typed};
+use super::page::{File, Page, form};
+use super::pairing::{Pairing, TOKEN_LENGTH, Token, Try, hexadecimal};
+use super::rules::{self, Forbidden, Order, Reach};
+use super::{Extension, Tell};
+use axum::Router;
+use axum::body::{Body, to_bytes};
+use axum::extract::{Path, Request, State};
+use axum::http::header::{
+    CACHE_CONTROL, CONTENT_SECURITY_POLICY, CONTENT_TYPE, COOKIE, HOST, HeaderName, LOCATION, ORIGIN, REFERRER_POLICY,
+    RETRY_AFTER, SET_COOKIE, X_CONTENT_TYPE_OPTIONS,
+};
+use axum::http::{HeaderMap, HeaderValue, Method, StatusCode, Uri};
+use axum::middleware::{Next, from_fn_with_state};
+use axum::response::sse::{Event, Sse};
+use axum::response::{IntoResponse, Response};
+use axum::routing::{get, post};
+use futures_util::stream::{self, Stream, StreamExt};
+use std::convert::Infallible;
+use std::net::IpAddr;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+use tokio::sync::broadcast::error::RecvError;
+use tokio::time::timeout;
+
+/// Bytes that a request's body has at the most: a command has 80.
+const BODY_BYTES: usize = 256;
+
+/// Time in which it has to come.
+const BODY_TIME: Duration = Duration::from_secs(5);
+
+/// Time in which a machine has answered, or is lost.
+const ANSWER_TIME: Duration = Duration::from_secs(30);
+
+/// Time after which a page hears that the computer is still there: it waits six times as long before it says that it is not.
+const BEAT: Duration = Duration::from_millis(500);
+
+/// Nothing but this program's own, and nobody may put it into a frame.
+const POLICY: &str = "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; img-src 'self' data:; \
+    connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+
+/// Cookies are shared by all ports of an address.
+const COOKIE_NAME: &str = "weeder";
+
+/// What all requests share.
+pub struct Served {
+    /// The page.
+    pub page: Page,
+    /// The machines, in the order of their numbers.
+    pub machines: Vec<Machine>,
+    /// What they say.
+    pub hub: Arc<Hub>,
+    /// Who is paired.
+    pub pairing: Mutex<Pairing>,
+    /// Says something to the operator.
+    pub tell: Tell,
+}
+
+impl Served {
+    fn pairing(&self) -> MutexGuard<'_, Pairing> {
+        // Each change of it is whole by itself.
+        self.pairing.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Who is at the other end of a connection, and through which door he came.
+#[derive(Clone)]
+pub struct Visitor {
+    /// His address.
+    pub address: IpAddr,
+    /// The door.
+    pub door: Arc<Door>,
+}
+
+/// Whether a request may see the page.
+#[derive(Clone, Copy)]
+struct MaySee(bool);
+
+/// All paths.
+pub fn routes(served: Arc<Served>) -> Router {
+    Router::new()
+        .route("/", get(front))
+        .route("/page.css", get(|State(served): State<Arc<Served>>| async move { file(&served.page.css) }))
+        .route("/page.js", get(|State(served): State<Arc<Served>>| async move { file(&served.page.js) }))
+        .route("/pair", post(pair))
+        .route("/pair.css", get(|| async { ([(CONTENT_TYPE, "text/css; charset=utf-8")], form::CSS) }))
+        .route("/pair.js", get(|| async { ([(CONTENT_TYPE, "text/javascript; charset=utf-8")], form::JS) }))
+        .route("/machines", get(machines))
+        .route("/machines/{number}/command", post(command))
+        .route("/events", get(events))
+        .fallback(|| async { (StatusCode::NOT_FOUND, "there is no such path\n") })
+        .layer(from_fn_with_state(Arc::clone(&served), admit))
+        .with_state(served)
+}
+
+/// Has the door let a request in, or says why it does not.
+async fn admit(
+    State(served): State<Arc<Served>>,
+    Extension(visitor): Extension<Visitor>,
+    mut request: Request,
+    next: Next,
+) -> Response {
+    let is_paired = cookies(request.headers()).any(|token| served.pairing().is_paired(token));
+    let (hosts, origins) = (all(request.headers(), HOST), all(request.headers(), ORIGIN));
+    let sites = all(request.headers(), HeaderName::from_static("sec-fetch-site"));
+    let knock = Knock {
+        only_looks: matches!(*request.method(), Method::GET | Method::HEAD),
+        path: request.uri().path(),
+        is_for_proxy: request.uri().authority().is_some(),
+        hosts: &hosts,
+        origins: &origins,
+        sites: &sites,
+        is_paired,
+    };
+    let mut response = match visitor.door.admit(&knock) {
+        Ok(()) => {
+            request.extensions_mut().insert(MaySee(is_paired || visitor.door.reach == Reach::Here));
+            next.run(request).await
+        }
+        Err(denial) => {
+            let status = StatusCode::from_u16(denial.status()).unwrap_or(StatusCode::FORBIDDEN);
+            (status, format!("{denial}\n")).into_response()
+        }
+    };
+    let headers = response.headers_mut();
+    for (name, value) in [
+        (CONTENT_SECURITY_POLICY, POLICY),
+        (X_CONTENT_TYPE_OPTIONS, "nosniff"),
+        (REFERRER_POLICY, "no-referrer"),
+        (CACHE_CONTROL, "no-store"),
+        (HeaderName::from_static("cross-origin-resource-policy"), "same-origin"),
+    ] {
+        headers.insert(name, HeaderValue::from_static(value));
+    }
+    response
+}
+
+/// All values of a header.
+fn all(headers: &HeaderMap, name: HeaderName) -> Vec<&[u8]> {
+    headers.get_all(name).iter().map(HeaderValue::as_bytes).collect()
+}
+
+/// The values of this program's cookie.
+fn cookies(headers: &HeaderMap) -> impl Iterator<Item = &str> {
+    let lines = headers.get_all(COOKIE).iter().filter_map(|value| value.to_str().ok());
+    let pairs = lines.flat_map(|line| line.split(';')).filter_map(|pair| pair.trim().split_once('='));
+    pairs.filter(|&(name, _)| name == COOKIE_NAME).map(|(_, value)| value)
+}
+
+fn file(file: &File) -> impl IntoResponse + use<> {
+    ([(CONTENT_TYPE, file.media)], file.content.clone())
+}
+
+/// The page, or the form for the code.
+async fn front(State(served): State<Arc<Served>>, Extension(MaySee(may_see)): Extension<MaySee>, uri: Uri) -> Response {
+    if !may_see {
+        return ([(CONTENT_TYPE, "text/html; charset=utf-8")], form::HTML).into_response();
+    }
+    // By this the page knows that there is a machine at its other end.
+    match uri.query() {
+        Some("served") => file(&served.page.html).into_response(),
+        _ => (StatusCode::SEE_OTHER, [(LOCATION, "/?served#work")]).into_response(),
+    }
+}
+
+/// Pairs whoever sends the code.
+async fn pair(
+    State(served): State<Arc<Served>>,
+    Extension(Visitor { address, door }): Extension<Visitor>,
+    body: Body,
+) -> Response {
+    if door.reach == Reach::Here {
+        return (StatusCode::NOT_FOUND, "at this computer nobody needs a code\n").into_response();
+    }
+    let typed = match text(body).await {
+        Ok(typed) => typed,
+        Err(problem) => return problem,
+    };
+    let tried = served.pairing().try_code(&typed, Instant::now());
+    match tried {
+        Try::Right => {
+            let mut token: Token = [0; TOKEN_LENGTH];
+            if getrandom::fill(&mut token).is_err() {
+                return (StatusCode::INTERNAL_SERVER_ERROR, "the system has no randomness to give\n").into_response();
+            }
+            let paired = served.pairing().pair(token);
+            (served.tell)(&format!("{address} is paired now. Paired in all: {paired}."));
+            let cookie = format!("{COOKIE_NAME}={}; HttpOnly; SameSite=Strict; Path=/", hexadecimal(&token));
+            (StatusCode::NO_CONTENT, [(SET_COOKIE, cookie)]).into_response()
+        }
+        Try::Wrong { left: 0 } => {
+            (served.tell)(&format!(
+                "{address} has sent a wrong code, the last of five: no code is taken for a minute, the right one included."
+            ));
+            (StatusCode::FORBIDDEN, "That is not the code. No code is taken for a minute now.\n").into_response()
+        }
+        Try::Wrong { left } => {
+            (served.tell)(&format!("{address} has sent a wrong code. Tries left: {left}."));
+            let said = format!("That is not the code. It stands on the computer's screen. Tries left: {left}.\n");
+            (StatusCode::FORBIDDEN, said).into_response()
+        }
+        Try::Locked(wait) => {
+            let seconds = wait.as_secs() + 1;
+            let said = format!("There were too many wrong codes: none is taken for {seconds} s.\n");
+            (StatusCode::TOO_MANY_REQUESTS, [(RETRY_AFTER, seconds.to_string())], said).into_response()
+        }
+    }
+}
+
+/// The machines' names, and what may be typed to them.
+async fn machines(
+    State(served): State<Arc<Served>>,
+    Extension(Visitor { door, .. }): Extension<Visitor>,
+) -> impl IntoResponse {
+    let names: Vec<&str> = served.machines.iter().map(|machine| machine.name.as_str()).collect();
+    let (may_start, may_change) = match door.reach {
+        Reach::Here => (true, true),
+        Reach::Lan { may_start } => (may_start, false),
+    };
+    let said = serde_json::json!({ "machines": names, "mayStart": may_start, "mayChange": may_change });
+    ([(CONTENT_TYPE, "application/json")], said.to_string())
+}
+
+/// Types a line to a machine, where that may be, and gives its answer.
+async fn command(
+    State(served): State<Arc<Served>>,
+    Extension(Visitor { door, .. }): Extension<Visitor>,
+    Path(number): Path<usize>,
+    body: Body,
+) -> Response {
+    let Some(machine) = served.machines.get(number) else {
+        return refused(StatusCode::NOT_FOUND, "there is no such machine");
+    };
+    let line = match text(body).await {
+        Ok(line) => line,
+        Err(problem) => return problem,
+    };
+    let order = match rules::allow(&line, door.reach) {
+        Ok(order) => order,
+        Err(why @ Forbidden::NoLine) => return refused(StatusCode::BAD_REQUEST, &why.to_string()),
+        Err(why) => return refused(StatusCode::FORBIDDEN, &why.to_string()),
+    };
+    if let Some(why) = served.hub.why_lost(number) {
+        return refused(StatusCode::SERVICE_UNAVAILABLE, &why);
+    }
+    let typed = match order {
+        Order::Hold => timeout(ANSWER_TIME, machine.hold()).await,
+        Order::Type => timeout(ANSWER_TIME, machine.command(line)).await,
+    };
+    match typed {
+        Ok(Typed::Answered(lines)) => (plain(), lines.join("\n") + "\n").into_response(),
+        Ok(Typed::Dropped) => refused(StatusCode::CONFLICT, "hold came first, so this was not sent"),
+        Ok(Typed::Lost(why)) => refused(StatusCode::SERVICE_UNAVAILABLE, &why),
+        Ok(Typed::Busy) => refused(StatusCode::SERVICE_UNAVAILABLE, "too much waits for the machine: try again"),
+        Err(_) => refused(StatusCode::GATEWAY_TIMEOUT, "the machine does not answer"),
+    }
+}
+
+/// A line that the machine never saw, in the words in which it refuses one itself.
+fn refused(status: StatusCode, why: &str) -> Response {
+    (status, plain(), format!("error: {why}\n")).into_response()
+}
+
+fn plain() -> [(HeaderName, &'static str); 1] {
+    [(CONTENT_TYPE, "text/plain; charset=utf-8")]
+}
+
+/// A short body that is text, or what is wrong with it.
+async fn text(body: Body) -> Result<String, Response> {
+    let bytes = match timeout(BODY_TIME, to_bytes(body, BODY_BYTES)).await {
+        Ok(Ok(bytes)) => bytes,
+        Ok(Err(_)) => return Err(refused(StatusCode::PAYLOAD_TOO_LARGE, &Forbidden::NoLine.to_string())),
+        Err(_) => return Err(refused(StatusCode::REQUEST_TIMEOUT, "the line has not come")),
+    };
+    String::from_utf8(bytes.to_vec()).map_err(|_| refused(StatusCode::BAD_REQUEST, &Forbidden::NoLine.to_string()))
+}
+
+/// What all machines are and say, for as long as the page reads it.
+async fn events(State(served): State<Arc<Served>>) -> Sse<impl Stream<Item = Result<Event, Infallible>>> {
+    Sse::new(heard(&served.hub).map(|message| Ok(Event::default().data(&*message))))
+}
+
+/// What a page hears: how all machines are, then what comes, and a beat where nothing does. To a page that is too far behind it is
+/// said at the end that it has missed something; it may listen anew.
+fn heard(hub: &Hub) -> impl Stream<Item = Message> + use<> {
+    let (first, later) = hub.listen();
+    let later = stream::unfold(Some(later), |later| async move {
+        let mut later = later?;
+        match timeout(BEAT, later.recv()).await {
+            Ok(Ok(message)) => Some((message, Some(later))),
+            Ok(Err(RecvError::Lagged(_))) => Some((Message::from(r#"{"is":"dropped"}"#), None)),
+            Ok(Err(RecvError::Closed)) => None,
+            Err(_) => Some((Message::from(r#"{"is":"beat"}"#), Some(later))),
+        }
+    });
+    stream::iter(first).chain(later)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::pin::pin;
+    use tokio::runtime;
+
+    #[test]
+    fn a_page_that_is_too_far_behind_is_told_so_at_the_end_and_may_listen_anew() {
+        let runtime = runtime::Builder::new_current_thread().enable_time().build().unwrap();
+        runtime.block_on(async {
+            let hub = Hub::new(1);
+            let mut page = pin!(heard(&hub));
+            for number in 0..1000 {
+                hub.event(0, &number.to_string());
+            }
+            assert!(page.next().await.unwrap().contains("lost"));
+            assert_eq!(page.next().await.as_deref(), Some(r#"{"is":"dropped"}"#));
+            assert_eq!(page.next().await, None);
+            let mut page = pin!(heard(&hub));
+            assert!(page.next().await.unwrap().contains("lost"));
+            assert_eq!(page.next().await.as_deref(), Some(r#"{"is":"beat"}"#));
+            hub.there(0, "0.1.0");
+            assert!(page.next().await.unwrap().contains("there"));
+        });
+    }
+}

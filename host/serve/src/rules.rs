@@ -1,0 +1,260 @@
+//! Who may type what. The lines are taken apart by the firmware's own parser (`control::say::command`), so that what is forbidden
+//! here is what the machine would do there.
+//!
+//! Whoever sits at the computer that has the port may type everything, as in `weeder monitor`. Over the network, what cannot put the
+//! tool into the row or change the machine may be typed by everybody who is paired; `start` and `clear` where the operator
+//! allowed it as he started `weeder serve`; all else by nobody. What this version does not know it does not pass on.
+
+use control::say::command::{Command, parse};
+use thiserror::Error;
+
+/// From where somebody types.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reach {
+    /// From the computer that has the port.
+    Here,
+    /// From the network.
+    Lan {
+        /// Whether the operator allowed it to start the machine.
+        may_start: bool,
+    },
+}
+
+/// What is to be done with a line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Order {
+    /// Hold, before all that waits.
+    Hold,
+    /// Type it when what was typed before is answered.
+    Type,
+}
+
+/// Why a line is not passed on to the machine.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+pub enum Forbidden {
+    /// It is none.
+    #[error("that is no command: it has to be one line of 1 to {} printable ASCII characters", link::COMMAND_LENGTH)]
+    NoLine,
+    /// It is none that is known here.
+    #[error(
+        "that is no command that `weeder serve` knows, and it passes none on that it does not know: `help` lists them"
+    )]
+    Unknown,
+    /// The operator has not allowed it.
+    #[error("this is not allowed from here: go to the machine, or have `weeder serve` started with --allow-start")]
+    NoStart,
+    /// It puts the tool over ground that nobody has seen.
+    #[error(
+        "this takes the tool over ground that the beam has not seen, and is never allowed over the network: go to the machine"
+    )]
+    Unseen,
+    /// It moves the tool by hand.
+    #[error(
+        "this moves the tool, and is never allowed over the network: go to the computer that has the machine's port"
+    )]
+    MovesTool,
+    /// It changes what the machine knows.
+    #[error("this changes the machine, and is never allowed over the network: go to the computer that has its port")]
+    ChangesMachine,
+    /// It changes what all others hear.
+    #[error(
+        "this changes what everybody hears, and is never allowed over the network: go to the computer that has the port"
+    )]
+    ChangesWire,
+}
+
+/// Whether a line may be typed from there, and how.
+///
+/// # Errors
+/// Why it may not, and where it may.
+pub fn allow(line: &str, reach: Reach) -> Result<Order, Forbidden> {
+    // The machine does not answer a line without a word.
+    if !link::is_command(line) || line.trim().is_empty() {
+        return Err(Forbidden::NoLine);
+    }
+    let command = parse(line.as_bytes());
+    if command == Ok(Command::Hold) {
+        return Ok(Order::Hold);
+    }
+    match (reach, command) {
+        // The machine says by itself what is wrong with it.
+        (Reach::Here, _) => Ok(Order::Type),
+        (Reach::Lan { .. }, Err(_)) => Err(Forbidden::Unknown),
+        (Reach::Lan { may_start }, Ok(command)) => match why_not(command) {
+            Some(Forbidden::NoStart) if may_start => Ok(Order::Type),
+            Some(why) => Err(why),
+            None => Ok(Order::Type),
+        },
+    }
+}
+
+/// Why a command may not be typed over the network, where nothing more is allowed; a new one has to be put here.
+fn why_not(command: Command) -> Option<Forbidden> {
+    match command {
+        Command::Help
+        | Command::Explain(_)
+        | Command::Status
+        | Command::GetAll
+        | Command::Get(_)
+        | Command::Hold
+        | Command::Events(true)
+        | Command::Examples
+        | Command::Dump
+        | Command::Version => None,
+        // A latched alarm is not cleared by somebody who has not seen what is wrong.
+        Command::Start { now: false } | Command::Clear => Some(Forbidden::NoStart),
+        Command::Start { now: true } => Some(Forbidden::Unseen),
+        Command::CalibrateServo
+        | Command::ServoIn
+        | Command::ServoOut
+        | Command::Servo(_)
+        | Command::TestRow { .. } => Some(Forbidden::MovesTool),
+        Command::Set(..)
+        | Command::Save
+        | Command::Revert
+        | Command::Defaults
+        | Command::CalibrateStart
+        | Command::Calibrate { .. }
+        | Command::Label { .. }
+        | Command::Forget(_)
+        | Command::ForgetAll => Some(Forbidden::ChangesMachine),
+        Command::Events(false) | Command::Plot(_) => Some(Forbidden::ChangesWire),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WATCHING: Reach = Reach::Lan { may_start: false };
+    const STARTING: Reach = Reach::Lan { may_start: true };
+
+    /// Every command, by the rule of the manual's table that it is under.
+    const HARMLESS: [&str; 11] =
+        ["help", "help k", "status", "get", "get k", "events on", "examples", "dump", "version", "  status ", "get  k"];
+    const STARTS: [&str; 4] = ["start", "clear", " start", "clear  "];
+    const NEVER: [(&str, Forbidden); 24] = [
+        ("start now", Forbidden::Unseen),
+        ("  start   now ", Forbidden::Unseen),
+        ("servo in", Forbidden::MovesTool),
+        ("servo out", Forbidden::MovesTool),
+        ("servo 1500", Forbidden::MovesTool),
+        ("test row", Forbidden::MovesTool),
+        ("test row 900", Forbidden::MovesTool),
+        ("calibrate servo", Forbidden::MovesTool),
+        ("calibrate start", Forbidden::ChangesMachine),
+        ("calibrate 10000", Forbidden::ChangesMachine),
+        ("calibrate 10000 force", Forbidden::ChangesMachine),
+        ("set k 3", Forbidden::ChangesMachine),
+        ("set margin_mm 0", Forbidden::ChangesMachine),
+        ("save", Forbidden::ChangesMachine),
+        ("revert", Forbidden::ChangesMachine),
+        ("defaults", Forbidden::ChangesMachine),
+        ("label plant", Forbidden::ChangesMachine),
+        ("label weed force", Forbidden::ChangesMachine),
+        ("forget 3", Forbidden::ChangesMachine),
+        ("forget all", Forbidden::ChangesMachine),
+        ("events off", Forbidden::ChangesWire),
+        ("plot on", Forbidden::ChangesWire),
+        ("plot off", Forbidden::ChangesWire),
+        ("plot teleplot", Forbidden::ChangesWire),
+    ];
+
+    #[test]
+    fn whoever_may_type_at_all_may_hold() {
+        for reach in [Reach::Here, WATCHING, STARTING] {
+            for line in ["hold", " hold", "hold   "] {
+                assert_eq!(allow(line, reach), Ok(Order::Hold), "{line:?} from {reach:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_only_looks_is_for_everybody() {
+        for line in HARMLESS {
+            for reach in [Reach::Here, WATCHING, STARTING] {
+                assert_eq!(allow(line, reach), Ok(Order::Type), "{line:?} from {reach:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn start_and_clear_are_for_those_whom_the_operator_allowed_it() {
+        for line in STARTS {
+            assert_eq!(allow(line, WATCHING), Err(Forbidden::NoStart), "{line:?}");
+            assert_eq!(allow(line, STARTING), Ok(Order::Type), "{line:?}");
+            assert_eq!(allow(line, Reach::Here), Ok(Order::Type), "{line:?}");
+        }
+    }
+
+    #[test]
+    fn what_moves_the_tool_by_hand_or_changes_the_machine_is_never_typed_over_the_network() {
+        for (line, why) in NEVER {
+            for reach in [WATCHING, STARTING] {
+                assert_eq!(allow(line, reach), Err(why), "{line:?} from {reach:?}");
+            }
+            assert_eq!(allow(line, Reach::Here), Ok(Order::Type), "{line:?}");
+        }
+    }
+
+    #[test]
+    fn every_command_of_the_console_is_under_a_rule_that_is_tested() {
+        use control::say::command::Word;
+        let tested: Vec<&str> =
+            HARMLESS.into_iter().chain(STARTS).chain(NEVER.map(|(line, _)| line)).chain(["hold"]).collect();
+        for word in (0..).map_while(Word::from_index) {
+            let word: String = word.text().bytes().map(char::from).collect();
+            assert!(tested.iter().any(|line| line.split_whitespace().next() == Some(&word)), "{word}");
+        }
+    }
+
+    #[test]
+    fn the_table_of_the_manual_says_of_every_command_what_becomes_of_it() {
+        let manual = include_str!("../../../docs/serve.md");
+        let row = |beginning: &str| -> Vec<&str> {
+            let line = manual.lines().find(|line| line.starts_with(beginning)).expect("the table has it");
+            line.trim_matches('|').split('|').map(str::trim).collect()
+        };
+        let (commands, phone, here) = (row("| who |"), row("| a paired phone |"), row("| at the computer that "));
+        let words = |cell: &'static str| cell.split('`').skip(1).step_by(2);
+        // `start now` stands elsewhere than `start`.
+        let column = |line: &str| {
+            let columns =
+                commands.iter().enumerate().flat_map(|(column, cell)| words(cell).map(move |word| (column, word)));
+            let own = columns.filter(|(_, word)| format!("{line} ").starts_with(&format!("{word} ")));
+            own.max_by_key(|(_, word)| word.len()).map(|(column, _)| column)
+        };
+        let never = NEVER.map(|(line, _)| line);
+        for line in HARMLESS.into_iter().chain(STARTS).chain(never).chain(["hold"]) {
+            let line = line.split_whitespace().collect::<Vec<_>>().join(" ");
+            let column = column(&line).unwrap_or_else(|| panic!("{line} is not in the table"));
+            let said = match [WATCHING, STARTING].map(|reach| allow(&line, reach).is_ok()) {
+                [true, true] => "yes",
+                [false, true] => "only with `--allow-start`",
+                _ => "never",
+            };
+            assert_eq!((phone[column], here[column]), (said, "yes"), "{line}");
+        }
+    }
+
+    #[test]
+    fn what_is_not_known_here_is_not_passed_on_over_the_network() {
+        for line in ["START", "starts", "start later", "start now now", "set k", "launch", "help me", "servo", "\u{1}"]
+        {
+            assert!(allow(line, STARTING).is_err(), "{line:?}");
+        }
+        assert_eq!(allow("launch", Reach::Here), Ok(Order::Type));
+    }
+
+    #[test]
+    fn a_line_that_is_none_or_two_is_passed_on_for_nobody() {
+        let long = "x".repeat(link::COMMAND_LENGTH + 1);
+        for line in
+            ["", "   ", "status\nstart", "status\rstart", "hold\u{8}\u{8}\u{8}\u{8}start", "\tstart", "grün", &long]
+        {
+            for reach in [Reach::Here, WATCHING, STARTING] {
+                assert_eq!(allow(line, reach), Err(Forbidden::NoLine), "{line:?} from {reach:?}");
+            }
+        }
+    }
+}

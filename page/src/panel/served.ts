@@ -1,0 +1,35 @@
+// The machines that `weeder serve` has at its ports, side by side: a panel for each, by its name.
+
+import { make } from "../dom.ts";
+import { Served } from "../link/served.ts";
+import { sentence } from "./machine.ts";
+import { Panel } from "./panel.ts";
+
+/** Time between two turns. */
+const TURN_MS = 20;
+
+/** Fills an element with the machines' panels, and gives these back. */
+export async function showServed(into: HTMLElement): Promise<Panel[]> {
+    const served = await Served.open();
+    const panels = served.names.map((name, machine) => {
+        const element = make("div", "panel");
+        const section = make("section", "served", make("h2", "", name), element);
+        section.ariaLabel = name;
+        into.append(section);
+        const panel = new Panel(element, `served-${machine}`, served.allowed);
+        // Whoever does not see the page has to know whose part he is in.
+        for (const part of element.querySelectorAll("section")) part.ariaLabel = `${name}: ${part.ariaLabel}`;
+        return panel;
+    });
+    served.onThere = (machine, wire) => panels[machine]?.connect(wire, performance.now(), false);
+    served.onLost = (machine, why) => {
+        const panel = panels[machine];
+        if (panel) panel.machine.lost = sentence(why);
+    };
+    setInterval(() => {
+        served.watch();
+        for (const panel of panels) panel.turn(performance.now());
+    }, TURN_MS);
+    served.listen();
+    return panels;
+}
