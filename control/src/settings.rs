@@ -99,6 +99,9 @@ settings! {
     /// Examples that vote.
     K "k": 1 to 15, 3, false,
         "nearest examples that vote on what an object is";
+    /// Narrow objects in a row, none of them a plant, that are an alarm.
+    MisfitAfter "misfit_after": 0 to 100, 5, false,
+        "so many narrow objects in a row and no plant raise an alarm; 0 never";
     /// Ground over which the beam may be broken before that is an alarm.
     MaxWidthMm "max_width_mm" in "mm": 20 to 1500, 400, false,
         "a beam broken over more ground than this raises an alarm";

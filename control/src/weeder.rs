@@ -12,7 +12,7 @@ mod shown;
 
 pub use self::shown::Reason;
 
-use self::faults::{Limits, NoPlants};
+use self::faults::{Limits, Misfits, NoPlants};
 use crate::{
     alarm::Alarm,
     ground::{
@@ -83,6 +83,7 @@ pub struct Controller<C, M> {
     /// Lines that were not understood, or came with a hole in them.
     mistakes: u16,
     no_plants: NoPlants,
+    misfits: Misfits,
     objects: Objects,
     events: Events,
     curves: Curves,
@@ -118,6 +119,7 @@ impl<C: Classifier, M: Memory> Asleep<C, M> {
             has_judged: false,
             mistakes: 0,
             no_plants: NoPlants::since(place),
+            misfits: Misfits::NONE,
             objects: Objects::NONE,
             events: Events::NONE,
             curves: Curves::NONE,
@@ -274,6 +276,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         if vote.class != Class::Weed && self.ground.keep(object).is_err() {
             self.raise(Alarm::ScheduleFull);
         }
+        self.count_misfit(vote.class, width_mm);
     }
 
     /// Latches an alarm. What was seen can no longer be trusted.
@@ -297,6 +300,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             return;
         }
         self.no_plants = NoPlants::since(self.readings.position);
+        self.misfits = Misfits::NONE;
         self.enter(State::Work);
     }
 

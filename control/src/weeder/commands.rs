@@ -1,6 +1,9 @@
 //! What the operator may ask of the machine, by switch or console.
 
-use super::{Controller, faults::Limits};
+use super::{
+    Controller,
+    faults::{Limits, Misfits},
+};
 use crate::{
     ground::{
         class::{Class, Classifier, ExamplesFull, label},
@@ -120,6 +123,8 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         }
         self.classifier.teach(&features, label).map_err(|ExamplesFull| Refusal::ExamplesFull)?;
         object.label = Some(label);
+        // Whoever labels looks at what the objects are taken for.
+        self.misfits = Misfits::NONE;
         Ok(())
     }
 
