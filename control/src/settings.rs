@@ -99,6 +99,9 @@ settings! {
     /// Examples that vote.
     K "k": 1 to 15, 3, false,
         "nearest examples that vote on what an object is";
+    /// Width below which an object is dust.
+    MinWidthMm "min_width_mm" in "mm": 0 to 100, 0, false,
+        "what is narrower is dust, and weeded over; 0 for nothing";
     /// Narrow objects in a row, none of them a plant, that are an alarm.
     MisfitAfter "misfit_after": 0 to 100, 5, false,
         "so many narrow objects in a row and no plant raise an alarm; 0 never";

@@ -42,7 +42,7 @@ use crate::{
         tool::Tool,
     },
     settings::Setting,
-    units::{Instant, Position},
+    units::{Instant, Position, count},
 };
 
 /// What the machine is to do after a turn.
@@ -82,6 +82,8 @@ pub struct Controller<C, M> {
     has_judged: bool,
     /// Lines that were not understood, or came with a hole in them.
     mistakes: u16,
+    /// Objects that were narrower than any plant or weed.
+    dust: u16,
     no_plants: NoPlants,
     misfits: Misfits,
     objects: Objects,
@@ -118,6 +120,7 @@ impl<C: Classifier, M: Memory> Asleep<C, M> {
             tool: Tool::NONE,
             has_judged: false,
             mistakes: 0,
+            dust: 0,
             no_plants: NoPlants::since(place),
             misfits: Misfits::NONE,
             objects: Objects::NONE,
@@ -254,15 +257,19 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         self.encoder.is_doubtful() || out && self.encoder.is_quiet() || self.ground.must_be_out(out)
     }
 
-    /// Classifies a complete object and remembers it unless it is a weed.
+    /// Classifies a complete object and remembers it unless it is a weed. What is dust is only counted.
     fn judge(&mut self, object: Object) {
         self.has_judged = true;
         let position = self.readings.position;
-        self.no_plants = NoPlants::since(position);
         let spacing = self.ground.spacing(&object);
         let speed_class_mm_s = features::speed_class(self.speed_mm_s());
         let (spacing_mm, width_mm) =
             (self.ground.millimetres(spacing), self.ground.millimetres(self.ground.ticks(object.width())));
+        if !object.cut && (width_mm as u16) < self.configuration.get(Setting::MinWidthMm) {
+            count(&mut self.dust);
+            return;
+        }
+        self.no_plants = NoPlants::since(position);
         // What is left of an object whose beginning was not seen may be as narrow as a weed.
         let vote = if object.cut {
             Vote { class: Class::Unknown, votes: 0 }

@@ -166,7 +166,7 @@ fn status_says_how_far_the_ground_that_was_seen_still_is() {
         ask(&mut machine, "status"),
         [
             "state=hold tool=out pos=0 speed_mm_s=0 windows=0 unseen_mm=400",
-            "lost=0 jumps=0 late=0 missed=0 mistakes=0 stack_free=65535 reset=power_on",
+            "lost=0 jumps=0 late=0 missed=0 mistakes=0 dust=0 stack_free=65535 reset=power_on",
             "ok"
         ]
     );

@@ -177,6 +177,31 @@ fn weeds_with_a_plant_between_them_are_no_alarm_and_neither_are_those_in_hold() 
 }
 
 #[test]
+fn what_is_narrower_than_the_least_width_is_counted_as_dust_and_is_neither_a_plant_nor_a_misfit() {
+    let mut drive = Drive::at_work();
+    for (setting, value) in [(Setting::MinWidthMm, 25), (Setting::NoPlantM, 2)] {
+        drive.machine.set(setting, value).unwrap();
+    }
+    assert_eq!((drive.pass_stalks(10), drive.alarm()), (10, None));
+    assert_eq!((drive.machine.dust(), drive.machine.objects().len()), (10, 0));
+    assert_eq!(drive.events(), [Event::Warning(Warning::NoPlants)], "nobody has seen a plant");
+    drive.pass(0.5, 0.03);
+    drive.roll(0.5, 0.1);
+    assert_eq!((drive.machine.dust(), drive.machine.objects().len()), (10, 1));
+}
+
+#[test]
+fn the_narrow_rest_of_an_object_is_no_dust() {
+    let mut drive = Drive::in_hold();
+    drive.machine.set(Setting::MinWidthMm, 100).unwrap();
+    drive.edges.push(Edge::Lost { broken: true });
+    drive.roll(0.5, 0.02);
+    drive.beam(false);
+    drive.roll(0.5, 0.1);
+    assert_eq!((drive.machine.dust(), drive.machine.objects().len()), (0, 1));
+}
+
+#[test]
 fn an_encoder_that_falls_silent_from_one_moment_to_the_next_has_the_tool_out_until_it_comes_to_ground_seen_since() {
     for speed_m_s in [0.14, 0.3, 0.7, 1.3] {
         let mut drive = Drive::at_work();

@@ -230,11 +230,14 @@ mod tests {
                     let mut spoiled = memory.clone();
                     spoiled.bytes[usize::from(address(copy)) + place] ^= 1 << bit;
                     assert_eq!(load(&spoiled), Some(with_k(left)), "byte {place}, bit {bit}");
-                    // The copy that is left is never the one to be overwritten.
-                    let mut failing = spoiled;
+                    // The copy that is left is never the one to be overwritten. Where what was spoiled has become what is to be
+                    // written, two bytes may be all that was missing.
+                    let mut failing = spoiled.clone();
                     failing.lose_power_after(2);
-                    let after = load(&save(failing, &with_k(9)).with_power());
-                    assert!([5, 7].map(|k| Some(with_k(k))).contains(&after), "byte {place}, bit {bit}: {after:?}");
+                    let memory = save(failing, &with_k(9)).with_power();
+                    let (after, is_all_written) = (load(&memory), memory.bytes == save(spoiled, &with_k(9)).bytes);
+                    let is_left = [5, 7].map(|k| Some(with_k(k))).contains(&after);
+                    assert!(is_left || is_all_written, "byte {place}, bit {bit}: {after:?}");
                 }
             }
         }

@@ -386,7 +386,9 @@ impl<M: Machine> Drive<M> {
         let wheel = self.machine.settings().wheel();
         let merge_gap = self.machine.settings().ticks(Setting::MergeGapMm).0.into();
         self.model.follow(self.here(), merge_gap, wheel.ticks(1000).0.into());
-        self.model.leave_narrow(wheel.ticks(M::NARROW_MM).0.into());
+        // What is narrower than the settings have it is dust, of which nothing is said either.
+        let narrow_mm = M::NARROW_MM.max(self.machine.settings().get(Setting::MinWidthMm));
+        self.model.leave_narrow(wheel.ticks(narrow_mm).0.into());
 
         self.world.time_us += self.beginning.turn_us;
         let seconds = self.beginning.turn_us as f64 / 1e6;

@@ -248,6 +248,7 @@ fn setting() -> BoxedStrategy<String> {
         1 => (Just("no_plant_m"), 0_u32..=3),
         1 => (Just("servo_out_us"), 500_u32..=2500),
         1 => (Just("servo_in_us"), 500_u32..=2500),
+        1 => (Just("min_width_mm"), 0_u32..=60),
         1 => (Just("misfit_after"), 0_u32..=6),
         1 => (Just("k"), 1_u32..=15),
     ];
@@ -263,6 +264,7 @@ fn setting() -> BoxedStrategy<String> {
         "servo_out_us",
         "servo_gap_ms",
         "k",
+        "min_width_mm",
         "misfit_after",
         "max_width_mm",
         "merge_gap_mm",
