@@ -111,6 +111,12 @@ settings! {
     /// Gaps in a canopy shorter than this belong to it.
     MergeGapMm "merge_gap_mm" in "mm": 0 to 1000, 21, false,
         "clear stretches shorter than this belong to the canopy";
+    /// Distance at which the crop is set, so that plants that are not seen can be guarded.
+    GuardSpacingMm "guard_spacing_mm" in "mm": 0 to 2000, 0, false,
+        "where plants stand evenly, this far apart, unseen ones are kept; 0 off";
+    /// How far off its place a guarded plant may stand.
+    GuardScatterMm "guard_scatter_mm" in "mm": 0 to 200, 30, false,
+        "how far from where it is due an unseen plant may stand";
     /// The sensor's response time.
     BeamResponseMs "beam_response_ms" in "ms": 0 to 50, 1, false,
         "time the beam's sensor takes to answer";

@@ -20,6 +20,7 @@ use crate::{
         class::{Class, Classifier, Vote},
         features::{self, Features},
         object::Object,
+        schedule::ScheduleFull,
     },
     measure::{
         monitor::{BeamMonitor, EncoderMonitor},
@@ -219,6 +220,11 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         }
         if let Some(object) = self.ground.roll_to(position) {
             self.judge(object);
+        }
+        match self.ground.guard() {
+            Some(Ok(due)) => self.events.add(Event::Guarded(self.ground.position_of(due, position))),
+            Some(Err(ScheduleFull)) => self.raise(Alarm::ScheduleFull),
+            None => {}
         }
         // Either takes half of what a turn may take.
         if self.configuration.has_changed() && !self.has_judged {

@@ -195,6 +195,7 @@ fn every_event_fits_on_a_line() {
     let plan = Plan { delay: long, hold: long };
     let mut events = vec![
         Event::Object { vote, leading: far, spacing: long, plan },
+        Event::Guarded(far),
         Event::Swing { out: true, position: far },
         Event::State(State::Hold),
     ];

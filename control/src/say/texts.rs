@@ -72,6 +72,7 @@ said! {
     COUNTS = "lost=# jumps=# late=# missed=# mistakes=# dust=# stack_free=# reset=";
     WARNING_IS = " warning=";
     OBJECT = " pos=# votes=# spacing=# delay=# hold=# actuation=#";
+    GUARDED = "guarded";
     SWING = "swing tool=";
     POS = " pos=#";
     STATE_EVENT = "state is=";
