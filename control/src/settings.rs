@@ -4,7 +4,7 @@
 //! name carries its unit.
 
 use crate::{
-    memory::CHECK,
+    memory::checksum,
     units::{Ticks, TicksPerSecond, Wheel},
 };
 
@@ -143,7 +143,7 @@ pub const TABLE_MARK: u16 = {
         end += 1 + name.len();
         place += 1;
     }
-    CHECK.checksum(bytes.split_at(end).0)
+    checksum(bytes.split_at(end).0)
 };
 
 /// Settings that cannot be right together.

@@ -52,6 +52,9 @@ impl Geometry {
         let metre = wheel.ticks(1000);
         let grain = Grain::of(metre);
         let length = |setting| grain.length(wheel.ticks(settings.get(setting)));
+        // Each length takes time, which those that are off need not.
+        let is_guarded = settings.get(Setting::GuardSpacingMm) > 0;
+        let guarded = |setting| if is_guarded { length(setting) } else { Length::ZERO };
         Self {
             wheel,
             grain,
@@ -59,8 +62,8 @@ impl Geometry {
             margin: length(Setting::MarginMm),
             max_width: length(Setting::MaxWidthMm),
             merge_gap: length(Setting::MergeGapMm),
-            guard_spacing: length(Setting::GuardSpacingMm),
-            guard_scatter: length(Setting::GuardScatterMm),
+            guard_spacing: guarded(Setting::GuardSpacingMm),
+            guard_scatter: guarded(Setting::GuardScatterMm),
             memory: Length(grain.length(metre).0 * MEMORY_M),
         }
     }
