@@ -55,8 +55,8 @@ pub struct Orders {
     pub pulse_out: HalfMicros,
     /// The shortest gap between servo pulses in milliseconds; 0 for fixed frames.
     pub gap_ms: u8,
-    /// Whether an object was judged: that is enough for a turn of the loop.
-    pub has_judged: bool,
+    /// Whether an object was judged, or another speed or other settings were followed: that is enough for a turn of the loop.
+    pub is_enough: bool,
 }
 
 /// The machine's decisions and all that they rest on.
@@ -79,8 +79,10 @@ pub struct Controller<C, M> {
     meter: SpeedMeter,
     state: State,
     tool: Tool,
-    /// Whether an object was judged in this turn.
-    has_judged: bool,
+    /// Whether the speed is another than the one by which the ground leads.
+    leads_are_old: bool,
+    /// Whether this turn has done what takes long.
+    is_enough: bool,
     /// Lines that were not understood, or came with a hole in them.
     mistakes: u16,
     /// Objects that were narrower than any plant or weed.
@@ -119,7 +121,8 @@ impl<C: Classifier, M: Memory> Asleep<C, M> {
             meter: SpeedMeter::NONE,
             state: State::Hold,
             tool: Tool::NONE,
-            has_judged: false,
+            leads_are_old: false,
+            is_enough: false,
             mistakes: 0,
             dust: 0,
             no_plants: NoPlants::since(place),
@@ -209,9 +212,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         let doubted = self.odometer.read(readings.position, readings.jumps, self.believes_jumps());
         let position = self.odometer.place(readings.position);
         self.readings.position = position;
-        if let Some(speed) = self.meter.read(readings.now, position) {
-            self.ground.lead(self.configuration.settings(), speed);
-        }
+        self.leads_are_old |= self.meter.read(readings.now, position).is_some();
         match self.switch.read(readings.now, readings.switch_on) {
             // An alarm wants to be cleared first, if by nothing else then by the switch going off.
             Some(true) if matches!(self.state, State::Hold) => self.go_to_work(),
@@ -226,9 +227,13 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             Some(Err(ScheduleFull)) => self.raise(Alarm::ScheduleFull),
             None => {}
         }
-        // Either takes half of what a turn may take.
-        if self.configuration.has_changed() && !self.has_judged {
+        // As judging does, these take a good part of what a turn may take: a turn does one of them.
+        if self.is_enough {
+        } else if self.configuration.has_changed() {
             self.follow_settings();
+        } else if self.leads_are_old {
+            self.ground.lead(self.configuration.settings(), self.meter.speed());
+            (self.leads_are_old, self.is_enough) = (false, true);
         }
         if let Some(alarm) = self.fault(doubted) {
             self.raise(alarm);
@@ -241,7 +246,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         let orders = self.orders();
         self.tool.order(orders.pulse, readings.now);
         self.warn();
-        self.has_judged = false;
+        self.is_enough = false;
         orders
     }
 
@@ -253,7 +258,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             pulse: self.bench.pulse().unwrap_or_else(|| pulse_of(pulse)),
             pulse_out: pulse_of(Setting::ServoOutUs),
             gap_ms: self.configuration.get(Setting::ServoGapMs) as u8,
-            has_judged: self.has_judged,
+            is_enough: self.is_enough,
         }
     }
 
@@ -265,7 +270,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// Classifies a complete object and remembers it unless it is a weed. What is dust is only counted.
     fn judge(&mut self, object: Object) {
-        self.has_judged = true;
+        self.is_enough = true;
         let position = self.readings.position;
         let spacing = self.ground.spacing(&object);
         let speed_class_mm_s = features::speed_class(self.speed_mm_s());

@@ -89,6 +89,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         let settings = self.configuration.settings();
         self.limits = Limits::of(settings);
         self.ground.follow(settings, self.readings.position, self.meter.speed());
+        (self.leads_are_old, self.is_enough) = (false, true);
     }
 
     /// Begins to save the settings, which [`carry_on`](Self::carry_on) finishes.
