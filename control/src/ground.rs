@@ -30,7 +30,7 @@ use self::{
 };
 use crate::{
     settings::Settings,
-    units::{Length, Place, Position, Ticks, TicksPerSecond},
+    units::{Length, Place, Position, Ticks, TicksPerSecond, Wheel},
 };
 
 /// What is known of the ground around the machine.
@@ -178,6 +178,11 @@ impl Ground {
     /// The paper's schedule of an object.
     pub fn plan(&self, object: &Object) -> Plan {
         Plan::new(&self.geometry, object.width())
+    }
+
+    /// The ground wheel, as the settings give it.
+    pub fn wheel(&self) -> Wheel {
+        self.geometry.wheel
     }
 
     /// A distance in millimetres.

@@ -87,8 +87,8 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     pub(super) fn follow_settings(&mut self) {
         self.configuration.follow();
         let settings = self.configuration.settings();
-        self.limits = Limits::of(settings);
         self.ground.follow(settings, self.readings.position, self.meter.speed());
+        self.limits = Limits::of(settings, self.ground.wheel());
         (self.leads_are_old, self.is_enough) = (false, true);
     }
 

@@ -11,7 +11,7 @@ use crate::{
     memory::Memory,
     operate::event::Event,
     settings::{Setting, Settings},
-    units::{Length, Position, Ticks},
+    units::{Length, Position, Ticks, Wheel},
 };
 
 /// What the end switch may take longer than the lead: a servo frame, the contacts' bouncing, and some patience.
@@ -35,8 +35,7 @@ pub(super) struct Limits {
 impl Limits {
     pub(super) const NONE: Self = Self { top_speed: 0, no_plant: Ticks::ZERO };
 
-    pub(super) fn of(settings: &Settings) -> Self {
-        let wheel = settings.wheel();
+    pub(super) fn of(settings: &Settings, wheel: Wheel) -> Self {
         Self {
             top_speed: wheel.ticks(settings.get(Setting::TopSpeedMmS)).0 as u16,
             no_plant: Ticks(wheel.ticks(1000).0 * i32::from(settings.get(Setting::NoPlantM))),
