@@ -91,9 +91,9 @@ fn run(typed: &mut LineBuffer) -> ! {
         servo.command(orders.pulse, orders.gap_ms);
         let Ok(()) = lamp.set_state(controller.lamp_is_lit().into());
 
-        // A turn has little time for the console: some bytes, or one thing that takes longer than a byte does. One in which an object
-        // was judged has none.
-        let bytes = if orders.has_judged { 0 } else { CONSOLE_BYTES };
+        // A turn has little time for the console: some bytes, or one thing that takes longer than a byte does. One that
+        // has done enough has none.
+        let bytes = if orders.is_enough { 0 } else { CONSOLE_BYTES };
         for _ in 0..bytes {
             if serial.room() > 0
                 && let Some(byte) = console.next_byte()

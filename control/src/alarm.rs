@@ -27,6 +27,8 @@ pub enum Alarm {
     RolledBackTooFar,
     /// More plants stand between beam and tool than the schedule can hold.
     ScheduleFull,
+    /// Object after object was as narrow as a weed, and none was taken for a plant: the examples may not know this crop.
+    CropUnknown,
     /// The end switch does not say what the tool was told.
     ToolStuck,
     /// No copy of the settings in the EEPROM is whole and of this firmware: the defaults are in use.
@@ -43,7 +45,7 @@ impl Alarm {
         (self as u8) < Self::TooFast as u8
     }
 
-    /// The code that the LED blinks. First digit: 1 beam, 2 encoder, 3 driving, 4 tool, 5 settings, 6 the controller itself.
+    /// The code that the LED blinks. First digit: 1 beam, 2 encoder, 3 driving and the row, 4 tool, 5 settings, 6 the controller itself.
     pub const fn code(self) -> u8 {
         // The first alarm of each digit. A list of codes would cost SRAM.
         let (tens, first) = match self as u8 {
@@ -77,6 +79,6 @@ mod tests {
     #[test]
     fn codes_rise_with_the_order_and_have_digits_that_can_be_counted() {
         let codes: Vec<u8> = (0..).map_while(Alarm::from_index).map(Alarm::code).collect();
-        assert_eq!(codes, [11, 12, 13, 21, 22, 23, 31, 32, 33, 41, 51, 52, 61]);
+        assert_eq!(codes, [11, 12, 13, 21, 22, 23, 31, 32, 33, 34, 41, 51, 52, 61]);
     }
 }

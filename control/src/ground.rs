@@ -1,8 +1,9 @@
 //! The ground: what the beam has seen of it, and the one question whether the tool may work on it.
 //!
 //! [`watch`] makes objects of the beam's edges, [`schedule`] remembers the canopies among them, and [`reach`] knows how far
-//! ahead the servo has to be told. [`Ground`] holds the three together, so that none of them can forget by itself: whatever
-//! the reason, [`Ground::forget`] closes all that was seen, and what is open at the frontier becomes the rest of something.
+//! ahead the servo has to be told. [`guard`] knows where a plant is due. [`Ground`] holds them together, so that none of them can
+//! forget by itself: whatever the reason, [`Ground::forget`] closes all that was seen, what is open at the frontier becomes the
+//! rest of something, and no plant is due.
 //!
 //! Places have 16 bits, so ground is left behind before the counter could come round: see [`Ground::roll_to`].
 //!
@@ -13,6 +14,7 @@ pub mod class;
 pub mod examples;
 pub mod features;
 pub mod field_examples;
+pub mod guard;
 pub mod nearest;
 pub mod object;
 pub mod reach;
@@ -20,6 +22,7 @@ pub mod schedule;
 pub mod watch;
 
 use self::{
+    guard::Guard,
     object::Object,
     reach::{Geometry, Leads},
     schedule::{Plan, Schedule, ScheduleFull},
@@ -27,7 +30,7 @@ use self::{
 };
 use crate::{
     settings::Settings,
-    units::{Length, Place, Position, Ticks, TicksPerSecond},
+    units::{Length, Place, Position, Ticks, TicksPerSecond, Wheel},
 };
 
 /// What is known of the ground around the machine.
@@ -39,6 +42,7 @@ pub struct Ground {
     beam: Place,
     watch: Watch,
     schedule: Schedule,
+    guard: Guard,
     /// The last plant's leading edge, or where watching began; no farther behind than is remembered.
     last_plant: Place,
     /// Whether the tool has just come to ground that had to be left behind.
@@ -53,6 +57,7 @@ impl Ground {
         beam: Place::new(0),
         watch: Watch::NONE,
         schedule: Schedule::NONE,
+        guard: Guard::NONE,
         last_plant: Place::new(0),
         rolled_back_too_far: false,
     };
@@ -68,10 +73,13 @@ impl Ground {
 
     /// Works out what follows from other settings. With another grain, what was seen means nothing any more.
     pub fn follow(&mut self, settings: &Settings, position: Position, speed: TicksPerSecond) {
-        let before = self.geometry.grain;
+        let Geometry { grain, guard_spacing, .. } = self.geometry;
         self.geometry = Geometry::of(settings);
         self.lead(settings, speed);
-        if self.geometry.grain != before {
+        if self.geometry.guard_spacing != guard_spacing {
+            self.guard = Guard::NONE;
+        }
+        if self.geometry.grain != grain {
             self.beam = self.geometry.grain.place(position);
             self.begin_here();
         }
@@ -114,6 +122,7 @@ impl Ground {
     #[inline(never)]
     pub fn forget(&mut self) {
         self.watch.forget();
+        self.guard = Guard::NONE;
         self.schedule.spoil(self.watch.frontier());
     }
 
@@ -144,7 +153,21 @@ impl Ground {
     /// [`ScheduleFull`] when more plants stand between beam and tool than can be remembered.
     pub fn keep(&mut self, plant: Object) -> Result<(), ScheduleFull> {
         self.last_plant = plant.leading;
+        self.guard.see(&plant, &self.geometry);
         self.schedule.push(plant, self.tool(), self.geometry.margin)
+    }
+
+    /// Guards the ground where a plant was due, once the beam has seen that none stands there; returns its middle.
+    ///
+    /// # Errors
+    /// [`ScheduleFull`], as for a plant that was seen.
+    #[inline(never)]
+    pub fn guard(&mut self) -> Option<Result<Place, ScheduleFull>> {
+        // What is in the beam may be the plant.
+        let seen_to = self.watch.open().unwrap_or(self.watch.frontier());
+        let guarded = self.guard.pass(seen_to, &self.geometry)?;
+        let pushed = self.schedule.push(guarded, self.tool(), self.geometry.margin);
+        Some(pushed.map(|()| guarded.leading + self.geometry.guard_scatter))
     }
 
     /// From the last plant's leading edge, or where watching began, to that of an object; what is remembered, at the most.
@@ -155,6 +178,11 @@ impl Ground {
     /// The paper's schedule of an object.
     pub fn plan(&self, object: &Object) -> Plan {
         Plan::new(&self.geometry, object.width())
+    }
+
+    /// The ground wheel, as the settings give it.
+    pub fn wheel(&self) -> Wheel {
+        self.geometry.wheel
     }
 
     /// A distance in millimetres.
@@ -218,11 +246,14 @@ impl Ground {
     }
 
     /// Whether any of the ground between two distances from the tool is closed: unknown, or within the margin of a canopy, the
-    /// one that is still being seen included.
+    /// one that is still being seen and the one that is due included.
     fn is_closed(&self, one: Length, other: Length) -> bool {
         let margin = self.geometry.margin;
         let (near, far) = (self.tool() + one.min(other), self.tool() + one.max(other));
-        self.schedule.is_closed(near, far, margin) || self.watch.open().is_some_and(|leading| far - leading >= -margin)
+        let reaches = |leading| far - leading >= -margin;
+        self.schedule.is_closed(near, far, margin)
+            || self.watch.open().is_some_and(reaches)
+            || self.guard.awaited(self.watch.frontier(), &self.geometry).is_some_and(reaches)
     }
 
     /// The ground that the tool works on.

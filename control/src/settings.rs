@@ -4,7 +4,7 @@
 //! name carries its unit.
 
 use crate::{
-    memory::CHECK,
+    memory::checksum,
     units::{Ticks, TicksPerSecond, Wheel},
 };
 
@@ -99,12 +99,24 @@ settings! {
     /// Examples that vote.
     K "k": 1 to 15, 3, false,
         "nearest examples that vote on what an object is";
+    /// Width below which an object is dust.
+    MinWidthMm "min_width_mm" in "mm": 0 to 100, 0, false,
+        "what is narrower is dust, and weeded over; 0 for nothing";
+    /// Narrow objects in a row, none of them a plant, that are an alarm.
+    MisfitAfter "misfit_after": 0 to 100, 5, false,
+        "so many narrow objects in a row and no plant raise an alarm; 0 never";
     /// Ground over which the beam may be broken before that is an alarm.
     MaxWidthMm "max_width_mm" in "mm": 20 to 1500, 400, false,
         "a beam broken over more ground than this raises an alarm";
     /// Gaps in a canopy shorter than this belong to it.
     MergeGapMm "merge_gap_mm" in "mm": 0 to 1000, 21, false,
         "clear stretches shorter than this belong to the canopy";
+    /// Distance at which the crop is set, so that plants that are not seen can be guarded.
+    GuardSpacingMm "guard_spacing_mm" in "mm": 0 to 2000, 0, false,
+        "where plants stand evenly, this far apart, unseen ones are kept; 0 off";
+    /// How far off its place a guarded plant may stand.
+    GuardScatterMm "guard_scatter_mm" in "mm": 0 to 200, 30, false,
+        "how far from where it is due an unseen plant may stand";
     /// The sensor's response time.
     BeamResponseMs "beam_response_ms" in "ms": 0 to 50, 1, false,
         "time the beam's sensor takes to answer";
@@ -131,7 +143,7 @@ pub const TABLE_MARK: u16 = {
         end += 1 + name.len();
         place += 1;
     }
-    CHECK.checksum(bytes.split_at(end).0)
+    checksum(bytes.split_at(end).0)
 };
 
 /// Settings that cannot be right together.

@@ -12,7 +12,7 @@ mod shown;
 
 pub use self::shown::Reason;
 
-use self::faults::{Limits, NoPlants};
+use self::faults::{Limits, Misfits, NoPlants};
 use crate::{
     alarm::Alarm,
     ground::{
@@ -20,6 +20,7 @@ use crate::{
         class::{Class, Classifier, Vote},
         features::{self, Features},
         object::Object,
+        schedule::ScheduleFull,
     },
     measure::{
         monitor::{BeamMonitor, EncoderMonitor},
@@ -42,7 +43,7 @@ use crate::{
         tool::Tool,
     },
     settings::Setting,
-    units::{Instant, Position},
+    units::{Instant, Position, count},
 };
 
 /// What the machine is to do after a turn.
@@ -54,8 +55,8 @@ pub struct Orders {
     pub pulse_out: HalfMicros,
     /// The shortest gap between servo pulses in milliseconds; 0 for fixed frames.
     pub gap_ms: u8,
-    /// Whether an object was judged: that is enough for a turn of the loop.
-    pub has_judged: bool,
+    /// Whether an object was judged, or another speed or other settings were followed: that is enough for a turn of the loop.
+    pub is_enough: bool,
 }
 
 /// The machine's decisions and all that they rest on.
@@ -78,11 +79,16 @@ pub struct Controller<C, M> {
     meter: SpeedMeter,
     state: State,
     tool: Tool,
-    /// Whether an object was judged in this turn.
-    has_judged: bool,
+    /// Whether the speed is another than the one by which the ground leads.
+    leads_are_old: bool,
+    /// Whether this turn has done what takes long.
+    is_enough: bool,
     /// Lines that were not understood, or came with a hole in them.
     mistakes: u16,
+    /// Objects that were narrower than any plant or weed.
+    dust: u16,
     no_plants: NoPlants,
+    misfits: Misfits,
     objects: Objects,
     events: Events,
     curves: Curves,
@@ -115,9 +121,12 @@ impl<C: Classifier, M: Memory> Asleep<C, M> {
             meter: SpeedMeter::NONE,
             state: State::Hold,
             tool: Tool::NONE,
-            has_judged: false,
+            leads_are_old: false,
+            is_enough: false,
             mistakes: 0,
+            dust: 0,
             no_plants: NoPlants::since(place),
+            misfits: Misfits::NONE,
             objects: Objects::NONE,
             events: Events::NONE,
             curves: Curves::NONE,
@@ -203,9 +212,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         let doubted = self.odometer.read(readings.position, readings.jumps, self.believes_jumps());
         let position = self.odometer.place(readings.position);
         self.readings.position = position;
-        if let Some(speed) = self.meter.read(readings.now, position) {
-            self.ground.lead(self.configuration.settings(), speed);
-        }
+        self.leads_are_old |= self.meter.read(readings.now, position).is_some();
         match self.switch.read(readings.now, readings.switch_on) {
             // An alarm wants to be cleared first, if by nothing else then by the switch going off.
             Some(true) if matches!(self.state, State::Hold) => self.go_to_work(),
@@ -215,9 +222,18 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         if let Some(object) = self.ground.roll_to(position) {
             self.judge(object);
         }
-        // Either takes half of what a turn may take.
-        if self.configuration.has_changed() && !self.has_judged {
+        match self.ground.guard() {
+            Some(Ok(due)) => self.events.add(Event::Guarded(self.ground.position_of(due, position))),
+            Some(Err(ScheduleFull)) => self.raise(Alarm::ScheduleFull),
+            None => {}
+        }
+        // As judging does, these take a good part of what a turn may take: a turn does one of them.
+        if self.is_enough {
+        } else if self.configuration.has_changed() {
             self.follow_settings();
+        } else if self.leads_are_old {
+            self.ground.lead(self.configuration.settings(), self.meter.speed());
+            (self.leads_are_old, self.is_enough) = (false, true);
         }
         if let Some(alarm) = self.fault(doubted) {
             self.raise(alarm);
@@ -230,7 +246,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         let orders = self.orders();
         self.tool.order(orders.pulse, readings.now);
         self.warn();
-        self.has_judged = false;
+        self.is_enough = false;
         orders
     }
 
@@ -242,7 +258,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             pulse: self.bench.pulse().unwrap_or_else(|| pulse_of(pulse)),
             pulse_out: pulse_of(Setting::ServoOutUs),
             gap_ms: self.configuration.get(Setting::ServoGapMs) as u8,
-            has_judged: self.has_judged,
+            is_enough: self.is_enough,
         }
     }
 
@@ -252,15 +268,19 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         self.encoder.is_doubtful() || out && self.encoder.is_quiet() || self.ground.must_be_out(out)
     }
 
-    /// Classifies a complete object and remembers it unless it is a weed.
+    /// Classifies a complete object and remembers it unless it is a weed. What is dust is only counted.
     fn judge(&mut self, object: Object) {
-        self.has_judged = true;
+        self.is_enough = true;
         let position = self.readings.position;
-        self.no_plants = NoPlants::since(position);
         let spacing = self.ground.spacing(&object);
         let speed_class_mm_s = features::speed_class(self.speed_mm_s());
         let (spacing_mm, width_mm) =
             (self.ground.millimetres(spacing), self.ground.millimetres(self.ground.ticks(object.width())));
+        if !object.cut && (width_mm as u16) < self.configuration.get(Setting::MinWidthMm) {
+            count(&mut self.dust);
+            return;
+        }
+        self.no_plants = NoPlants::since(position);
         // What is left of an object whose beginning was not seen may be as narrow as a weed.
         let vote = if object.cut {
             Vote { class: Class::Unknown, votes: 0 }
@@ -274,6 +294,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         if vote.class != Class::Weed && self.ground.keep(object).is_err() {
             self.raise(Alarm::ScheduleFull);
         }
+        self.count_misfit(vote.class, width_mm);
     }
 
     /// Latches an alarm. What was seen can no longer be trusted.
@@ -297,6 +318,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             return;
         }
         self.no_plants = NoPlants::since(self.readings.position);
+        self.misfits = Misfits::NONE;
         self.enter(State::Work);
     }
 

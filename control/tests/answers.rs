@@ -166,7 +166,7 @@ fn status_says_how_far_the_ground_that_was_seen_still_is() {
         ask(&mut machine, "status"),
         [
             "state=hold tool=out pos=0 speed_mm_s=0 windows=0 unseen_mm=400",
-            "lost=0 jumps=0 late=0 missed=0 mistakes=0 stack_free=65535 reset=power_on",
+            "lost=0 jumps=0 late=0 missed=0 mistakes=0 dust=0 stack_free=65535 reset=power_on",
             "ok"
         ]
     );
@@ -195,6 +195,7 @@ fn every_event_fits_on_a_line() {
     let plan = Plan { delay: long, hold: long };
     let mut events = vec![
         Event::Object { vote, leading: far, spacing: long, plan },
+        Event::Guarded(far),
         Event::Swing { out: true, position: far },
         Event::State(State::Hold),
     ];

@@ -102,9 +102,25 @@ impl Drive {
 
     /// A plant of 150 mm passes the beam.
     fn pass_a_plant(&mut self, speed_m_s: f64) {
+        self.pass(speed_m_s, 0.15);
+    }
+
+    /// Something as wide as this passes the beam, in metres.
+    fn pass(&mut self, speed_m_s: f64, width_m: f64) {
         self.beam(true);
-        self.roll(speed_m_s, 0.15);
+        self.roll(speed_m_s, width_m);
         self.beam(false);
+    }
+
+    /// Stalks of 20 mm pass the beam, which this machine takes for weeds, until an alarm or so many of them; how many did.
+    fn pass_stalks(&mut self, most: u32) -> u32 {
+        (1..=most)
+            .find(|_| {
+                self.pass(0.5, 0.02);
+                self.roll(0.5, 0.2);
+                self.alarm().is_some()
+            })
+            .unwrap_or(most)
     }
 
     fn alarm(&self) -> Option<Alarm> {
@@ -125,6 +141,64 @@ impl Drive {
 /// How long the encoder may be silent at a speed until that is sudden, in seconds: the time of ten ticks, and three turns.
 fn sudden_s(speed_m_s: f64) -> f64 {
     10.0 / (speed_m_s * TICKS_A_METRE) + 0.004
+}
+
+#[test]
+fn a_row_of_stalks_that_are_taken_for_weeds_is_an_alarm_at_the_fifth() {
+    let mut drive = Drive::at_work();
+    assert_eq!((drive.pass_stalks(20), drive.alarm()), (5, Some(Alarm::CropUnknown)));
+    drive.machine.clear();
+    drive.machine.start(false).unwrap();
+    assert_eq!((drive.pass_stalks(20), drive.alarm()), (5, Some(Alarm::CropUnknown)), "it is counted anew");
+}
+
+#[test]
+fn so_many_stalks_as_are_set_are_an_alarm_and_none_where_that_is_zero() {
+    for (misfit_after, stalks) in [(1, 1), (2, 2), (100, 100), (0, 300)] {
+        let mut drive = Drive::at_work();
+        drive.machine.set(Setting::MisfitAfter, misfit_after).unwrap();
+        assert_eq!(drive.pass_stalks(300), stalks);
+        assert_eq!(drive.alarm().is_some(), misfit_after != 0);
+    }
+}
+
+#[test]
+fn weeds_with_a_plant_between_them_are_no_alarm_and_neither_are_those_in_hold() {
+    let mut drive = Drive::at_work();
+    for _ in 0..10 {
+        assert_eq!((drive.pass_stalks(4), drive.alarm()), (4, None));
+        drive.pass_a_plant(0.5);
+        drive.roll(0.5, 0.2);
+    }
+    drive.machine.hold();
+    assert_eq!((drive.pass_stalks(20), drive.alarm()), (20, None));
+    drive.machine.start(false).unwrap();
+    assert_eq!(drive.pass_stalks(20), 5, "what was seen in hold does not count");
+}
+
+#[test]
+fn what_is_narrower_than_the_least_width_is_counted_as_dust_and_is_neither_a_plant_nor_a_misfit() {
+    let mut drive = Drive::at_work();
+    for (setting, value) in [(Setting::MinWidthMm, 25), (Setting::NoPlantM, 2)] {
+        drive.machine.set(setting, value).unwrap();
+    }
+    assert_eq!((drive.pass_stalks(10), drive.alarm()), (10, None));
+    assert_eq!((drive.machine.dust(), drive.machine.objects().len()), (10, 0));
+    assert_eq!(drive.events(), [Event::Warning(Warning::NoPlants)], "nobody has seen a plant");
+    drive.pass(0.5, 0.03);
+    drive.roll(0.5, 0.1);
+    assert_eq!((drive.machine.dust(), drive.machine.objects().len()), (10, 1));
+}
+
+#[test]
+fn the_narrow_rest_of_an_object_is_no_dust() {
+    let mut drive = Drive::in_hold();
+    drive.machine.set(Setting::MinWidthMm, 100).unwrap();
+    drive.edges.push(Edge::Lost { broken: true });
+    drive.roll(0.5, 0.02);
+    drive.beam(false);
+    drive.roll(0.5, 0.1);
+    assert_eq!((drive.machine.dust(), drive.machine.objects().len()), (0, 1));
 }
 
 #[test]

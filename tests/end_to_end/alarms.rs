@@ -99,6 +99,30 @@ fn more_plants_than_the_schedule_holds_are_an_alarm() {
 }
 
 #[test]
+fn a_crop_of_stalks_that_the_built_in_examples_do_not_know_is_an_alarm_before_the_sixth() {
+    let widths_mm = [20.0, 15.0, 25.0, 18.0, 22.0, 16.0, 24.0];
+    for (spacing_mm, before_mm, speed_km_h) in
+        [(500.0, 300.0, 1.0), (600.0, 900.0, 2.0), (250.0, 500.0, 2.5), (550.0, 1400.0, 1.5)]
+    {
+        let stalk = |(width_mm, number)| Thing::plant(before_mm + spacing_mm * f64::from(number), width_mm);
+        let row = Row::new(widths_mm.into_iter().zip(0..).map(stalk).collect()).expect("the stalks stand apart");
+        let mut run = Run::begin(trial(row, steady(mm_s(speed_km_h), before_mm + 5.5 * spacing_mm)), &[]);
+        run.roll_to_the_end();
+        assert_alarm(&mut run, "crop_unknown", 34);
+    }
+}
+
+#[test]
+fn stalks_are_no_alarm_where_it_is_off() {
+    let stalks = (0..9).map(|number| Thing::plant(300.0 + 250.0 * f64::from(number), 20.0));
+    let row = Row::new(stalks.collect()).expect("the stalks stand apart");
+    let mut run = Run::begin(trial(row, steady(mm_s(2.0), 2700.0)), &["set misfit_after 0"]);
+    run.roll_to_the_end();
+    assert_eq!(run.events("alarm"), [""; 0]);
+    assert_eq!(run.events("weed").len() + run.events("unknown").len(), 9, "{:#?}", run.lines());
+}
+
+#[test]
 fn a_beam_that_flickers_faster_than_it_can_be_followed_is_an_alarm() {
     let mut run = Run::begin(trial(bare_ground(), steady(mm_s(2.0), 900.0)), &[]);
     run.roll_to(600.0);

@@ -36,5 +36,6 @@ mod tall_weeds;
 mod the_schedule_on_the_pins;
 mod turns_of_the_loop;
 mod twin;
+mod unseen_plants;
 mod wakes_up_in_hold;
 mod weeds_at_every_speed;

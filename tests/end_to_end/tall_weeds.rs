@@ -1,9 +1,10 @@
 //! Weeds tall enough for the beam, and canopies with gaps: what breaks the beam is not always a plant, or one plant.
 
-use crate::common::{Run, assert_a_swing_each, assert_all_kept};
+use crate::common::{Run, assert_a_swing_each, assert_all_kept, number, status};
 use field::machine::Machine;
 use field::motion::mm_s;
 use field::planting::Planting;
+use field::row::{Row, Thing};
 use field::trial::Trial;
 use field::verdict::Timing;
 
@@ -27,6 +28,21 @@ fn a_tall_weed_does_not_lift_the_tool() {
         assert_eq!(run.events("plant").len() + run.events("unknown").len(), planting.plants);
         assert!(judgement.weeds.iter().any(|weed| weed.cut), "{:#?}", judgement.weeds);
     }
+}
+
+#[test]
+fn what_is_narrower_than_the_least_width_is_dust_that_is_counted_and_no_object() {
+    let dust = (0..8).map(|number| Thing::weed(450.0 + 40.0 * f64::from(number), 4.0));
+    let row = Row::new(dust.chain([Thing::plant(300.0, 150.0), Thing::weed(800.0, 18.0)]).collect());
+    let row = row.expect("all of them stand apart");
+    let trial = Trial::at_speed(row, Machine::default(), Timing::default(), mm_s(2.0));
+    let mut run = Run::begin(trial, &["set min_width_mm 8"]);
+    run.roll_to_the_end();
+    assert_all_kept(&run.judgement());
+    assert_eq!(run.events("alarm"), [""; 0]);
+    let told = ["weed", "plant", "unknown"].map(|name| run.events(name).len());
+    assert_eq!((told.iter().sum::<usize>(), told[0]), (2, 1), "{:#?}", run.lines());
+    assert_eq!(number(&status(&mut run.uno), "dust"), 8);
 }
 
 #[test]

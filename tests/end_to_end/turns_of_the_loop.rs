@@ -137,8 +137,9 @@ fn no_turn_takes_more_than_a_millisecond_whatever_is_typed_and_told() {
     println!("{} of {TURN} cycles: {}", worst.0, worst.1);
 }
 
-/// A turn on the move, at most: one that judges an object, or reads a line while the speed changes, is the longest.
-const JUDGING: u64 = TURN * 7 / 6;
+/// A turn on the move, at most. The longest judges an object where fifteen examples vote, `set k 15` being among the lines: 22,700
+/// cycles, where three of them take no more than other turns do.
+const JUDGING: u64 = TURN * 3 / 2;
 
 #[test]
 fn no_turn_takes_much_more_than_a_millisecond_while_a_row_rolls_by() {

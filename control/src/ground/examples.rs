@@ -6,7 +6,7 @@
 
 mod table;
 
-use crate::ground::features;
+use crate::ground::{class::label, features};
 use knn::{Example, Scale};
 
 avr_progmem::progmem! {
@@ -40,6 +40,20 @@ pub const RADIUS: u32 = table::RADIUS;
 
 /// Examples that vote, as the table was trained.
 pub const K: u8 = table::K;
+
+/// Half as wide, in mm, as the narrowest plant among the examples: what is narrower has a weed's width, whatever it is.
+pub const NARROW_MM: i16 = {
+    let (mut narrowest, mut index) = (i32::MAX, 0);
+    while index < COUNT {
+        let ([.., hold, _], label) = table::TRAINED[index];
+        let width = hold - features::HOLD_BEYOND_WIDTH_MM;
+        if label == label::PLANT && width < narrowest {
+            narrowest = width;
+        }
+        index += 1;
+    }
+    (narrowest / 2) as i16
+};
 
 /// Most examples that the flash below the older bootloader has room for, at 6 bytes each.
 pub const CAPACITY: usize = 72;

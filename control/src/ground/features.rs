@@ -18,6 +18,9 @@ mod reference {
     pub const LEAD_IN_MS: u16 = 40;
 }
 
+/// What hold is more than an object's width, in mm.
+pub const HOLD_BEYOND_WIDTH_MM: i32 = 2 * reference::MARGIN_MM as i32;
+
 /// The feature vector of an object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Features {

@@ -8,7 +8,7 @@
 
 use crate::{
     ground::{examples, features},
-    memory::{CHECK, ERASED, Memory},
+    memory::{ERASED, Memory, checksum},
 };
 use knn::{Example, Examples, Neighbour};
 
@@ -22,7 +22,7 @@ const SLOT: usize = features::COUNT + 3;
 type Taught = Example<{ features::COUNT }>;
 
 /// Stands for the scale in each slot's CRC.
-const SCALE_MARK: [u8; 2] = CHECK.checksum(&examples::SCALE_BYTES).to_le_bytes();
+const SCALE_MARK: [u8; 2] = checksum(&examples::SCALE_BYTES).to_le_bytes();
 
 /// The store of examples taught in the field.
 #[derive(Clone, Debug)]
@@ -193,7 +193,7 @@ impl<M: Memory> Examples<{ features::COUNT }> for FieldExamples<M> {
 fn encode(example: Taught) -> [u8; SLOT] {
     let [a, b, c, d, e] = example.features;
     let [mark, scale] = SCALE_MARK;
-    let [low, high] = CHECK.checksum(&[a, b, c, d, e, example.label, mark, scale]).to_le_bytes();
+    let [low, high] = checksum(&[a, b, c, d, e, example.label, mark, scale]).to_le_bytes();
     [a, b, c, d, e, example.label, low, high]
 }
 
@@ -299,7 +299,7 @@ mod tests {
         store.add(example(0)).unwrap();
         while !store.carry_on() {}
         let [a, b, c, d, e, label, ..] = store.read(0);
-        let [low, high] = CHECK.checksum(&[a, b, c, d, e, label, !SCALE_MARK[0], SCALE_MARK[1]]).to_le_bytes();
+        let [low, high] = checksum(&[a, b, c, d, e, label, !SCALE_MARK[0], SCALE_MARK[1]]).to_le_bytes();
         store.memory.bytes[6..SLOT].copy_from_slice(&[low, high]);
         let store = restart(store);
         assert_eq!((store.slot(0), store.spoiled()), (None, 1));

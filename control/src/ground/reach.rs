@@ -24,6 +24,10 @@ pub struct Geometry {
     pub max_width: Length,
     /// Clear ground behind which a canopy is over.
     pub merge_gap: Length,
+    /// From the middle of a plant to that of the next; zero where the crop is not set at even distances.
+    pub guard_spacing: Length,
+    /// How far off its place such a plant may stand.
+    pub guard_scatter: Length,
     /// How far the machine may be rolled back with the ground still remembered.
     pub memory: Length,
 }
@@ -37,6 +41,8 @@ impl Geometry {
         margin: Length::ZERO,
         max_width: Length::ZERO,
         merge_gap: Length::ZERO,
+        guard_spacing: Length::ZERO,
+        guard_scatter: Length::ZERO,
         memory: Length::ZERO,
     };
 
@@ -46,6 +52,9 @@ impl Geometry {
         let metre = wheel.ticks(1000);
         let grain = Grain::of(metre);
         let length = |setting| grain.length(wheel.ticks(settings.get(setting)));
+        // Each length takes time, which those that are off need not.
+        let is_guarded = settings.get(Setting::GuardSpacingMm) > 0;
+        let guarded = |setting| if is_guarded { length(setting) } else { Length::ZERO };
         Self {
             wheel,
             grain,
@@ -53,6 +62,8 @@ impl Geometry {
             margin: length(Setting::MarginMm),
             max_width: length(Setting::MaxWidthMm),
             merge_gap: length(Setting::MergeGapMm),
+            guard_spacing: guarded(Setting::GuardSpacingMm),
+            guard_scatter: guarded(Setting::GuardScatterMm),
             memory: Length(grain.length(metre).0 * MEMORY_M),
         }
     }

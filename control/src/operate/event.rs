@@ -25,6 +25,8 @@ pub enum Event {
         /// The paper's schedule for it.
         plan: Plan,
     },
+    /// A plant was due here, none was seen, and the ground is kept free all the same.
+    Guarded(Position),
     /// The tool was told to leave the row or to come back.
     Swing {
         /// Out of the row, or back into it.

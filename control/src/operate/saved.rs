@@ -5,7 +5,7 @@
 //! On waking up the newest copy counts that is whole, of this firmware's table, and within its ranges.
 
 use crate::{
-    memory::{CHECK, Memory, SIZE},
+    memory::{Memory, SIZE, checksum},
     settings::{Setting, Settings, TABLE_MARK},
 };
 
@@ -155,7 +155,7 @@ fn image(settings: &Settings, sequence: u8) -> [u8; COPY] {
     for (setting, value) in Setting::all().zip(bytes[HEADER..END].chunks_exact_mut(2)) {
         value.copy_from_slice(&settings.get(setting).to_le_bytes());
     }
-    let check = CHECK.checksum(&bytes[..END]).to_le_bytes();
+    let check = checksum(&bytes[..END]).to_le_bytes();
     bytes[END..].copy_from_slice(&check);
     bytes
 }
@@ -230,11 +230,14 @@ mod tests {
                     let mut spoiled = memory.clone();
                     spoiled.bytes[usize::from(address(copy)) + place] ^= 1 << bit;
                     assert_eq!(load(&spoiled), Some(with_k(left)), "byte {place}, bit {bit}");
-                    // The copy that is left is never the one to be overwritten.
-                    let mut failing = spoiled;
+                    // The copy that is left is never the one to be overwritten. Where what was spoiled has become what is to be
+                    // written, two bytes may be all that was missing.
+                    let mut failing = spoiled.clone();
                     failing.lose_power_after(2);
-                    let after = load(&save(failing, &with_k(9)).with_power());
-                    assert!([5, 7].map(|k| Some(with_k(k))).contains(&after), "byte {place}, bit {bit}: {after:?}");
+                    let memory = save(failing, &with_k(9)).with_power();
+                    let (after, is_all_written) = (load(&memory), memory.bytes == save(spoiled, &with_k(9)).bytes);
+                    let is_left = [5, 7].map(|k| Some(with_k(k))).contains(&after);
+                    assert!(is_left || is_all_written, "byte {place}, bit {bit}: {after:?}");
                 }
             }
         }
@@ -253,7 +256,7 @@ mod tests {
         for place in 0..HEADER - 1 {
             let mut bytes = image(&with_k(5), 1);
             bytes[place] ^= 1;
-            let check = CHECK.checksum(&bytes[..END]).to_le_bytes();
+            let check = checksum(&bytes[..END]).to_le_bytes();
             bytes[END..].copy_from_slice(&check);
             let mut memory = Volatile::new();
             memory.bytes[..COPY].copy_from_slice(&bytes);
@@ -265,7 +268,7 @@ mod tests {
     fn values_out_of_their_range_are_no_settings_although_their_crc_is_right() {
         let mut bytes = image(&Settings::new(), 1);
         bytes[HEADER..HEADER + 2].copy_from_slice(&u16::MAX.to_le_bytes());
-        let check = CHECK.checksum(&bytes[..END]).to_le_bytes();
+        let check = checksum(&bytes[..END]).to_le_bytes();
         bytes[END..].copy_from_slice(&check);
         let mut memory = Volatile::new();
         memory.bytes[..COPY].copy_from_slice(&bytes);

@@ -23,6 +23,11 @@ pub fn write_event(event: &Event, line: &mut Line) {
             line.number(plan.hold.0);
             line.number(plan.actuation().0);
         }
+        Event::Guarded(place) => {
+            line.say(texts::GUARDED);
+            line.say(texts::POS);
+            line.number(place.count());
+        }
         Event::Swing { out, position } => {
             line.say(texts::SWING);
             line.say(place_name(out));

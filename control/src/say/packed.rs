@@ -47,10 +47,10 @@ avr_progmem::progmem! {
     static progmem TABLE: [u8; table::<4096>().1] = table().0;
 }
 
-/// A byte of the table: in one place, as reading it takes more code than it seems.
+/// A byte of the table.
 #[inline(never)]
 fn byte(place: usize) -> u8 {
-    TABLE.load_at(place)
+    flash::byte(&TABLE, place)
 }
 
 /// A text in flash, by its number.

@@ -44,6 +44,7 @@ pub(super) fn write_counts<C: Classifier, M: Memory>(controller: &Controller<C, 
     line.counted(controller.late());
     line.counted(controller.events_missed());
     line.counted(controller.mistakes());
+    line.counted(controller.dust());
     line.counted(readings.stack_free);
     line.say(controller.cause().text());
     if controller.sees_no_plants() {

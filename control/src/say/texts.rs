@@ -69,9 +69,10 @@ said! {
     TOOL_IS = " tool=";
     FOR = " for=";
     PLACE = " pos=# speed_mm_s=# windows=# unseen_mm=#";
-    COUNTS = "lost=# jumps=# late=# missed=# mistakes=# stack_free=# reset=";
+    COUNTS = "lost=# jumps=# late=# missed=# mistakes=# dust=# stack_free=# reset=";
     WARNING_IS = " warning=";
     OBJECT = " pos=# votes=# spacing=# delay=# hold=# actuation=#";
+    GUARDED = "guarded";
     SWING = "swing tool=";
     POS = " pos=#";
     STATE_EVENT = "state is=";

@@ -93,6 +93,7 @@ words! {
         TooFast = "too_fast",
         RolledBackTooFar = "rolled_back_too_far",
         ScheduleFull = "schedule_full",
+        CropUnknown = "crop_unknown",
         ToolStuck = "tool_stuck",
         SettingsLost = "settings_lost",
         SettingsContradict = "settings_contradict",

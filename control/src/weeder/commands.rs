@@ -1,6 +1,9 @@
 //! What the operator may ask of the machine, by switch or console.
 
-use super::{Controller, faults::Limits};
+use super::{
+    Controller,
+    faults::{Limits, Misfits},
+};
 use crate::{
     ground::{
         class::{Class, Classifier, ExamplesFull, label},
@@ -84,8 +87,9 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     pub(super) fn follow_settings(&mut self) {
         self.configuration.follow();
         let settings = self.configuration.settings();
-        self.limits = Limits::of(settings);
         self.ground.follow(settings, self.readings.position, self.meter.speed());
+        self.limits = Limits::of(settings, self.ground.wheel());
+        (self.leads_are_old, self.is_enough) = (false, true);
     }
 
     /// Begins to save the settings, which [`carry_on`](Self::carry_on) finishes.
@@ -120,6 +124,8 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         }
         self.classifier.teach(&features, label).map_err(|ExamplesFull| Refusal::ExamplesFull)?;
         object.label = Some(label);
+        // Whoever labels looks at what the objects are taken for.
+        self.misfits = Misfits::NONE;
         Ok(())
     }
 

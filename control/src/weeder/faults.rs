@@ -3,12 +3,15 @@
 use super::Controller;
 use crate::{
     alarm::{Alarm, Warning},
-    ground::class::Classifier,
+    ground::{
+        class::{Class, Classifier},
+        examples::NARROW_MM,
+    },
     measure::readings::Readings,
     memory::Memory,
     operate::event::Event,
     settings::{Setting, Settings},
-    units::{Length, Position, Ticks},
+    units::{Length, Position, Ticks, Wheel},
 };
 
 /// What the end switch may take longer than the lead: a servo frame, the contacts' bouncing, and some patience.
@@ -32,8 +35,7 @@ pub(super) struct Limits {
 impl Limits {
     pub(super) const NONE: Self = Self { top_speed: 0, no_plant: Ticks::ZERO };
 
-    pub(super) fn of(settings: &Settings) -> Self {
-        let wheel = settings.wheel();
+    pub(super) fn of(settings: &Settings, wheel: Wheel) -> Self {
         Self {
             top_speed: wheel.ticks(settings.get(Setting::TopSpeedMmS)).0 as u16,
             no_plant: Ticks(wheel.ticks(1000).0 * i32::from(settings.get(Setting::NoPlantM))),
@@ -67,6 +69,33 @@ impl NoPlants {
     /// Whether the operator was warned.
     pub(super) const fn has_warned(&self) -> bool {
         self.warned
+    }
+}
+
+/// Objects as narrow as a weed since the last one that was wider or taken for a plant, or that was labelled, or since work began.
+///
+/// Those that are unknown are kept, and count nevertheless: a stalk far behind the last plant is like no example, be it crop or weed.
+#[derive(Clone, Debug)]
+pub(super) struct Misfits {
+    count: u8,
+    /// Whether any of them was taken for a weed: else nothing is lost.
+    any_weed: bool,
+}
+
+impl Misfits {
+    /// No objects.
+    pub(super) const NONE: Self = Self { count: 0, any_weed: false };
+
+    /// Counts an object; whether these are so many now, or more; zero never.
+    fn count(&mut self, class: Class, width_mm: i16, enough: u8) -> bool {
+        if class == Class::Plant || width_mm >= NARROW_MM {
+            *self = Self::NONE;
+        } else if width_mm > 0 {
+            // A leaf that moves while the machine stands has no width.
+            self.count = self.count.saturating_add(1);
+            self.any_weed |= class == Class::Weed;
+        }
+        self.any_weed && self.count > enough.wrapping_sub(1)
     }
 }
 
@@ -106,6 +135,14 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             return Some(Alarm::ToolStuck);
         }
         (stack_free < STACK_RESERVE).then_some(Alarm::StackLow)
+    }
+
+    /// Counts what an object was taken for, while it is at stake.
+    pub(super) fn count_misfit(&mut self, class: Class, width_mm: i16) {
+        if self.is_working() && self.misfits.count(class, width_mm, self.configuration.get(Setting::MisfitAfter) as u8)
+        {
+            self.raise(Alarm::CropUnknown);
+        }
     }
 
     /// Tells what the operator should know, once.

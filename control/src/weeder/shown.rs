@@ -125,6 +125,11 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         self.mistakes
     }
 
+    /// Objects that were too narrow to be judged.
+    pub fn dust(&self) -> u16 {
+        self.dust
+    }
+
     /// Events that found no room to wait in.
     pub fn events_missed(&self) -> u16 {
         self.events.missed()

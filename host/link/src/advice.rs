@@ -14,6 +14,7 @@ pub fn alarm(alarm: Alarm) -> &'static str {
         Alarm::TooFast => "drive slower, or set the beam farther ahead and raise the limit",
         Alarm::RolledBackTooFar => "roll forward to where you stopped, then `clear`",
         Alarm::ScheduleFull => "set the beam nearer, or raise `merge_gap_mm`",
+        Alarm::CropUnknown => "are they the crop? `label plant`; else raise `misfit_after`",
         Alarm::ToolStuck => "stop; look for a stone, a dead servo, a loose switch",
         Alarm::SettingsLost => "check `get`, set what differs, `save`, `clear`",
         Alarm::SettingsContradict => "`start` says which; change one of them, `save`",

@@ -33,6 +33,11 @@ pub enum EventLine {
         /// The machine's position at the command, in ticks.
         position: i32,
     },
+    /// Ground is kept free on which a plant was due and none was seen.
+    Guarded {
+        /// The middle of it, in ticks.
+        position: i32,
+    },
     /// The machine went from one state to another.
     State(Mode),
     /// A fault was latched.
@@ -161,6 +166,7 @@ impl EventLine {
             "weed" => object(Class::Weed),
             "unknown" => object(Class::Unknown),
             "swing" => Some(Self::Swing { out: values.out()?, position: values.number("pos")? }),
+            "guarded" => Some(Self::Guarded { position: values.number("pos")? }),
             "state" => Some(Self::State(Mode::find(values.text("is")?)?)),
             "alarm" => Some(Self::Alarm {
                 alarm: Alarm::find(values.text("name")?.as_bytes())?,
@@ -242,6 +248,8 @@ mod tests {
             };
             assert_eq!(EventLine::parse(&line(event)), Some(expected));
         }
+        let guarded = Event::Guarded(Position::new(-3));
+        assert_eq!(EventLine::parse(&line(guarded)), Some(EventLine::Guarded { position: -3 }));
         let swing = Event::Swing { out: true, position: Position::new(12) };
         assert_eq!(EventLine::parse(&line(swing)), Some(EventLine::Swing { out: true, position: 12 }));
         assert_eq!(EventLine::parse(&line(Event::State(State::Work))), Some(EventLine::State(Mode::Work)));

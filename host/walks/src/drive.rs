@@ -101,6 +101,10 @@ pub struct Drive<M> {
     out_since_us: Option<u64>,
     turns: u64,
     steady_swings: u32,
+    /// The least that a plant was said to stand off its place, and every distance of plants that was set: the machine may guard by
+    /// what was set a moment ago.
+    guard_scatter: i64,
+    guard_spacings: Vec<i64>,
 }
 
 impl<M: Machine> Drive<M> {
@@ -151,6 +155,8 @@ impl<M: Machine> Drive<M> {
             out_since_us: Some(0),
             turns: 0,
             steady_swings: 0,
+            guard_scatter: i64::MAX,
+            guard_spacings: Vec::new(),
         };
         drive.say("clear")?;
         Ok(drive)
@@ -274,6 +280,7 @@ impl<M: Machine> Drive<M> {
         let metre = f64::from(self.machine.settings().wheel().ticks(1000).0);
         // Over what was seen, and forgotten, and on until ground that is known comes to the tool.
         let end = self.farthest.max(self.ground as i64)
+            + self.unseen_row()
             + 2 * self.ticks(Setting::BeamToToolMm)
             + self.ticks(Setting::MarginMm)
             + metre as i64;
@@ -292,12 +299,20 @@ impl<M: Machine> Drive<M> {
             self.turn()?;
             let there = self.ground as i64;
             // What the last turn has rolled past is still counted.
-            let is_bare = there > self.bare_from + BEHIND_THE_ROW;
+            let is_bare = there > self.bare_from + BEHIND_THE_ROW + self.unseen_row();
             prop_assert!(!is_bare || !is_alarm(self.machine.state()), "{:?} on bare ground", self.machine.state());
             let (state, reason) = (self.machine.state(), self.machine.reason());
             prop_assert!(there < end, "the tool does not come back to work: {state:?}, {reason:?}");
         }
         Ok(())
+    }
+
+    /// So far behind the row the machine may guard plants that it has not seen.
+    fn unseen_row(&self) -> i64 {
+        match self.ticks(Setting::GuardSpacingMm) {
+            0 => 0,
+            spacing => 4 * (spacing + self.ticks(Setting::GuardScatterMm) + self.ticks(Setting::MarginMm)),
+        }
     }
 
     /// The machine's state.
@@ -386,7 +401,14 @@ impl<M: Machine> Drive<M> {
         let wheel = self.machine.settings().wheel();
         let merge_gap = self.machine.settings().ticks(Setting::MergeGapMm).0.into();
         self.model.follow(self.here(), merge_gap, wheel.ticks(1000).0.into());
-        self.model.leave_narrow(wheel.ticks(M::NARROW_MM).0.into());
+        // What is narrower than the settings have it is dust, of which nothing is said either.
+        let narrow_mm = M::NARROW_MM.max(self.machine.settings().get(Setting::MinWidthMm));
+        self.guard_scatter = self.guard_scatter.min(self.ticks(Setting::GuardScatterMm));
+        let spacing = self.ticks(Setting::GuardSpacingMm);
+        if spacing > 0 && !self.guard_spacings.contains(&spacing) {
+            self.guard_spacings.push(spacing);
+        }
+        self.model.leave_narrow(wheel.ticks(narrow_mm).0.into());
 
         self.world.time_us += self.beginning.turn_us;
         let seconds = self.beginning.turn_us as f64 / 1e6;
@@ -550,6 +572,8 @@ impl<M: Machine> Drive<M> {
             && self.calm_since_us + STEADY_US < self.world.time_us
             && self.machine.reason().is_none_or(|reason| reason == Reason::Plant)
             && !self.model.is_unseen(tool)
+            // What is guarded may not have been told.
+            && self.guard_spacings.is_empty()
             && !self.model.is_shifted;
         if !is_calm {
             self.left_for = None;
@@ -599,7 +623,23 @@ impl<M: Machine> Drive<M> {
         for end in written.iter().filter(|line| is_end(line)) {
             self.end(end, unseen_mm);
         }
+        written.iter().try_for_each(|line| self.check_guarded(line))?;
         self.written = written;
+        Ok(())
+    }
+
+    /// What the machine says that it guards is where a plant was due.
+    fn check_guarded(&mut self, line: &str) -> Checked {
+        let Some(told) = line.strip_prefix("guarded pos=").and_then(|place| place.parse::<i32>().ok()) else {
+            return Ok(());
+        };
+        let here = self.here();
+        let due = here + i64::from(told.wrapping_sub(here as i32));
+        // It was decided a moment ago, and the settings may have changed since.
+        let guarded: Vec<_> =
+            self.guard_spacings.iter().map(|&spacing| self.model.guard(due, spacing, self.guard_scatter)).collect();
+        let is_right = guarded.iter().any(Result::is_ok) || self.model.is_shifted;
+        prop_assert!(is_right, "{guarded:?}");
         Ok(())
     }
 

@@ -5,6 +5,8 @@
 //! weed while it was whole, and the operator's word. `start now` is that word. It counts for the ground of which `status` says
 //! that the machine does not know it, never seen or seen and forgotten, and for no other. An alarm opens nothing.
 //!
+//! What the machine says that it guards is as closed as a canopy from then on, whoever may stand there.
+//!
 //! Where the encoder's count goes wrong, the row is shifted under it by what was lost or made up: the model then still holds
 //! what the beam has shown at each count, which is all that the machine can know.
 
@@ -37,6 +39,8 @@ pub struct Model {
     is_growing: bool,
     /// In the order in which they lie.
     runs: Vec<Run>,
+    /// Ground where a plant was due and none was seen, in the order in which it was told.
+    guarded: Vec<Run>,
     /// Gaps that belong to a canopy, each with the frontier from which on it was set.
     merge_gaps: Vec<(i64, i64)>,
     /// An object no longer than this may have been taken for a weed, and nobody has said so.
@@ -59,6 +63,7 @@ impl Model {
             broken,
             is_growing: false,
             runs: Vec::new(),
+            guarded: Vec::new(),
             merge_gaps: Vec::new(),
             narrow: 0,
             slack: 0,
@@ -105,7 +110,32 @@ impl Model {
         (self.frontier, self.is_growing) = (place, false);
         self.runs.retain(|run| run.leading < place);
         self.runs.iter_mut().for_each(|run| run.trailing = run.trailing.min(place - 1));
+        self.guarded.retain(|guarded| guarded.trailing < place);
         self.merge_gaps.clear();
+    }
+
+    /// The machine says that it guards the ground around a place, where a plant was due.
+    ///
+    /// # Errors
+    /// What the beam has shown, where it has not seen all of that ground, or nothing stands so far behind that the plant was due.
+    pub fn guard(&mut self, due: i64, spacing: i64, scatter: i64) -> Result<(), String> {
+        if due + scatter > self.frontier + self.slack {
+            return Err(format!("ground is guarded around {due}, and the beam has only come to {}", self.frontier));
+        }
+        // From the middle of a plant, which may have gaps, to that of the first, the second, or the third unseen behind it.
+        let is_from = |first: usize| {
+            self.runs[first..].iter().any(|last| {
+                let middle = (self.runs[first].leading + last.trailing) / 2;
+                let off = (1..=3).map(|unseen| (due - middle - unseen * spacing).abs()).min().unwrap_or(i64::MAX);
+                off <= 4 * self.slack + 2 * self.runs[first].blur
+            })
+        };
+        if !(0..self.runs.len()).any(is_from) {
+            return Err(format!("ground is guarded around {due}, {spacing} behind none of {:?}", self.runs));
+        }
+        let (leading, trailing) = (due - scatter, due + scatter);
+        self.guarded.push(Run { leading, trailing, blur: 0, margin_to: i64::MAX, is_free: false });
+        Ok(())
     }
 
     /// The beam has come to a place, which the machine may have by `blur` elsewhere.
@@ -154,7 +184,8 @@ impl Model {
             [part(i64::MIN, from - 1, run.is_free), part(from, to, true), part(to + 1, i64::MAX, run.is_free)]
         };
         self.runs = self.runs.iter().flat_map(parts).flatten().collect();
-        for run in self.runs.iter_mut().filter(|run| run.trailing < from) {
+        self.guarded.retain(|guarded| guarded.trailing < from || guarded.leading > to);
+        for run in self.runs.iter_mut().chain(&mut self.guarded).filter(|run| run.trailing < from) {
             run.margin_to = run.margin_to.min(from - 1);
         }
         // What the beam is still to come to there counts as little.
@@ -211,11 +242,14 @@ impl Model {
     pub fn canopy_between(&self, near: i64, far: i64, margin: i64) -> Option<Run> {
         let first = self.runs.partition_point(|run| run.trailing + margin < near);
         let mut near_by = self.runs[first..].iter().take_while(|run| run.leading - margin <= far);
-        let is_closed = |run: &&Run| {
-            let meets = self.bounds(run, margin).is_some_and(|(from, to)| from <= far && to >= near);
-            meets && (self.narrow == 0 || self.is_wide(run))
-        };
-        near_by.find(is_closed).copied()
+        let is_closed = |run: &&Run| self.is_met(run, near, far, margin) && (self.narrow == 0 || self.is_wide(run));
+        let guarded = || self.guarded.iter().find(|run| self.is_met(run, near, far, margin));
+        near_by.find(is_closed).or_else(guarded).copied()
+    }
+
+    /// Whether the ground around a run is closed for sure somewhere from `near` to `far`.
+    fn is_met(&self, run: &Run, near: i64, far: i64, margin: i64) -> bool {
+        self.bounds(run, margin).is_some_and(|(from, to)| from <= far && to >= near)
     }
 
     /// As [`canopy_between`](Self::canopy_between), where all of the ground is closed by canopies and their margins.

@@ -248,6 +248,10 @@ fn setting() -> BoxedStrategy<String> {
         1 => (Just("no_plant_m"), 0_u32..=3),
         1 => (Just("servo_out_us"), 500_u32..=2500),
         1 => (Just("servo_in_us"), 500_u32..=2500),
+        2 => (Just("guard_spacing_mm"), 0_u32..=700),
+        1 => (Just("guard_scatter_mm"), 0_u32..=100),
+        1 => (Just("min_width_mm"), 0_u32..=60),
+        1 => (Just("misfit_after"), 0_u32..=6),
         1 => (Just("k"), 1_u32..=15),
     ];
     let names = [
@@ -262,6 +266,10 @@ fn setting() -> BoxedStrategy<String> {
         "servo_out_us",
         "servo_gap_ms",
         "k",
+        "guard_spacing_mm",
+        "guard_scatter_mm",
+        "min_width_mm",
+        "misfit_after",
         "max_width_mm",
         "merge_gap_mm",
         "beam_response_ms",
@@ -323,6 +331,11 @@ fn happenings() -> BoxedStrategy<Vec<Happening>> {
         .prop_map(|((bench, ms), off, line)| vec![typed("hold"), Type(bench), Stand { ms: ms + off - 15 }, Type(line)]);
     prop_oneof![
         24 => one.prop_map(|happening| vec![happening]),
+        // A crop at even distances, and the machine says what it guards of it.
+        2 => (150_u32..900, to_work(), forward(), forward()).prop_map(|(mm, start, roll, on)| {
+            let set = Type(format!("set guard_spacing_mm {mm}"));
+            vec![typed("events on"), set, typed("clear"), typed(start), roll, on]
+        }),
         6 => (to_work(), forward()).prop_map(|(start, roll)| vec![typed("clear"), typed(start), roll]),
         // A fault in the midst of whatever there is, and on from where it was.
         6 => (fault(), back(), to_work(), forward()).prop_map(|(fault, back, start, forward)| {

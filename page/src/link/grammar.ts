@@ -68,6 +68,8 @@ export type Said =
     | { is: "object"; seen: Seen }
     | { is: "state"; mode: Mode }
     | { is: "swing"; out: boolean }
+    /** Ground is kept free on which a plant was due and none was seen. */
+    | { is: "guarded" }
     /** A fault was latched. */
     | { is: "alarm"; name: string }
     | { is: "warning"; name: string }
@@ -79,7 +81,7 @@ export type Said =
 
 /** Whether the machine says it by itself, and not as a part of an answer. */
 export function isTold({ is }: Said): boolean {
-    return ["object", "state", "swing", "alarm", "warning", "calibrated", "plot"].includes(is);
+    return ["object", "state", "swing", "guarded", "alarm", "warning", "calibrated", "plot"].includes(is);
 }
 
 /** Reads a line. */

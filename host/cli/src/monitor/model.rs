@@ -136,7 +136,10 @@ impl Model {
                     Some(format!("warning {}: {}", name_of(warning.text().bytes()), advice::warning(warning)));
             }
             EventLine::Plot => return,
-            EventLine::Swing { .. } | EventLine::State(_) | EventLine::Calibrated { .. } => {}
+            EventLine::Swing { .. }
+            | EventLine::Guarded { .. }
+            | EventLine::State(_)
+            | EventLine::Calibrated { .. } => {}
         }
         self.say(line);
     }

@@ -154,8 +154,10 @@ fn describe(heard: Option<&Heard>) -> String {
             let name: String = alarm.text().bytes().map(char::from).collect();
             format!("`alarm name={name} pos={position}`")
         }
-        EventLine::State(_) | EventLine::Warning(_) | EventLine::Calibrated { .. } | EventLine::Plot => {
-            "something else".to_owned()
-        }
+        EventLine::Guarded { .. }
+        | EventLine::State(_)
+        | EventLine::Warning(_)
+        | EventLine::Calibrated { .. }
+        | EventLine::Plot => "something else".to_owned(),
     }
 }

@@ -227,7 +227,7 @@ impl<'a> Player<'a> {
                 Event::Alarm { .. } if std::mem::take(&mut self.swallows_alarm) => continue,
                 Event::Alarm { alarm, position } => EventLine::Alarm { alarm, position: position.count() },
                 // They rest on time, which the log has only roughly; or follow from the others.
-                Event::State(_) | Event::Warning(_) | Event::Calibrated { .. } => continue,
+                Event::State(_) | Event::Warning(_) | Event::Calibrated { .. } | Event::Guarded(_) => continue,
             };
             self.heard.push(Heard { line: 0, event, speed, is_given: false });
         }

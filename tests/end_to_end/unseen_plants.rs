@@ -1,0 +1,44 @@
+//! Plants that the beam does not see, in a crop at even distances: with their spacing set, the ground where they are due is kept.
+
+use crate::common::{Run, is_out_at_the_pin, number, steady, trial};
+use field::motion::mm_s;
+use field::row::{Row, Thing};
+
+/// From beam to tool.
+const X_MM: f64 = 400.0;
+
+/// A run past plants half a metre apart, the third of which the beam does not see; behind the fourth the row is at its end.
+fn past_an_unseen_plant(commands: &[&str]) -> Run {
+    let seen = [600.0, 1100.0, 2100.0].map(|place_mm| Thing::plant(place_mm, 150.0));
+    let row = Row::new(seen.to_vec()).expect("the plants stand apart");
+    Run::begin(trial(row, steady(mm_s(2.0), 4900.0)), commands)
+}
+
+/// Whether the tool is out of the row when it comes to a place.
+fn is_out_at(run: &mut Run, place_mm: f64) -> bool {
+    run.roll_to(place_mm + X_MM);
+    is_out_at_the_pin(&run.uno)
+}
+
+#[test]
+fn a_plant_that_is_not_seen_is_kept_where_it_is_due_and_behind_three_the_row_is_at_its_end() {
+    let mut run = past_an_unseen_plant(&["set guard_spacing_mm 500"]);
+    let out_mm = [1100.0, 1530.0, 1600.0, 1650.0, 2100.0, 2600.0, 3100.0, 3600.0];
+    let in_mm = [1330.0, 1760.0, 2330.0, 2830.0, 4100.0, 4400.0];
+    let mut places_mm: Vec<f64> = out_mm.iter().chain(&in_mm).copied().collect();
+    places_mm.sort_by(f64::total_cmp);
+    let is_out = |place_mm: &f64| is_out_at(&mut run, *place_mm);
+    let found: Vec<f64> = places_mm.into_iter().filter(is_out).collect();
+    assert_eq!(found, out_mm, "{:#?}", run.lines());
+    let guarded: Vec<f64> = run.events("guarded").iter().map(|line| number(line, "pos") as f64 / 1.90986).collect();
+    let due_mm = [1600.0, 2600.0, 3100.0, 3600.0];
+    let is_near = |(told, due): (&f64, &f64)| (told - due).abs() < 4.0;
+    assert!(guarded.len() == 4 && guarded.iter().zip(&due_mm).all(is_near), "{guarded:?}");
+}
+
+#[test]
+fn a_plant_that_is_not_seen_is_weeded_where_no_spacing_is_set() {
+    let mut run = past_an_unseen_plant(&[]);
+    assert!(!is_out_at(&mut run, 1600.0));
+    assert_eq!(run.events("guarded"), [""; 0]);
+}
