@@ -363,6 +363,38 @@ fn curves_are_labels_and_values_and_nothing_else() {
 }
 
 #[test]
+fn curves_and_status_show_how_fast_the_machine_rolls_and_the_beam_whether_it_is_broken() {
+    let mut machine = machine();
+    for (direction, broken) in [(1, true), (-1, false)] {
+        let edge = Edge::Seen { position: Position::new(0), broken };
+        machine.turn(readings(0, 0), [edge]);
+        for milliseconds in 1..1000 {
+            machine.turn(readings(milliseconds * 1000, direction * milliseconds as i32), []);
+        }
+        let speed_mm_s = 523 * direction;
+        assert!((machine.speed_mm_s() - speed_mm_s as i16).abs() <= 1, "{}", machine.speed_mm_s());
+        let speed = format!("speed_mm_s{}{}", ':', machine.speed_mm_s());
+        let mut line = Line::new();
+        say::write_plot(&machine, Plot::Arduino, &mut line);
+        let curves = said(line);
+        assert!(curves.contains(&speed) && curves.contains(&format!("beam_broken:{}", u8::from(broken))), "{curves}");
+        assert!(ask(&mut machine, "status")[0].contains(&speed.replace(':', "=")));
+    }
+}
+
+#[test]
+fn status_counts_the_events_that_found_no_room_to_wait() {
+    let mut machine = machine();
+    machine.tell_events(true);
+    for _ in 0..5 {
+        machine.start(false).expect("no alarm is latched");
+        machine.hold();
+    }
+    assert!(ask(&mut machine, "status")[1].contains(" missed=4 "), "six of ten wait");
+    assert_eq!(std::iter::from_fn(|| machine.next_event()).count(), 6);
+}
+
+#[test]
 fn events_and_curves_wait_until_an_answer_is_complete() {
     let mut machine = machine();
     machine.tell_events(true);

@@ -461,6 +461,23 @@ fn jumps_at_rest_move_nothing_and_are_an_alarm_where_there_are_many() {
 }
 
 #[test]
+fn the_jumps_of_a_wheel_so_fast_that_an_edge_can_be_missed_are_believed() {
+    for (speed_m_s, believed) in [(7.0, false), (15.0, true)] {
+        let mut drive = Drive::in_hold();
+        drive.roll(speed_m_s, 3.0);
+        let before = drive.machine.readings().position;
+        let (place, jumps) = (drive.place, 5);
+        for _ in 0..jumps {
+            drive.readings.jumps += 1;
+            drive.roll(speed_m_s, 0.1);
+        }
+        let counted = drive.place.floor() as i32 - place.floor() as i32;
+        let doubted = if believed { 0 } else { 2 * jumps };
+        assert_eq!(drive.machine.readings().position - before, Ticks(counted - doubted), "{speed_m_s} m/s");
+    }
+}
+
+#[test]
 fn working_faster_than_the_limit_is_an_alarm_in_both_directions() {
     for (speed_m_s, alarm) in [(1.35, None), (1.45, Some(Alarm::TooFast)), (-1.35, None), (-1.45, Some(Alarm::TooFast))]
     {
@@ -538,6 +555,20 @@ fn a_jump_in_speed_just_before_a_window_is_counted_as_late_and_the_tool_leaves_a
         let told = drive.events().contains(&Event::Warning(Warning::LateCommand));
         assert_eq!(told, jumps);
         assert_eq!(drive.machine.state(), State::Work);
+    }
+}
+
+#[test]
+fn a_command_is_late_where_the_speed_rises_by_more_than_an_eighth_while_the_tool_swings() {
+    for (rises_by, late) in [(1.1, 0), (1.2, 1)] {
+        let mut drive = Drive::at_work();
+        drive.roll(0.5, 0.5);
+        drive.pass_a_plant(0.5);
+        while drive.tool_is_in() {
+            drive.roll(0.5, 0.001);
+        }
+        drive.roll(0.5 * rises_by, 0.2);
+        assert_eq!(drive.machine.late(), late, "{rises_by}");
     }
 }
 

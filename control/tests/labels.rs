@@ -122,3 +122,17 @@ fn what_the_built_in_examples_do_not_know_is_taught_at_the_first_word() {
         assert_eq!(rolling.ask(&format!("label {label}")), "ok");
     }
 }
+
+#[test]
+fn what_was_taught_by_mistake_is_forgotten_by_its_number_or_with_all_others() {
+    for command in ["forget 0", "forget all"] {
+        let mut rolling = Rolling::new();
+        rolling.machine.set(Setting::K, 1).expect("it may be");
+        rolling.past(540, 150);
+        assert_eq!(rolling.ask("label weed force"), "ok");
+        assert_eq!(rolling.ask(command), "ok");
+        assert_eq!(rolling.past(540, 150), Class::Plant, "{command}");
+        let refusal = rolling.ask("forget 0");
+        assert!(refusal.starts_with("error: "), "it is forgotten already: {refusal}");
+    }
+}

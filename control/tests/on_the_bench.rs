@@ -50,6 +50,22 @@ fn the_tool_moves_by_hand_in_hold_only_and_is_out_again_when_the_machine_starts(
 }
 
 #[test]
+fn the_lamp_tells_hold_while_nothing_swings() {
+    let mut machine = machine();
+    let lit_ms = |machine: &mut Machine, from_ms: u64| {
+        (from_ms..from_ms + 2000)
+            .filter(|&now| {
+                stand(machine, now, 1, 0);
+                machine.lamp_is_lit()
+            })
+            .count()
+    };
+    assert!((200..300).contains(&lit_ms(&mut machine, 0)), "a short flash a second");
+    machine.servo_by_hand(2000).unwrap();
+    assert!((200..300).contains(&lit_ms(&mut machine, 2000)), "by hand as well");
+}
+
+#[test]
 fn hold_and_the_switch_going_off_end_what_is_done_by_hand() {
     let out = servo::from_us(2000);
     let mut machine = machine();

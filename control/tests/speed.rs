@@ -2,7 +2,7 @@
 
 use control::{
     measure::speed::SpeedMeter,
-    units::{Instant, Interval, Position},
+    units::{Instant, Interval, Position, TicksPerSecond},
 };
 use proptest::prelude::*;
 
@@ -109,4 +109,59 @@ fn one_tick_backwards_moves_the_answer_by_its_share() {
     run.roll(500, 200, |time| 1326.0 * time);
     run.roll(20, 200, |time| 1326.0 * time - if time < 0.505 { 1.5 } else { 0.0 });
     assert!((run.speed() - 1326.0).abs() < 40.0, "{}", run.speed());
+}
+
+#[test]
+fn a_speed_is_told_when_it_has_changed_and_only_then() {
+    let mut meter = SpeedMeter::new(Position::new(0), Instant::default());
+    let mut known = meter.speed();
+    for milliseconds in 0..2000_u32 {
+        // It gains speed, rolls steadily and stands.
+        let count = (milliseconds * milliseconds / 500).min(milliseconds).min(1000);
+        let now = Instant::default() + Interval::from_ms(milliseconds);
+        let told = meter.read(now, Position::new(count as i32));
+        assert_eq!(told, (meter.speed() != known).then_some(meter.speed()), "at {milliseconds} ms");
+        known = told.unwrap_or(known);
+    }
+    assert_eq!(known, TicksPerSecond(0));
+}
+
+#[test]
+fn a_creeping_wheel_whose_edges_come_unevenly_is_not_taken_to_falter() {
+    // Every other edge comes late by a third of the way between two, as encoders give them.
+    let ticks = |time: f64| {
+        let place = 60.0 * time;
+        let is_yet_to_come = place as u32 % 2 == 0 && place.fract() < 1.0 / 3.0;
+        place - f64::from(u8::from(is_yet_to_come))
+    };
+    let mut run = Run::new();
+    run.roll(500, 200, ticks);
+    for _ in 0..1000 {
+        run.roll(1, 200, ticks);
+        assert!((run.speed() - 60.0).abs() < 5.0, "{}", run.speed());
+    }
+}
+
+#[test]
+fn a_silent_wheel_is_slower_than_a_tick_in_its_silence_whichever_way_it_turned() {
+    for direction in [1.0, -1.0] {
+        let mut run = Run::new();
+        run.roll(500, 200, |time| direction * 1000.0 * time);
+        for silence_ms in 1..500 {
+            run.roll(1, 200, |_| direction * 500.0);
+            let speed = direction * run.speed();
+            // The last tick may have come up to a millisecond sooner, and the meter looks at the silence whenever an eighth more of it
+            // has gone by.
+            let [least, most] = [silence_ms + 1, silence_ms].map(|ms| 1000.0 / f64::from(ms));
+            let is_of_the_silence = (least - 1.0..=most * 9.0 / 8.0 + 1.0).contains(&speed);
+            assert!(silence_ms < 12 || is_of_the_silence, "{speed} after {silence_ms} ms");
+        }
+    }
+    // What was slower already is no faster for it.
+    let mut run = Run::new();
+    run.roll(2000, 200, |time| 10.0 * time);
+    for _ in 0..200 {
+        run.roll(1, 200, |_| 20.0);
+        assert!(run.speed() <= 10.0, "{}", run.speed());
+    }
 }

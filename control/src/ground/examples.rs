@@ -91,6 +91,7 @@ const fn greatest_common_divisor(one: usize, other: usize) -> usize {
 
 #[cfg(test)]
 mod tests {
+    extern crate std;
     use super::*;
     use crate::{
         ground::{
@@ -101,6 +102,7 @@ mod tests {
         memory::Volatile,
         settings::Setting,
     };
+    use std::vec::Vec;
 
     fn class(speed: i16, spacing_mm: i16, width_mm: i16) -> Class {
         Nearest::new(EXAMPLES, Volatile::new())
@@ -113,6 +115,12 @@ mod tests {
         for (features, label) in &table::TRAINED {
             assert!(EXAMPLES.contains(&Example::new(SCALE.quantise(features), *label)), "{features:?}");
         }
+    }
+
+    #[test]
+    fn the_bytes_of_the_scale_are_the_ranges_of_all_its_features() {
+        let bounds = table::RANGES.iter().flat_map(|range| [range.lowest, range.highest]);
+        assert_eq!(SCALE_BYTES[..], bounds.flat_map(i32::to_le_bytes).collect::<Vec<u8>>());
     }
 
     #[test]

@@ -298,7 +298,6 @@ mod tests {
 
     /// Whether an edge to and one fro, so many milliseconds apart, are a dead channel within so many edges.
     fn is_dead_channel(edge_ms: u32, edges: u32) -> bool {
-        let at = |ms: u32| Instant::new(Interval::from_ms(ms).steps());
         let mut monitor = EncoderMonitor::new(at(0), Position::new(0));
         (1..=edge_ms * edges).any(|ms| {
             let position = Position::new((ms / edge_ms % 2) as i32);
@@ -311,5 +310,51 @@ mod tests {
         assert!(!is_dead_channel(5, 80));
         assert!(is_dead_channel(5, 81));
         assert!(!is_dead_channel(7, 1000), "71 in half a second");
+    }
+
+    fn at(ms: u32) -> Instant {
+        Instant::new(Interval::from_ms(ms).steps())
+    }
+
+    /// The first alarm within a second of an encoder that shows a position at each millisecond, and when it comes.
+    fn first_alarm(position: impl Fn(u32) -> u32) -> Option<(u32, Alarm)> {
+        let mut monitor = EncoderMonitor::new(at(0), Position::new(0));
+        (1..1000).find_map(|ms| Some((ms, monitor.read(at(ms), Position::new(position(ms) as i32), 0, 4)?)))
+    }
+
+    #[test]
+    fn a_rolling_wheel_is_quiet_when_no_progress_came_for_a_hundredth_of_a_second_until_it_comes() {
+        let mut monitor = EncoderMonitor::new(at(0), Position::new(0));
+        for ms in 0..100 {
+            let position = if ms < 60 { ms.min(40) } else { ms - 20 };
+            monitor.read(at(ms), Position::new(position as i32), 0, 4);
+            assert_eq!(monitor.is_quiet(), (50..64).contains(&ms), "{ms} ms");
+        }
+    }
+
+    #[test]
+    fn ticks_that_may_be_lost_in_gaps_between_steady_ones_add_up_to_an_alarm() {
+        // 4 ticks in 4 ms three times over, and then in 7 ms: a progress may be lost each time, and half a tick is paid for. Debt
+        // is beyond 48 ticks at the 14th.
+        let gaps = |ms: u32| 16 * (ms / 19) + (ms % 19).min(12) + (ms % 19).saturating_sub(15);
+        assert_eq!(first_alarm(gaps), Some((14 * 19 + 4, Alarm::EncoderSilent)));
+        assert_eq!(first_alarm(|ms| ms), None);
+    }
+
+    #[test]
+    fn a_rolling_wheel_that_seems_to_turn_round_for_a_tick_time_and_again_has_a_dead_channel() {
+        // A tick back every 12 ms.
+        let alarm = first_alarm(|ms| 10 * (ms / 12) + if ms % 12 == 11 { 9 } else { ms % 12 });
+        assert!(matches!(alarm, Some((144..180, Alarm::EncoderChannelDead))), "{alarm:?}");
+    }
+
+    #[test]
+    fn a_beam_flickers_that_changes_more_than_forty_times_in_a_tenth_of_a_second() {
+        let first_alarm = |every_ms: u32| {
+            let mut monitor = BeamMonitor::new(at(0));
+            (1..200).find(|edge| monitor.edge(at(every_ms * (edge - 1))) == Some(Alarm::BeamFlickers))
+        };
+        assert_eq!(first_alarm(2), Some(41));
+        assert_eq!(first_alarm(3), None, "34 in a tenth of a second");
     }
 }

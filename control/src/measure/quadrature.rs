@@ -166,6 +166,18 @@ mod tests {
         assert_eq!(decoder.step(0b11), Step::Ticks(2));
     }
 
+    #[test]
+    fn the_direction_is_that_of_the_last_step() {
+        let mut decoder = Quadrature::new(0b00);
+        let mut directions = [0b00, 0b10, 0b10, 0b00, 0b11].map(|channels| {
+            decoder.step(channels);
+            decoder.direction()
+        });
+        assert_eq!(directions, [0, 1, 1, -1, -1]);
+        directions = [1, 0, -1, 1, 0];
+        assert_eq!(directions.map(|direction| Quadrature::moving(0b11, direction).direction()), directions);
+    }
+
     /// The odometer's place after these readings of count and jumps, and the ticks that it does not believe.
     fn read(readings: &[(i32, u16)]) -> (i32, u8) {
         let mut odometer = Odometer::new(Position::new(readings[0].0), readings[0].1);
@@ -185,6 +197,10 @@ mod tests {
     fn where_an_edge_can_be_missed_a_jump_is_one() {
         assert_eq!(read(&[(0, 0), (17, 1)]), (17, 0));
         assert_eq!(read(&[(0, 0), (-17, 1)]), (-17, 0));
+        assert_eq!(read(&[(0, 0), (16, 1)]), (14, 2), "sixteen ticks in a turn are too few");
+        let mut fast = Odometer::new(Position::new(0), 0);
+        assert_eq!(fast.read(Position::new(6), 1, true), 0);
+        assert_eq!(fast.place(Position::new(6)), Position::new(6));
     }
 
     #[test]

@@ -127,3 +127,34 @@ impl<M: Memory> Configuration<M> {
         self.settings.contradiction().map_or(Ok(()), |contradiction| Err(Refusal::Contradiction(contradiction)))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::memory::Volatile;
+
+    #[test]
+    fn what_follows_from_the_settings_is_to_be_worked_out_once_for_each_change_of_them() {
+        let mut configuration = Configuration::new(Volatile::new());
+        configuration.load();
+        assert!(!configuration.has_changed(), "waking up works it out");
+        assert_eq!(configuration.change(&[(Setting::K, 0)], false), Err(Refusal::OutOfRange));
+        assert_eq!(configuration.take_saved(), Err(Refusal::NothingSaved));
+        assert!(!configuration.has_changed(), "what is refused changes nothing");
+        let changes: [fn(&mut Configuration<Volatile>); 3] = [
+            |configuration| configuration.change(&[(Setting::K, 5)], true).expect("it may be"),
+            |configuration| configuration.take_defaults(),
+            |configuration| {
+                configuration.save().expect("nothing contradicts");
+                while !configuration.carry_on() {}
+                configuration.take_saved().expect("it was saved");
+            },
+        ];
+        for change in changes {
+            change(&mut configuration);
+            assert!(configuration.has_changed());
+            configuration.follow();
+            assert!(!configuration.has_changed());
+        }
+    }
+}

@@ -47,4 +47,13 @@ mod tests {
             assert_eq!(counted, [first, second, first, second].map(usize::from));
         }
     }
+
+    #[test]
+    fn hold_is_a_flash_of_an_eighth_of_a_second_each_second() {
+        // An eighth is 2^15 steps here, and a second eight of them.
+        let lit = |step: u32| is_lit(State::Hold, Instant::default() + Interval::from_steps(step << 12));
+        let seen: String = (0..128).map(|step| if lit(step) { '*' } else { ' ' }).collect();
+        let second = "*".repeat(8) + &" ".repeat(56);
+        assert_eq!(seen, second.repeat(2));
+    }
 }

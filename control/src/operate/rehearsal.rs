@@ -95,7 +95,9 @@ mod tests {
 
     #[test]
     fn windows_too_near_for_two_strokes_are_one() {
-        assert_eq!(swings(1000, &Settings::new()).len(), 3, "in, out for all of them, and in");
+        for speed_mm_s in [1000, 1380] {
+            assert_eq!(swings(speed_mm_s, &Settings::new()).len(), 3, "in, out for all of them, and in");
+        }
     }
 
     #[test]

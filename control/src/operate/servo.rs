@@ -48,6 +48,11 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_pulse_has_two_steps_a_microsecond_and_a_frame_lasts_twenty_milliseconds() {
+        assert_eq!((from_us(1500), from_us(20_000)), (3000, FRAME));
+    }
+
+    #[test]
     fn a_frame_is_cut_short_only_after_the_gap() {
         let width = from_us(1500);
         assert_eq!(action(0, width, 3), Action::Wait);
