@@ -102,6 +102,7 @@ mod tests {
         memory::Volatile,
         settings::Setting,
     };
+    use knn::Neighbour;
     use std::vec::Vec;
 
     fn class(speed: i16, spacing_mm: i16, width_mm: i16) -> Class {
@@ -156,6 +157,28 @@ mod tests {
             for width_mm in (35..=90).chain([250, 400, 1000, 30_000]) {
                 for spacing_mm in (0..=2000).step_by(5) {
                     assert_ne!(class(speed, spacing_mm, width_mm), Class::Weed, "{speed} {spacing_mm} {width_mm}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn whatever_passes_at_most_a_third_of_the_examples_are_among_the_nearest_when_the_search_meets_them() {
+        let among_the_nearest = |object: Features| {
+            let query = SCALE.quantise(&object.values());
+            let mut nearest = [Neighbour::FARTHEST; K as usize];
+            let finds_a_place = |example: &&Example<{ features::COUNT }>| {
+                let before = nearest;
+                example.neighbour_of(&query).join(&mut nearest, &mut |_| {});
+                nearest != before
+            };
+            EXAMPLES.iter().filter(finds_a_place).count()
+        };
+        for speed in SPEED_CLASSES_MM_S {
+            for width_mm in (12..=20).chain(95..=190).step_by(4) {
+                for spacing_mm in (60..=1240).step_by(20) {
+                    let found = among_the_nearest(Features::describe(speed, spacing_mm, width_mm));
+                    assert!(found <= COUNT / 3, "{found} of {COUNT}: {speed} {spacing_mm} {width_mm}");
                 }
             }
         }
