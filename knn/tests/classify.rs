@@ -3,7 +3,7 @@
 //! Features come from few values, or from the extremes, as often as from all bytes: level distances, on which the rules
 //! for ties rest, are then common.
 
-use knn::{Answer, ClassifyError, Example, Examples, Kind, MAX_K, Scale, Table, classify};
+use knn::{Answer, ClassifyError, Example, Examples, Kind, MAX_K, Neighbour, Scale, Table, classify};
 use proptest::prelude::*;
 use smartcore::{
     dataset::iris,
@@ -251,6 +251,16 @@ fn level_examples_vote_whenever_they_are_met_and_only_while_they_are_level_with_
     let near = [at(5, 0), at(5, 1), at(5, 1), at(5, 1), at(1, 0)];
     assert_eq!(answer(&[&far[..], &near].concat()), Ok([2, 3]));
     assert_eq!(answer(&[&near[..], &far].concat()), Ok([2, 3]));
+}
+
+#[test]
+fn a_neighbour_of_another_class_is_as_far() {
+    for distance in [0, 1, 0x12_34_56, 258 * 255 * 255] {
+        let other = Neighbour::new(distance, 1).with_label(200);
+        assert_eq!((other.distance(), other.label()), (distance, 200));
+        assert_eq!(other, Neighbour::new(distance, 200));
+        assert!(!other.is_none());
+    }
 }
 
 #[test]

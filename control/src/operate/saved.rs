@@ -170,6 +170,7 @@ mod tests {
     extern crate std;
     use super::*;
     use crate::memory::{ERASED, Volatile};
+    use std::vec::Vec;
 
     fn with_k(k: u16) -> Settings {
         let mut settings = Settings::new();
@@ -193,6 +194,19 @@ mod tests {
     fn an_erased_memory_holds_no_settings() {
         assert_eq!(load(&Volatile::new()), None);
         assert_eq!(load(&Volatile::holding([0; SIZE])), None);
+    }
+
+    #[test]
+    fn a_copy_is_mark_number_sequence_values_and_check_with_nothing_in_between() {
+        let values = Setting::all().flat_map(|setting| with_k(9).get(setting).to_le_bytes());
+        let mark = TABLE_MARK.to_le_bytes();
+        let mut bytes: Vec<u8> = mark.into_iter().chain([Setting::COUNT, 77]).chain(values).collect();
+        bytes.extend(checksum(&bytes).to_le_bytes());
+        for copy in 0..2 {
+            let mut memory = Volatile::new();
+            memory.bytes[usize::from(address(copy))..][..bytes.len()].copy_from_slice(&bytes);
+            assert_eq!(load(&memory), Some(with_k(9)), "copy {copy}");
+        }
     }
 
     #[test]
