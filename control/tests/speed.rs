@@ -165,3 +165,17 @@ fn a_silent_wheel_is_slower_than_a_tick_in_its_silence_whichever_way_it_turned()
         assert!(run.speed() <= 10.0, "{}", run.speed());
     }
 }
+
+#[test]
+fn a_wheel_that_falls_silent_has_its_speed_told_anew_for_each_eighth_of_the_silence_and_not_every_turn() {
+    let mut run = Run::new();
+    run.roll(500, 200, |time| 1000.0 * time);
+    let (mut known, mut told) = (run.speed(), 0);
+    for _ in 0..600 {
+        run.roll(1, 200, |_| 500.0);
+        told += u32::from(run.speed() != known);
+        known = run.speed();
+    }
+    // From 10 to 500 ms there are 34 eighths, the last of which are less than a tick a second apart.
+    assert!((20..=34).contains(&told), "{told} times");
+}
