@@ -3,7 +3,7 @@
 //! The plant seen last tells where the next is due: a spacing from its middle to the middle of that one, give or take the
 //! scatter of the crop. Whatever is kept and meets that stretch is the plant, and the next is counted from it. What is kept and
 //! does not, a double or a weed like a plant, changes nothing. Once the beam has seen all of the stretch, it becomes ground like
-//! that of a canopy, and is no other from then on. Behind [`IN_A_ROW`] of these the row is at its end, and nothing is due until
+//! that of a canopy, and is no other from then on. Behind `IN_A_ROW` of these the row is at its end, and nothing is due until
 //! a plant is seen.
 //!
 //! What it does not do: tell an unseen plant from none. Gaps are guarded too, and weeds in them stay.
