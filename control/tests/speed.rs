@@ -131,7 +131,7 @@ fn a_creeping_wheel_whose_edges_come_unevenly_is_not_taken_to_falter() {
     // Every other edge comes late by a third of the way between two, as encoders give them.
     let ticks = |time: f64| {
         let place = 60.0 * time;
-        let is_yet_to_come = place as u32 % 2 == 0 && place.fract() < 1.0 / 3.0;
+        let is_yet_to_come = (place as u32).is_multiple_of(2) && place.fract() < 1.0 / 3.0;
         place - f64::from(u8::from(is_yet_to_come))
     };
     let mut run = Run::new();
