@@ -3,7 +3,7 @@
 //! [`Server::open`] takes the addresses and starts the machines, [`Server::run`] serves until it is told to stop. What may be decided
 //! without a network is decided without one, in parts that know neither socket nor clock: [`door`] says which requests come in,
 //! [`pairing`] who may come in over the network, [`rules`] what may be typed from where. [`machine`] talks to one machine in a thread
-//! of its own, [`hub`] tells all pages what the machines say, and [`routes`] and this file are the shell round them.
+//! of its own, [`hub`] tells all pages what the machines say, and `routes` and this file are the shell round them.
 //!
 //! It is for a network that one trusts to be read: http is not encrypted. It flashes nothing, and gives no file away but the page's own.
 
