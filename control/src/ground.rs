@@ -414,6 +414,23 @@ mod tests {
     }
 
     #[test]
+    fn a_plant_is_due_whatever_is_set_but_another_spacing() {
+        for (setting, value, is_due) in [(Setting::MarginMm, 60, true), (Setting::GuardSpacingMm, 510, false)] {
+            let (mut ground, mut settings) = ground();
+            settings.set(Setting::GuardSpacingMm, 500).expect("within its range");
+            ground.follow(&settings, Position::new(1400), SPEED);
+            ground.edge(Position::new(2000), true);
+            ground.edge(Position::new(2300), false);
+            let canopy = ground.roll_to(Position::new(2400)).expect("the gap has been seen");
+            ground.keep(canopy).expect("there is room");
+            settings.set(setting, value).expect("within its range");
+            ground.follow(&settings, Position::new(2400), SPEED);
+            assert_eq!(ground.roll_to(Position::new(3300)), None);
+            assert_eq!(ground.guard().is_some(), is_due, "{setting:?}");
+        }
+    }
+
+    #[test]
     fn the_beam_is_outrun_where_the_lead_reaches_from_the_tool_to_the_margin_of_what_it_has_not_seen() {
         let (mut ground, _) = ground();
         let reach = ground.geometry.beam_to_tool - ground.geometry.margin;

@@ -188,6 +188,9 @@ fn what_is_narrower_than_the_least_width_is_counted_as_dust_and_is_neither_a_pla
     drive.pass(0.5, 0.03);
     drive.roll(0.5, 0.1);
     assert_eq!((drive.machine.dust(), drive.machine.objects().len()), (10, 1));
+    drive.pass(0.5, 0.0252);
+    drive.roll(0.5, 0.1);
+    assert_eq!((drive.machine.dust(), drive.machine.objects().len()), (10, 2), "as wide as the least is no dust");
 }
 
 #[test]

@@ -125,6 +125,15 @@ mod tests {
     }
 
     #[test]
+    fn narrow_is_what_has_half_the_width_of_the_narrowest_plant() {
+        let plants = table::TRAINED.iter().filter(|(_, label)| *label == label::PLANT);
+        let narrowest = plants.map(|([_, _, _, hold, _], _)| hold - features::HOLD_BEYOND_WIDTH_MM).min();
+        assert_eq!(narrowest.map(|width| width / 2), Some(NARROW_MM.into()));
+        let [_, _, _, hold, _] = Features::describe(556, 500, 40).values();
+        assert_eq!(hold - features::HOLD_BEYOND_WIDTH_MM, 40);
+    }
+
+    #[test]
     fn the_settings_begin_with_the_k_of_the_training() {
         assert_eq!(Setting::K.description().default, u16::from(K));
     }
