@@ -162,3 +162,24 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_plant_however_narrow_and_whatever_is_wide_end_the_count_of_misfits() {
+        for (class, width_mm, ends) in [
+            (Class::Plant, NARROW_MM - 1, true),
+            (Class::Weed, NARROW_MM, true),
+            (Class::Unknown, NARROW_MM, true),
+            (Class::Unknown, NARROW_MM - 1, false),
+            (Class::Weed, 0, false),
+        ] {
+            let mut misfits = Misfits::NONE;
+            assert!(!misfits.count(Class::Weed, 10, 3) && !misfits.count(Class::Weed, 10, 3));
+            misfits.count(class, width_mm, 3);
+            assert_eq!(misfits.count(Class::Weed, 10, 3), !ends, "{class:?} {width_mm} mm");
+        }
+    }
+}
