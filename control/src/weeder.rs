@@ -228,12 +228,13 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             None => {}
         }
         // As judging does, these take a good part of what a turn may take: a turn does one of them.
-        if self.is_enough {
-        } else if self.configuration.has_changed() {
-            self.follow_settings();
-        } else if self.leads_are_old {
-            self.ground.lead(self.configuration.settings(), self.meter.speed());
-            (self.leads_are_old, self.is_enough) = (false, true);
+        if !self.is_enough {
+            if self.configuration.has_changed() {
+                self.follow_settings();
+            } else if self.leads_are_old {
+                self.ground.lead(self.configuration.settings(), self.meter.speed());
+                (self.leads_are_old, self.is_enough) = (false, true);
+            }
         }
         if let Some(alarm) = self.fault(doubted) {
             self.raise(alarm);

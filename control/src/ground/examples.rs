@@ -55,7 +55,7 @@ pub const NARROW_MM: i16 = {
     (narrowest / 2) as i16
 };
 
-/// Most examples that the flash below the older bootloader has room for, at 6 bytes each.
+/// Most examples that the flash is to hold, at 6 bytes each.
 pub const CAPACITY: usize = 72;
 
 /// Examples in the table.

@@ -26,7 +26,7 @@ const NAME_LENGTH: usize = 24;
 #[command(after_help = "\
 At this computer alone the page may do whatever `weeder monitor` may. Over the network, by --lan, it is shown to nobody without the \
 code that is printed; with the code it shows the machine and has it hold, and nothing else that moves the tool or changes the machine. \
-The manual's docs/page.md has the whole table. http is not encrypted: use a network whose members you know. Opening a port resets \
+The manual's docs/serve.md has the whole table. http is not encrypted: use a network whose members you know. Opening a port resets \
 most Unos: begin before you work. A port that is not there is waited for. Ctrl-C ends it.
 
 Examples:
