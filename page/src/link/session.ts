@@ -103,9 +103,11 @@ export class Session {
         return this.#ask(command, true);
     }
 
-    /** Has the machine hold, before whatever waits: that is dropped. */
+    /** Has the machine hold, before whatever waits: what the operator typed of that is dropped, what the page asks itself is not. */
     hold(): void {
-        for (const { failed } of this.#waiting.splice(0)) failed(new Refused("hold came first, so this was not sent"));
+        const dropped = this.#waiting.filter(({ isTyped }) => isTyped);
+        this.#waiting = this.#waiting.filter(({ isTyped }) => !isTyped);
+        for (const { failed } of dropped) failed(new Refused("hold came first, so this was not sent"));
         if (this.#ended) return;
         const nothing = () => {};
         this.#send({ command: "hold", isTyped: true, since: this.#now, answer: [], done: nothing, failed: nothing });

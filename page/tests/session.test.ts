@@ -1,0 +1,83 @@
+// A session with the real firmware, without a page: what the operator does at any moment of it.
+
+import assert from "node:assert/strict";
+import test from "node:test";
+import { type Happening, Refused, Session, type Wire } from "../src/link/session.ts";
+import { CYCLES_PER_SECOND } from "../src/uno/uno.ts";
+import { wokenUp } from "./operator.ts";
+
+/** Time between two turns of the session. */
+const TURN_MS = 10;
+/** Turns in which a session is sure to have asked all that it asks. */
+const TURNS = 300;
+
+/** A session with a firmware that was told to work, which turns as often as a page's. */
+class Connected {
+    readonly happened: Happening[] = [];
+    readonly session: Session;
+    readonly #operator = wokenUp();
+
+    constructor() {
+        const { uno } = this.#operator;
+        this.#operator.ask("start now");
+        const wire: Wire = {
+            onText: () => {},
+            onEnd: () => {},
+            send: (text) => uno.send(text),
+            close: async () => {},
+        };
+        uno.onByte = (byte) => wire.onText(String.fromCharCode(byte));
+        this.session = new Session(wire, this.nowMs, false);
+        this.session.onHappening = (happening) => this.happened.push(happening);
+    }
+
+    get nowMs(): number {
+        return (this.#operator.uno.cycle / CYCLES_PER_SECOND) * 1000;
+    }
+
+    async turn(): Promise<void> {
+        this.#operator.run(TURN_MS);
+        this.session.turn(this.nowMs);
+        // Whoever waits for an answer goes on.
+        await new Promise((done) => setImmediate(done));
+    }
+
+    has(is: Happening["is"]): boolean {
+        return this.happened.some((happening) => happening.is === is);
+    }
+
+    /** The machine's state as it was last told. */
+    get mode(): string | undefined {
+        return this.happened.flatMap((happening) => (happening.is === "status" ? [happening.status.mode] : [])).at(-1);
+    }
+}
+
+test("HOLD at any moment of a session holds the machine, and the session goes on", async () => {
+    // Ten a second, and one alone at moments that lie all over the questions that a session begins with.
+    const moments = [
+        (turn: number) => turn % 10 === 0,
+        ...[1, 3, 8, 21, 55].map((at) => (turn: number) => turn === at),
+    ];
+    for (const [index, isMoment] of moments.entries()) {
+        const machine = new Connected();
+        for (let turn = 0; turn < TURNS; turn++) {
+            await machine.turn();
+            if (isMoment(turn)) machine.session.hold();
+        }
+        for (const is of ["connected", "help"] as const) assert(machine.has(is), `${is} is missing at moment ${index}`);
+        assert(!machine.has("lost"), `the session is lost at moment ${index}`);
+        assert.equal(machine.mode, "hold");
+    }
+});
+
+test("what was typed and waits is not sent behind a HOLD, and says so", async () => {
+    const machine = new Connected();
+    for (let turn = 0; turn < TURNS; turn++) await machine.turn();
+    assert.equal(machine.mode, "work");
+    const examples = machine.session.ask("examples");
+    const start = machine.session.ask("start");
+    machine.session.hold();
+    for (const dropped of [examples, start]) await assert.rejects(dropped, Refused);
+    for (let turn = 0; turn < 50; turn++) await machine.turn();
+    assert.equal(machine.mode, "hold");
+});
