@@ -17,13 +17,19 @@ class Connected {
     readonly session: Session;
     readonly #operator = wokenUp();
 
-    constructor() {
+    /** `dropped` says which of the lines, counted from 0, others have dropped on their way, where they share the machine. */
+    constructor(dropped?: (line: number) => boolean) {
         const { uno } = this.#operator;
         this.#operator.ask("start now");
+        let lines = 0;
         const wire: Wire = {
             onText: () => {},
             onEnd: () => {},
-            send: (text) => uno.send(text),
+            send: (text) => {
+                if (text.trim() === "" || !dropped?.(lines++)) uno.send(text);
+                else wire.onText("error: hold came first, so this was not sent\r\n");
+            },
+            ...(dropped && { onStatus: () => {} }),
             close: async () => {},
         };
         uno.onByte = (byte) => wire.onText(String.fromCharCode(byte));
@@ -60,7 +66,7 @@ test("HOLD at any moment of a session holds the machine, and the session goes on
     ];
     for (const [index, isMoment] of moments.entries()) {
         const machine = new Connected();
-        for (let turn = 0; turn < TURNS; turn++) {
+        for (let turn = 0; turn < TURNS && !(machine.has("help") && machine.mode === "hold"); turn++) {
             await machine.turn();
             if (isMoment(turn)) machine.session.hold();
         }
@@ -68,6 +74,13 @@ test("HOLD at any moment of a session holds the machine, and the session goes on
         assert(!machine.has("lost"), `the session is lost at moment ${index}`);
         assert.equal(machine.mode, "hold");
     }
+});
+
+test("a HOLD of others, who share the machine, drops no question of the page's own for good", async () => {
+    const machine = new Connected((line) => line % 2 === 0);
+    for (let turn = 0; turn < TURNS && !machine.has("help"); turn++) await machine.turn();
+    for (const is of ["connected", "help"] as const) assert(machine.has(is), `${is} is missing`);
+    assert(!machine.has("lost"));
 });
 
 test("what was typed and waits is not sent behind a HOLD, and says so", async () => {

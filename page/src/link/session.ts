@@ -33,6 +33,8 @@ const SHARED_PATIENCE_MS = 35_000;
 const BOOT_MS = 3000;
 /** How often the firmware's name is asked for again. */
 const TRIES = 1;
+/** How often a question is asked again where others have it dropped: each HOLD of theirs may. */
+const SHARED_TRIES = 20;
 
 /** Something that happened. */
 export type Happening =
@@ -158,16 +160,16 @@ export class Session {
         try {
             const version = await this.#version();
             const settings = await this.#settings();
-            const examples = await this.#ask("examples", false);
-            await this.#ask("events on", false);
+            const examples = await this.#insist("examples");
+            await this.#insist("events on");
             this.isReady = true;
             this.#strange = "";
             this.onHappening({ is: "connected", version, settings, examples });
             this.#pollAt = this.#now;
-            await this.#ask("status", false);
+            await this.#insist("status");
             const help = new Map<string, string>();
             for (const { name } of settings)
-                for (const line of await this.#ask(`help ${name}`, false)) {
+                for (const line of await this.#insist(`help ${name}`)) {
                     const said = read(line);
                     if (said.is === "help") help.set(said.name, said.help);
                 }
@@ -179,12 +181,22 @@ export class Session {
         }
     }
 
+    /** Asks for the page itself. A HOLD of others drops what waits where they share the machine, so that is asked again. */
+    async #insist(command: string): Promise<string[]> {
+        for (let tries = 0; ; tries++)
+            try {
+                return await this.#ask(command, false);
+            } catch (error) {
+                if (!(error instanceof Refused && this.#isShared && tries < SHARED_TRIES)) throw error;
+            }
+    }
+
     async #version(): Promise<string> {
         // Whatever was typed before ends here, and its answer is nobody's.
         this.#wire.send("\n");
         for (let tries = 0; ; tries++)
             try {
-                for (const line of await this.#ask("version", false)) {
+                for (const line of await this.#insist("version")) {
                     const said = read(line);
                     if (said.is === "version") return said.version;
                 }
@@ -195,7 +207,7 @@ export class Session {
     }
 
     async #settings(): Promise<Setting[]> {
-        const settings = (await this.#ask("get", false))
+        const settings = (await this.#insist("get"))
             .map(read)
             .flatMap((said) => (said.is === "setting" ? [said.setting] : []));
         if (settings.length === 0)
@@ -259,7 +271,7 @@ export class Session {
                 void this.#readSettings();
             if (question.isTyped && /^\s*events\b/.test(question.command))
                 // The page lives on them.
-                void this.#ask("events on", false).catch(() => {});
+                void this.#insist("events on").catch(() => {});
         }
     }
 
