@@ -12,6 +12,7 @@ mod shown;
 
 pub use self::shown::Reason;
 
+use self::commands::Told;
 use self::faults::{Limits, Misfits, NoPlants};
 use crate::{
     alarm::Alarm,
@@ -89,6 +90,7 @@ pub struct Controller<C, M> {
     dust: u16,
     no_plants: NoPlants,
     misfits: Misfits,
+    told: Told,
     objects: Objects,
     events: Events,
     curves: Curves,
@@ -127,6 +129,7 @@ impl<C: Classifier, M: Memory> Asleep<C, M> {
             dust: 0,
             no_plants: NoPlants::since(place),
             misfits: Misfits::NONE,
+            told: Told::NONE,
             objects: Objects::NONE,
             events: Events::NONE,
             curves: Curves::NONE,

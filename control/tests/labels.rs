@@ -4,7 +4,11 @@
 mod readings;
 
 use control::{
-    ground::{class::Class, examples::EXAMPLES, nearest::Nearest},
+    ground::{
+        class::{Class, Classifier},
+        examples::EXAMPLES,
+        nearest::Nearest,
+    },
     measure::{readings::Edge, reset::Cause},
     memory::Volatile,
     say::{self, command::LineBuffer, line::Line},
@@ -134,5 +138,38 @@ fn what_was_taught_by_mistake_is_forgotten_by_its_number_or_with_all_others() {
         assert_eq!(rolling.past(540, 150), Class::Plant, "{command}");
         let refusal = rolling.ask("forget 0");
         assert!(refusal.starts_with("error: "), "it is forgotten already: {refusal}");
+    }
+}
+
+#[test]
+fn an_example_that_is_told_feature_by_feature_is_known_as_one_that_was_labelled_is() {
+    let mut rolling = Rolling::new();
+    rolling.past(540, 150);
+    rolling.past(540, 55);
+    assert_eq!(rolling.ask("label weed"), "ok");
+    let listed = rolling.machine.classifier().listed(EXAMPLES.len() as u8).expect("it was taught").0.example;
+    assert_eq!(rolling.ask("forget all"), "ok");
+    for round in 0..2 {
+        for feature in listed.features {
+            assert_eq!(rolling.ask(&format!("teach {feature}")), "ok");
+        }
+        assert_eq!(rolling.ask("teach weed"), "ok", "{round}");
+    }
+    let taught = (0..2).map(|place| rolling.machine.classifier().listed(EXAMPLES.len() as u8 + place));
+    assert!(taught.into_iter().all(|taught| taught.expect("it was taught").0.example == listed));
+}
+
+#[test]
+fn an_example_with_too_few_or_too_many_features_is_refused_and_the_next_one_begins_anew() {
+    for features in (0..20).filter(|&features| features != 5).chain([255, 256, 261, 600]) {
+        let mut rolling = Rolling::new();
+        for feature in 0..features {
+            assert_eq!(rolling.ask(&format!("teach {}", feature % 256)), "ok");
+        }
+        assert!(rolling.ask("teach plant").starts_with("error: tell its 5 features first"), "{features}");
+        for feature in 0..5 {
+            assert_eq!(rolling.ask(&format!("teach {feature}")), "ok");
+        }
+        assert_eq!(rolling.ask("teach plant"), "ok", "{features}");
     }
 }

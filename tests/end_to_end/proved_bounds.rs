@@ -20,7 +20,7 @@ use uno::elf::Image;
 const BUSY_PER_S: u64 = 150_000;
 
 /// Commands that are taken in HOLD, each with what it has done for it.
-const COMMANDS: [&str; 24] = [
+const COMMANDS: [&str; 25] = [
     "help",
     "help k",
     "status",
@@ -35,6 +35,7 @@ const COMMANDS: [&str; 24] = [
     "dump",
     "label plant",
     "label weed",
+    "teach 255",
     "examples",
     "forget 1",
     "forget all",

@@ -68,6 +68,12 @@ pub trait Classifier {
     /// [`ExamplesFull`]; one has to be forgotten first.
     fn teach(&mut self, features: &Features, label: u8) -> Result<(), ExamplesFull>;
 
+    /// Adds an example that is known already, to be kept over a loss of power.
+    ///
+    /// # Errors
+    /// [`ExamplesFull`]; one has to be forgotten first.
+    fn keep(&mut self, example: Example<{ features::COUNT }>) -> Result<(), ExamplesFull>;
+
     /// Forgets the example from the field with this number; whether there was one.
     fn forget(&mut self, number: u8) -> bool;
 

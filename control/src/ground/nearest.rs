@@ -102,7 +102,10 @@ impl<B: Examples<{ features::COUNT }>, M: Memory> Classifier for Nearest<B, M> {
     }
 
     fn teach(&mut self, features: &Features, label: u8) -> Result<(), ExamplesFull> {
-        let example = Example::new(scaled(features), label);
+        self.keep(Example::new(scaled(features), label))
+    }
+
+    fn keep(&mut self, example: Example<{ features::COUNT }>) -> Result<(), ExamplesFull> {
         self.field.add(example).map(|_| ()).map_err(|_| ExamplesFull)
     }
 

@@ -17,6 +17,8 @@ pub enum Refusal {
     NothingToLabel,
     /// The built-in examples are sure that the object is of this class, which is not the label's.
     TakenFor(Class),
+    /// An example was to be taught whose features were not told, all and no more.
+    NotTold,
     /// All places for examples are taken.
     ExamplesFull,
     /// No example from the field has this number.

@@ -49,6 +49,8 @@ pub enum Word {
     Plot,
     /// Says what the last object was, and teaches it.
     Label,
+    /// Tells a feature of an example, and teaches it.
+    Teach,
     /// Lists the examples.
     Examples,
     /// Forgets examples from the field.
@@ -122,6 +124,10 @@ pub enum Command {
         /// Whatever the built-in examples say.
         force: bool,
     },
+    /// `teach N`.
+    Feature(u8),
+    /// `teach plant|weed`: the [`label`].
+    Teach(u8),
     /// `examples`.
     Examples,
     /// `forget N`.
@@ -223,6 +229,7 @@ pub fn parse(line: &[u8]) -> Result<Command, Mistake> {
     } else {
         match (word, number(first)) {
             (Word::Forget, Some(number @ 0..=255)) => Command::Forget(number as u8),
+            (Word::Teach, Some(feature @ 0..=255)) => Command::Feature(feature as u8),
             (Word::Servo, Some(pulse_us)) => Command::Servo(pulse_us),
             (Word::Calibrate, Some(distance_mm)) => Command::Calibrate { distance_mm, force },
             _ => return usage,
@@ -296,6 +303,8 @@ commands! {
     Plot Off => Command::Plot(Plot::Off);
     Plot Teleplot => Command::Plot(Plot::Teleplot);
     Examples => Command::Examples;
+    Teach Plant => Command::Teach(label::PLANT);
+    Teach Weed => Command::Teach(label::WEED);
     Forget All => Command::ForgetAll;
     Dump => Command::Dump;
     Version => Command::Version;
@@ -426,6 +435,9 @@ mod tests {
             (b"label plant", Command::Label { label: label::PLANT, force: false }),
             (b"label weed", Command::Label { label: label::WEED, force: false }),
             (b"label weed force", Command::Label { label: label::WEED, force: true }),
+            (b"teach 255", Command::Feature(255)),
+            (b"teach plant", Command::Teach(label::PLANT)),
+            (b"teach weed", Command::Teach(label::WEED)),
             (b"examples", Command::Examples),
             (b"forget 31", Command::Forget(31)),
             (b"forget all", Command::ForgetAll),
@@ -475,6 +487,11 @@ mod tests {
             (b"label weed now", Mistake::Usage(Word::Label)),
             (b"label weed force now", Mistake::Usage(Word::Label)),
             (b"label force", Mistake::Usage(Word::Label)),
+            (b"teach", Mistake::Usage(Word::Teach)),
+            (b"teach 256", Mistake::Usage(Word::Teach)),
+            (b"teach 1 2 3 4 5", Mistake::Usage(Word::Teach)),
+            (b"teach tree", Mistake::Usage(Word::Teach)),
+            (b"teach plant force", Mistake::Usage(Word::Teach)),
             (b"forget", Mistake::Usage(Word::Forget)),
             (b"forget 256", Mistake::Usage(Word::Forget)),
         ] {

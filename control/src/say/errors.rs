@@ -64,6 +64,7 @@ pub(super) fn write_refusal(refusal: Refusal, setting: Option<Setting>, line: &m
             line.counted(fastest);
             texts::TEST_SPEED
         }
+        (Refusal::NotTold, _) => texts::NOT_TOLD,
         (Refusal::ExamplesFull, _) => texts::EXAMPLES_FULL,
         (Refusal::NoSuchExample, _) => texts::NO_SUCH_EXAMPLE,
     };

@@ -51,6 +51,11 @@ where
         }
         Command::Start { now } => done(controller.start(now), None),
         Command::Label { label, force } => done(controller.label(label, force), None),
+        Command::Feature(feature) => {
+            controller.tell_feature(feature);
+            Answer::Ok
+        }
+        Command::Teach(label) => done(controller.teach(label), None),
         Command::Forget(number) => done(controller.forget(number), None),
         Command::ForgetAll => {
             controller.forget_all();

@@ -115,6 +115,7 @@ said! {
     TAKEN_FOR = "the built-in examples say ";
     LOOK_AGAIN = ", look again, or add force";
     TEST_SPEED = "test row takes a speed in mm/s from 100 to #";
+    NOT_TOLD = "tell its 5 features first, as examples lists them";
     EXAMPLES_FULL = "all 32 places are taken, forget one first";
     NO_SUCH_EXAMPLE = "no field example has this number, examples lists them";
     ALARM_LATCHED = "an alarm is latched, see status, then clear it";
@@ -182,6 +183,8 @@ commands! {
         "curves for the Arduino Serial Plotter, or Teleplot";
     Label "label plant|weed [force]",
         "say what the last object was, and teach it";
+    Teach "teach N|plant|weed",
+        "tell an example, feature by feature, and teach it";
     Examples "examples",
         "all examples, with source and class";
     Forget "forget N|all",

@@ -139,6 +139,7 @@ words! {
         Events = "events",
         Plot = "plot",
         Label = "label",
+        Teach = "teach",
         Examples = "examples",
         Forget = "forget",
         Dump = "dump",

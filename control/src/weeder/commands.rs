@@ -7,13 +7,14 @@ use super::{
 use crate::{
     ground::{
         class::{Class, Classifier, ExamplesFull, label},
-        field_examples,
+        features, field_examples,
     },
     memory::Memory,
     operate::{plot::Plot, refusal::Refusal, state::State},
     settings::Setting,
     units::count,
 };
+use knn::Example;
 
 impl<C: Classifier, M: Memory> Controller<C, M> {
     /// Goes to work; with `now`, at once and over ground that the beam has not seen.
@@ -129,6 +130,24 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         Ok(())
     }
 
+    /// Takes the next feature of an example that is told.
+    pub fn tell_feature(&mut self, feature: u8) {
+        self.told.add(feature);
+    }
+
+    /// Teaches the classifier the example that was told, whatever the built-in ones say of it: who tells one has it from a machine or
+    /// a file.
+    ///
+    /// # Errors
+    /// [`Refusal::NotTold`] and [`Refusal::ExamplesFull`].
+    pub fn teach(&mut self, label: u8) -> Result<(), Refusal> {
+        let features = self.told.take().ok_or(Refusal::NotTold)?;
+        self.classifier.keep(Example::new(features, label)).map_err(|ExamplesFull| Refusal::ExamplesFull)?;
+        // Whoever teaches looks at what the objects are taken for.
+        self.misfits = Misfits::NONE;
+        Ok(())
+    }
+
     /// Forgets an example from the field.
     ///
     /// # Errors
@@ -157,5 +176,31 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// Counts a line that was not understood.
     pub fn count_mistake(&mut self) {
         count(&mut self.mistakes);
+    }
+}
+
+/// The features of an example that the operator tells, one after the other.
+#[derive(Clone, Debug)]
+pub(super) struct Told {
+    features: [u8; features::COUNT],
+    /// How many were told.
+    count: u8,
+}
+
+impl Told {
+    pub const NONE: Self = Self { features: [0; features::COUNT], count: 0 };
+
+    /// One more than there are is none of any example.
+    fn add(&mut self, feature: u8) {
+        if let Some(next) = self.features.get_mut(usize::from(self.count)) {
+            *next = feature;
+        }
+        self.count = self.count.saturating_add(1);
+    }
+
+    /// The features, if they were told, all and no more. The next example begins anew in any case.
+    fn take(&mut self) -> Option<[u8; features::COUNT]> {
+        let count = core::mem::take(&mut self.count);
+        (usize::from(count) == features::COUNT).then_some(self.features)
     }
 }

@@ -66,6 +66,10 @@ impl Classifier for ByWidth {
         self.nearest.teach(features, label)
     }
 
+    fn keep(&mut self, example: Example<5>) -> Result<(), ExamplesFull> {
+        self.nearest.keep(example)
+    }
+
     fn forget(&mut self, number: u8) -> bool {
         self.nearest.forget(number)
     }

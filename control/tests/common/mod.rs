@@ -13,6 +13,7 @@ use control::{
     memory::Volatile,
     weeder::Controller,
 };
+use knn::Example;
 
 /// Takes for a weed what is narrower than 60 mm.
 #[derive(Clone, Debug)]
@@ -31,6 +32,10 @@ impl Classifier for ByWidth {
     }
 
     fn teach(&mut self, _: &Features, _: u8) -> Result<(), ExamplesFull> {
+        Err(ExamplesFull)
+    }
+
+    fn keep(&mut self, _: Example<5>) -> Result<(), ExamplesFull> {
         Err(ExamplesFull)
     }
 

@@ -15,6 +15,7 @@ mod course;
 mod design;
 mod destination;
 mod evaluate;
+mod examples;
 mod figures;
 mod flash;
 mod hex;
@@ -88,6 +89,8 @@ enum Command {
     Record(record::Arguments),
     /// Decide anew on the host what a log's machine met, and say where that differs.
     Replay(replay::Arguments),
+    /// Keep what the machine was taught in a table, teach it from one, or compare both.
+    Examples(examples::Arguments),
     /// Keep the machine's settings in a file, set them from it, or compare both.
     Settings(settings::Arguments),
     /// Calculate what a machine's engine, servo, shanks, chain, wheels and handle have to be like.
@@ -158,6 +161,7 @@ fn main() -> ExitCode {
         Command::Serve(arguments) => serve::run(&arguments).map(|()| Finding::Good),
         Command::Record(arguments) => record::run(&arguments).map(|()| Finding::Good),
         Command::Replay(arguments) => replay::run(&arguments),
+        Command::Examples(arguments) => examples::run(&arguments),
         Command::Settings(arguments) => settings::run(&arguments),
         Command::Design(arguments) => design::run(&arguments).map(|()| Finding::Good),
         Command::Plan(arguments) => plan::run(&arguments).map(|()| Finding::Good),

@@ -80,7 +80,11 @@ pub struct Port {
 }
 
 impl Port {
-    fn open(&self) -> Result<Link> {
+    /// The machine there.
+    ///
+    /// # Errors
+    /// Where there is none, or another than a weeder.
+    pub fn open(&self) -> Result<Link> {
         Ok(Link::open(self.port.as_deref())?)
     }
 }

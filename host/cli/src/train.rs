@@ -206,7 +206,7 @@ impl<'a> Destination<'a> {
     fn write(&self, training: &Training, command: &str) -> Result<()> {
         match self.form {
             Form::Rust => self.file.write(|to| to.write_all(listing::rust(training, command).as_bytes())),
-            Form::Csv => self.file.write(|to| listing::write_csv(training, to)),
+            Form::Csv => self.file.write(|to| listing::write_csv(&training.kept, to)),
         }
     }
 }

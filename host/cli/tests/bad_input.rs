@@ -84,6 +84,7 @@ fn no_cause_is_told_twice() {
         &["hex", "weeder.hex", "--elf", "no-such.elf"],
         &["replay", "no-such.csv"],
         &["settings", "diff", "no-such.toml"],
+        &["examples", "push", "no-such.csv"],
         &["design", "--machine", "no-such.toml"],
     ] {
         let message = String::from_utf8_lossy(&weeder(arguments).stderr).into_owned();

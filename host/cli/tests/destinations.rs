@@ -26,6 +26,7 @@ const WRITERS: [(&[&str], Kind); 12] = [
     (&["train", "--synthetic", "--picture"], Kind::File("regions.svg")),
     (&["hex"], Kind::File("weeder.hex")),
     (&["record", "--port", "/dev/no-such-port", "--out"], Kind::File("log.csv")),
+    (&["examples", "pull", "--port", "/dev/no-such-port"], Kind::File("taught.csv")),
     (&["settings", "pull", "--port", "/dev/no-such-port"], Kind::File("machine.toml")),
 ];
 

@@ -76,6 +76,49 @@ fn settings_are_pulled_changed_compared_and_pushed() {
 }
 
 #[test]
+fn examples_are_pulled_taught_to_another_machine_and_compared() {
+    let (uno, other) = (uno(), uno());
+    let folder = tempfile::tempdir().expect("there is room for a file");
+    let [taught, again] = ["taught.csv", "again.csv"].map(|name| folder.path().join(name));
+    let [taught, again] = [&taught, &again].map(|path| path.to_str().expect("it is text"));
+    // Stalks, which the built-in examples take for weeds, and the weeds beside them.
+    let heading = "speed_mm_s,spacing_mm,delay_mm,hold_mm,actuation_mm,label\n";
+    let table = format!("{heading}278,250,300,120,459,plant\n278,100,300,108,447,weed\n278,100,300,108,447,weed\n");
+    fs::write(taught, &table).expect("it can be written");
+
+    let refused = printed(&weeder(&["examples", "push", taught], uno.path(), ""), 2);
+    assert!(refused.contains("1 of 2 examples") && refused.contains("--force"), "{refused}");
+    let nothing = printed(&weeder(&["examples", "pull", again], uno.path(), ""), 0);
+    assert!(nothing.ends_with(": 0 examples\n"), "{nothing}");
+    let pushed = printed(&weeder(&["examples", "push", taught, "--force"], uno.path(), ""), 0);
+    assert_eq!(pushed, "Taught: 2. Known already: 0.\n");
+    let pushed = printed(&weeder(&["examples", "push", taught, "--force", "--json"], uno.path(), ""), 0);
+    let pushed: serde_json::Value = serde_json::from_str(&pushed).expect("it is JSON");
+    assert_eq!(pushed, serde_json::json!({ "taught": 0, "forgotten": 0 }));
+
+    // Each of these opened the port anew, which is a reset.
+    printed(&weeder(&["examples", "diff", taught], uno.path(), ""), 0);
+    printed(&weeder(&["examples", "pull", again], uno.path(), ""), 0);
+    printed(&weeder(&["examples", "push", again, "--force"], other.path(), ""), 0);
+    printed(&weeder(&["examples", "diff", taught], other.path(), ""), 0);
+
+    fs::write(taught, table.replace("278,250", "278,400")).expect("it can be written");
+    let differences = printed(&weeder(&["examples", "diff", taught], other.path(), ""), 1);
+    assert!(differences.contains("in the file") && differences.contains("on the machine"), "{differences}");
+    let pushed = printed(&weeder(&["examples", "push", taught, "--force", "--replace"], other.path(), ""), 0);
+    assert_eq!(pushed, "Taught: 1. Known already: 1.\nForgotten: 1.\n");
+    printed(&weeder(&["examples", "diff", taught], other.path(), ""), 0);
+
+    let many: String = (0..40).map(|place| format!("278,{},300,108,447,weed\n", 60 + 10 * place)).collect();
+    fs::write(taught, format!("{heading}{many}")).expect("it can be written");
+    let refused = printed(&weeder(&["examples", "push", taught, "--force"], other.path(), ""), 2);
+    assert!(refused.contains("room for 30 of its 32") && refused.contains("nothing was sent"), "{refused}");
+    fs::write(taught, format!("{heading}278,250,300,120,459,\n")).expect("it can be written");
+    let refused = printed(&weeder(&["examples", "push", taught], other.path(), ""), 2);
+    assert!(refused.contains("has no labelled object"), "{refused}");
+}
+
+#[test]
 fn what_is_pushed_is_kept_over_a_reset_unless_it_is_not_to_be() {
     let uno = uno();
     let folder = tempfile::tempdir().expect("there is room for a file");

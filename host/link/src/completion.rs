@@ -18,7 +18,7 @@ pub fn complete(line: &str) -> Vec<String> {
         ["start"] => owned(&["now"]),
         ["events"] => owned(&["on", "off"]),
         ["plot"] => owned(&["on", "off", "teleplot"]),
-        ["label"] => owned(&["plant", "weed"]),
+        ["label" | "teach"] => owned(&["plant", "weed"]),
         ["label", _] => owned(&["force"]),
         ["forget"] => owned(&["all"]),
         ["servo"] => owned(&["in", "out"]),

@@ -3,7 +3,7 @@
 //! [`Link::open`] opens an Uno's port, real or virtual, waits out the reset that opening a real one causes, and makes sure
 //! that the weeder's firmware answers. [`Link::ask`] types a command and waits for its answer; [`Link::next_line`] hears
 //! what the machine says by itself, and a [`session`] does both for as long as one likes. [`Said`] is what a line means, and
-//! [`settings`] and [`settings_file`] move all settings at once.
+//! [`settings`] and [`settings_file`] move all settings at once, [`examples`] all that was taught.
 //!
 //! Whatever comes from the port is suspect: noise, lines without an end, a firmware that is not the weeder's. What is kept
 //! of it is bounded, characters that could move a terminal's cursor are taken out, and no wait is endless.
@@ -14,6 +14,7 @@
 pub mod advice;
 pub mod completion;
 mod event_line;
+pub mod examples;
 mod lines;
 pub mod log;
 #[cfg(not(target_arch = "wasm32"))]

@@ -6,6 +6,7 @@
 
 use super::{EventLine, Status};
 use control::ground::class::Class;
+use control::ground::features::COUNT;
 
 /// What a line says.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -42,6 +43,8 @@ pub enum Said {
         number: u16,
         /// What it is an example of.
         label: Class,
+        /// Its features, on the scale of the firmware's own examples.
+        features: [u8; COUNT],
     },
     /// What the machine tells by itself.
     Event(EventLine),
@@ -115,7 +118,11 @@ fn example(line: &str) -> Option<Said> {
         "weed" => Class::Weed,
         _ => return None,
     };
-    words.next().map(|_| Said::Example { from_field, number, label })
+    let mut features = [0; COUNT];
+    for feature in &mut features {
+        *feature = words.next()?.parse().ok()?;
+    }
+    Some(Said::Example { from_field, number, label, features })
 }
 
 /// `NAME and what it takes - what it is`.
@@ -231,7 +238,7 @@ mod tests {
     fn lines_of_answers_are_told_apart() {
         assert_eq!(Said::parse("ok"), Said::Done);
         assert_eq!(Said::parse("error: no such command"), Said::Refused("no such command".to_owned()));
-        let taught = Said::Example { from_field: true, number: 7, label: Class::Weed };
+        let taught = Said::Example { from_field: true, number: 7, label: Class::Weed, features: [1, 2, 3, 4, 5] };
         assert_eq!(Said::parse("field 7 weed 1 2 3 4 5"), taught);
         let help = Said::Help { name: "get".to_owned(), help: "shows settings".to_owned() };
         assert_eq!(Said::parse("get [name] - shows settings"), help);
@@ -241,8 +248,18 @@ mod tests {
             Said::parse("swing tool=in pos=3"),
             Said::Event(EventLine::Swing { out: false, position: 3 })
         ));
-        for line in ["", "okay", "weeder", "weeder ", "weeder 1, reset by ", "field 7 grass 1", "field x weed 1", "k=3"]
-        {
+        for line in [
+            "",
+            "okay",
+            "weeder",
+            "weeder ",
+            "weeder 1, reset by ",
+            "field 7 grass 1 2 3 4 5",
+            "field 7 weed 1 2 3 4",
+            "field 7 weed 1 2 3 4 256",
+            "field x weed 1",
+            "k=3",
+        ] {
             assert_eq!(Said::parse(line), Said::Other, "{line:?}");
         }
     }

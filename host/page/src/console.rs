@@ -17,7 +17,7 @@ pub fn read(line: &str) -> Value {
         Said::Status(status) => json!({ "is": "status", "status": shown_status(&status, line) }),
         Said::Setting(setting) => json!({ "is": "setting", "setting": shown_setting(&setting) }),
         Said::Help { name, help } => json!({ "is": "help", "name": name, "help": help }),
-        Said::Example { from_field, number, label } => {
+        Said::Example { from_field, number, label, .. } => {
             json!({ "is": "example", "fromField": from_field, "number": number, "label": class(label) })
         }
         Said::Event(event) => read_event(&event, line),

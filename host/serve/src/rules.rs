@@ -116,6 +116,8 @@ fn why_not(command: Command) -> Option<Forbidden> {
         | Command::CalibrateStart
         | Command::Calibrate { .. }
         | Command::Label { .. }
+        | Command::Feature(_)
+        | Command::Teach(_)
         | Command::Forget(_)
         | Command::ForgetAll => Some(Forbidden::ChangesMachine),
         Command::Events(false) | Command::Plot(_) => Some(Forbidden::ChangesWire),
@@ -133,7 +135,7 @@ mod tests {
     const HARMLESS: [&str; 11] =
         ["help", "help k", "status", "get", "get k", "events on", "examples", "dump", "version", "  status ", "get  k"];
     const STARTS: [&str; 4] = ["start", "clear", " start", "clear  "];
-    const NEVER: [(&str, Forbidden); 24] = [
+    const NEVER: [(&str, Forbidden); 26] = [
         ("start now", Forbidden::Unseen),
         ("  start   now ", Forbidden::Unseen),
         ("servo in", Forbidden::MovesTool),
@@ -152,6 +154,8 @@ mod tests {
         ("defaults", Forbidden::ChangesMachine),
         ("label plant", Forbidden::ChangesMachine),
         ("label weed force", Forbidden::ChangesMachine),
+        ("teach 3", Forbidden::ChangesMachine),
+        ("teach plant", Forbidden::ChangesMachine),
         ("forget 3", Forbidden::ChangesMachine),
         ("forget all", Forbidden::ChangesMachine),
         ("events off", Forbidden::ChangesWire),

@@ -225,6 +225,10 @@ fn line() -> BoxedStrategy<String> {
         1 => (90_u32..1500).prop_map(|mm_s| format!("test row {mm_s}")),
         1 => (400_u32..2600).prop_map(|us| format!("servo {us}")),
         1 => (0_u32..40).prop_map(|number| format!("forget {number}")),
+        1 => any::<u8>().prop_map(|feature| format!("teach {feature}")),
+        1 => (prop::sample::select(vec!["plant", "weed"]), prop::array::uniform5(any::<u8>())).prop_map(
+            |(label, [a, b, c, d, e])| format!("teach {a}\nteach {b}\nteach {c}\nteach {d}\nteach {e}\nteach {label}")
+        ),
         1 => "[ -~]{0,90}",
     ]
     .boxed()

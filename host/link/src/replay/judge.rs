@@ -103,6 +103,10 @@ impl Classifier for Judge<'_> {
         self.nearest.teach(&self.by_machine(features), label)
     }
 
+    fn keep(&mut self, example: Example<{ features::COUNT }>) -> Result<(), ExamplesFull> {
+        self.nearest.keep(example)
+    }
+
     fn forget(&mut self, number: u8) -> bool {
         self.nearest.forget(number)
     }

@@ -276,6 +276,10 @@ impl<'a> Player<'a> {
             Ok(Command::Label { label, force }) => {
                 let _ = self.controller.label(label, force);
             }
+            Ok(Command::Feature(feature)) => self.controller.tell_feature(feature),
+            Ok(Command::Teach(label)) => {
+                let _ = self.controller.teach(label);
+            }
             Ok(Command::Forget(_) | Command::ForgetAll) => return false,
             _ => {
                 let word = line.split_whitespace().next().unwrap_or_default();

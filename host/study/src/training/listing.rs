@@ -42,14 +42,14 @@ pub fn rust(training: &Training, how: &str) -> String {
     text
 }
 
-/// Writes the examples as a table that [`table::read_labelled`] reads.
+/// Writes examples as a table that [`table::read_labelled`] reads.
 ///
 /// # Errors
 /// Those of the writer.
-pub fn write_csv(training: &Training, to: impl io::Write) -> Result<(), csv::Error> {
+pub fn write_csv(examples: &[Labelled], to: impl io::Write) -> Result<(), csv::Error> {
     let mut writer = csv::Writer::from_writer(to);
     writer.write_record(table::COLUMNS.into_iter().chain([table::LABEL]))?;
-    for Labelled { features, kind } in in_order(&training.kept) {
+    for Labelled { features, kind } in in_order(examples) {
         let values = features.values().map(|value| value.to_string());
         writer.write_record(values.into_iter().chain([kind.to_string()]))?;
     }

@@ -13,7 +13,7 @@
 
 use super::Labelled;
 use control::ground::class::{Class, Classifier, ExamplesFull, Listed, Vote};
-use control::ground::features::{Features, SPEED_CLASSES_MM_S};
+use control::ground::features::{self, Features, SPEED_CLASSES_MM_S};
 use control::measure::quadrature::{Quadrature, Step};
 use control::measure::reset::Cause;
 use control::memory::Volatile;
@@ -27,6 +27,7 @@ use field::motion::Motion;
 use field::planting::{Planting, PlantingError};
 use field::row::{Kind, Problem, Row, Thing};
 use field::wiring;
+use knn::Example;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use signal::{CYCLES_PER_SECOND, PinChange};
@@ -182,6 +183,10 @@ impl Classifier for &Recorder<'_> {
     }
 
     fn teach(&mut self, _features: &Features, _label: u8) -> Result<(), ExamplesFull> {
+        Err(ExamplesFull)
+    }
+
+    fn keep(&mut self, _: Example<{ features::COUNT }>) -> Result<(), ExamplesFull> {
         Err(ExamplesFull)
     }
 

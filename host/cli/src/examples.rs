@@ -1,0 +1,203 @@
+//! `weeder examples`: what a machine was taught in the field as a table that can be kept, learned from, and taught to another.
+
+use crate::Finding;
+use crate::destination::FileName;
+use crate::output::{say, tell};
+use crate::settings::Port;
+use crate::source;
+use anyhow::{Result, bail, ensure};
+use clap::{Args, Subcommand};
+use comfy_table::{Table, presets};
+use field::row::Kind;
+use link::examples::{self, Taught, contradiction, example_of, features_of};
+use serde_json::{Map, Value, json};
+use std::path::{Path, PathBuf};
+use study::training::{Labelled, label_of, listing, table};
+
+/// What the user asks of the examples.
+#[derive(Args)]
+#[command(after_help = "Examples:\n  \
+    weeder examples pull chilli.csv             write what the machine was taught into a table
+  weeder examples push chilli.csv             teach it to another machine
+  weeder examples diff chilli.csv             say what either of them has alone; ends with status 1 if there is anything
+  weeder train chilli.csv dump.csv            learn from it, with other tables, see docs/training.md")]
+pub struct Arguments {
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(Subcommand)]
+enum Action {
+    /// Write the examples that the machine was taught into a CSV file, as `weeder train` and `push` read it.
+    #[command(after_help = "Example: weeder examples pull chilli.csv --port /dev/ttyACM0")]
+    Pull {
+        /// The file.
+        #[arg(value_name = "FILE.csv", required_unless_present = "json")]
+        file: Option<FileName>,
+        /// Print them as JSON as well.
+        #[arg(long)]
+        json: bool,
+        #[command(flatten)]
+        port: Port,
+    },
+    /// Teach the machine a table's examples; nothing is sent unless all of them find room.
+    #[command(after_help = "\
+An Uno has room for 32 examples beside its built-in table. They are kept over a loss of power.\n\n\
+Example: weeder examples push chilli.csv --replace")]
+    Push {
+        /// The table; - for standard input.
+        #[arg(value_name = "FILE.csv", value_parser = source::file)]
+        file: PathBuf,
+        /// Have the machine forget what it was taught and the table does not name.
+        #[arg(long)]
+        replace: bool,
+        /// Teach even what the built-in examples are sure is the other class.
+        #[arg(long)]
+        force: bool,
+        /// Print what was done as JSON.
+        #[arg(long)]
+        json: bool,
+        #[command(flatten)]
+        port: Port,
+    },
+    /// Say which examples the table has and the machine has not, and the other way round; the status is 1 where there is one.
+    #[command(after_help = "Example: weeder examples diff chilli.csv && echo the same")]
+    Diff {
+        /// The table; - for standard input.
+        #[arg(value_name = "FILE.csv", value_parser = source::file)]
+        file: PathBuf,
+        /// Print the differences as JSON.
+        #[arg(long)]
+        json: bool,
+        #[command(flatten)]
+        port: Port,
+    },
+}
+
+/// Pulls, pushes or compares.
+///
+/// # Errors
+/// Where table or machine cannot be used; each says what would be right.
+pub fn run(arguments: &Arguments) -> Result<Finding> {
+    match &arguments.action {
+        Action::Pull { file, json, port } => {
+            let file = file.as_ref().map(FileName::check).transpose()?;
+            let taught = on_machine(port)?;
+            let printed =
+                if *json { say!("{:#}", Value::from_iter(taught.iter().filter_map(in_json))) } else { Ok(()) };
+            if let Some(file) = file {
+                let objects: Vec<Labelled> = taught.iter().filter_map(object).collect();
+                file.write(|to| listing::write_csv(&objects, to))?;
+                if !json {
+                    say!("What the machine was taught is in {}: {} examples", file.path().display(), taught.len())?;
+                }
+            }
+            printed?;
+            Ok(Finding::Good)
+        }
+        Action::Push { file, replace, force, json, port } => {
+            let wanted = in_table(file)?;
+            if !force {
+                refuse_contradictions(&wanted)?;
+            }
+            let pushed = examples::push(&mut port.open()?, &wanted, *replace)?;
+            match *json {
+                true => say!("{:#}", json!({ "taught": pushed.taught, "forgotten": pushed.forgotten }))?,
+                false => {
+                    say!("Taught: {}. Known already: {}.", pushed.taught, wanted.len() - pushed.taught)?;
+                    if *replace {
+                        say!("Forgotten: {}.", pushed.forgotten)?;
+                    }
+                }
+            }
+            Ok(Finding::Good)
+        }
+        Action::Diff { file, json, port } => {
+            let (wanted, found) = (in_table(file)?, on_machine(port)?);
+            let only = |of: &[Taught], than: &[Taught]| -> Vec<Taught> {
+                of.iter().filter(|example| !than.contains(example)).copied().collect()
+            };
+            let (in_file, on_machine) = (only(&wanted, &found), only(&found, &wanted));
+            let is_same = in_file.is_empty() && on_machine.is_empty();
+            match *json {
+                true => {
+                    let list = |examples: &[Taught]| Value::from_iter(examples.iter().filter_map(in_json));
+                    say!("{:#}", json!({ "only_in_file": list(&in_file), "only_on_machine": list(&on_machine) }))?;
+                }
+                false if is_same => say!("The machine was taught what is in {}", file.display())?,
+                false => say!("{}", differences(&in_file, &on_machine))?,
+            }
+            Ok(if is_same { Finding::Good } else { Finding::Bad })
+        }
+    }
+}
+
+/// What the machine was taught, in the order of its numbers.
+fn on_machine(port: &Port) -> Result<Vec<Taught>> {
+    Ok(examples::read(&mut port.open()?)?.into_iter().map(|(_, example)| example).collect())
+}
+
+/// A table's examples, each once; at least one.
+fn in_table(file: &Path) -> Result<Vec<Taught>> {
+    let objects = table::read(file)?;
+    let mut examples = Vec::new();
+    for object in &objects {
+        let Some(kind) = object.kind else { continue };
+        let example = example_of(&object.features, label_of(kind));
+        if !examples.contains(&example) {
+            examples.push(example);
+        }
+    }
+    let unlabelled = objects.iter().filter(|object| object.kind.is_none()).count();
+    ensure!(
+        !examples.is_empty(),
+        "{} has no labelled object: fill in the column {}, plant or weed",
+        file.display(),
+        table::LABEL
+    );
+    if unlabelled > 0 {
+        tell!("Passed over {unlabelled} without a label");
+    }
+    Ok(examples)
+}
+
+/// As the machine refuses a label that its built-in examples contradict.
+fn refuse_contradictions(wanted: &[Taught]) -> Result<()> {
+    let contradicting: Vec<_> =
+        wanted.iter().filter(|example| contradiction(example).is_some()).filter_map(object).collect();
+    let Some(Labelled { features, kind }) = contradicting.first() else { return Ok(()) };
+    let [speed, spacing, .., hold, _] = features.values();
+    bail!(
+        "{} of {} examples have a label of which the built-in ones are sure that it is wrong. The first: a {kind} at {speed} mm/s, \
+         {spacing} mm behind the last plant, with a hold of {hold} mm. Look again; --force teaches them all the same. Nothing was sent",
+        contradicting.len(),
+        wanted.len(),
+    )
+}
+
+/// An example in millimetres; what comes from a machine or a table has them.
+fn object(example: &Taught) -> Option<Labelled> {
+    let kind = if example.label == label_of(Kind::Plant) { Kind::Plant } else { Kind::Weed };
+    features_of(example).map(|features| Labelled { features, kind })
+}
+
+fn differences(in_file: &[Taught], on_machine: &[Taught]) -> Table {
+    let mut table = Table::new();
+    let heading = ["only", table::LABEL].into_iter().chain(table::COLUMNS);
+    table.load_style(presets::UTF8_BORDERS_ONLY).set_header(heading);
+    for (place, examples) in [("in the file", in_file), ("on the machine", on_machine)] {
+        for Labelled { features, kind } in examples.iter().filter_map(object) {
+            let values = features.values().map(|value| value.to_string());
+            table.add_row([place.to_owned(), kind.to_string()].into_iter().chain(values));
+        }
+    }
+    table
+}
+
+fn in_json(example: &Taught) -> Option<Value> {
+    let Labelled { features, kind } = object(example)?;
+    let values =
+        table::COLUMNS.iter().zip(features.values()).map(|(column, value)| ((*column).to_owned(), json!(value)));
+    let label = (table::LABEL.to_owned(), json!(kind.to_string()));
+    Some(Value::Object(Map::from_iter(values.chain([label]))))
+}

@@ -1,0 +1,213 @@
+//! The examples that a machine was taught in the field, all at once: reading them, and teaching them to another.
+//!
+//! The firmware lists an example as bytes, on the scale of its built-in table; [`features_of`] gives the millimetres back, and
+//! [`example_of`] the bytes. Both mean something only where this program has the firmware's table, so the built-in examples
+//! that the firmware lists are compared first. Nothing is sent where not all of it can be taught.
+
+use super::{Class, Link, LinkError, Said};
+use control::ground::class::{Classifier, label};
+use control::ground::examples::{EXAMPLES, SCALE};
+use control::ground::features::{COUNT, Features};
+use control::ground::field_examples::CAPACITY;
+use control::ground::nearest::Nearest;
+use control::memory::Volatile;
+use knn::Example;
+use std::collections::{HashMap, HashSet};
+use std::sync::LazyLock;
+use thiserror::Error;
+
+/// An example: five features as bytes, and a [`label`].
+pub type Taught = Example<COUNT>;
+
+/// Why examples could not be read or taught.
+#[derive(Debug, Error)]
+pub enum ExamplesError {
+    /// The console failed.
+    #[error(transparent)]
+    Link(#[from] LinkError),
+    /// The firmware has other built-in examples than this program.
+    #[error(
+        "the firmware has other built-in examples than this program, so what it was taught cannot be told in millimetres: use the \
+         `weeder` that was built with it, or put this one's on the board by `weeder flash`"
+    )]
+    OtherTable,
+    /// An example has features that no object in whole millimetres has.
+    #[error(
+        "the machine was taught an example by hand that is none of any object: have it forget that one, by `forget {number}`"
+    )]
+    NoObject {
+        /// Its number.
+        number: u16,
+    },
+    /// They do not find room.
+    #[error(
+        "{new} examples are new to the machine, which has room for {free} of its {CAPACITY}: leave some out, or have it forget what \
+         the file does not name by --replace; nothing was sent"
+    )]
+    NoRoom {
+        /// Examples that would be taught.
+        new: usize,
+        /// Places that are free.
+        free: usize,
+    },
+    /// The machine does not list what it was taught.
+    #[error(
+        "{missing} of the examples are not on the machine afterwards: try again, and see to the supply if it stays so"
+    )]
+    NotTaken {
+        /// How many.
+        missing: usize,
+    },
+}
+
+/// What was done to a machine's examples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Pushed {
+    /// Examples that it was taught.
+    pub taught: usize,
+    /// Examples that it forgot.
+    pub forgotten: usize,
+}
+
+/// Reads the examples that the machine was taught, with their numbers.
+///
+/// # Errors
+/// Where the console fails, [`ExamplesError::NoObject`] and [`ExamplesError::OtherTable`].
+pub fn read(link: &mut Link) -> Result<Vec<(u16, Taught)>, ExamplesError> {
+    let (mut built_in, mut taught) = (Vec::new(), Vec::new());
+    for line in link.ask("examples")? {
+        let Said::Example { from_field, number, label, features } = Said::parse(&line) else { continue };
+        let label = if label == Class::Plant { label::PLANT } else { label::WEED };
+        let example = Example::new(features, label);
+        if from_field {
+            features_of(&example).ok_or(ExamplesError::NoObject { number })?;
+            taught.push((number, example));
+        } else {
+            built_in.push(example);
+        }
+    }
+    if built_in == EXAMPLES { Ok(taught) } else { Err(ExamplesError::OtherTable) }
+}
+
+/// Has the machine know these examples, and with `replace` no others; those that it has already are not taught again.
+///
+/// # Errors
+/// As said, [`ExamplesError::NoRoom`] before anything is sent, and [`ExamplesError::NotTaken`].
+pub fn push(link: &mut Link, wanted: &[Taught], replace: bool) -> Result<Pushed, ExamplesError> {
+    let before = read(link)?;
+    let (known, named) = (set(before.iter().map(|(_, example)| example)), set(wanted));
+    let stale: Vec<u16> =
+        before.iter().filter(|(_, example)| replace && !named.contains(example)).map(|&(number, _)| number).collect();
+    let mut new: Vec<Taught> = Vec::new();
+    for example in wanted {
+        if !known.contains(example) && !new.contains(example) {
+            new.push(*example);
+        }
+    }
+    let free = usize::from(CAPACITY) - (before.len() - stale.len());
+    if new.len() > free {
+        return Err(ExamplesError::NoRoom { new: new.len(), free });
+    }
+    for number in &stale {
+        link.ask(&format!("forget {number}"))?;
+    }
+    for Example { features, label } in &new {
+        for feature in features {
+            link.ask(&format!("teach {feature}"))?;
+        }
+        link.ask(if *label == label::PLANT { "teach plant" } else { "teach weed" })?;
+    }
+    let after = read(link)?;
+    let after = set(after.iter().map(|(_, example)| example));
+    let missing = named.difference(&after).count();
+    if missing > 0 {
+        return Err(ExamplesError::NotTaken { missing });
+    }
+    Ok(Pushed { taught: new.len(), forgotten: stale.len() })
+}
+
+fn set<'a>(examples: impl IntoIterator<Item = &'a Taught>) -> HashSet<Taught> {
+    examples.into_iter().copied().collect()
+}
+
+/// An object as an example, as the firmware teaches itself one by `label`.
+pub fn example_of(features: &Features, label: u8) -> Taught {
+    Example::new(SCALE.quantise(&features.values()), label)
+}
+
+/// What an example is told by in millimetres and millimetres a second: for each feature the middle of the values that have its
+/// byte, and the nearest of them where they have no end. Its bytes are the example's again. Nothing where a byte has no value: no
+/// object gives such an example.
+pub fn features_of(example: &Taught) -> Option<Features> {
+    let mut values = [0; COUNT];
+    for (feature, value) in values.iter_mut().enumerate() {
+        *value = *VALUES[feature].get(&example.features[feature])?;
+    }
+    let [speed_mm_s, spacing_mm, delay_mm, hold_mm, actuation_mm] = values;
+    Some(Features { speed_mm_s, spacing_mm, delay_mm, hold_mm, actuation_mm })
+}
+
+/// For each feature, the value that stands for a byte.
+static VALUES: LazyLock<[HashMap<u8, i16>; COUNT]> = LazyLock::new(|| {
+    std::array::from_fn(|feature| {
+        let mut spans: HashMap<u8, (i16, i16)> = HashMap::new();
+        for value in i16::MIN..=i16::MAX {
+            let byte = SCALE.quantise(&[value.into(); COUNT])[feature];
+            spans.entry(byte).or_insert((value, value)).1 = value;
+        }
+        let middle = |(byte, (first, last)): (u8, (i16, i16))| match (first, last) {
+            (i16::MIN, _) => (byte, last),
+            (_, i16::MAX) => (byte, first),
+            _ => (byte, i16::midpoint(first, last)),
+        };
+        spans.into_iter().map(middle).collect()
+    })
+});
+
+/// What the built-in examples are sure that an example is, where it is labelled otherwise: the machine refuses such a label unless it
+/// is forced.
+pub fn contradiction(example: &Taught) -> Option<Class> {
+    let built_in = Nearest::new(EXAMPLES, Volatile::new()).built_in_class(&features_of(example)?);
+    let other = if example.label == label::PLANT { Class::Weed } else { Class::Plant };
+    (built_in == other).then_some(other)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_bytes_of_whatever_an_object_may_measure_come_back_from_the_millimetres() {
+        for value in i16::MIN..=i16::MAX {
+            let example = Example::new(SCALE.quantise(&[value.into(); COUNT]), label::WEED);
+            let features = features_of(&example).expect("it is an object's");
+            assert_eq!(example_of(&features, label::WEED), example);
+        }
+    }
+
+    #[test]
+    fn features_that_no_object_has_are_none() {
+        let strange = (0..=u8::MAX).map(|byte| Example::new([64, 64, byte, 64, 64], label::WEED));
+        assert!(strange.filter(|example| features_of(example).is_none()).count() > 0);
+    }
+
+    #[test]
+    fn an_object_is_told_within_what_a_byte_leaves_open() {
+        for (spacing_mm, width_mm) in [(60, 12), (500, 100), (600, 150), (700, 180)] {
+            let features = Features::describe(417, spacing_mm, width_mm);
+            let told = features_of(&example_of(&features, label::PLANT)).expect("it is an object's");
+            for (told, true_one) in told.values().into_iter().zip(features.values()) {
+                assert!((told - true_one).abs() <= 10, "{told} for {true_one}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_label_against_the_built_in_examples_is_a_contradiction() {
+        let plant = Features::describe(417, 500, 150);
+        let stalk = Features::describe(417, 250, 20);
+        assert_eq!(contradiction(&example_of(&plant, label::PLANT)), None);
+        assert_eq!(contradiction(&example_of(&plant, label::WEED)), Some(Class::Plant));
+        assert_eq!(contradiction(&example_of(&stalk, label::PLANT)), Some(Class::Weed));
+    }
+}
