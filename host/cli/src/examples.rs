@@ -138,7 +138,10 @@ fn on_machine(port: &Port) -> Result<Vec<Taught>> {
 }
 
 /// A table's examples, each once; at least one.
-fn in_table(file: &Path) -> Result<Vec<Taught>> {
+///
+/// # Errors
+/// Where it is no such table.
+pub fn in_table(file: &Path) -> Result<Vec<Taught>> {
     let objects = table::read(file)?;
     let mut examples = Vec::new();
     for object in &objects {

@@ -7,11 +7,14 @@ use crate::output::{say, tell};
 use crate::source;
 use anyhow::{Result, bail};
 use clap::Args;
+use link::examples::CAPACITY;
 use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::str::FromStr;
+use study::training::synthetic::{CROPS, Crop};
 use study::training::{
-    self, Confusion, DEFAULT_MOST_EXAMPLES, Labelled, MOST_EXAMPLES, Training, listing, regions, synthetic, table,
+    self, Beside, Confusion, DEFAULT_MOST_EXAMPLES, Labelled, MOST_EXAMPLES, Training, listing, regions, synthetic,
+    table,
 };
 
 /// What the user asks of a training.
@@ -20,7 +23,8 @@ use study::training::{
 Examples:
   weeder train field.csv --picture field.svg                    say how well it would do, and draw it
   weeder train field.csv --out control/src/ground/examples/table.rs    have the next `weeder flash` take it along
-  weeder train --synthetic                                      the built-in table, from simulated rows")]
+  weeder train --synthetic                                      the built-in table, from simulated rows
+  weeder train --synthetic --crop maize --beside --out maize.csv    examples for `weeder examples push`")]
 pub struct Arguments {
     /// CSV files with the columns speed_mm_s,spacing_mm,delay_mm,hold_mm,actuation_mm,label; label is plant or weed;
     /// - for standard input.
@@ -29,6 +33,9 @@ pub struct Arguments {
     /// Learn from simulated rows at four speeds and two spacings instead.
     #[arg(long)]
     synthetic: bool,
+    /// The crop of the simulated rows: chilli, broccoli or maize.
+    #[arg(long, value_name = "CROP", default_value = "chilli", value_parser = crop, conflicts_with = "files")]
+    crop: &'static Crop,
     /// Which of all the possible simulated fields, 0 to 18446744073709551615: the same seed gives the same table.
     #[arg(long, default_value = "1", value_parser = whole_within(0..=u64::MAX), conflicts_with = "files")]
     seed: u64,
@@ -46,6 +53,10 @@ pub struct Arguments {
         help = format!("Most examples that the table may have, 0 to {MOST_EXAMPLES}: flash has no room for more")
     )]
     max: usize,
+    /// Choose at most 32 that a machine can be taught by `weeder examples push` beside its built-in table, instead of a table for the
+    /// firmware.
+    #[arg(long, conflicts_with_all = ["k", "max", "picture"])]
+    beside: bool,
     /// Draw what the table decides.
     #[arg(long, value_name = "FILE.svg")]
     picture: Option<FileName>,
@@ -59,6 +70,17 @@ pub struct Arguments {
 enum Votes {
     Auto,
     Given(u8),
+}
+
+/// A crop by its name.
+fn crop(name: &str) -> Result<&'static Crop, String> {
+    CROPS.iter().find(|crop| crop.name == name).ok_or_else(|| {
+        let names: Vec<&str> = CROPS.iter().map(|crop| crop.name).collect();
+        format!(
+            "it has to be one of {}; of another crop, roll along a row and teach it, see docs/training.md",
+            names.join(", ")
+        )
+    })
 }
 
 impl FromStr for Votes {
@@ -81,6 +103,9 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     let table = arguments.out.as_ref().map(Destination::of).transpose()?;
     let picture = arguments.picture.as_ref().map(FileName::check).transpose()?;
     let objects = arguments.objects()?;
+    if arguments.beside {
+        return beside(arguments, table.as_ref(), &objects);
+    }
     let k = match arguments.k {
         Votes::Auto => None,
         Votes::Given(k) => Some(k),
@@ -89,7 +114,7 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     let another_field = match arguments.synthetic {
         true => {
             let seed = arguments.seed.wrapping_add(1);
-            Some((seed, training.model().judge(&synthetic::objects(seed)?)))
+            Some((seed, training.model().judge(&synthetic::objects(arguments.crop, seed)?)))
         }
         false => None,
     };
@@ -98,7 +123,12 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
         false => report(&training, &objects, another_field.as_ref()),
     };
     if let Some(table) = &table {
-        table.write(&training, &arguments.command())?;
+        match table.form {
+            Form::Rust => {
+                table.file.write(|to| to.write_all(listing::rust(&training, &arguments.command()).as_bytes()))?
+            }
+            Form::Csv => table.file.write(|to| listing::write_csv(&training.kept, to))?,
+        }
         if !arguments.json {
             say!("Table       {}", table.file.path().display())?;
         }
@@ -116,7 +146,7 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
 impl Arguments {
     fn objects(&self) -> Result<Vec<Labelled>> {
         if self.synthetic {
-            return Ok(synthetic::objects(self.seed)?);
+            return Ok(synthetic::objects(self.crop, self.seed)?);
         }
         let lesson = table::read_labelled(&self.files)?;
         if lesson.unlabelled > 0 {
@@ -129,7 +159,11 @@ impl Arguments {
     fn command(&self) -> String {
         let mut words = vec!["weeder train".to_owned()];
         if self.synthetic {
-            words.push(format!("--synthetic --seed {}", self.seed));
+            words.push("--synthetic".to_owned());
+            if self.crop != &CROPS[0] {
+                words.push(format!("--crop {}", self.crop.name));
+            }
+            words.push(format!("--seed {}", self.seed));
         }
         words.extend(self.files.iter().map(|file| file.display().to_string()));
         if let Votes::Given(k) = self.k {
@@ -138,6 +172,38 @@ impl Arguments {
         words.push(format!("--max {}", self.max));
         words.join(" ")
     }
+}
+
+/// Chooses what a machine is taught beside its built-in table, and prints what came of it.
+fn beside(arguments: &Arguments, table: Option<&Destination>, objects: &[Labelled]) -> Result<Finding> {
+    if table.is_some_and(|table| matches!(table.form, Form::Rust)) {
+        bail!("what a machine is taught beside its built-in table is written as CSV (.csv)");
+    }
+    let Beside { chosen, before, after } = training::beside(objects, usize::from(CAPACITY))?;
+    let printed = match arguments.json {
+        true => say!(
+            "{:#}",
+            json!({
+                "objects": objects.len(),
+                "examples": chosen.len(),
+                "built_in_alone": judged_in_json(&before),
+                "with_these": judged_in_json(&after),
+            })
+        ),
+        false => say!(
+            "Objects     {}\nExamples    {} chosen\n\nBy the built-in table alone\n\n{before}\n\nBy both together\n\n{after}\n",
+            objects.len(),
+            chosen.len()
+        ),
+    };
+    if let Some(table) = table {
+        table.file.write(|to| listing::write_csv(&chosen, to))?;
+        if !arguments.json {
+            say!("Table       {}", table.file.path().display())?;
+        }
+    }
+    printed?;
+    Ok(Finding::Good)
 }
 
 /// What is said of a training; `another_field` are the seed of another field and how its objects were judged.
@@ -200,13 +266,5 @@ impl<'a> Destination<'a> {
             _ => bail!("{}: a table is written as Rust (.rs) or as CSV (.csv)", name.path().display()),
         };
         Ok(Self { file: name.check()?, form })
-    }
-
-    /// Writes a table, given the command that made it.
-    fn write(&self, training: &Training, command: &str) -> Result<()> {
-        match self.form {
-            Form::Rust => self.file.write(|to| to.write_all(listing::rust(training, command).as_bytes())),
-            Form::Csv => self.file.write(|to| listing::write_csv(&training.kept, to)),
-        }
     }
 }

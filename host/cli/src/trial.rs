@@ -2,6 +2,7 @@
 
 use crate::Finding;
 use crate::destination::{FolderName, OutFolder};
+use crate::examples;
 use crate::numbers::{number_within, whole_within};
 use crate::output::{self, say};
 use crate::progress::Progress;
@@ -45,10 +46,13 @@ pub struct Arguments {
     /// Plant spacings in cm, each 5 to 500.
     #[arg(long, value_delimiter = ',', default_value = "50,60", value_parser = number_within(SPACINGS_CM.0..=SPACINGS_CM.1))]
     spacings: Vec<f64>,
-    /// The field's conditions: a preset (transplanted, even-stand, direct-sown, weedy, soft-ground, heavy-soil, dusty, hand-steered), or a TOML
-    /// file that says what differs from the first of them; - for standard input.
+    /// The field's conditions: a preset (transplanted, even-stand, direct-sown, weedy, soft-ground, heavy-soil, dusty, hand-steered,
+    /// chilli, broccoli, maize), or a TOML file that says what differs from the first of them; - for standard input.
     #[arg(long, value_name = "PRESET|FILE.toml", value_parser = source::named, default_value = "transplanted")]
     field: String,
+    /// A table of examples that the firmware is taught beforehand, as `weeder examples push` would; - for standard input.
+    #[arg(long, value_name = "FILE.csv", value_parser = source::file)]
+    examples: Option<PathBuf>,
     /// Which of all the possible fields, 0 to 18446744073709551615: the same seed gives the same one.
     #[arg(long, default_value = "1", value_parser = whole_within(0..=u64::MAX))]
     seed: u64,
@@ -87,6 +91,7 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
         replications: arguments.replications,
         controllers: Controller::ALL.to_vec(),
         conditions: Conditions::load(&arguments.field, |file| fs::read_to_string(file))?,
+        examples: arguments.examples.as_deref().map(examples::in_table).transpose()?.unwrap_or_default(),
         seed: arguments.seed,
     };
     let engine = match (arguments.engine, &arguments.elf) {

@@ -14,7 +14,7 @@ fn weeder(folder: &Path, arguments: &[&str]) -> Output {
 }
 
 /// Every argument that names something to write, without it.
-const WRITERS: [(&[&str], Kind); 12] = [
+const WRITERS: [(&[&str], Kind); 13] = [
     (&["trial", "--field", "small.toml", "--out"], Kind::Folder),
     (&["evaluate", concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/trial-example.csv"), "--out"], Kind::Folder),
     (&["sim", "--out"], Kind::Folder),

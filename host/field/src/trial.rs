@@ -8,7 +8,9 @@ use crate::machine::Machine;
 use crate::motion::Motion;
 use crate::row::Row;
 use crate::verdict::Timing;
+use control::ground::features;
 use control::settings::Setting;
+use knn::Example;
 
 /// How the firmware is put to work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -36,6 +38,8 @@ pub struct Trial {
     pub start: Start,
     /// What else the firmware is told, after the settings that follow from machine and timing.
     pub settings: Vec<(Setting, u16)>,
+    /// What the firmware is taught beside its built-in examples.
+    pub examples: Vec<Example<{ features::COUNT }>>,
 }
 
 /// Distance that the machine rolls ahead of the row, so that it has its speed and the tool is in the row when the row
@@ -72,7 +76,7 @@ impl Trial {
         );
         // No machine stops dead, and one that did would look like one whose encoder has failed.
         let motion = motion.change_speed(0.0, BRAKING_MM_S2);
-        Self { row, machine, motion, timing, start: Start::Command, settings: Vec::new() }
+        Self { row, machine, motion, timing, start: Start::Command, settings: Vec::new(), examples: Vec::new() }
     }
 
     /// The settings that the firmware gets, in an order in which machine and timing do not contradict each other on the way.

@@ -10,6 +10,7 @@
 use crate::machine::{Machine, time_at_s};
 use crate::motion::{Course, marks};
 use crate::trial::{Start, Trial};
+use control::ground::class::label;
 use control::ground::examples::EXAMPLES;
 use control::ground::features;
 use control::ground::nearest::Nearest;
@@ -181,6 +182,10 @@ pub fn weed(trial: &Trial) -> Result<Weeded, Refused> {
     type_line(&mut weeder, "clear")?;
     for (setting, value) in trial.firmware_settings() {
         type_line(&mut weeder, &format!("set {} {value}", setting.text()))?;
+    }
+    for example in &trial.examples {
+        example.features.into_iter().for_each(|feature| weeder.tell_feature(feature));
+        type_line(&mut weeder, if example.label == label::PLANT { "teach plant" } else { "teach weed" })?;
     }
     type_line(&mut weeder, if trial.start == Start::Now { "start now" } else { "start" })?;
 

@@ -8,7 +8,7 @@ use super::{Class, Link, LinkError, Said};
 use control::ground::class::{Classifier, label};
 use control::ground::examples::{EXAMPLES, SCALE};
 use control::ground::features::{COUNT, Features};
-use control::ground::field_examples::CAPACITY;
+pub use control::ground::field_examples::CAPACITY;
 use control::ground::nearest::Nearest;
 use control::memory::Volatile;
 use knn::Example;
@@ -111,11 +111,8 @@ pub fn push(link: &mut Link, wanted: &[Taught], replace: bool) -> Result<Pushed,
     for number in &stale {
         link.ask(&format!("forget {number}"))?;
     }
-    for Example { features, label } in &new {
-        for feature in features {
-            link.ask(&format!("teach {feature}"))?;
-        }
-        link.ask(if *label == label::PLANT { "teach plant" } else { "teach weed" })?;
+    for line in new.iter().flat_map(lines) {
+        link.ask(&line)?;
     }
     let after = read(link)?;
     let after = set(after.iter().map(|(_, example)| example));
@@ -124,6 +121,13 @@ pub fn push(link: &mut Link, wanted: &[Taught], replace: bool) -> Result<Pushed,
         return Err(ExamplesError::NotTaken { missing });
     }
     Ok(Pushed { taught: new.len(), forgotten: stale.len() })
+}
+
+/// The lines of the console that teach an example.
+pub fn lines(example: &Taught) -> impl Iterator<Item = String> + use<> {
+    let label = if example.label == label::PLANT { "plant" } else { "weed" };
+    let features = example.features.map(|feature| format!("teach {feature}"));
+    features.into_iter().chain([format!("teach {label}")])
 }
 
 fn set<'a>(examples: impl IntoIterator<Item = &'a Taught>) -> HashSet<Taught> {

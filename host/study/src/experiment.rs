@@ -10,6 +10,7 @@ pub mod table;
 pub mod total;
 
 use crate::evaluation::PlotRecord;
+use control::ground::features;
 use control::operate::state::State;
 use field::bound::undamaged_share;
 use field::conditions::Conditions;
@@ -21,6 +22,7 @@ use field::tool_path::{Effect, effect};
 use field::trial::{Start, Trial};
 use field::twin::{self, Refused};
 use field::verdict::{Judgement, Timing, Verdict, judge};
+use knn::Example;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -84,6 +86,8 @@ pub struct Experiment {
     pub controllers: Vec<Controller>,
     /// Where.
     pub conditions: Conditions,
+    /// What the firmware is taught beforehand.
+    pub examples: Vec<Example<{ features::COUNT }>>,
     /// Which of all the possible fields.
     pub seed: u64,
 }
@@ -200,6 +204,7 @@ impl Experiment {
             replications: 3,
             controllers: Controller::ALL.to_vec(),
             conditions,
+            examples: Vec::new(),
             seed,
         }
     }
@@ -364,6 +369,7 @@ impl Experiment {
             timing: self.conditions.timing(),
             start: Start::Command,
             settings: self.conditions.firmware_settings(),
+            examples: self.examples.clone(),
         };
         Ok((stand, drive, trial))
     }

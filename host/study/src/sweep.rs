@@ -229,6 +229,7 @@ impl Sweep {
             replications: 1,
             controllers: vec![self.controller],
             conditions: self.conditions.clone(),
+            examples: Vec::new(),
             seed: self.seed,
         };
         for (axis, value) in [(Some(&self.x), Some(x)), (self.y.as_ref(), y)] {

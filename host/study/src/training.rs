@@ -274,6 +274,35 @@ pub fn train(objects: &[Labelled], k: Option<u8>, most: usize) -> Result<Trainin
     }
 }
 
+/// Examples that are taught in the field, beside the built-in ones.
+#[derive(Clone, Debug)]
+pub struct Beside {
+    /// The objects that were chosen.
+    pub chosen: Vec<Labelled>,
+    /// All objects, judged by the built-in examples alone.
+    pub before: Confusion,
+    /// All objects, judged by both together.
+    pub after: Confusion,
+}
+
+/// Chooses at most `most` of the objects to be taught beside the built-in table, on its scale and with its radius and k: so that no
+/// plant is taken for a weed, and as many weeds as can be are known ([`condense::beside`]).
+///
+/// # Errors
+/// [`TrainingError::NoObjects`] and [`TrainingError::TooMany`].
+pub fn beside(objects: &[Labelled], most: usize) -> Result<Beside, TrainingError> {
+    if objects.is_empty() {
+        return Err(TrainingError::NoObjects);
+    }
+    let mut model = Model::built_in();
+    let before = model.judge(objects);
+    let examples = quantised(&model.scale, objects);
+    let chosen = condense::beside(&model.examples, &examples, model.k, model.radius, most)?;
+    model.examples.extend(chosen.iter().map(|&index| examples[index]));
+    let after = model.judge(objects);
+    Ok(Beside { chosen: chosen.into_iter().map(|index| objects[index]).collect(), before, after })
+}
+
 /// The objects as examples.
 fn quantised(scale: &Scale<COUNT>, objects: &[Labelled]) -> Vec<Example<COUNT>> {
     let example = |object: &Labelled| Example::new(scale.quantise(&object.features.values()), label_of(object.kind));

@@ -10,6 +10,7 @@ use control::memory::Volatile;
 use field::row::Kind;
 use std::io::Write;
 use std::path::PathBuf;
+use study::training::synthetic::CROPS;
 use study::training::table::{read, read_labelled};
 use study::training::{DEFAULT_MOST_EXAMPLES, Labelled, Model, TrainingError, listing, regions, synthetic, train};
 use tempfile::TempDir;
@@ -31,7 +32,7 @@ fn clear_case() -> Vec<Labelled> {
 
 #[test]
 fn each_object_of_the_simulated_field_is_judged_right_by_all_others() {
-    let objects = synthetic::objects(1).unwrap();
+    let objects = synthetic::objects(&CROPS[0], 1).unwrap();
     let training = train(&objects, None, DEFAULT_MOST_EXAMPLES).unwrap();
     assert_eq!(training.k, K);
     for confusion in [training.leave_one_out, training.by_table] {
@@ -44,7 +45,7 @@ fn each_object_of_the_simulated_field_is_judged_right_by_all_others() {
 #[test]
 fn the_built_in_table_holds_on_fields_that_it_was_not_trained_on() {
     for seed in 2..6 {
-        let confusion = Model::built_in().judge(&synthetic::objects(seed).unwrap());
+        let confusion = Model::built_in().judge(&synthetic::objects(&CROPS[0], seed).unwrap());
         let (plants, weeds) = (confusion.count(Kind::Plant) as f64, confusion.count(Kind::Weed) as f64);
         assert!(plants > 1000.0 && weeds > 1000.0, "{confusion}");
         assert!((confusion.plants_taken_for_weeds() as f64) < PLANTS_CUT * plants, "{confusion}");
@@ -54,13 +55,13 @@ fn the_built_in_table_holds_on_fields_that_it_was_not_trained_on() {
 
 #[test]
 fn the_simulated_field_is_the_same_for_a_seed_and_another_for_another() {
-    assert_eq!(synthetic::objects(5).unwrap(), synthetic::objects(5).unwrap());
-    assert_ne!(synthetic::objects(5).unwrap(), synthetic::objects(6).unwrap());
+    assert_eq!(synthetic::objects(&CROPS[0], 5).unwrap(), synthetic::objects(&CROPS[0], 5).unwrap());
+    assert_ne!(synthetic::objects(&CROPS[0], 5).unwrap(), synthetic::objects(&CROPS[0], 6).unwrap());
 }
 
 #[test]
 fn the_simulated_field_has_every_speed_slip_missing_plants_and_weeds_everywhere() {
-    let objects = synthetic::objects(1).unwrap();
+    let objects = synthetic::objects(&CROPS[0], 1).unwrap();
     let is = |kind: Kind, test: &dyn Fn(&Features) -> bool| {
         objects.iter().any(|object| object.kind == kind && test(&object.features))
     };
@@ -132,7 +133,7 @@ fn a_handful_of_objects_does_not_make_weeds_of_what_is_nearer_to_plants() {
 
 #[test]
 fn a_table_that_cuts_plants_which_all_objects_together_spare_is_refused() {
-    let objects = synthetic::objects(1).unwrap();
+    let objects = synthetic::objects(&CROPS[0], 1).unwrap();
     let few = train(&objects, None, DEFAULT_MOST_EXAMPLES).unwrap().kept;
     let error = train(&few, Some(15), DEFAULT_MOST_EXAMPLES).unwrap_err();
     assert!(matches!(error, TrainingError::Outvoted { k: 15, .. }), "{error}");
@@ -147,7 +148,7 @@ fn as_many_examples_are_kept_as_vote() {
 
 #[test]
 fn objects_that_need_more_examples_than_there_is_room_for_are_refused_by_name() {
-    let error = train(&synthetic::objects(1).unwrap(), None, 10).unwrap_err();
+    let error = train(&synthetic::objects(&CROPS[0], 1).unwrap(), None, 10).unwrap_err();
     assert!(matches!(error, TrainingError::TooMany(_)));
     assert!(error.to_string().starts_with("too many examples for the flash budget: "), "{error}");
 }

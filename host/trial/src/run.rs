@@ -11,6 +11,7 @@ use field::servo::WIDTHS_US;
 use field::trial::{Start, Trial};
 use field::verdict::{Judgement, judge};
 use field::wiring;
+use link::examples;
 use link::settings::name;
 use signal::{CYCLES_PER_SECOND, PinChange, Pulse};
 use std::path::Path;
@@ -144,13 +145,16 @@ pub fn run(trial: &Trial, elf: &Path, mut progress: impl FnMut(f64)) -> Result<O
     })
 }
 
-/// Tells the firmware what it has to know of machine and timing, by its settings.
+/// Tells the firmware what it has to know of machine and timing, by its settings, and of the crop, by examples.
 ///
 /// # Errors
-/// Where it refuses one of them, or does not answer.
+/// Where it refuses something, or does not answer.
 pub fn set_up(trial: &Trial, uno: &mut Uno) -> Result<(), ConsoleError> {
     for (setting, value) in trial.firmware_settings() {
         ask(uno, &format!("set {} {value}", name(setting)))?;
+    }
+    for line in trial.examples.iter().flat_map(examples::lines) {
+        ask(uno, &line)?;
     }
     Ok(())
 }

@@ -19,6 +19,7 @@ use control::ground::{
     features::COUNT,
 };
 use knn::{Example, Kind, classify, squared_distance};
+use std::collections::HashSet;
 use thiserror::Error;
 
 /// The examples do not fit.
@@ -82,6 +83,39 @@ pub fn condense(
     keep_most_needed(examples, edited, &mut kept, usize::MAX, half, is_mistreated);
     fits(&kept)?;
     Ok(kept)
+}
+
+/// Chooses at most `most` of `examples` that, beside those which are `given`, have every plant spared and, as far as there is room,
+/// weeds known: their places, in the order in which they were chosen. No two of them are alike.
+///
+/// # Errors
+/// [`TooMany`], where that many leave a plant that is taken for a weed.
+pub fn beside(
+    given: &[Example<COUNT>],
+    examples: &[Example<COUNT>],
+    k: u8,
+    radius: u32,
+    most: usize,
+) -> Result<Vec<usize>, TooMany> {
+    let all = [given, examples].concat();
+    let mut seen = HashSet::new();
+    let of = |wanted: u8, seen: &mut HashSet<Example<COUNT>>| -> Vec<usize> {
+        (given.len()..all.len()).filter(|&index| all[index].label == wanted && seen.insert(all[index])).collect()
+    };
+    let (plants, weeds) = (of(label::PLANT, &mut seen), of(label::WEED, &mut seen));
+    let is_taken_for_a_weed = |index: usize, kept: &[Example<COUNT>]| {
+        let answer = classify::<COUNT, { label::COUNT }>(kept, &all[index].features, k, radius);
+        answer.is_ok_and(|answer| class_of(&answer) == Class::Weed)
+    };
+    let room = given.len() + most;
+    let mut kept: Vec<usize> = (0..given.len()).collect();
+    keep_most_needed(&all, &plants, &mut kept, room, radius / 2, is_taken_for_a_weed);
+    // A quarter is left for the plants that a weed may outvote.
+    let for_weeds = kept.len() + (room - kept.len()) * 3 / 4;
+    keep_most_needed(&all, &weeds, &mut kept, for_weeds, radius / 2, |index, kept| !is_taken_for_a_weed(index, kept));
+    keep_most_needed(&all, &plants, &mut kept, usize::MAX, radius / 2, is_taken_for_a_weed);
+    let chosen: Vec<usize> = kept.drain(given.len()..).map(|index| index - given.len()).collect();
+    if chosen.len() > most { Err(TooMany { needed: chosen.len(), most }) } else { Ok(chosen) }
 }
 
 /// While fewer than `most` are kept and `needs` says of any of `candidates` that the examples kept are not enough for it:

@@ -1,6 +1,6 @@
 //! Objects from simulated rows, as the firmware's own code sees them.
 //!
-//! The machine rolls past rows at the paper's four speeds and two spacings, and the levels that its encoder and its
+//! The machine rolls past rows of a [`Crop`] at the paper's four speeds and two spacings, and the levels that its encoder and its
 //! beam give go through the firmware's decoder and its [`Controller`]; no feature is made up. What varies: speed within
 //! a tenth of its class, spacing and canopy, plants that are missing, tall weeds wherever there is ground, closed and
 //! ragged canopies, and the slip of the wheel.
@@ -35,24 +35,67 @@ use std::cell::RefCell;
 use std::ops::RangeInclusive;
 use thiserror::Error;
 
-/// The paper's plant spacings.
-pub const SPACINGS_MM: [f64; 2] = [500.0, 600.0];
+/// How a crop stands, and which weeds outgrow the beam beside it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Crop {
+    /// What it is called.
+    pub name: &'static str,
+    /// Its plant spacings.
+    pub spacings_mm: [f64; 2],
+    /// A spacing is within this of its mean.
+    pub spacing_scatter_mm: f64,
+    /// Mean width of a canopy at the beam's height.
+    pub canopy_mm: f64,
+    /// A canopy's width is within this of its mean.
+    pub canopy_scatter_mm: f64,
+    /// Whether there are canopies through which the beam passes.
+    pub is_ragged: bool,
+    /// Widths of tall weeds.
+    pub weed_widths_mm: RangeInclusive<f64>,
+}
+
+/// The crops that there are, the paper's first. All but its spacings is assumed.
+pub const CROPS: [Crop; 3] = [
+    Crop {
+        name: "chilli",
+        spacings_mm: [500.0, 600.0],
+        spacing_scatter_mm: 50.0,
+        canopy_mm: 140.0,
+        canopy_scatter_mm: 40.0,
+        is_ragged: true,
+        weed_widths_mm: 12.0..=20.0,
+    },
+    // Heads some weeks after transplanting.
+    Crop {
+        name: "broccoli",
+        spacings_mm: [400.0, 500.0],
+        spacing_scatter_mm: 40.0,
+        canopy_mm: 220.0,
+        canopy_scatter_mm: 60.0,
+        is_ragged: true,
+        weed_widths_mm: 12.0..=30.0,
+    },
+    // Stalks below their leaves, and grasses, which are the narrower ones.
+    Crop {
+        name: "maize",
+        spacings_mm: [200.0, 250.0],
+        spacing_scatter_mm: 40.0,
+        canopy_mm: 20.0,
+        canopy_scatter_mm: 5.0,
+        is_ragged: false,
+        weed_widths_mm: 4.0..=10.0,
+    },
+];
 
 /// Passes over a row at each speed and spacing, and plants in a row before any go missing.
 const PASSES: usize = 12;
 const PLANTS: usize = 20;
 
-/// How the plants stand: spacing within plus and minus this, canopies of 100 to 180 mm.
-const SPACING_SCATTER_MM: f64 = 50.0;
-const CANOPY_MM: f64 = 140.0;
-const CANOPY_SCATTER_MM: f64 = 40.0;
-
 /// Share of the plants that did not come up; never two neighbours.
 const MISSING: f64 = 0.05;
 
-/// Tall weeds: their widths, how many grow on a metre of bare ground, and how far they stand from everything else, so
+/// Tall weeds: how many grow on a metre of bare ground, and how far they stand from everything else, so
 /// that the beam sees each as an object of its own.
-const WEED_WIDTHS_MM: RangeInclusive<f64> = 12.0..=20.0;
 const WEEDS_PER_METRE: f64 = 3.0;
 const WEED_MARGIN_MM: f64 = 25.0;
 
@@ -96,17 +139,17 @@ pub enum SyntheticError {
     },
 }
 
-/// All objects of the field that grows from a seed, in the order in which the machine meets them.
+/// All objects of the crop's field that grows from a seed, in the order in which the machine meets them.
 ///
 /// # Errors
 /// Where rows cannot grow or be seen as they should.
-pub fn objects(seed: u64) -> Result<Vec<Labelled>, SyntheticError> {
+pub fn objects(crop: &Crop, seed: u64) -> Result<Vec<Labelled>, SyntheticError> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut objects = Vec::new();
     for pass in 0..PASSES {
         for class_mm_s in SPEED_CLASSES_MM_S {
-            for spacing_mm in SPACINGS_MM {
-                let row = grow(spacing_mm, pass % 2 == 1, &mut rng)?;
+            for spacing_mm in crop.spacings_mm {
+                let row = grow(crop, spacing_mm, crop.is_ragged && pass % 2 == 1, &mut rng)?;
                 let speed_mm_s = f64::from(class_mm_s) * rng.random_range(PACE);
                 let slip = rng.random_range(SLIP);
                 objects.extend(roll_past(&row, speed_mm_s, slip)?);
@@ -117,13 +160,13 @@ pub fn objects(seed: u64) -> Result<Vec<Labelled>, SyntheticError> {
 }
 
 /// A row with missing plants, and weeds on its bare ground.
-fn grow(spacing_mm: f64, ragged: bool, rng: &mut impl Rng) -> Result<Row, SyntheticError> {
+fn grow(crop: &Crop, spacing_mm: f64, ragged: bool, rng: &mut impl Rng) -> Result<Row, SyntheticError> {
     let planting = Planting {
         plants: PLANTS,
         spacing_mm,
-        spacing_scatter_mm: SPACING_SCATTER_MM,
-        canopy_mm: CANOPY_MM,
-        canopy_scatter_mm: CANOPY_SCATTER_MM,
+        spacing_scatter_mm: crop.spacing_scatter_mm,
+        canopy_mm: crop.canopy_mm,
+        canopy_scatter_mm: crop.canopy_scatter_mm,
         weeds: 0,
         ragged,
     };
@@ -141,7 +184,7 @@ fn grow(spacing_mm: f64, ragged: bool, rng: &mut impl Rng) -> Result<Row, Synthe
         let attempts = ((bare_mm.end - bare_mm.start) / 1000.0 * WEEDS_PER_METRE).round() as usize;
         let mut taken = Vec::<Thing>::new();
         for _ in 0..attempts {
-            let weed = Thing::weed(rng.random_range(bare_mm.clone()), rng.random_range(WEED_WIDTHS_MM));
+            let weed = Thing::weed(rng.random_range(bare_mm.clone()), rng.random_range(crop.weed_widths_mm.clone()));
             let ground = weed.span_mm().start - WEED_MARGIN_MM..weed.span_mm().end + WEED_MARGIN_MM;
             let is_free = |other: &Thing| other.span_mm().end < ground.start || ground.end < other.span_mm().start;
             if bare_mm.start <= ground.start && ground.end <= bare_mm.end && taken.iter().all(is_free) {
