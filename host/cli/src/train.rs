@@ -55,7 +55,7 @@ pub struct Arguments {
     max: usize,
     /// Choose at most 32 that a machine can be taught by `weeder examples push` beside its built-in table, instead of a table for the
     /// firmware.
-    #[arg(long, conflicts_with_all = ["k", "max", "picture"])]
+    #[arg(long, conflicts_with_all = ["max", "picture"])]
     beside: bool,
     /// Draw what the table decides.
     #[arg(long, value_name = "FILE.svg")]
@@ -103,13 +103,13 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     let table = arguments.out.as_ref().map(Destination::of).transpose()?;
     let picture = arguments.picture.as_ref().map(FileName::check).transpose()?;
     let objects = arguments.objects()?;
-    if arguments.beside {
-        return beside(arguments, table.as_ref(), &objects);
-    }
     let k = match arguments.k {
         Votes::Auto => None,
         Votes::Given(k) => Some(k),
     };
+    if arguments.beside {
+        return beside(arguments, table.as_ref(), &objects, k);
+    }
     let training = training::train(&objects, k, arguments.max)?;
     let another_field = match arguments.synthetic {
         true => {
@@ -175,11 +175,11 @@ impl Arguments {
 }
 
 /// Chooses what a machine is taught beside its built-in table, and prints what came of it.
-fn beside(arguments: &Arguments, table: Option<&Destination>, objects: &[Labelled]) -> Result<Finding> {
+fn beside(arguments: &Arguments, table: Option<&Destination>, objects: &[Labelled], k: Option<u8>) -> Result<Finding> {
     if table.is_some_and(|table| matches!(table.form, Form::Rust)) {
         bail!("what a machine is taught beside its built-in table is written as CSV (.csv)");
     }
-    let Beside { chosen, before, after } = training::beside(objects, usize::from(CAPACITY))?;
+    let Beside { chosen, before, after } = training::beside(objects, k, usize::from(CAPACITY))?;
     let printed = match arguments.json {
         true => say!(
             "{:#}",

@@ -1,5 +1,6 @@
 //! `weeder trial` and `weeder sweep`, as they are called.
 
+use serde_json::Value;
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
@@ -103,6 +104,37 @@ fn a_machine_that_outruns_its_beam_is_told_and_is_no_success() {
     assert!(words.contains("an alarm took the firmware's tool out"), "{words}");
     let words = said(folder.path(), &["sweep", "--field", "small.toml", "--x", "speed=2..7:5"]);
     assert!(words.contains(" ! ") && words.contains("--result alarms says in how many"), "{words}");
+}
+
+#[test]
+fn maize_is_spared_with_its_examples_and_stops_the_machine_without_them() {
+    let folder = folder();
+    said(folder.path(), &["train", "--synthetic", "--crop", "maize", "--beside", "--out", "maize.csv"]);
+    let trial = ["trial", "--field", "maize", "--speeds", "1", "--spacings", "20,25", "--replications", "1", "--json"];
+    let [without, with] = [&[][..], &["--examples", "maize.csv"]].map(|examples| {
+        let output = weeder(folder.path(), &[&trial[..], examples].concat());
+        let said: Value = serde_json::from_slice(&output.stdout).expect("it is JSON");
+        let of_firmware = |plot: &&Value| plot["controller"] == "this firmware";
+        let plots: Vec<Value> = said["plots"].as_array().unwrap().iter().filter(of_firmware).cloned().collect();
+        (output.status.code(), plots)
+    });
+    let sum = |plots: &[Value], key: &str| plots.iter().map(|plot| plot[key].as_f64().unwrap()).sum::<f64>();
+    assert_eq!(with.0, Some(0), "{:?}", with.1);
+    assert_eq!((sum(&with.1, "damaged_by_tool"), sum(&with.1, "alarms")), (0.0, 0.0));
+    assert!(sum(&with.1, "canopies") > 400.0, "{:?}", with.1);
+    assert_eq!((without.0, sum(&without.1, "alarms")), (Some(1), 6.0), "each row ends in an alarm: {:?}", without.1);
+}
+
+#[test]
+fn maize_is_spared_by_the_real_firmware_that_was_taught_its_examples() {
+    let folder = folder();
+    let small = format!("{SMALL}{}", include_str!("../../field/presets/maize.toml"));
+    fs::write(folder.path().join("maize.toml"), small).unwrap();
+    said(folder.path(), &["train", "--synthetic", "--crop", "maize", "--beside", "--out", "maize.csv"]);
+    let field =
+        ["trial", "--engine", "uno", "--field", "maize.toml", "--speeds", "1", "--spacings", "20", "--replications"];
+    said(folder.path(), &[&field[..], &["1", "--examples", "maize.csv"]].concat());
+    assert_eq!(weeder(folder.path(), &[&field[..], &["1"]].concat()).status.code(), Some(1));
 }
 
 #[test]

@@ -290,12 +290,13 @@ pub struct Beside {
 ///
 /// # Errors
 /// [`TrainingError::NoObjects`] and [`TrainingError::TooMany`].
-pub fn beside(objects: &[Labelled], most: usize) -> Result<Beside, TrainingError> {
+pub fn beside(objects: &[Labelled], k: Option<u8>, most: usize) -> Result<Beside, TrainingError> {
     if objects.is_empty() {
         return Err(TrainingError::NoObjects);
     }
     let mut model = Model::built_in();
     let before = model.judge(objects);
+    model.k = k.unwrap_or(model.k);
     let examples = quantised(&model.scale, objects);
     let chosen = condense::beside(&model.examples, &examples, model.k, model.radius, most)?;
     model.examples.extend(chosen.iter().map(|&index| examples[index]));

@@ -8,11 +8,14 @@ use control::ground::{
 };
 use control::memory::Volatile;
 use field::row::Kind;
+use knn::Example;
 use std::io::Write;
 use std::path::PathBuf;
 use study::training::synthetic::CROPS;
 use study::training::table::{read, read_labelled};
-use study::training::{DEFAULT_MOST_EXAMPLES, Labelled, Model, TrainingError, listing, regions, synthetic, train};
+use study::training::{
+    DEFAULT_MOST_EXAMPLES, Labelled, Model, TrainingError, beside, label_of, listing, regions, synthetic, train,
+};
 use tempfile::TempDir;
 
 /// Plants that may be taken for weeds, and weeds for plants, as shares of all.
@@ -291,4 +294,27 @@ fn objects_to_be_classified_need_no_label() {
 fn a_file_that_does_not_exist_is_named() {
     let error = read_labelled(&[PathBuf::from("no/such/objects.csv")]).unwrap_err().to_string();
     assert!(error.starts_with("no/such/objects.csv cannot be read"), "{error}");
+}
+
+#[test]
+fn what_is_taught_beside_the_built_in_table_spares_the_plants_of_another_field_too() {
+    for crop in &CROPS[1..] {
+        let chosen = beside(&synthetic::objects(crop, 1).unwrap(), None, 32).unwrap();
+        assert!(chosen.chosen.len() <= 32, "{}", crop.name);
+        let mut model = Model::built_in();
+        let example =
+            |object: &Labelled| Example::new(model.scale.quantise(&object.features.values()), label_of(object.kind));
+        let taught: Vec<_> = chosen.chosen.iter().map(example).collect();
+        model.examples.extend(taught);
+        let confusion = model.judge(&synthetic::objects(crop, 2).unwrap());
+        let (plants, weeds) = (confusion.count(Kind::Plant) as f64, confusion.count(Kind::Weed) as f64);
+        assert!((confusion.plants_taken_for_weeds() as f64) < 0.003 * plants, "{}: {confusion}", crop.name);
+        assert!((confusion.weeds_taken_for_plants() as f64) < 0.1 * weeds, "{}: {confusion}", crop.name);
+    }
+}
+
+#[test]
+fn what_cannot_be_spared_beside_the_built_in_table_is_refused() {
+    let error = beside(&synthetic::objects(&CROPS[2], 1).unwrap(), None, 5).unwrap_err();
+    assert!(matches!(error, TrainingError::TooMany(_)), "{error}");
 }

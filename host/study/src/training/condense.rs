@@ -85,8 +85,8 @@ pub fn condense(
     Ok(kept)
 }
 
-/// Chooses at most `most` of `examples` that, beside those which are `given`, have every plant spared and, as far as there is room,
-/// weeds known: their places, in the order in which they were chosen. No two of them are alike.
+/// Chooses at most `most` of `examples` that, beside those which are `given`, have every plant spared and, as far as there is room
+/// and no plant is lost by it, weeds known: their places, in the order in which they were chosen. No two of them are alike.
 ///
 /// # Errors
 /// [`TooMany`], where that many leave a plant that is taken for a weed.
@@ -99,21 +99,25 @@ pub fn beside(
 ) -> Result<Vec<usize>, TooMany> {
     let all = [given, examples].concat();
     let mut seen = HashSet::new();
-    let of = |wanted: u8, seen: &mut HashSet<Example<COUNT>>| -> Vec<usize> {
+    let mut of = |wanted: u8| -> Vec<usize> {
         (given.len()..all.len()).filter(|&index| all[index].label == wanted && seen.insert(all[index])).collect()
     };
-    let (plants, weeds) = (of(label::PLANT, &mut seen), of(label::WEED, &mut seen));
+    let (plants, weeds) = (of(label::PLANT), of(label::WEED));
     let is_taken_for_a_weed = |index: usize, kept: &[Example<COUNT>]| {
         let answer = classify::<COUNT, { label::COUNT }>(kept, &all[index].features, k, radius);
         answer.is_ok_and(|answer| class_of(&answer) == Class::Weed)
     };
     let room = given.len() + most;
     let mut kept: Vec<usize> = (0..given.len()).collect();
-    keep_most_needed(&all, &plants, &mut kept, room, radius / 2, is_taken_for_a_weed);
-    // A quarter is left for the plants that a weed may outvote.
-    let for_weeds = kept.len() + (room - kept.len()) * 3 / 4;
-    keep_most_needed(&all, &weeds, &mut kept, for_weeds, radius / 2, |index, kept| !is_taken_for_a_weed(index, kept));
     keep_most_needed(&all, &plants, &mut kept, usize::MAX, radius / 2, is_taken_for_a_weed);
+    let lost = |kept: &[Example<COUNT>]| plants.iter().filter(|&&plant| is_taken_for_a_weed(plant, kept)).count();
+    let table: Vec<Example<COUNT>> = kept.iter().map(|&index| all[index]).collect();
+    // One that is an example may be outvoted by those around it.
+    let lost_already = lost(&table);
+    let costs_no_plant = |index: usize, kept: &[Example<COUNT>]| lost(&[kept, &[all[index]]].concat()) <= lost_already;
+    keep_most_needed(&all, &weeds, &mut kept, room, radius / 2, |index, kept| {
+        !is_taken_for_a_weed(index, kept) && costs_no_plant(index, kept)
+    });
     let chosen: Vec<usize> = kept.drain(given.len()..).map(|index| index - given.len()).collect();
     if chosen.len() > most { Err(TooMany { needed: chosen.len(), most }) } else { Ok(chosen) }
 }

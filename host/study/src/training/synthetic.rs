@@ -1,6 +1,6 @@
 //! Objects from simulated rows, as the firmware's own code sees them.
 //!
-//! The machine rolls past rows of a [`Crop`] at the paper's four speeds and two spacings, and the levels that its encoder and its
+//! The machine rolls past rows of a [`Crop`] at its speeds and two spacings, and the levels that its encoder and its
 //! beam give go through the firmware's decoder and its [`Controller`]; no feature is made up. What varies: speed within
 //! a tenth of its class, spacing and canopy, plants that are missing, tall weeds wherever there is ground, closed and
 //! ragged canopies, and the slip of the wheel.
@@ -40,6 +40,8 @@ use thiserror::Error;
 pub struct Crop {
     /// What it is called.
     pub name: &'static str,
+    /// The speed classes at which it is weeded, in mm/s.
+    pub speeds_mm_s: &'static [i16],
     /// Its plant spacings.
     pub spacings_mm: [f64; 2],
     /// A spacing is within this of its mean.
@@ -50,6 +52,11 @@ pub struct Crop {
     pub canopy_scatter_mm: f64,
     /// Whether there are canopies through which the beam passes.
     pub is_ragged: bool,
+    /// Bare ground between the places where the firmware wakes up and the first plant's place, in turn: where no plant was before, spacing
+    /// is counted from there.
+    pub headlands_mm: &'static [f64],
+    /// Passes over a row at each speed and spacing.
+    pub passes: usize,
     /// Widths of tall weeds.
     pub weed_widths_mm: RangeInclusive<f64>,
 }
@@ -58,37 +65,45 @@ pub struct Crop {
 pub const CROPS: [Crop; 3] = [
     Crop {
         name: "chilli",
+        speeds_mm_s: &SPEED_CLASSES_MM_S,
         spacings_mm: [500.0, 600.0],
         spacing_scatter_mm: 50.0,
         canopy_mm: 140.0,
         canopy_scatter_mm: 40.0,
         is_ragged: true,
+        headlands_mm: &[300.0],
+        passes: 12,
         weed_widths_mm: 12.0..=20.0,
     },
     // Heads some weeks after transplanting.
     Crop {
         name: "broccoli",
+        speeds_mm_s: &SPEED_CLASSES_MM_S,
         spacings_mm: [400.0, 500.0],
         spacing_scatter_mm: 40.0,
         canopy_mm: 220.0,
         canopy_scatter_mm: 60.0,
         is_ragged: true,
+        headlands_mm: &[300.0],
+        passes: 12,
         weed_widths_mm: 12.0..=30.0,
     },
-    // Stalks below their leaves, and grasses, which are the narrower ones.
+    // Stalks below their leaves, and grasses, which are the narrower ones. Above 1.25 km/h so narrow a spacing leaves the tool no time.
     Crop {
         name: "maize",
+        speeds_mm_s: &[SPEED_CLASSES_MM_S[0]],
         spacings_mm: [200.0, 250.0],
-        spacing_scatter_mm: 40.0,
+        spacing_scatter_mm: 60.0,
         canopy_mm: 20.0,
-        canopy_scatter_mm: 5.0,
+        canopy_scatter_mm: 7.0,
         is_ragged: false,
+        headlands_mm: &[300.0, 450.0, 600.0, 750.0, 900.0],
+        passes: 60,
         weed_widths_mm: 4.0..=10.0,
     },
 ];
 
-/// Passes over a row at each speed and spacing, and plants in a row before any go missing.
-const PASSES: usize = 12;
+/// Plants in a row before any go missing.
 const PLANTS: usize = 20;
 
 /// Share of the plants that did not come up; never two neighbours.
@@ -98,9 +113,6 @@ const MISSING: f64 = 0.05;
 /// that the beam sees each as an object of its own.
 const WEEDS_PER_METRE: f64 = 3.0;
 const WEED_MARGIN_MM: f64 = 25.0;
-
-/// Bare ground between the place where the firmware wakes up and the first plant's place.
-const HEADLAND_MM: f64 = 300.0;
 
 /// Ground behind the last thing, over which the machine sees that it was the last.
 const RUN_OUT_MM: f64 = 100.0;
@@ -146,13 +158,14 @@ pub enum SyntheticError {
 pub fn objects(crop: &Crop, seed: u64) -> Result<Vec<Labelled>, SyntheticError> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut objects = Vec::new();
-    for pass in 0..PASSES {
-        for class_mm_s in SPEED_CLASSES_MM_S {
+    for pass in 0..crop.passes {
+        for &class_mm_s in crop.speeds_mm_s {
             for spacing_mm in crop.spacings_mm {
-                let row = grow(crop, spacing_mm, crop.is_ragged && pass % 2 == 1, &mut rng)?;
+                let headland_mm = crop.headlands_mm[pass % crop.headlands_mm.len()];
+                let row = grow(crop, spacing_mm, headland_mm, crop.is_ragged && pass % 2 == 1, &mut rng)?;
                 let speed_mm_s = f64::from(class_mm_s) * rng.random_range(PACE);
                 let slip = rng.random_range(SLIP);
-                objects.extend(roll_past(&row, speed_mm_s, slip)?);
+                objects.extend(roll_past(&row, headland_mm, speed_mm_s, slip)?);
             }
         }
     }
@@ -160,7 +173,13 @@ pub fn objects(crop: &Crop, seed: u64) -> Result<Vec<Labelled>, SyntheticError> 
 }
 
 /// A row with missing plants, and weeds on its bare ground.
-fn grow(crop: &Crop, spacing_mm: f64, ragged: bool, rng: &mut impl Rng) -> Result<Row, SyntheticError> {
+fn grow(
+    crop: &Crop,
+    spacing_mm: f64,
+    headland_mm: f64,
+    ragged: bool,
+    rng: &mut impl Rng,
+) -> Result<Row, SyntheticError> {
     let planting = Planting {
         plants: PLANTS,
         spacing_mm,
@@ -177,7 +196,7 @@ fn grow(crop: &Crop, spacing_mm: f64, ragged: bool, rng: &mut impl Rng) -> Resul
         came_up
     });
 
-    let mut bare_from_mm = -HEADLAND_MM;
+    let mut bare_from_mm = -headland_mm;
     let mut weeds = Vec::new();
     for plant in &things {
         let bare_mm = bare_from_mm..plant.span_mm().start;
@@ -251,11 +270,11 @@ impl Classifier for &Recorder<'_> {
 }
 
 /// What the controller sees of a row.
-fn roll_past(row: &Row, speed_mm_s: f64, slip: f64) -> Result<Vec<Labelled>, SyntheticError> {
+fn roll_past(row: &Row, headland_mm: f64, speed_mm_s: f64, slip: f64) -> Result<Vec<Labelled>, SyntheticError> {
     let standard = Machine::default();
     // The firmware knows the wheel; the wheel that slips goes farther in a turn than it knows.
     let machine = Machine { wheel_mm: standard.wheel_mm * (1.0 + slip), ..standard };
-    let motion = Motion::steady(-HEADLAND_MM, ACCELERATION_MM_S2, speed_mm_s, row.span_mm().end + RUN_OUT_MM);
+    let motion = Motion::steady(-headland_mm, ACCELERATION_MM_S2, speed_mm_s, row.span_mm().end + RUN_OUT_MM);
     let recorder = Recorder { row, seen: RefCell::new(Vec::new()) };
     let beam_broken = !machine.beam_before(row, &motion).high;
     let wake_up = WakeUp { readings: readings(0, Position::default()), beam_broken, cause: Cause::PowerOn };
