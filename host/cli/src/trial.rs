@@ -29,6 +29,7 @@ use trial::{firmware, picture};
 Examples:
   weeder trial                                       the paper's speeds and spacings, three replications
   weeder trial --field soft-ground --out report      with its report as a page, report/report.html
+  weeder trial --field set-up --rivals paper         the machine set up by the manual, beside the paper's controller
   weeder trial --brief                               what counts most, as a short table
   weeder trial --engine uno --replications 1         with the real firmware on the virtual Uno
   weeder trial --field my-field.toml --speeds 1,3 --spacings 30,40,50
@@ -47,12 +48,15 @@ pub struct Arguments {
     #[arg(long, value_delimiter = ',', default_value = "50,60", value_parser = number_within(SPACINGS_CM.0..=SPACINGS_CM.1))]
     spacings: Vec<f64>,
     /// The field's conditions: a preset (transplanted, even-stand, direct-sown, weedy, soft-ground, heavy-soil, dusty, hand-steered,
-    /// chilli, broccoli, maize), or a TOML file that says what differs from the first of them; - for standard input.
+    /// set-up, chilli, broccoli, maize), or a TOML file that says what differs from the first of them; - for standard input.
     #[arg(long, value_name = "PRESET|FILE.toml", value_parser = source::named, default_value = "transplanted")]
     field: String,
     /// A table of examples that the firmware is taught beforehand, as `weeder examples push` would; - for standard input.
     #[arg(long, value_name = "FILE.csv", value_parser = source::file)]
     examples: Option<PathBuf>,
+    /// Who weeds the same ground beside the firmware.
+    #[arg(long, value_enum, value_delimiter = ',', default_values_t = [Rival::Queue, Rival::Paper, Rival::AllKnowing])]
+    rivals: Vec<Rival>,
     /// Which of all the possible fields, 0 to 18446744073709551615: the same seed gives the same one.
     #[arg(long, default_value = "1", value_parser = whole_within(0..=u64::MAX))]
     seed: u64,
@@ -79,6 +83,30 @@ enum EngineName {
     Uno,
 }
 
+/// The firmware's rivals by their names.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Rival {
+    /// The firmware's queue of windows, without look-ahead.
+    Queue,
+    /// The paper's controller: one window, and a loop that polls.
+    Paper,
+    /// One that is told where each plant stands.
+    AllKnowing,
+}
+
+impl Arguments {
+    /// The firmware and its rivals, in the order in which they are shown.
+    fn controllers(&self) -> Vec<Controller> {
+        let takes_part = |controller: &Controller| match controller {
+            Controller::Firmware => true,
+            Controller::WithoutLookAhead => self.rivals.contains(&Rival::Queue),
+            Controller::Paper => self.rivals.contains(&Rival::Paper),
+            Controller::AllKnowing => self.rivals.contains(&Rival::AllKnowing),
+        };
+        Controller::ALL.into_iter().filter(takes_part).collect()
+    }
+}
+
 /// Runs it and prints the result.
 ///
 /// # Errors
@@ -89,7 +117,7 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
         speeds_km_h: ascending(&arguments.speeds),
         spacings_cm: ascending(&arguments.spacings),
         replications: arguments.replications,
-        controllers: Controller::ALL.to_vec(),
+        controllers: arguments.controllers(),
         conditions: Conditions::load(&arguments.field, |file| fs::read_to_string(file))?,
         examples: arguments.examples.as_deref().map(examples::in_table).transpose()?.unwrap_or_default(),
         seed: arguments.seed,

@@ -29,6 +29,7 @@ const PRESETS: &[(&str, &str)] = &[
     ("heavy-soil", include_str!("../presets/heavy-soil.toml")),
     ("dusty", include_str!("../presets/dusty.toml")),
     ("hand-steered", include_str!("../presets/hand-steered.toml")),
+    ("set-up", include_str!("../presets/set-up.toml")),
     ("chilli", include_str!("../presets/chilli.toml")),
     ("broccoli", include_str!("../presets/broccoli.toml")),
     ("maize", include_str!("../presets/maize.toml")),
