@@ -10,6 +10,8 @@ use field::motion::mm_s;
 use field::planting::Planting;
 use field::trial::Trial;
 use field::verdict::Timing;
+use std::collections::BTreeMap;
+use std::path::Path;
 use std::process::Command;
 use trial::firmware::workspace_root;
 use uno::Uno;
@@ -108,6 +110,53 @@ fn no_count_is_lost_at_the_rate_that_is_never_lost() {
     println!("{} counts a second, {} cycles of wait", edges.never_lost_per_s, edges.wait_cycles);
     // A rate whose counts go up in quarters.
     roll(&mut woken_up(), edges.never_lost_per_s / 100 * 100);
+}
+
+/// Flash with a function's saving of one register taken out: its `push` and every `pop` are `nop`. `None` where it saves none.
+fn without_saving(flash: &[u8], function: std::ops::Range<usize>, register: u16) -> Option<Vec<u8>> {
+    let (push, pop) = (0x920F | register << 4, 0x900F | register << 4);
+    let mut flash = flash.to_vec();
+    let mut taken = 0;
+    for word in flash[function].chunks_exact_mut(2) {
+        if [push, pop].contains(&u16::from_le_bytes([word[0], word[1]])) {
+            word.fill(0);
+            taken += 1;
+        }
+    }
+    (taken >= 2).then_some(flash)
+}
+
+#[test]
+fn a_function_that_no_longer_saves_what_its_callers_need_is_found() {
+    let elf = elf();
+    let image = Image::read(&elf).expect("it is an ELF");
+    let file = std::fs::read(&elf).expect("it can be read");
+    // The code lies in the file as it lies in flash.
+    let start = file.windows(64).position(|window| *window == image.flash[..64]).expect("flash is in the file");
+    assert_eq!(file[start..start + 0x4000], image.flash[..0x4000]);
+    let functions: BTreeMap<usize, &String> = image.functions.iter().map(|(name, at)| (*at as usize, name)).collect();
+    let broken = Path::new(env!("CARGO_TARGET_TMPDIR")).join("saves-too-little.elf");
+    let (mut found, mut needless) = (0, 0);
+    for (&from, name) in &functions {
+        let to = functions.range(from + 1..).next().map_or(image.flash.len(), |(&to, _)| to);
+        // The frame's pointer is left alone: without it the stack could not be followed.
+        for register in 2..=17 {
+            let Some(flash) = without_saving(&image.flash, from..to, register) else { continue };
+            let mut file = file.clone();
+            file[start..start + flash.len()].copy_from_slice(&flash);
+            std::fs::write(&broken, file).expect("it can be written");
+            match bounds::prove(&broken, None) {
+                Ok(_) => needless += 1,
+                Err(bounds::BoundsError::Spoilt { all }) => {
+                    assert!(all.iter().any(|spoilt| spoilt.registers == format!("r{register}")), "{name}: {all:?}");
+                    found += 1;
+                }
+                Err(other) => panic!("{name} without saving r{register}: {other}"),
+            }
+        }
+    }
+    println!("{found} registers are saved for somebody, {needless} for nobody");
+    assert!(found > 40, "{found} were found");
 }
 
 #[test]

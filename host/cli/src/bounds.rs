@@ -9,7 +9,7 @@ use serde_json::json;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use trial::firmware;
-use uno::bounds::{self, Bounds, Budgets, Frame, Held};
+use uno::bounds::{self, Bounds, Budgets, Frame, Held, Lasting};
 
 /// What the user asks of the bounds.
 #[derive(Args)]
@@ -20,7 +20,8 @@ Examples:
   weeder bounds --elf other.elf --budgets other.toml --json
 
 The status is 0 where every bound keeps to its budget, 1 where one does not, and 2 where the program has no bounds: for recursion,
-calls to addresses that are worked out, handlers that turn interrupts on, and loops without a bound where time must have one.")]
+calls to addresses that are worked out, handlers that turn interrupts on, values in registers that a call spoils, and loops without
+a bound where time must have one.")]
 pub struct Arguments {
     /// Follow this firmware instead of building the one in this repository.
     #[arg(long, value_name = "FILE.elf")]
@@ -83,6 +84,10 @@ fn report(bounds: &Bounds, held: &[Held], every_loop: bool) -> String {
         line(format!("An edge of the encoder waits {} cycles at most until a handler looks.", edges.wait_cycles));
         line(format!("No count is lost up to {} a second.", edges.never_lost_per_s));
     }
+    let Lasting { calls, bytes } = bounds.lasting;
+    line(format!(
+        "Over {calls} calls, {bytes} bytes last in registers, and none is spoilt; handlers put all registers and flags back."
+    ));
     match &bounds.turn {
         Some(turn) => match turn.cycles {
             Some(cycles) => line(format!("A turn of the loop takes {cycles} cycles at most, without interrupts.")),

@@ -10,6 +10,9 @@
 //! rules are for. A path that the program never takes is followed like any other, so a bound can be larger than
 //! what ever happens, never smaller.
 //!
+//! Values in registers are proved to last over calls and handlers as well (`registers`), since the compiler chooses their registers by
+//! what the called functions happen to leave alone.
+//!
 //! # The rate that is never lost
 //!
 //! An edge asks for a handler, and the handler looks at the pins. From an edge that comes right behind one look to the next look
@@ -22,8 +25,10 @@
 mod budget;
 mod cycles;
 mod decode;
+mod effects;
 mod flow;
 mod loops;
+mod registers;
 
 pub use self::budget::{Budgets, BudgetsError, BudgetsProblem, Held};
 use self::cycles::{Stretch, Time, Timer};
@@ -33,6 +38,7 @@ use crate::elf::{Image, ImageError};
 use serde::{Deserialize, Serialize};
 use signal::CYCLES_PER_SECOND;
 use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
 use std::path::Path;
 use std::rc::Rc;
 
@@ -178,6 +184,22 @@ pub enum BoundsError {
         /// In which function.
         function: String,
     },
+    /// Functions change registers that are needed behind their calls.
+    #[error("a value is needed behind a call that spoils it:{}", all.iter().map(Spoilt::to_string).collect::<String>())]
+    Spoilt {
+        /// Every call that does.
+        all: Vec<Spoilt>,
+    },
+    /// A handler leaves something else in registers or flags than it found there.
+    #[error("the handler of vector {vector}, {function}, does not put back what it found in {registers}")]
+    HandlerSpoils {
+        /// The vector.
+        vector: u8,
+        /// The handler.
+        function: String,
+        /// The registers and flags.
+        registers: String,
+    },
     /// The watched vectors do not come before all others.
     #[error(
         "vector {other} goes before vector {vector} and is not among those whose edges are watched, so their longest wait is not bounded"
@@ -198,6 +220,26 @@ pub enum BoundsError {
         /// The port's address in the data space.
         port: u16,
     },
+}
+
+/// A call behind which registers are needed that the function changes.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Spoilt {
+    /// The call's address.
+    pub address: u32,
+    /// The function that calls.
+    pub function: String,
+    /// The function that is called.
+    pub called: String,
+    /// The registers.
+    pub registers: String,
+}
+
+impl fmt::Display for Spoilt {
+    fn fmt(&self, to: &mut fmt::Formatter) -> fmt::Result {
+        let Spoilt { address, function, called, registers } = self;
+        write!(to, "\n  {address:#06x} {function} calls {called}, which spoils {registers}")
+    }
 }
 
 /// Bytes of the stack that a function holds at its deepest.
@@ -253,6 +295,15 @@ pub struct TurnBound {
     pub without_bound: Vec<(u32, String)>,
 }
 
+/// Values in registers that last over calls, each of which was found to be left alone or put back.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct Lasting {
+    /// Places that call a function.
+    pub calls: usize,
+    /// Bytes in registers that are needed behind them, of all calls together.
+    pub bytes: usize,
+}
+
 /// All that was proved.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Bounds {
@@ -271,6 +322,8 @@ pub struct Bounds {
     pub edges: Option<EdgeBounds>,
     /// The main program's loop; `None` where no loop feeds the watchdog.
     pub turn: Option<TurnBound>,
+    /// What lasts in registers.
+    pub lasting: Lasting,
 }
 
 impl Bounds {
@@ -336,6 +389,7 @@ pub fn prove(elf: &Path, input: Option<&Input>) -> Result<Bounds, BoundsError> {
         without_bound: turn.unbounded.iter().map(|&address| (address, program.name(address))).collect(),
     });
 
+    let lasting = registers::prove(&program, &main, handlers.iter().map(|(&vector, handler)| (vector, handler)))?;
     let stack = deepest(&main, handlers.values());
     Ok(Bounds {
         stack_bytes: bytes(&stack),
@@ -345,6 +399,7 @@ pub fn prove(elf: &Path, input: Option<&Input>) -> Result<Bounds, BoundsError> {
         closed_cycles,
         edges,
         turn,
+        lasting,
     })
 }
 

@@ -6,8 +6,10 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-use object::read::elf::{ElfFile32, ProgramHeader};
-use object::{Architecture, LittleEndian, Object, ObjectSection, ObjectSymbol, SectionFlags, SymbolKind, elf};
+use object::read::elf::{ElfFile32, ElfSymbol32, ProgramHeader};
+use object::{
+    Architecture, LittleEndian, Object, ObjectSection, ObjectSymbol, SectionFlags, SectionKind, SymbolKind, elf,
+};
 
 /// Flash of the ATmega328P in bytes (data sheet, section 8.2).
 pub const FLASH_BYTES: usize = 32 * 1024;
@@ -202,8 +204,15 @@ fn variables(file: &ElfFile32<LittleEndian>) -> HashMap<String, Variable> {
 }
 
 fn functions(file: &ElfFile32<LittleEndian>) -> HashMap<String, u32> {
+    // Those of libgcc have a size and no type.
+    let is_untyped = |symbol: &ElfSymbol32<LittleEndian>| {
+        let section = symbol.section_index().and_then(|index| file.section_by_index(index).ok());
+        symbol.kind() == SymbolKind::Unknown
+            && symbol.size() > 0
+            && section.is_some_and(|section| section.kind() == SectionKind::Text)
+    };
     file.symbols()
-        .filter(|symbol| symbol.kind() == SymbolKind::Text)
+        .filter(|symbol| symbol.kind() == SymbolKind::Text || is_untyped(symbol))
         .filter_map(|symbol| Some((name(&symbol)?, u32::try_from(symbol.address()).ok()?)))
         .collect()
 }

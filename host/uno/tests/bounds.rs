@@ -234,16 +234,18 @@ fn an_edge_waits_for_the_other_handler_for_a_critical_section_and_for_the_way_to
             sei
             rjmp 1b
         handler:
+            push r2
             in r2, 0x09
-            nop
+            pop r2
             reti
         other:
-            lds r3, 0x0100
+            push r3
+            pop r3
             reti";
     let edges = try_to_prove(program, Some(&INPUT())).expect("it has bounds").edges.expect("they were asked for");
-    // Synchroniser 3; the other handler 4 + 3 + 2 + 4; cli, nop, nop, sei, rjmp 2; response 4, jmp 3, in 1.
-    assert_eq!(edges.wait_cycles, 3 + 13 + 6 + 8);
-    assert_eq!(edges.never_lost_per_s, 2 * 16_000_000 / 30);
+    // Synchroniser 3; the other handler 4 + 3 + 4 + 4; cli, nop, nop, sei, rjmp 2; response 4, jmp 3, push 2, in 1.
+    assert_eq!(edges.wait_cycles, 3 + 15 + 6 + 10);
+    assert_eq!(edges.never_lost_per_s, 2 * 16_000_000 / 34);
 }
 
 #[test]
@@ -325,14 +327,18 @@ fn at_most(turns: u32) -> String {
 
 #[test]
 fn a_loop_that_says_how_often_it_turns_takes_so_many_turns_and_the_way_out() {
-    let handler = |body: &str| format!("start:\n sei\n2: rjmp 2b\nhandler:\n ldi r24, 8\n{body} reti");
+    let saved = "push r24\n push r25\n in r24, 0x3f\n push r24\n";
+    let restored = "pop r24\n out 0x3f, r24\n pop r25\n pop r24\n";
+    let handler =
+        |body: &str| format!("start:\n sei\n2: rjmp 2b\nhandler:\n {saved} ldi r24, 8\n{body} {restored} reti");
     let cycles = |body: &str| proved(&handler(body)).handlers[0].cycles.expect("it returns");
-    // Response 4, jmp 3, ldi 1, reti 4; eight turns of dec 1 and brne 2, and one more up to the way out, 2.
-    assert_eq!(cycles(&format!("1:\n {} dec r24\n brne 1b\n", at_most(8))), 12 + 8 * 3 + 2);
+    // Response 4, jmp 3, ldi 1, reti 4, and 7 each to save and to restore; eight turns of dec 1 and brne 2, and one more up to the
+    // way out, 2.
+    assert_eq!(cycles(&format!("1:\n {} dec r24\n brne 1b\n", at_most(8))), 26 + 8 * 3 + 2);
     // Three turns of ldi 1, of the inner loop's eight with their way out, and of dec 1 and brne 2; the last one's way out is 1 shorter.
     let inner = format!("3:\n {} dec r25\n brne 3b\n", at_most(8));
     let outer = format!("1: ldi r25, 8\n {inner} {} dec r24\n brne 1b\n", at_most(3));
-    assert_eq!(cycles(&outer), 12 + 3 * (1 + 26 + 3) + (1 + 26 + 2));
+    assert_eq!(cycles(&outer), 26 + 3 * (1 + 26 + 3) + (1 + 26 + 2));
 }
 
 #[test]
@@ -361,6 +367,110 @@ fn a_turn_of_the_loop_that_feeds_the_watchdog_has_a_bound_once_every_loop_in_it_
     assert_eq!(proved("start:\n rjmp start").turn, None);
 }
 
+/// A program whose first function calls the second one, with r1 zero.
+fn calling(caller: &str, called: &str) -> String {
+    format!("start:\n clr r1\n sei\n1: rcall caller\n rjmp 1b\ncaller:\n {caller}\n ret\ncalled:\n {called}\n ret")
+}
+
+#[test]
+fn a_value_lasts_over_a_call_where_the_function_leaves_it_alone_or_puts_it_back() {
+    let lasts = |caller: &str, called: &str| proved(&calling(caller, called)).lasting;
+    let keep = "ldi r20, 5\n rcall called\n sts 0x0100, r20";
+    let lasting = lasts(keep, "ldi r21, 1\n sts 0x0101, r21");
+    assert_eq!((lasting.calls, lasting.bytes), (2, 1));
+    // Saved on the stack, and elsewhere.
+    for saved in [
+        "push r20\n lds r20, 0x0101\n inc r20\n sts 0x0101, r20\n pop r20",
+        "mov r30, r20\n ldi r20, 1\n sts 0x0101, r20\n mov r20, r30",
+    ] {
+        assert_eq!(lasts(keep, saved).bytes, 1, "{saved}");
+    }
+    // What is saved and put back is not used by that.
+    assert_eq!(lasts("push r2\n rcall called\n pop r2", "clr r2\n inc r2\n sts 0x0100, r2").bytes, 0);
+}
+
+#[test]
+fn a_register_that_only_a_convention_would_keep_is_found_where_it_is_spoilt() {
+    let spoils = "lds r16, 0x0101\n inc r16\n sts 0x0101, r16";
+    let program = calling("ldi r16, 5\n rcall called\n sts 0x0100, r16", spoils);
+    assert_refused(&program, "caller calls called, which spoils r16");
+    // On one of two paths is enough; and so is a function further down.
+    assert_refused(
+        &calling("ldi r16, 5\n rcall called\n sts 0x0100, r16", "sbrc r24, 0\n ldi r16, 1\n sts 0x0101, r16"),
+        "caller calls called, which spoils r16",
+    );
+    let deeper =
+        format!("{}\ndeeper:\n {spoils}\n ret", calling("ldi r16, 5\n rcall called\n sts 0x0100, r16", "rcall deeper"));
+    assert_refused(&deeper, "called calls deeper, which spoils r16");
+    // Only where it is needed.
+    proved(&calling("ldi r16, 5\n sts 0x0100, r16\n rcall called\n ldi r16, 6\n sts 0x0100, r16", spoils));
+    // What the caller's caller keeps there.
+    let above = format!(
+        "start:\n clr r1\n ldi r16, 5\n1: rcall caller\n sts 0x0100, r16\n rjmp 1b\ncaller:\n rcall called\n ret\ncalled:\n {spoils}\n ret"
+    );
+    assert_refused(&above, "caller calls called, which spoils r16");
+}
+
+#[test]
+fn a_result_is_no_spoilt_value_and_what_a_function_uses_itself_is_no_result() {
+    // Given back, alone and in several bytes.
+    proved(&calling("ldi r24, 5\n rcall called\n sts 0x0100, r24", "lds r24, 0x0101\n inc r24"));
+    proved(&calling(
+        "rcall called\n sts 0x0100, r22\n sts 0x0101, r25",
+        "lds r22, 0x0101\n lds r23, 0x0102\n clr r24\n clr r25",
+    ));
+    // Worked out in a loop, in which it is read again.
+    let shifts = "ldi r18, 3\n2: lsl r24\n rol r25\n dec r18\n brne 2b";
+    proved(&calling("ldi r24, 1\n clr r25\n rcall called\n sts 0x0100, r24\n sts 0x0101, r25", shifts));
+    // Given back by what it calls.
+    let deeper =
+        format!("{}\ndeeper:\n lds r24, 0x0101\n ret", calling("rcall called\n sts 0x0100, r24", "rcall deeper"));
+    proved(&deeper);
+    // The loop's counter is what the function counts with.
+    let counts = "ldi r18, 3\n2: sts 0x0101, r18\n dec r18\n brne 2b";
+    assert_refused(
+        &calling("ldi r18, 5\n rcall called\n sts 0x0100, r18", counts),
+        "caller calls called, which spoils r18",
+    );
+    // So it is where the caller counts with it, too.
+    assert_refused(
+        &calling("ldi r18, 5\n3: sts 0x0100, r18\n rcall called\n dec r18\n brne 3b", counts),
+        "caller calls called, which spoils r18",
+    );
+    // A pointer, and a flag, are never given back.
+    assert_refused(&calling("rcall called\n st X, r1", "lds r26, 0x0101\n lds r27, 0x0102"), "which spoils r26, r27");
+    assert_refused(&calling("rcall called\n brts 3f\n sts 0x0100, r1\n3:", "bst r24, 0"), "which spoils flag T");
+}
+
+#[test]
+fn r1_is_zero_wherever_a_function_takes_it_for_that() {
+    let product = "mul r24, r22\n movw r24, r0";
+    let caller = "rcall called\n sts 0x0100, r24\n sts 0x0101, r1";
+    assert_refused(&calling(caller, product), "caller calls called, which spoils r1");
+    proved(&calling(caller, &format!("{product}\n clr r1")));
+    assert_refused(
+        &calling("inc r1\n rcall called\n clr r1", "sts 0x0100, r1"),
+        "caller calls called, which spoils r1",
+    );
+    // Counted down to zero.
+    let counted = "ldi r26, 3\n mov r1, r26\n2: dec r1\n brne 2b";
+    proved(&calling("rcall called\n sts 0x0101, r1", counted));
+    assert_refused(&calling("rcall called\n sts 0x0101, r1", &counted.replace("brne", "brpl")), "spoils r1");
+}
+
+#[test]
+fn a_handler_puts_every_register_and_every_flag_back() {
+    let main = "start:\n sei\n1: rjmp 1b\n";
+    let flags = "push r24\n in r24, 0x3f\n out 0x1e, r24\n inc r24\n in r24, 0x1e\n out 0x3f, r24\n pop r24\n reti";
+    proved(&format!("{main}handler:\n {flags}"));
+    let without = |line: &str| format!("{main}handler:\n {}", flags.replacen(line, "nop\n", 1));
+    assert_refused(&without("out 0x3f, r24\n"), "does not put back what it found in flag Z, flag N, flag V, flag S");
+    assert_refused(&without("out 0x1e, r24\n"), "a value that is not a saved SREG");
+    assert_refused(&format!("{main}handler:\n in r24, 0x09\n reti"), "handler, does not put back what it found in r24");
+    // On one of two paths.
+    assert_refused(&format!("{main}handler:\n sbic 0x09, 2\n in r24, 0x09\n reti"), "what it found in r24");
+}
+
 #[test]
 fn words_that_are_no_instructions_are_refused() {
     assert_refused("start:\n .word 0xFFFF", "start comes to 0x0068, where there is no instruction");
@@ -378,8 +488,8 @@ fn a_bound_over_its_budget_is_told_and_so_is_a_rate_under_it() {
         std::fs::write(file.path(), text).expect("it can be written");
         Budgets::read(file.path()).expect("it is whole")
     };
-    // A push and an interrupt: 3 bytes of stack. Response 4, jmp 3, in 1, nop 1, reti 4: 13 cycles.
-    let program = "start:\n sei\n1: wdr\n push r2\n pop r2\n rjmp 1b\nhandler:\n in r2, 9\n nop\n reti";
+    // A push and an interrupt: 3 bytes of stack. Response 4, jmp 3, sbic and nop 2, reti 4: 13 cycles.
+    let program = "start:\n sei\n1: wdr\n push r2\n pop r2\n rjmp 1b\nhandler:\n sbic 9, 0\n nop\n reti";
     let bounds = try_to_prove(program, Some(&INPUT())).expect("it has bounds");
     let rate = bounds.edges.as_ref().expect("they were asked for").never_lost_per_s;
     let over = |budgets: Budgets| -> Vec<&str> {

@@ -114,6 +114,11 @@ const FORMS: [Form; 86] = [
     ("1001010110101000", Wdr, 1),
 ];
 
+/// The lower registers of the pointers.
+const X: usize = 26;
+const Y: usize = 28;
+const Z: usize = 30;
+
 /// Which form each word is of.
 static FORM_OF_WORD: LazyLock<Vec<Option<&Form>>> = LazyLock::new(|| {
     let mut forms = vec![None; 1 << 16];
@@ -215,12 +220,19 @@ impl Instruction {
         matches!(self.operation, In | Lds | Sbic | Sbis) && self.data_address() == Some(address)
     }
 
+    /// The lower register of the pointer that a load or a store goes by.
+    pub(super) fn pointer(&self) -> Option<usize> {
+        match (self.operation, self.word & 0xF) {
+            (Ld | St, 0xC..=0xE) => Some(X),
+            (Ld | St, 0x9 | 0xA) => Some(Y),
+            (Ldd | Std, 0x8..) => Some(Y),
+            (Ld | St, 0x1 | 0x2) | (Ldd | Std | Lpm, _) => Some(Z),
+            _ => None,
+        }
+    }
+
     /// The lower register of the pointer that a load or a store moves on or back.
     pub(super) fn moved_pointer(&self) -> Option<usize> {
-        const X: usize = 26;
-        const Y: usize = 28;
-        const Z: usize = 30;
-
         match (self.operation, self.word & 0xF) {
             (Ld | St, 0xD | 0xE) => Some(X),
             (Ld | St, 0x9 | 0xA) => Some(Y),

@@ -1,0 +1,184 @@
+//! What an instruction reads and what it changes, of registers and of the flags in SREG.
+//!
+//! As the AVR instruction set manual gives it. The interrupt flag is not among the flags here ([`super::flow`] follows it). A
+//! call, a jump and a return have no effects of their own; what a call does to registers is what the called function does.
+
+use super::decode::Instruction;
+use super::decode::Operation::*;
+use std::fmt;
+use std::ops::{self, RangeInclusive};
+
+const SREG: u16 = 0x5F;
+
+/// A set of registers and flags: registers by their number, flags behind them by their bit in SREG.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Registers(u64);
+
+/// How many registers there are; the flags come behind them.
+const REGISTERS: usize = 32;
+
+impl Registers {
+    pub(super) const NONE: Registers = Registers(0);
+    /// The pair that a multiplication's product is in.
+    const PRODUCT: Registers = Registers(0b11);
+    /// All flags but the interrupts'.
+    pub(super) const FLAGS: Registers = flags(0b0111_1111);
+    pub(super) const ZERO_FLAG: Registers = Z;
+    /// All registers and flags.
+    pub(super) const ALL: Registers = Registers(Registers::FLAGS.0 | (1 << REGISTERS) - 1);
+
+    pub(super) fn one(register: usize) -> Registers {
+        Registers(1 << register)
+    }
+
+    fn pair(lower: usize) -> Registers {
+        Registers(0b11 << lower)
+    }
+
+    pub(super) fn contains(self, register: usize) -> bool {
+        self.0 >> register & 1 == 1
+    }
+
+    pub(super) fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
+    /// Those of it that are registers or flags, one after the other.
+    pub(super) fn iter(self) -> impl Iterator<Item = usize> {
+        (0..REGISTERS + 7).filter(move |&register| self.contains(register))
+    }
+
+    /// Registers that are neighbours.
+    pub(super) const fn range(registers: RangeInclusive<usize>) -> Registers {
+        Registers((2 << *registers.end()) - (1 << *registers.start()))
+    }
+
+    /// Every register for which that holds.
+    pub(super) fn which(holds: impl Fn(usize) -> bool) -> Registers {
+        let registers = (0..REGISTERS).filter(|&register| holds(register));
+        registers.fold(Registers::NONE, |all, register| all | Registers::one(register))
+    }
+}
+
+impl ops::BitOr for Registers {
+    type Output = Registers;
+
+    fn bitor(self, other: Registers) -> Registers {
+        Registers(self.0 | other.0)
+    }
+}
+
+impl ops::BitOrAssign for Registers {
+    fn bitor_assign(&mut self, other: Registers) {
+        self.0 |= other.0;
+    }
+}
+
+impl ops::BitAnd for Registers {
+    type Output = Registers;
+
+    fn bitand(self, other: Registers) -> Registers {
+        Registers(self.0 & other.0)
+    }
+}
+
+impl ops::Sub for Registers {
+    type Output = Registers;
+
+    fn sub(self, other: Registers) -> Registers {
+        Registers(self.0 & !other.0)
+    }
+}
+
+/// Names: `r5, r6`, and a flag by its letter.
+impl fmt::Display for Registers {
+    fn fmt(&self, to: &mut fmt::Formatter) -> fmt::Result {
+        let names = self.iter().map(|register| match register.checked_sub(REGISTERS) {
+            None => format!("r{register}"),
+            Some(flag) => format!("flag {}", char::from(b"CZNVSHT"[flag])),
+        });
+        to.write_str(&names.collect::<Vec<_>>().join(", "))
+    }
+}
+
+/// The flags with these bits in SREG.
+const fn flags(bits: u64) -> Registers {
+    Registers(bits << REGISTERS)
+}
+
+// Flags by their bit in SREG, and those that instructions of a kind change.
+const C: Registers = flags(1);
+const Z: Registers = flags(1 << 1);
+const T: Registers = flags(1 << 6);
+const SVNZ: Registers = flags(0b01_1110);
+const SVNZC: Registers = flags(0b01_1111);
+const HSVNZC: Registers = flags(0b11_1111);
+
+/// What an instruction does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Effects {
+    pub(super) reads: Registers,
+    pub(super) changes: Registers,
+    /// It does something else as well: to memory, to a peripheral, to the stack, or to where the program goes.
+    pub(super) acts: bool,
+}
+
+impl Instruction {
+    /// What it reads and changes.
+    pub(super) fn effects(&self) -> Effects {
+        use Registers as R;
+
+        let (d, r) = (self.destination(), self.source());
+        let (to, from) = (R::one(d), R::one(r));
+        let flag = flags(1 << self.operand('s')) & R::FLAGS;
+        let pointer = self.pointer().map_or(R::NONE, R::pair);
+        let moved = self.moved_pointer().map_or(R::NONE, R::pair);
+        // A register less itself, or with itself by exclusive or, is 0 or made of the carry, whatever it held.
+        let is_same = d == r;
+        let (reads, changes, acts) = match self.operation {
+            Sub | Eor if is_same => (R::NONE, to | if self.operation == Sub { HSVNZC } else { SVNZ }, false),
+            Sbc if is_same => (C | Z, to | HSVNZC, false),
+            Add | Sub => (to | from, to | HSVNZC, false),
+            Adc => (to | from | C, to | HSVNZC, false),
+            Sbc => (to | from | C | Z, to | HSVNZC, false),
+            Subi | Neg => (to, to | HSVNZC, false),
+            Sbci => (to | C | Z, to | HSVNZC, false),
+            And | Or | Eor => (to | from, to | SVNZ, false),
+            Andi | Ori | Inc | Dec => (to, to | SVNZ, false),
+            Com | Asr | Lsr => (to, to | SVNZC, false),
+            Ror => (to | C, to | SVNZC, false),
+            Adiw | Sbiw => (R::pair(d), R::pair(d) | SVNZC, false),
+            Mul | Muls | Mulsu | Fmul | Fmuls | Fmulsu => (to | from, R::PRODUCT | Z | C, false),
+            Cp => (to | from, HSVNZC, false),
+            Cpc => (to | from | C | Z, HSVNZC, false),
+            Cpi => (to, HSVNZC, false),
+            Swap => (to, to, false),
+            Mov => (from, to, false),
+            Movw => (R::pair(r), R::pair(d), false),
+            Ldi => (R::NONE, to, false),
+            Bst => (to, T, false),
+            Bld => (to | T, to, false),
+            Bset | Bclr => (R::NONE, flag, flag.is_empty()),
+            Brbs | Brbc => (flag, R::NONE, true),
+            Cpse => (to | from, R::NONE, true),
+            Sbrc | Sbrs => (from, R::NONE, true),
+            // Functions read the status register for its interrupt flag, handlers to put it back, which is followed by itself.
+            In | Lds => (R::NONE, to, false),
+            Out | Sts => (from, R::NONE, true),
+            Ld | Ldd => (pointer, to | moved, false),
+            Lpm => (pointer, to | moved, false),
+            St | Std => (pointer | from, moved, true),
+            // What is on the stack is followed by itself.
+            Push => (R::NONE, R::NONE, true),
+            Pop => (R::NONE, to, true),
+            Break | Call | Cbi | Icall | Ijmp | Jmp | Nop | Rcall | Ret | Reti | Rjmp | Sbi | Sbic | Sbis | Sleep
+            | Spm | Wdr => (R::NONE, R::NONE, true),
+        };
+        Effects { reads, changes, acts }
+    }
+
+    /// Whether it puts a whole byte into the status register, or takes it from there.
+    pub(super) fn is_of_status(&self) -> bool {
+        matches!(self.operation, In | Out | Lds | Sts) && self.data_address() == Some(SREG)
+    }
+}
