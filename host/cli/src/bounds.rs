@@ -45,7 +45,7 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     let file = arguments.budgets.clone().unwrap_or_else(|| firmware::workspace_root().join("budgets.toml"));
     let budgets = Budgets::read(&file)?;
     let elf = arguments.elf.clone().map_or_else(firmware::build, Ok)?;
-    let bounds = bounds::prove(&elf, Some(&budgets.input))?;
+    let bounds = bounds::prove(&elf, Some(&budgets.input), &budgets.loops)?;
     let held = budgets.hold(&bounds);
     let keeps = held.iter().all(|held| held.keeps);
     if arguments.json {

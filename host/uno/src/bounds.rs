@@ -31,9 +31,10 @@ mod loops;
 mod registers;
 
 pub use self::budget::{Budgets, BudgetsError, BudgetsProblem, Held};
-use self::cycles::{Stretch, Time, Timer};
+use self::cycles::{Stretch, Time, Timer, Turns};
 use self::decode::{Instruction, Operation};
 use self::flow::{Entry, Interrupts, Kind, Node, Program, Routine, bytes};
+pub use self::loops::{LoopBound, LoopBounds};
 use crate::elf::{Image, ImageError};
 use serde::{Deserialize, Serialize};
 use signal::CYCLES_PER_SECOND;
@@ -174,7 +175,7 @@ pub enum BoundsError {
     },
     /// A loop where time has to have a bound.
     #[error(
-        "{what} has a loop without a bound, at {address:#06x} in {function}: say how often it turns by a record in .loop_bounds"
+        "{what} has a loop without a bound, at {address:#06x} in {function}: say how often it turns, by a record in .loop_bounds or for the function"
     )]
     Unbounded {
         /// What has no bound.
@@ -333,11 +334,12 @@ impl Bounds {
     }
 }
 
-/// Proves what the firmware at `elf` needs at most, and how fast the edges of `input` may come, if one is asked for.
+/// Proves what the firmware at `elf` needs at most, and how fast the edges of `input` may come, if one is asked for. `loops` says how
+/// often the loops of some functions turn.
 ///
 /// # Errors
 /// Where the ELF cannot be read, or its program cannot be followed.
-pub fn prove(elf: &Path, input: Option<&Input>) -> Result<Bounds, BoundsError> {
+pub fn prove(elf: &Path, input: Option<&Input>, loops: &LoopBounds) -> Result<Bounds, BoundsError> {
     let image = Image::read(elf)?;
     // Of two names for one place, always the same.
     let mut functions: Vec<_> = image.functions.iter().collect();
@@ -356,8 +358,9 @@ pub fn prove(elf: &Path, input: Option<&Input>) -> Result<Bounds, BoundsError> {
         }
     }
 
-    let stated = loops::stated(elf)?;
-    let mut timer = Timer::new(stated);
+    let places = program.routines().flat_map(|routine| &routine.nodes).map(|node| node.place.address);
+    let of_heads = places.filter_map(|place| Some((place, loops.get(&program.name(place))?.passes))).collect();
+    let mut timer = Timer::new(Turns { stated: loops::stated(elf)?, of_heads });
     let mut told = Vec::new();
     for (&vector, handler) in &handlers {
         let what = format!("the handler of vector {vector}");

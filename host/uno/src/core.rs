@@ -28,7 +28,7 @@ use signal::{CYCLES_PER_SECOND, Pin};
 
 unsafe extern "C" {
     /// Runs the next instruction. It stands in sim_core.h, which simavr-ffi leaves out of its bindings.
-    fn avr_run_one(avr: *mut simavr::avr_t) -> simavr::avr_flashaddr_t;
+    pub(crate) fn avr_run_one(avr: *mut simavr::avr_t) -> simavr::avr_flashaddr_t;
 }
 
 /// The chip's name for simavr.

@@ -2,11 +2,16 @@
 
 use std::io::Write;
 use std::process::{Command, Stdio};
-use uno::bounds::{Bounds, BoundsError, Budgets, Input, prove};
+use uno::bounds::{Bounds, BoundsError, Budgets, Input, LoopBound, LoopBounds, prove};
 
 /// Assembles a program for the ATmega328P and proves its bounds. It begins at `start`; `handler` is INT0's, where there is one,
 /// and `other` Timer0's. A vector that is not used leads to the reset, as avr-libc has it.
 fn try_to_prove(program: &str, input: Option<&Input>) -> Result<Bounds, BoundsError> {
+    try_to_prove_with(program, input, &LoopBounds::new())
+}
+
+/// The same with what is said of the loops of its functions.
+fn try_to_prove_with(program: &str, input: Option<&Input>, loops: &LoopBounds) -> Result<Bounds, BoundsError> {
     let used = |label: &str| if program.contains(&format!("{label}:")) { label.to_owned() } else { "0".to_owned() };
     let vectors: String = (0..26)
         .map(|vector| match vector {
@@ -32,7 +37,7 @@ fn try_to_prove(program: &str, input: Option<&Input>) -> Result<Bounds, BoundsEr
     writeln!(source, "{functions}{vectors}{program}").expect("avr-gcc reads");
     drop(source);
     assert!(gcc.wait().expect("avr-gcc ends").success(), "{program}");
-    prove(elf.path(), input)
+    prove(elf.path(), input, loops)
 }
 
 #[track_caller]
@@ -349,6 +354,22 @@ fn a_record_that_a_turn_can_go_round_bounds_nothing() {
     // The inner loop's record says nothing of the outer one.
     let outer = format!("1: ldi r25, 8\n3:\n {} dec r25\n brne 3b\n dec r24\n brne 1b\n", at_most(8));
     assert_refused(&format!("{main}handler:\n {outer} reti"), "the handler of vector 1 has a loop without a bound");
+}
+
+#[test]
+fn what_is_said_of_a_function_holds_for_each_of_its_loops_and_a_record_at_one_goes_before_it() {
+    let cycles = |body: &str, passes: u64| {
+        let program = format!("start:\n clr r1\n1: wdr\n rcall waits\n rjmp 1b\nwaits:\n ldi r24, 8\n{body} ret");
+        let bound = LoopBound { passes, because: "it counts".into() };
+        let bounds = try_to_prove_with(&program, None, &[("waits".into(), bound)].into()).expect("it has bounds");
+        bounds.turn.expect("the watchdog is fed").cycles
+    };
+    // wdr 1, rcall 3, ldi 1, so many turns and the way out, ret 4, rjmp 2.
+    assert_eq!(cycles("3: dec r24\n brne 3b\n", 9), Some(11 + 9 * 3 + 2));
+    assert_eq!(cycles(&format!("3:\n {} dec r24\n brne 3b\n", at_most(8)), 9), Some(11 + 8 * 3 + 2));
+    // Nine turns of ldi 1, of the inner loop's nine with their way out, and of dec 1 and brne 2; the last way out is 1 shorter.
+    let nested = "2: ldi r25, 3\n3: dec r25\n brne 3b\n dec r24\n brne 2b\n";
+    assert_eq!(cycles(nested, 9), Some(11 + 9 * (1 + 29 + 3) + (1 + 29 + 2)));
 }
 
 #[test]

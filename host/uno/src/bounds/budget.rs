@@ -1,6 +1,6 @@
 //! What a firmware may need at most, as a file says it, and whether it keeps to that.
 
-use super::{Bounds, Input};
+use super::{Bounds, Input, LoopBounds};
 use serde::{Deserialize, Serialize};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -21,6 +21,9 @@ pub struct Budgets {
     pub never_lost_per_s: u64,
     /// The input whose edges are watched.
     pub input: Input,
+    /// How often the loops of some functions turn.
+    #[serde(default)]
+    pub loops: LoopBounds,
 }
 
 /// Why a file of budgets could not be read.

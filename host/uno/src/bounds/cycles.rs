@@ -53,7 +53,16 @@ fn longer(one: Option<Time>, other: Option<Time>) -> Option<Time> {
 }
 
 /// How often the program comes by an address inside a loop at most, each time that the loop is come to.
-pub(super) type Turns = BTreeMap<u32, u64>;
+pub(super) type Stated = BTreeMap<u32, u64>;
+
+/// What has been said of how often loops turn.
+#[derive(Default)]
+pub(super) struct Turns {
+    /// By addresses in loops.
+    pub(super) stated: Stated,
+    /// By addresses at which loops may begin.
+    pub(super) of_heads: Stated,
+}
 
 /// What is meant by a stretch without interrupts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -374,7 +383,7 @@ impl Paths<'_> {
 
     /// How often a loop turns at most, where a place that is in no loop within it says so, and no turn goes round that place.
     fn stated(&self, circle: &BTreeSet<usize>, head: usize) -> Option<u64> {
-        let saying = |node: usize| self.turns.get(&(self.address)(node)).map(|turns| (node, *turns));
+        let saying = |node: usize| self.turns.stated.get(&(self.address)(node)).map(|turns| (node, *turns));
         let within = |node: usize, set: &BTreeSet<usize>| -> Vec<usize> {
             self.ways[node].iter().map(|(to, _)| *to).filter(|to| set.contains(to)).collect()
         };
@@ -392,7 +401,8 @@ impl Paths<'_> {
                     .any(|rest| rest.contains(&head) && (rest.len() > 1 || within(head, rest).contains(&head)))
         };
         let stated = circle.iter().filter_map(|&node| saying(node));
-        stated.filter(|&(node, _)| !is_inner(node) && !goes_round(node)).map(|(_, turns)| turns).min()
+        let stated = stated.filter(|&(node, _)| !is_inner(node) && !goes_round(node)).map(|(_, turns)| turns).min();
+        stated.or_else(|| self.turns.of_heads.get(&(self.address)(head)).copied())
     }
 }
 

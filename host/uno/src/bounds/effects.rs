@@ -182,3 +182,113 @@ impl Instruction {
         matches!(self.operation, In | Out | Lds | Sts) && self.data_address() == Some(SREG)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::core::avr_run_one;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    /// Registers and flags, each with what it holds: a byte, or 0 or 1.
+    type Contents = [u8; REGISTERS + 7];
+
+    /// A chip that carries single instructions out.
+    struct Chip(*mut simavr_ffi::avr_t);
+
+    impl Chip {
+        fn new() -> Chip {
+            // SAFETY: the name is a string of C; the chip is initialised once, and belongs to this value alone.
+            unsafe {
+                let avr = simavr_ffi::avr_make_mcu_by_name(c"atmega328p".as_ptr());
+                simavr_ffi::avr_init(avr);
+                Chip(avr)
+            }
+        }
+
+        /// Carries an instruction of these two words out and returns what registers and flags hold then.
+        fn run(&mut self, words: [u16; 2], before: &Contents) -> Contents {
+            /// Where it stands: no vector lies there.
+            const PLACE: usize = 0x100;
+
+            let mut behind = *before;
+            // SAFETY: the chip lives as long as this value; its flash has 32 KB, its data space begins with the registers, and
+            // SREG has 8 flags of a byte each.
+            unsafe {
+                let avr = &mut *self.0;
+                for (place, byte) in words.iter().flat_map(|word| word.to_le_bytes()).enumerate() {
+                    *avr.flash.add(PLACE + place) = byte;
+                }
+                avr.pc = PLACE as u32;
+                avr.state = simavr_ffi::cpu_Running as _;
+                std::ptr::copy_nonoverlapping(before.as_ptr(), avr.data, REGISTERS);
+                avr.sreg[..7].copy_from_slice(&before[REGISTERS..]);
+                avr_run_one(avr);
+                std::ptr::copy_nonoverlapping(avr.data, behind.as_mut_ptr(), REGISTERS);
+                behind[REGISTERS..].copy_from_slice(&avr.sreg[..7]);
+            }
+            behind
+        }
+    }
+
+    /// Whatever registers and flags can hold, with pointers into SRAM, and away from its ends by more than a displacement.
+    fn any_contents(random: &mut ChaCha8Rng) -> Contents {
+        std::array::from_fn(|register| match register {
+            27 | 29 | 31 => random.random_range(2..6),
+            REGISTERS.. => random.random_range(0..2),
+            // Ends of the range are where flags change.
+            _ if random.random_bool(0.3) => [0, 1, 0x7F, 0x80, 0xFF][random.random_range(0..5)],
+            _ => random.random(),
+        })
+    }
+
+    #[test]
+    fn an_instruction_changes_and_reads_in_the_simulator_what_it_is_said_to() {
+        /// An address in SRAM for those that have it in their second word, and GPIOR0, which does nothing, for `in`.
+        const ADDRESS: u16 = 0x0300;
+        const GPIOR0: u16 = 0x3E;
+
+        let mut chip = Chip::new();
+        let mut random = ChaCha8Rng::seed_from_u64(1);
+        let mut seen = 0;
+        for word in 0..=u16::MAX {
+            let bytes = [word.to_le_bytes(), ADDRESS.to_le_bytes()].concat();
+            let Some(instruction) = Instruction::at(&bytes, 0) else { continue };
+            let Effects { reads, changes, acts } = instruction.effects();
+            let is_store = matches!(instruction.operation, St | Std | Sts);
+            let is_harmless_input = instruction.operation != In || instruction.data_address() == Some(GPIOR0);
+            if acts && !is_store || !is_harmless_input {
+                continue;
+            }
+            seen += 1;
+            for _ in 0..4 {
+                let before = any_contents(&mut random);
+                let behind = chip.run([word, ADDRESS], &before);
+                for place in (Registers::ALL - changes).iter() {
+                    assert_eq!(
+                        behind[place],
+                        before[place],
+                        "{} changes {}",
+                        instruction.mnemonic(),
+                        Registers::one(place)
+                    );
+                }
+                // What is not read may hold anything else.
+                let other = any_contents(&mut random);
+                let other =
+                    std::array::from_fn(|place| if reads.contains(place) { before[place] } else { other[place] });
+                let behind_other = chip.run([word, ADDRESS], &other);
+                for place in changes.iter() {
+                    assert_eq!(
+                        behind_other[place],
+                        behind[place],
+                        "{} reads more for {}",
+                        instruction.mnemonic(),
+                        Registers::one(place)
+                    );
+                }
+            }
+        }
+        assert!(seen > 40_000, "{seen} instructions");
+    }
+}

@@ -12,25 +12,46 @@
 //!
 //! The compiler keeps such a record in its loop, and writes it twice where it makes two loops of one. The record is taken for
 //! the innermost loop around its address, and only where no turn can go round it; so a record that has come to lie elsewhere
-//! bounds nothing. That the number itself is right is the source's word, which a run in the simulator can refute.
+//! bounds nothing.
+//!
+//! Where a source cannot write assembly, or is a library's, a table names the function, by its path without types, and says how often the
+//! program comes by the beginning of any loop in it at most ([`LoopBound`]). Of several loops it is the one that turns most that
+//! counts, since the order in which a compiler lays them out is nobody's business. A record at a loop goes before the table.
+//!
+//! That a number is right is the source's word, or the table's, which a run in the simulator can refute.
 
 use super::BoundsError;
-use super::cycles::Turns;
+use super::cycles::Stated;
 use crate::elf::ImageError;
 use object::read::elf::ElfFile32;
 use object::{LittleEndian, Object, ObjectSection};
+use serde::Deserialize;
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// The section.
 const SECTION: &str = ".loop_bounds";
 
+/// How often the loops of a function turn.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LoopBound {
+    /// How often the program comes by the beginning of a loop at most, each time that the loop is come to.
+    pub passes: u64,
+    /// Why it does not do so more often.
+    pub because: String,
+}
+
+/// Those of functions, by their paths without types.
+pub type LoopBounds = BTreeMap<String, LoopBound>;
+
 /// The records of an ELF.
-pub(super) fn stated(elf: &Path) -> Result<Turns, BoundsError> {
+pub(super) fn stated(elf: &Path) -> Result<Stated, BoundsError> {
     let bytes = std::fs::read(elf).map_err(|source| ImageError::Read { path: elf.into(), source })?;
     let not_elf = |reason| ImageError::NotElf { path: elf.into(), reason };
     let file: ElfFile32<LittleEndian> = ElfFile32::parse(&*bytes).map_err(not_elf)?;
-    let Some(section) = file.section_by_name(SECTION) else { return Ok(Turns::new()) };
-    let mut turns = Turns::new();
+    let Some(section) = file.section_by_name(SECTION) else { return Ok(Stated::new()) };
+    let mut turns = Stated::new();
     for record in section.data().map_err(not_elf)?.chunks_exact(8) {
         let word = |at: usize| record[at..].first_chunk().map_or(0, |bytes| u32::from_le_bytes(*bytes));
         let (address, stated) = (word(0), u64::from(word(4)));
