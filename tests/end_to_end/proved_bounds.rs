@@ -5,7 +5,7 @@
 
 use crate::common::{Run, ask, elf, run_for_ms, woken_up};
 use crate::interrupt_budgets::roll;
-use control::ground::{field_examples, schedule};
+use control::ground::{examples, field_examples, schedule};
 use control::operate::saved;
 use control::say::command::LINE_LENGTH;
 use control::settings::Setting;
@@ -14,6 +14,7 @@ use field::motion::mm_s;
 use field::planting::Planting;
 use field::trial::Trial;
 use field::verdict::Timing;
+use knn::MAX_K;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;
@@ -133,6 +134,10 @@ fn loops_are_said_to_turn_as_often_as_the_constants_behind_them_have_it() {
         assert_eq!(passes(&format!("control::{function}")), LINE_LENGTH + 1, "{function}");
     }
     assert_eq!(passes("control::say::answer::Answer::write_line"), usize::from(field_examples::CAPACITY) + 1);
+    assert_eq!(passes("knn::classify::search"), usize::from(field_examples::CAPACITY).max(examples::COUNT) + 1);
+    for function in ["knn::neighbour::Neighbour::displace", "control::ground::nearest::Nearest::vote"] {
+        assert_eq!(passes(function), usize::from(MAX_K) + 1, "{function}");
+    }
     // What is copied lies in a variable or on the stack.
     let longest = Image::read(&elf()).expect("it is an ELF").variables.values().map(|variable| variable.size).max();
     for function in ["memcpy", "memmove", "memset"] {

@@ -367,6 +367,9 @@ fn what_is_said_of_a_function_holds_for_each_of_its_loops_and_a_record_at_one_go
     // wdr 1, rcall 3, ldi 1, so many turns and the way out, ret 4, rjmp 2.
     assert_eq!(cycles("3: dec r24\n brne 3b\n", 9), Some(11 + 9 * 3 + 2));
     assert_eq!(cycles(&format!("3:\n {} dec r24\n brne 3b\n", at_most(8)), 9), Some(11 + 8 * 3 + 2));
+    // Entered in its middle as well: by the longer way, sbrc 1 and rjmp 2, with nop 1 in each turn.
+    let twice = "sbrc r2, 0\n rjmp 4f\n3: nop\n4: dec r24\n brne 3b\n";
+    assert_eq!(cycles(twice, 9), Some(11 + 3 + 9 * 4 + 2));
     // Nine turns of ldi 1, of the inner loop's nine with their way out, and of dec 1 and brne 2; the last way out is 1 shorter.
     let nested = "2: ldi r25, 3\n3: dec r25\n brne 3b\n dec r24\n brne 2b\n";
     assert_eq!(cycles(nested, 9), Some(11 + 9 * (1 + 29 + 3) + (1 + 29 + 2)));

@@ -350,7 +350,7 @@ impl Paths<'_> {
 
     /// Carries the times at which a loop is entered on to all of its places.
     fn turn(&self, circle: &BTreeSet<usize>, times: &mut [Option<Time>]) {
-        // A loop that can be entered at several places is taken at each; nobody can say how often it turns.
+        // A loop that can be entered at several places is taken at each; what one place in it says is no word for all of them.
         let heads: Vec<usize> = circle.iter().copied().filter(|&node| times[node].is_some()).collect();
         let mut all: BTreeMap<usize, Time> = BTreeMap::new();
         for &head in &heads {
@@ -365,6 +365,7 @@ impl Paths<'_> {
                 }
             }
             let stated = self.stated(circle, head).filter(|_| heads.len() == 1);
+            let stated = stated.or_else(|| self.turns.of_heads.get(&(self.address)(head)).copied());
             let mut before_last = Time { cycles: turn.cycles * stated.unwrap_or(1), unbounded: turn.unbounded };
             if stated.is_none() {
                 before_last.unbounded.insert((self.address)(head));
@@ -401,8 +402,7 @@ impl Paths<'_> {
                     .any(|rest| rest.contains(&head) && (rest.len() > 1 || within(head, rest).contains(&head)))
         };
         let stated = circle.iter().filter_map(|&node| saying(node));
-        let stated = stated.filter(|&(node, _)| !is_inner(node) && !goes_round(node)).map(|(_, turns)| turns).min();
-        stated.or_else(|| self.turns.of_heads.get(&(self.address)(head)).copied())
+        stated.filter(|&(node, _)| !is_inner(node) && !goes_round(node)).map(|(_, turns)| turns).min()
     }
 }
 

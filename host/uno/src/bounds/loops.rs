@@ -15,7 +15,8 @@
 //! bounds nothing.
 //!
 //! Where a source cannot write assembly, or is a library's, a table names the function, by its path without types, and says how often the
-//! program comes by the beginning of any loop in it at most ([`LoopBound`]). Of several loops it is the one that turns most that
+//! program comes by the beginning of any loop in it at most ([`LoopBound`]), or by each of its beginnings where it can be entered at
+//! several places. Of several loops it is the one that turns most that
 //! counts, since the order in which a compiler lays them out is nobody's business. A record at a loop goes before the table.
 //!
 //! That a number is right is the source's word, or the table's, which a run in the simulator can refute.
