@@ -16,17 +16,20 @@
 //! # What a function gives back
 //!
 //! Results are in R18 to R25 and nowhere else, and end in R25 or R24 (AVR calling conventions of GCC and LLVM, libgcc's division
-//! included). So every other register that is needed behind a call, and every flag, has to be kept, on every path.
-//!
-//! Of R18 to R25 a register counts as a result where an instruction puts something there that the function itself does not need,
-//! and that reaches a return. What is read only to work out what nobody needs is not needed, so a result that is worked out in
-//! a loop counts. A counter, a pointer or a temporary value is needed until the function has done with it, so it does not. The
-//! division routines go by what they have worked out so far; for them it is written down ([`LIBRARY`]). All between a result
+//! included). Of those a register counts as a result where an instruction puts something there that the function itself does not
+//! need, and that reaches a return. What is read only to work out what nobody needs is not needed, so a result that is worked
+//! out in a loop counts. A counter, a pointer or a temporary value is needed until the function has done with it, so it does not.
+//! The division routines go by what they have worked out so far; for them it is written down ([`LIBRARY`]). All between a result
 //! and R25 goes with it, and R25 with R24, since a value of several bytes lies in neighbours.
 //!
-//! Where such a register is no result, an instruction that reads it is found if a call has spoilt it on every path there. A read
-//! that spoilt and proper values can both reach is let pass: so compilers copy the payload of an empty `Option`, which
-//! nobody has set and nobody looks at. No analysis of registers alone can tell the two apart.
+//! # What is found, and what is not
+//!
+//! Found is an instruction that reads what a call has spoilt, whichever way the program came to it; and a call that spoils a register
+//! other than a result's, which was set before it, has not been read since, and is needed behind it.
+//!
+//! A read that spoilt and proper values can both reach, of a register that was read before the call too, is let pass. Compilers make such
+//! reads of the payload of an empty `Option`, which nobody has set and which they copy with the rest: an analysis of registers
+//! cannot tell the two apart. A test takes from functions of the firmware the saving of a register, and counts how often it is found.
 //!
 //! # What else is held
 //!
@@ -430,7 +433,34 @@ impl Survey<'_> {
         Ok(sure)
     }
 
-    /// What has been spoilt by a call on every path to a place, and not been set since, of the registers that results are in.
+    /// In which registers something has been put on every path to a place, and has not been read yet.
+    fn unread(&self, routine: &Routine) -> Result<Vec<Registers>, BoundsError> {
+        let nodes = &routine.nodes;
+        let mut unread = vec![Registers::ALL; nodes.len()];
+        unread[0] = Registers::NONE;
+        let mut to_do = vec![0];
+        let mut is_seen = vec![false; nodes.len()];
+        while let Some(number) = to_do.pop() {
+            let node = &nodes[number];
+            let effects = self.program.instruction(node.place.address)?.effects();
+            let new = if effects.acts { Registers::NONE } else { effects.changes };
+            let behind = unread[number] - effects.reads - effects.changes | new;
+            for way in &node.ways {
+                let behind = way.through.as_ref().map_or(behind, |called| {
+                    let Summary { keeps, reads, .. } = *self.of(called);
+                    behind & keeps - reads
+                });
+                let both = unread[way.to] & behind;
+                if both != unread[way.to] || !is_seen[way.to] {
+                    (unread[way.to], is_seen[way.to]) = (both, true);
+                    to_do.push(way.to);
+                }
+            }
+        }
+        Ok(unread)
+    }
+
+    /// What has been spoilt by a call on every path to a place, and not been set since.
     fn spoilt(&self, routine: &Routine) -> Result<Vec<Registers>, BoundsError> {
         let nodes = &routine.nodes;
         let mut spoilt = vec![Registers::ALL; nodes.len()];
@@ -453,10 +483,10 @@ impl Survey<'_> {
         Ok(spoilt)
     }
 
-    /// The registers that results are in, where a routine gives nothing back in them and leaves something else.
+    /// Registers in which a routine gives nothing back and leaves something else than it found. R1 is looked at by itself.
     fn spoils(&self, routine: &Rc<Routine>) -> Registers {
         let Summary { keeps, gives, .. } = *self.of(routine);
-        RESULTS - keeps - gives
+        Registers::ALL - keeps - gives - Registers::one(ZERO)
     }
 
     /// Holds every call against what is needed behind it.
@@ -469,6 +499,7 @@ impl Survey<'_> {
             let needed_behind_it = needed_behind.get(&Rc::as_ptr(routine)).copied().unwrap_or_default();
             let needs = self.needs(routine, needed_behind_it | self.of(routine).gives, What::Needed)?;
             let spoilt = self.spoilt(routine)?;
+            let unread = self.unread(routine)?;
             for (number, node) in routine.nodes.iter().enumerate() {
                 let Place { address, .. } = node.place;
                 let needed = behind(node, &needs);
@@ -477,10 +508,9 @@ impl Survey<'_> {
                 for called in called(node) {
                     let Summary { keeps, reads, surely_reads, .. } = *self.of(called);
                     read |= surely_reads;
-                    let mut spoils = needed - keeps - RESULTS;
-                    if !self.of(routine).zero[number] {
-                        spoils |= Registers::one(ZERO) & (reads | needed);
-                    }
+                    let mut spoils = (needed & unread[number]) - keeps - RESULTS - reads;
+                    let zero = if self.of(routine).zero[number] { needed - keeps } else { needed | reads };
+                    spoils |= zero & Registers::one(ZERO);
                     if !spoils.is_empty() {
                         *found.entry((address, called.entry.address)).or_default() |= spoils;
                     }
