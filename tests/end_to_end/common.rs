@@ -107,6 +107,7 @@ pub fn trial(row: Row, motion: Motion) -> Trial {
         timing: Timing::default(),
         start: Start::Command,
         settings: Vec::new(),
+        examples: Vec::new(),
     }
 }
 

@@ -33,6 +33,7 @@ fn random_row(seed: u64) -> Trial {
         timing: conditions.timing(),
         start: Start::Command,
         settings: conditions.firmware_settings(),
+        examples: Vec::new(),
     }
 }
 
