@@ -25,7 +25,7 @@ impl Registers {
     pub(super) const FLAGS: Registers = flags(0b0111_1111);
     pub(super) const ZERO_FLAG: Registers = Z;
     /// All registers and flags.
-    pub(super) const ALL: Registers = Registers(Registers::FLAGS.0 | (1 << REGISTERS) - 1);
+    pub(super) const ALL: Registers = Registers(Registers::FLAGS.0 | ((1 << REGISTERS) - 1));
 
     pub(super) fn one(register: usize) -> Registers {
         Registers(1 << register)

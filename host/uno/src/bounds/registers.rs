@@ -418,13 +418,13 @@ impl Survey<'_> {
             let node = &nodes[number];
             let instruction = self.program.instruction(node.place.address)?;
             let ways = node.ways.iter().map(|way| match &way.through {
-                Some(called) => sure[way.to] & self.of(called).keeps | self.of(called).surely_reads,
+                Some(called) => (sure[way.to] & self.of(called).keeps) | self.of(called).surely_reads,
                 None => sure[way.to],
             });
             let ends = node.ends_in.iter().map(|(_, called)| self.of(called).surely_reads);
             let returns = node.returns.map(|_| Registers::NONE);
             let all = ways.chain(ends).chain(returns).fold(Registers::ALL, |all, way| all & way);
-            let before = all - instruction.effects().changes | reads(&instruction, behind(node, needs));
+            let before = (all - instruction.effects().changes) | reads(&instruction, behind(node, needs));
             if before != sure[number] {
                 sure[number] = before;
                 to_do.extend(&from[number]);
@@ -444,11 +444,11 @@ impl Survey<'_> {
             let node = &nodes[number];
             let effects = self.program.instruction(node.place.address)?.effects();
             let new = if effects.acts { Registers::NONE } else { effects.changes };
-            let behind = unread[number] - effects.reads - effects.changes | new;
+            let behind = (unread[number] - effects.reads - effects.changes) | new;
             for way in &node.ways {
                 let behind = way.through.as_ref().map_or(behind, |called| {
                     let Summary { keeps, reads, .. } = *self.of(called);
-                    behind & keeps - reads
+                    behind & (keeps - reads)
                 });
                 let both = unread[way.to] & behind;
                 if both != unread[way.to] || !is_seen[way.to] {
@@ -471,8 +471,10 @@ impl Survey<'_> {
             let node = &nodes[number];
             let behind = spoilt[number] - self.program.instruction(node.place.address)?.effects().changes;
             for way in &node.ways {
-                let behind =
-                    way.through.as_ref().map_or(behind, |called| behind - self.of(called).gives | self.spoils(called));
+                let behind = way
+                    .through
+                    .as_ref()
+                    .map_or(behind, |called| (behind - self.of(called).gives) | self.spoils(called));
                 let both = spoilt[way.to] & behind;
                 if both != spoilt[way.to] || !is_seen[way.to] {
                     (spoilt[way.to], is_seen[way.to]) = (both, true);
@@ -515,7 +517,7 @@ impl Survey<'_> {
                         *found.entry((address, called.entry.address)).or_default() |= spoils;
                     }
                     *needed_behind.entry(Rc::as_ptr(called)).or_default() |= needed;
-                    *lasting.entry(address).or_default() |= needed & keeps - Registers::one(ZERO);
+                    *lasting.entry(address).or_default() |= needed & (keeps - Registers::one(ZERO));
                 }
                 for register in (read & spoilt[number]).iter() {
                     for (place, called) in self.spoilers(routine, number, register)? {
