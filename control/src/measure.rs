@@ -5,5 +5,6 @@ pub mod monitor;
 pub mod quadrature;
 pub mod readings;
 pub mod reset;
+pub mod sensors;
 pub mod speed;
 pub mod switch;

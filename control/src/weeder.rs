@@ -24,12 +24,9 @@ use crate::{
         schedule::ScheduleFull,
     },
     measure::{
-        monitor::{BeamMonitor, EncoderMonitor},
-        quadrature::Odometer,
         readings::{Edge, Readings, WakeUp},
         reset::Cause,
-        speed::SpeedMeter,
-        switch::Switch,
+        sensors::Sensors,
     },
     memory::Memory,
     operate::{
@@ -44,7 +41,7 @@ use crate::{
         tool::Tool,
     },
     settings::Setting,
-    units::{Instant, Position, count},
+    units::{Position, count},
 };
 
 /// What the machine is to do after a turn.
@@ -68,16 +65,9 @@ pub struct Controller<C, M> {
     ground: Ground,
     limits: Limits,
     cause: Cause,
-    readings: Readings,
-    switch: Switch,
-    end_switch: Switch,
-    odometer: Odometer,
-    encoder: EncoderMonitor,
-    beam: BeamMonitor,
-    beam_broken: bool,
+    sensors: Sensors,
     bench: Bench,
     distance: Distance,
-    meter: SpeedMeter,
     state: State,
     tool: Tool,
     /// Whether the speed is another than the one by which the ground leads.
@@ -104,30 +94,22 @@ pub struct Asleep<C, M>(Controller<C, M>);
 impl<C: Classifier, M: Memory> Asleep<C, M> {
     /// A controller with a classifier and a memory of which nobody has read anything.
     pub const fn new(classifier: C, memory: M) -> Self {
-        let (start, place) = (Instant::ZERO, Position::new(0));
         Self(Controller {
             classifier,
             ground: Ground::NONE,
             limits: Limits::NONE,
             configuration: Configuration::new(memory),
             cause: Cause::PowerOn,
-            readings: Readings { stack_free: 0, ..Readings::new(start, place) },
-            switch: Switch::new(false),
-            end_switch: Switch::new(false),
-            odometer: Odometer::new(place, 0),
-            encoder: EncoderMonitor::NONE,
-            beam: BeamMonitor::new(start),
-            beam_broken: false,
+            sensors: Sensors::NONE,
             bench: Bench::Idle,
             distance: Distance::NONE,
-            meter: SpeedMeter::NONE,
             state: State::Hold,
             tool: Tool::NONE,
             leads_are_old: false,
             is_enough: false,
             mistakes: 0,
             dust: 0,
-            no_plants: NoPlants::since(place),
+            no_plants: NoPlants::since(Position::new(0)),
             misfits: Misfits::NONE,
             told: Told::NONE,
             objects: Objects::NONE,
@@ -139,20 +121,14 @@ impl<C: Classifier, M: Memory> Asleep<C, M> {
     /// Wakes the machine up: in HOLD, with the tool out, and with no ground known. Where the memory holds no settings, or some
     /// that cannot be right, that is an alarm.
     pub fn wake_up(&mut self, wake_up: WakeUp) -> &mut Controller<C, M> {
-        let WakeUp { readings, beam_broken, cause } = wake_up;
-        let Readings { now, position, jumps, .. } = readings;
+        let WakeUp { readings: Readings { now, position, .. }, beam_broken, cause } = wake_up;
         let controller = &mut self.0;
         controller.classifier.wake_up();
         controller.state = controller.configuration.load().map_or(State::Hold, State::Alarm);
         controller.follow_settings();
         controller.ground.begin(controller.configuration.settings(), position, beam_broken);
-        (controller.cause, controller.readings, controller.beam_broken) = (cause, readings, beam_broken);
-        controller.switch = Switch::new(readings.switch_on);
-        controller.end_switch = Switch::new(readings.end_switch_on);
-        controller.odometer = Odometer::new(position, jumps);
-        controller.encoder = EncoderMonitor::new(now, position);
-        controller.beam = BeamMonitor::new(now);
-        controller.meter = SpeedMeter::new(position, now);
+        controller.cause = cause;
+        controller.sensors.wake_up(wake_up);
         controller.tool.wake_up(now);
         controller.no_plants = NoPlants::since(position);
         controller.curves.wake_up(now);
@@ -187,36 +163,36 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// Takes an edge of the beam, with the position at which it came.
     fn beam_edge(&mut self, position: Position, broken: bool) {
-        self.beam_broken = broken;
-        if let Some(alarm) = self.beam.edge(self.readings.now) {
+        self.sensors.beam_broken = broken;
+        if let Some(alarm) = self.sensors.beam.edge(self.sensors.readings.now) {
             self.raise(alarm);
         }
         if broken
             && self.is_working()
-            && let Some(alarm) = self.encoder.beam_broke()
+            && let Some(alarm) = self.sensors.encoder.beam_broke()
         {
             self.raise(alarm);
         }
-        if let Some(object) = self.ground.edge(self.odometer.place(position), broken) {
+        if let Some(object) = self.ground.edge(self.sensors.odometer.place(position), broken) {
             self.judge(object);
         }
     }
 
     /// Edges of the beam were lost: what stood there is not known, and neither is the beam's level, which is now `broken`.
     fn beam_edges_lost(&mut self, broken: bool) {
-        self.beam_broken = broken;
+        self.sensors.beam_broken = broken;
         self.ground.lose_edges(broken);
         self.raise(Alarm::BeamEdgesLost);
     }
 
     /// The last part of a [`turn`](Self::turn), for a test that looks in between.
     pub fn step(&mut self, readings: Readings) -> Orders {
-        self.readings = readings;
-        let doubted = self.odometer.read(readings.position, readings.jumps, self.believes_jumps());
-        let position = self.odometer.place(readings.position);
-        self.readings.position = position;
-        self.leads_are_old |= self.meter.read(readings.now, position).is_some();
-        match self.switch.read(readings.now, readings.switch_on) {
+        self.sensors.readings = readings;
+        let doubted = self.sensors.odometer.read(readings.position, readings.jumps, self.believes_jumps());
+        let position = self.sensors.odometer.place(readings.position);
+        self.sensors.readings.position = position;
+        self.leads_are_old |= self.sensors.meter.read(readings.now, position).is_some();
+        match self.sensors.switch.read(readings.now, readings.switch_on) {
             // An alarm wants to be cleared first, if by nothing else then by the switch going off.
             Some(true) if matches!(self.state, State::Hold) => self.go_to_work(),
             Some(false) => self.enter(State::Hold),
@@ -235,7 +211,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             if self.configuration.has_changed() {
                 self.follow_settings();
             } else if self.leads_are_old {
-                self.ground.lead(self.configuration.settings(), self.meter.speed());
+                self.ground.lead(self.configuration.settings(), self.sensors.meter.speed());
                 (self.leads_are_old, self.is_enough) = (false, true);
             }
         }
@@ -244,7 +220,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         }
         let out = self.try_out().unwrap_or(!self.is_working() || self.must_be_out());
         if out != self.tool.is_out() {
-            self.tool.send(out, out && self.is_working() && !self.encoder.is_doubtful());
+            self.tool.send(out, out && self.is_working() && !self.sensors.encoder.is_doubtful());
             self.events.add(Event::Swing { out, position });
         }
         let orders = self.orders();
@@ -269,13 +245,13 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// Whether the encoder's silence or the ground keeps the tool out of the row.
     fn must_be_out(&self) -> bool {
         let out = self.tool.is_out();
-        self.encoder.is_doubtful() || out && self.encoder.is_quiet() || self.ground.must_be_out(out)
+        self.sensors.encoder.is_doubtful() || out && self.sensors.encoder.is_quiet() || self.ground.must_be_out(out)
     }
 
     /// Classifies a complete object and remembers it unless it is a weed. What is dust is only counted.
     fn judge(&mut self, object: Object) {
         self.is_enough = true;
-        let position = self.readings.position;
+        let position = self.sensors.readings.position;
         let spacing = self.ground.spacing(&object);
         let speed_class_mm_s = features::speed_class(self.speed_mm_s());
         let (spacing_mm, width_mm) =
@@ -308,7 +284,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         if nobody_asks || matches!(self.state, State::Alarm(_)) {
             return;
         }
-        self.events.add(Event::Alarm { alarm, position: self.readings.position });
+        self.events.add(Event::Alarm { alarm, position: self.sensors.readings.position });
         self.enter(State::Alarm(alarm));
     }
 
@@ -321,7 +297,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             self.raise(Alarm::SettingsContradict);
             return;
         }
-        self.no_plants = NoPlants::since(self.readings.position);
+        self.no_plants = NoPlants::since(self.sensors.readings.position);
         self.misfits = Misfits::NONE;
         self.enter(State::Work);
     }

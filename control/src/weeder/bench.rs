@@ -59,7 +59,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         self.expect_hold()?;
         let watched = self.configuration.get(Setting::EndSwitch) != 0;
         let gap_ms = self.configuration.get(Setting::ServoGapMs);
-        self.bench = Bench::Swings(Swings::new(self.readings.now, watched, gap_ms as u8));
+        self.bench = Bench::Swings(Swings::new(self.sensors.readings.now, watched, gap_ms as u8));
         Ok(())
     }
 
@@ -69,7 +69,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// [`Refusal::NotInHold`] and [`Refusal::AlarmLatched`].
     pub fn calibrate_start(&mut self) -> Result<(), Refusal> {
         self.expect_hold()?;
-        self.distance.begin(self.readings.position);
+        self.distance.begin(self.sensors.readings.position);
         Ok(())
     }
 
@@ -79,7 +79,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// [`Refusal::Unfit`], [`Refusal::NotInHold`], [`Refusal::OutOfRange`] and [`Refusal::Contradiction`]; nothing is changed then.
     pub fn calibrate(&mut self, distance_mm: u16, force: bool) -> Result<(), Refusal> {
         let nominal = self.configuration.settings().nominal_wheel().ticks(1000).0 as u16;
-        let ended = self.distance.end(self.readings.position, distance_mm, nominal, force);
+        let ended = self.distance.end(self.sensors.readings.position, distance_mm, nominal, force);
         self.set(Setting::TicksPerM, ended.map_err(Refusal::Unfit)?)
     }
 
@@ -95,13 +95,13 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         if !(Setting::TopSpeedMmS.description().least..=fastest).contains(&speed_mm_s) {
             return Err(Refusal::TestSpeed { fastest });
         }
-        self.bench = Bench::Row(Rehearsal::new(self.readings.now, speed_mm_s, self.configuration.settings()));
+        self.bench = Bench::Row(Rehearsal::new(self.sensors.readings.now, speed_mm_s, self.configuration.settings()));
         Ok(())
     }
 
     /// Carries on with what is being tried; whether it has the tool out, if it says.
     pub(super) fn try_out(&mut self) -> Option<bool> {
-        let Readings { now, end_switch_on, .. } = self.readings;
+        let Readings { now, end_switch_on, .. } = self.sensors.readings;
         let (out, outcome) = self.bench.carry_on(now, end_switch_on, self.tool.is_out());
         if let Some(outcome) = outcome {
             self.finish_swings(outcome);

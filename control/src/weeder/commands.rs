@@ -88,7 +88,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     pub(super) fn follow_settings(&mut self) {
         self.configuration.follow();
         let settings = self.configuration.settings();
-        self.ground.follow(settings, self.readings.position, self.meter.speed());
+        self.ground.follow(settings, self.sensors.readings.position, self.sensors.meter.speed());
         self.limits = Limits::of(settings, self.ground.wheel());
         (self.leads_are_old, self.is_enough) = (false, true);
     }

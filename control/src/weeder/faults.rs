@@ -103,10 +103,10 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// The fault that the readings show, if any; so many of the encoder's ticks are `doubted`.
     #[inline(never)]
     pub(super) fn fault(&mut self, doubted: u8) -> Option<Alarm> {
-        let Readings { now, position, end_switch_on, stack_free, .. } = self.readings;
+        let Readings { now, position, end_switch_on, stack_free, .. } = self.sensors.readings;
         let working = self.is_working();
-        let fault = self.encoder.read(now, position, doubted, self.ground.ticks(PROGRESS).0 as u8);
-        if self.encoder.is_silent() {
+        let fault = self.sensors.encoder.read(now, position, doubted, self.ground.ticks(PROGRESS).0 as u8);
+        if self.sensors.encoder.is_silent() {
             // Nobody knows how far the machine has rolled since.
             self.ground.forget();
         }
@@ -119,16 +119,16 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         if self.ground.is_blocked() {
             return Some(Alarm::BeamBlocked);
         }
-        if working && self.meter.speed().is_beyond(self.limits.top_speed) {
+        if working && self.sensors.meter.speed().is_beyond(self.limits.top_speed) {
             return Some(Alarm::TooFast);
         }
         if working && self.ground.rolled_back_too_far() {
             return Some(Alarm::RolledBackTooFar);
         }
-        self.end_switch.read(now, end_switch_on);
+        self.sensors.end_switch.read(now, end_switch_on);
         if self.configuration.get(Setting::EndSwitch) != 0
             && !self.bench.needs_no_end_switch()
-            && self.end_switch.is_on() != self.tool.is_out()
+            && self.sensors.end_switch.is_on() != self.tool.is_out()
             // Where what was done by hand has ended just now, the tool is yet to be told.
             && self.tool.has_had(self.orders().pulse, now, self.configuration.get(Setting::LeadOutMs) + END_SWITCH_GRACE_MS)
         {
@@ -153,11 +153,11 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         if self.tool.awaits_ground() && self.ground.is_closed_at_tool() {
             // An eighth of the lead is what the speed may waver by.
             let lead_ms = self.configuration.get(Setting::LeadOutMs);
-            if self.tool.is_late(self.readings.now, lead_ms - lead_ms / 8) {
+            if self.tool.is_late(self.sensors.readings.now, lead_ms - lead_ms / 8) {
                 self.events.add(Event::Warning(Warning::LateCommand));
             }
         }
-        if self.no_plants.warn(self.readings.position, self.limits.no_plant) {
+        if self.no_plants.warn(self.sensors.readings.position, self.limits.no_plant) {
             self.events.add(Event::Warning(Warning::NoPlants));
         }
     }

@@ -34,7 +34,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     pub fn reason(&self) -> Option<Reason> {
         if !self.is_working() || !self.tool.is_out() {
             None
-        } else if self.encoder.is_doubtful() || self.encoder.is_quiet() {
+        } else if self.sensors.encoder.is_doubtful() || self.sensors.encoder.is_quiet() {
             Some(Reason::EncoderDoubtful)
         } else if self.ground.is_unseen() {
             Some(Reason::UnseenGround)
@@ -47,7 +47,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// The machine's speed in millimetres a second, negative backwards.
     pub fn speed_mm_s(&self) -> i16 {
-        self.ground.millimetres(Ticks(self.meter.speed().0))
+        self.ground.millimetres(Ticks(self.sensors.meter.speed().0))
     }
 
     /// Windows at the tool or ahead of it, the one still being seen included.
@@ -62,22 +62,22 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// Whether the encoder fell silent from one moment to the next, so that nobody knows how far the machine has rolled since.
     pub fn encoder_is_silent(&self) -> bool {
-        self.encoder.is_silent()
+        self.sensors.encoder.is_silent()
     }
 
     /// Whether the wheel turns so fast that an edge may be missed, and both channels may have changed at once.
     pub fn believes_jumps(&self) -> bool {
-        self.meter.speed().is_beyond(quadrature::FAST)
+        self.sensors.meter.speed().is_beyond(quadrature::FAST)
     }
 
     /// Whether the beam is broken.
     pub fn beam_is_broken(&self) -> bool {
-        self.beam_broken
+        self.sensors.beam_broken
     }
 
     /// Whether the status LED shines: while the servo is being tried, it marks the commands.
     pub fn lamp_is_lit(&self) -> bool {
-        if self.bench.swings() { self.tool.is_out() } else { lamp::is_lit(self.state, self.readings.now) }
+        if self.bench.swings() { self.tool.is_out() } else { lamp::is_lit(self.state, self.sensors.readings.now) }
     }
 
     /// Whether the tool is to be out of the row.
@@ -87,7 +87,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// The last readings.
     pub fn readings(&self) -> &Readings {
-        &self.readings
+        &self.sensors.readings
     }
 
     /// The settings in use.
@@ -147,6 +147,6 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// The curves of which the next points are due, which are due 20 times a second.
     pub fn next_plot(&mut self) -> Option<Plot> {
-        self.curves.due(self.readings.now)
+        self.curves.due(self.sensors.readings.now)
     }
 }
