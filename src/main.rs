@@ -86,6 +86,7 @@ fn run(typed: &mut LineBuffer) -> ! {
         watchdog::feed();
         // The readings come first: an edge that is still in the queue is then never farther than the next readings.
         let readings = read();
+        beam.watch_second(controller.has_second_beam());
         let orders = controller.turn(readings, beam.edges());
         heartbeat::beat(orders.pulse_out);
         servo.command(orders.pulse, orders.gap_ms);

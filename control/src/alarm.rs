@@ -15,6 +15,10 @@ pub enum Alarm {
     BeamFlickers,
     /// Edges of the beam came faster than they could be taken.
     BeamEdgesLost,
+    /// The second beam sees what the first does not: a torn wire, or a dirty lens.
+    BeamBlind,
+    /// The first beam sees what the second does not.
+    SecondBeamBlind,
     /// Plants pass the beam, and the encoder says that the machine stands.
     EncoderSilent,
     /// Edges without progress: only one of the encoder's channels is alive.
@@ -79,6 +83,6 @@ mod tests {
     #[test]
     fn codes_rise_with_the_order_and_have_digits_that_can_be_counted() {
         let codes: Vec<u8> = (0..).map_while(Alarm::from_index).map(Alarm::code).collect();
-        assert_eq!(codes, [11, 12, 13, 21, 22, 23, 31, 32, 33, 34, 41, 51, 52, 61]);
+        assert_eq!(codes, [11, 12, 13, 14, 15, 21, 22, 23, 31, 32, 33, 34, 41, 51, 52, 61]);
     }
 }

@@ -19,6 +19,7 @@ pub mod nearest;
 pub mod object;
 pub mod reach;
 pub mod schedule;
+pub mod second_beam;
 pub mod watch;
 
 use self::{
@@ -26,6 +27,7 @@ use self::{
     object::Object,
     reach::{Geometry, Leads},
     schedule::{Plan, Schedule, ScheduleFull},
+    second_beam::{Compared, SecondBeam},
     watch::Watch,
 };
 use crate::{
@@ -43,6 +45,9 @@ pub struct Ground {
     watch: Watch,
     schedule: Schedule,
     guard: Guard,
+    second_beam: SecondBeam,
+    /// The slip by which the geometry goes: how much more the wheel turns than the ground.
+    corrected_by: i8,
     /// The last plant's leading edge, or where watching began; no farther behind than is remembered.
     last_plant: Place,
     /// Whether the tool has just come to ground that had to be left behind.
@@ -58,23 +63,27 @@ impl Ground {
         watch: Watch::NONE,
         schedule: Schedule::NONE,
         guard: Guard::NONE,
+        second_beam: SecondBeam::NONE,
+        corrected_by: 0,
         last_plant: Place::new(0),
         rolled_back_too_far: false,
     };
 
     /// Ground of which nothing has been seen, with the beam at a position, broken or not.
     pub fn begin(&mut self, settings: &Settings, position: Position, broken: bool) {
-        self.geometry = Geometry::of(settings);
+        self.correct(settings);
         self.beam = self.geometry.grain.place(position);
         self.watch = Watch::start(self.beam, broken);
         self.schedule = Schedule::new(self.beam);
         self.last_plant = self.beam;
+        self.second_beam.begin(self.beam);
     }
 
     /// Works out what follows from other settings. With another grain, what was seen means nothing any more.
     pub fn follow(&mut self, settings: &Settings, position: Position, speed: TicksPerSecond) {
-        let Geometry { grain, guard_spacing, .. } = self.geometry;
-        self.geometry = Geometry::of(settings);
+        let grain = self.geometry.grain;
+        let guard_spacing = self.geometry.guard_spacing;
+        self.correct(settings);
         self.lead(settings, speed);
         if self.geometry.guard_spacing != guard_spacing {
             self.guard = Guard::NONE;
@@ -83,6 +92,23 @@ impl Ground {
             self.beam = self.geometry.grain.place(position);
             self.begin_here();
         }
+    }
+
+    /// Whether another slip was measured than the distances are corrected by.
+    pub fn is_to_be_corrected(&self) -> bool {
+        self.corrected_by != self.second_beam.slip().excess()
+    }
+
+    /// Works out what follows from the slip that was measured.
+    pub fn correct(&mut self, settings: &Settings) {
+        self.corrected_by = self.second_beam.slip().excess();
+        self.geometry = Geometry::of(settings, self.corrected_by);
+    }
+
+    /// Forgets what the second beam has measured: the wheel, or where the beams stand, may be another. It has nothing to tell of what
+    /// the first has seen before.
+    pub fn forget_slip(&mut self) {
+        self.second_beam.begin(self.watch.frontier());
     }
 
     /// Works out what follows from another speed.
@@ -94,6 +120,26 @@ impl Ground {
     pub fn edge(&mut self, position: Position, broken: bool) -> Option<Object> {
         let place = self.geometry.grain.place(position) - self.leads.response;
         self.watch.edge(place, broken, self.geometry.merge_gap)
+    }
+
+    /// The second beam is at a position of the machine, broken or not; returns what follows from what it has seen.
+    pub fn look_again(&mut self, position: Position, broken: bool) -> Option<Compared> {
+        let Geometry { grain, second_beam: apart, merge_gap, .. } = self.geometry;
+        let place = grain.place(position) - self.leads.response - apart;
+        if broken != self.second_beam.is_broken() {
+            self.widen(place);
+        }
+        self.second_beam.look(place, broken, apart, merge_gap, self.watch.open())
+    }
+
+    /// The first beam has seen an object, which is to come to the second, if there is one.
+    pub fn await_object(&mut self, object: Object) {
+        self.second_beam.await_object(object);
+    }
+
+    /// What the second beam has an edge of is no smaller than that.
+    fn widen(&mut self, place: Place) {
+        self.schedule.widen(place, Length(self.geometry.second_beam.0 >> 2));
     }
 
     /// The machine has rolled to a position; returns the object that this completes.
@@ -123,6 +169,7 @@ impl Ground {
     pub fn forget(&mut self) {
         self.watch.forget();
         self.guard = Guard::NONE;
+        self.forget_slip();
         self.schedule.spoil(self.watch.frontier());
     }
 
@@ -154,7 +201,12 @@ impl Ground {
     pub fn keep(&mut self, plant: Object) -> Result<(), ScheduleFull> {
         self.last_plant = plant.leading;
         self.guard.see(&plant, &self.geometry);
-        self.schedule.push(plant, self.tool(), self.geometry.margin)
+        self.schedule.push(plant, self.tool(), self.geometry.margin)?;
+        // The second beam may be at it already.
+        if let Some(begin) = self.second_beam.open() {
+            self.widen(begin);
+        }
+        Ok(())
     }
 
     /// Guards the ground where a plant was due, once the beam has seen that none stands there; returns its middle.
@@ -198,6 +250,21 @@ impl Ground {
     /// What the odometer shows at a place, if it shows `position` where the beam is.
     pub fn position_of(&self, place: Place, position: Position) -> Position {
         position + self.ticks(place - self.beam)
+    }
+
+    /// Whether there is a second beam.
+    pub fn has_second_beam(&self) -> bool {
+        self.geometry.second_beam > Length::ZERO
+    }
+
+    /// Whether the second beam is broken, as far as is known.
+    pub fn second_is_broken(&self) -> bool {
+        self.second_beam.is_broken()
+    }
+
+    /// The wheel's slip in thousandths; none where nothing has told it.
+    pub fn slip_permille(&self) -> Option<i16> {
+        self.second_beam.slip().permille()
     }
 
     /// Whether the beam has been broken over more ground than a canopy covers.
@@ -254,6 +321,7 @@ impl Ground {
         self.schedule.is_closed(near, far, margin)
             || self.watch.open().is_some_and(reaches)
             || self.guard.awaited(self.watch.frontier(), &self.geometry).is_some_and(reaches)
+            || self.second_beam.open_alone().is_some_and(reaches)
     }
 
     /// The ground that the tool works on.

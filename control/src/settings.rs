@@ -78,6 +78,9 @@ settings! {
     /// X: how far the beam stands ahead of the tool.
     BeamToToolMm "beam_to_tool_mm" in "mm": 100 to 2000, 400, true,
         "X, how far the beam stands ahead of the tool";
+    /// How far a second beam stands behind the first.
+    SecondBeamMm "second_beam_mm" in "mm": 0 to 900, 0, true,
+        "how far a second beam on D10 stands behind the first; 0 for none";
     /// Ground kept free of the tool on both sides of a canopy.
     MarginMm "margin_mm" in "mm": 0 to 200, 50, true,
         "ground that the tool leaves alone on both sides of a canopy";
@@ -146,6 +149,12 @@ pub const TABLE_MARK: u16 = {
     checksum(bytes.split_at(end).0)
 };
 
+/// The second beam stands no nearer to the first: slip is measured over the way between them, to a tick or two.
+const SECOND_BEAM_LEAST_MM: u16 = 50;
+
+/// With a second beam, X is no longer: what slip makes of it has to fit into what is remembered.
+const SLIPPING_BEAM_TO_TOOL_MM: u16 = 1000;
+
 /// Settings that cannot be right together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Contradiction {
@@ -156,6 +165,8 @@ pub enum Contradiction {
     },
     /// Both pulses are the same: the tool would not move.
     PulsesEqual,
+    /// The second beam stands at the first or not ahead of the tool, or X is too long for it.
+    SecondBeamAstray,
 }
 
 impl Setting {
@@ -235,7 +246,14 @@ impl Settings {
         let notice_ms = lead_out_ms + lead_out_ms / 8 + self.get(Setting::BeamResponseMs) + 1;
         let rolled = TicksPerSecond(self.get(Setting::TopSpeedMmS).into()).distance_in_ms(notice_ms);
         let needed_mm = self.get(Setting::MarginMm) + rolled.0 as u16 + 1;
-        (self.get(Setting::BeamToToolMm) < needed_mm).then_some(Contradiction::BeamTooNear { needed_mm })
+        let beam_to_tool_mm = self.get(Setting::BeamToToolMm);
+        if beam_to_tool_mm < needed_mm {
+            return Some(Contradiction::BeamTooNear { needed_mm });
+        }
+        let second_beam_mm = self.get(Setting::SecondBeamMm);
+        let can_stand = (SECOND_BEAM_LEAST_MM..beam_to_tool_mm).contains(&second_beam_mm);
+        let is_astray = second_beam_mm > 0 && (!can_stand || beam_to_tool_mm > SLIPPING_BEAM_TO_TOOL_MM);
+        is_astray.then_some(Contradiction::SecondBeamAstray)
     }
 
     /// The ground wheel with its encoder.

@@ -22,6 +22,7 @@ use crate::{
         features::{self, Features},
         object::Object,
         schedule::ScheduleFull,
+        second_beam::Compared,
     },
     measure::{
         readings::{Edge, Readings, WakeUp},
@@ -156,7 +157,18 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     #[inline(always)]
     pub fn take_edge(&mut self, edge: Edge) {
         match edge {
-            Edge::Seen { position, broken } => self.beam_edge(position, broken),
+            Edge::Seen { position, broken, second_broken } => {
+                if let Some(alarm) = self.sensors.beam.edge(self.sensors.readings.now) {
+                    self.raise(alarm);
+                }
+                let is_of_second = self.ground.has_second_beam() && second_broken != self.ground.second_is_broken();
+                if !is_of_second || broken != self.sensors.beam_broken {
+                    self.beam_edge(position, broken);
+                }
+                if is_of_second {
+                    self.look_again(self.sensors.odometer.place(position), second_broken);
+                }
+            }
             Edge::Lost { broken } => self.beam_edges_lost(broken),
         }
     }
@@ -164,9 +176,6 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// Takes an edge of the beam, with the position at which it came.
     fn beam_edge(&mut self, position: Position, broken: bool) {
         self.sensors.beam_broken = broken;
-        if let Some(alarm) = self.sensors.beam.edge(self.sensors.readings.now) {
-            self.raise(alarm);
-        }
         if broken
             && self.is_working()
             && let Some(alarm) = self.sensors.encoder.beam_broke()
@@ -174,8 +183,30 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             self.raise(alarm);
         }
         if let Some(object) = self.ground.edge(self.sensors.odometer.place(position), broken) {
-            self.judge(object);
+            self.see(object);
         }
+    }
+
+    /// The second beam is broken or not, with the machine at a position.
+    #[inline(never)]
+    fn look_again(&mut self, position: Position, broken: bool) {
+        match self.ground.look_again(position, broken) {
+            Some(Compared::Slip) => {
+                if let Some(permille) = self.ground.slip_permille() {
+                    self.events.add(Event::Slip { permille });
+                }
+            }
+            Some(Compared::Alone(object)) => self.judge(object),
+            Some(Compared::FirstIsBlind) => self.raise(Alarm::BeamBlind),
+            Some(Compared::SecondIsBlind) => self.raise(Alarm::SecondBeamBlind),
+            None => {}
+        }
+    }
+
+    /// The first beam has seen an object in full.
+    fn see(&mut self, object: Object) {
+        self.ground.await_object(object);
+        self.judge(object);
     }
 
     /// Edges of the beam were lost: what stood there is not known, and neither is the beam's level, which is now `broken`.
@@ -199,7 +230,10 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             _ => {}
         }
         if let Some(object) = self.ground.roll_to(position) {
-            self.judge(object);
+            self.see(object);
+        }
+        if self.ground.has_second_beam() {
+            self.look_again(position, self.ground.second_is_broken());
         }
         match self.ground.guard() {
             Some(Ok(due)) => self.events.add(Event::Guarded(self.ground.position_of(due, position))),
@@ -210,6 +244,9 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         if !self.is_enough {
             if self.configuration.has_changed() {
                 self.follow_settings();
+            } else if self.ground.is_to_be_corrected() {
+                self.ground.correct(self.configuration.settings());
+                self.is_enough = true;
             } else if self.leads_are_old {
                 self.ground.lead(self.configuration.settings(), self.sensors.meter.speed());
                 (self.leads_are_old, self.is_enough) = (false, true);

@@ -366,7 +366,7 @@ fn curves_are_labels_and_values_and_nothing_else() {
 fn curves_and_status_show_how_fast_the_machine_rolls_and_the_beam_whether_it_is_broken() {
     let mut machine = machine();
     for (direction, broken) in [(1, true), (-1, false)] {
-        let edge = Edge::Seen { position: Position::new(0), broken };
+        let edge = Edge::Seen { position: Position::new(0), broken, second_broken: false };
         machine.turn(readings(0, 0), [edge]);
         for milliseconds in 1..1000 {
             machine.turn(readings(milliseconds * 1000, i32::from(direction) * milliseconds as i32), []);

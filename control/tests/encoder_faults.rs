@@ -307,7 +307,7 @@ fn roll(run: Run) -> Shown {
         };
         while let Some((edge_s, broken)) = beam.next_if(|&(edge_s, _)| edge_s <= time_s) {
             wires.roll_to(edge_s);
-            edges.push(Edge::Seen { position: Position::new(wires.count as i32), broken });
+            edges.push(Edge::Seen { position: Position::new(wires.count as i32), broken, second_broken: false });
         }
         wires.roll_to(time_s);
         let orders = weeder.turn(readings(time_s, &wires), edges.drain(..));

@@ -97,7 +97,11 @@ impl Drive {
     }
 
     fn beam(&mut self, broken: bool) {
-        self.edges.push(Edge::Seen { position: Position::new(self.place.floor() as i32), broken });
+        self.edges.push(Edge::Seen {
+            position: Position::new(self.place.floor() as i32),
+            broken,
+            second_broken: false,
+        });
     }
 
     /// A plant of 150 mm passes the beam.
@@ -689,7 +693,7 @@ fn a_test_row_that_contradicting_settings_refuse_leaves_what_stands_in_the_beam(
     let mut machine = Controller::new(ByWidth, saved(&settings), woken_up(Cause::PowerOn));
     machine.clear();
     machine.turn(readings(0, 0), []);
-    machine.turn(readings(1000, 0), [Edge::Seen { position: Position::new(0), broken: true }]);
+    machine.turn(readings(1000, 0), [Edge::Seen { position: Position::new(0), broken: true, second_broken: false }]);
     assert_eq!(machine.windows(), 1);
     assert_eq!(machine.test_row(500), Err(Refusal::Contradiction(Contradiction::PulsesEqual)));
     assert_eq!(machine.windows(), 1);
@@ -741,7 +745,7 @@ fn nothing_happens_where_time_and_place_wrap() {
             let broken = count % 1000 >= 700 && count > 1000;
             let now = place(readings(turn * TURN_US, count));
             let is_edge = count > 1000 && broken != ((count - 1) % 1000 >= 700 && count - 1 > 1000);
-            machine.turn(now, is_edge.then_some(Edge::Seen { position: now.position, broken }));
+            machine.turn(now, is_edge.then_some(Edge::Seen { position: now.position, broken, second_broken: false }));
             if machine.tool_out() != was_out {
                 was_out = !was_out;
                 swings.push((turn, was_out));

@@ -40,7 +40,7 @@ proptest! {
 
     #[test]
     fn delay_hold_and_actuation_are_within_two_units_of_the_equations(settings in machines(), width in 0_i16..4000) {
-        let geometry = Geometry::of(&settings);
+        let geometry = Geometry::of(&settings, 0);
         let unit = f64::from(geometry.grain.ticks(Length(1)).0);
         let plan = Plan::new(&geometry, Length(width));
         let scale = ticks_a_metre(&settings);
@@ -73,6 +73,6 @@ proptest! {
 #[test]
 fn the_default_machine_has_the_papers_figures() {
     // (0.4 m - 0.05 m) * 1909.86; 0.1 m * 1909.86 on top of the canopy; each within a tick.
-    let plan = Plan::new(&Geometry::of(&Settings::new()), Length(286));
+    let plan = Plan::new(&Geometry::of(&Settings::new(), 0), Length(286));
     assert_eq!((plan.delay, plan.hold, plan.actuation()), (Ticks(669), Ticks(476), Ticks(1145)));
 }

@@ -69,7 +69,7 @@ impl Rolling {
             self.time_us += TURN_US;
             let position = (self.place_mm * TICKS_A_MM).floor() as i32;
             let broken = self.seen_mm.iter().any(|&(from, to)| (from..to).contains(&self.place_mm));
-            let edge = Edge::Seen { position: Position::new(position), broken };
+            let edge = Edge::Seen { position: Position::new(position), broken, second_broken: false };
             let edges = (broken != std::mem::replace(&mut self.broken, broken)).then_some(edge);
             self.machine.turn(readings(self.time_us, position), edges);
             if !self.machine.tool_out() {

@@ -47,9 +47,9 @@ impl Rolling {
         let leading = self.leading + wheel.ticks(spacing_mm).0;
         let trailing = leading + wheel.ticks(width_mm).0;
         self.roll_to(leading);
-        self.edges.push(Edge::Seen { position: Position::new(leading), broken: true });
+        self.edges.push(Edge::Seen { position: Position::new(leading), broken: true, second_broken: false });
         self.roll_to(trailing);
-        self.edges.push(Edge::Seen { position: Position::new(trailing), broken: false });
+        self.edges.push(Edge::Seen { position: Position::new(trailing), broken: false, second_broken: false });
         self.roll_to(trailing + wheel.ticks(40).0);
         self.leading = leading;
         self.machine.objects().last().expect("the object was seen").vote.class

@@ -108,7 +108,7 @@ fn roll(distance_mm: u16, plants: &[(f64, f64)], legs: &[Leg], paper: bool) -> R
                 count += (reached - count).signum();
                 if broken_at(count) != broken {
                     broken = !broken;
-                    edges.push(Edge::Seen { position: Position::new(count), broken });
+                    edges.push(Edge::Seen { position: Position::new(count), broken, second_broken: false });
                 }
             }
             farthest = farthest.max(count);

@@ -189,7 +189,7 @@ fn the_tool_swings_as_for_a_row_whatever_the_sensors_say() {
     for now in 100..10_000 {
         // Nothing is wired: the beam flickers faster than anybody can count, and the encoder's contacts pick up hum.
         let broken = now % 2 == 0;
-        let seen = Edge::Seen { position: Position::new(77), broken };
+        let seen = Edge::Seen { position: Position::new(77), broken, second_broken: false };
         let lost = (now % 5 == 0).then_some(Edge::Lost { broken });
         machine.turn(Readings { jumps: now as u16, ..readings(now * 1000, 77) }, [seen].into_iter().chain(lost));
         assert_eq!(machine.state(), State::Hold);
@@ -212,8 +212,11 @@ fn a_row_that_is_played_leaves_what_is_known_of_the_ground_alone() {
         let mut milliseconds = 0;
         for count in 0..2000 {
             milliseconds += 1;
-            let edge = matches!(count, 1000 | 1300 | 1900)
-                .then(|| Edge::Seen { position: Position::new(count), broken: count != 1300 });
+            let edge = matches!(count, 1000 | 1300 | 1900).then(|| Edge::Seen {
+                position: Position::new(count),
+                broken: count != 1300,
+                second_broken: false,
+            });
             machine.turn(readings(milliseconds * 1000, count), edge);
         }
         if played {
@@ -226,7 +229,11 @@ fn a_row_that_is_played_leaves_what_is_known_of_the_ground_alone() {
         let mut tool = Vec::new();
         for count in 2000..4500 {
             milliseconds += 1;
-            let edge = (count == 2200).then(|| Edge::Seen { position: Position::new(count), broken: false });
+            let edge = (count == 2200).then(|| Edge::Seen {
+                position: Position::new(count),
+                broken: false,
+                second_broken: false,
+            });
             machine.turn(readings((milliseconds + 9000) * 1000, count), edge);
             tool.push(machine.tool_out());
         }
@@ -263,8 +270,11 @@ fn whatever_comes_in_the_turn_in_which_a_row_ends_the_next_real_plant_keeps_the_
             for count in 0..3000 {
                 milliseconds += 1;
                 let plant = (1000..1300).contains(&count);
-                let edge =
-                    matches!(count, 1000 | 1300).then(|| Edge::Seen { position: Position::new(count), broken: plant });
+                let edge = matches!(count, 1000 | 1300).then(|| Edge::Seen {
+                    position: Position::new(count),
+                    broken: plant,
+                    second_broken: false,
+                });
                 machine.turn(readings(milliseconds * 1000, count), edge);
                 let window = (1010..2150).contains(&count);
                 assert!(!window || machine.windows() == 1, "command {number}, {count}");

@@ -1,8 +1,9 @@
 //! Where the tool may be in the row: the machine's distances, and the stretch of ground that its servo needs to be open.
 
+use super::second_beam::Slip;
 use crate::{
     settings::{Setting, Settings},
-    units::{Grain, Length, TicksPerSecond, Wheel},
+    units::{Grain, Length, Ticks, TicksPerSecond, Wheel},
 };
 
 /// How far the machine may be rolled back with the ground still remembered, in metres. Together with twice the longest X and
@@ -18,6 +19,8 @@ pub struct Geometry {
     pub grain: Grain,
     /// X.
     pub beam_to_tool: Length,
+    /// From the first beam back to the second; zero where there is none.
+    pub second_beam: Length,
     /// Ground left alone on both sides of a canopy.
     pub margin: Length,
     /// What no canopy is wider than.
@@ -38,6 +41,7 @@ impl Geometry {
         wheel: Wheel::NONE,
         grain: Grain::TICK,
         beam_to_tool: Length::ZERO,
+        second_beam: Length::ZERO,
         margin: Length::ZERO,
         max_width: Length::ZERO,
         merge_gap: Length::ZERO,
@@ -46,24 +50,29 @@ impl Geometry {
         memory: Length::ZERO,
     };
 
-    /// Those of the settings.
-    pub fn of(settings: &Settings) -> Self {
+    /// Those of the settings, where the wheel turns by so many 256ths of its way more than the ground that is rolled over.
+    pub fn of(settings: &Settings, excess: i8) -> Self {
         let wheel = settings.wheel();
         let metre = wheel.ticks(1000);
         let grain = Grain::of(metre);
-        let length = |setting| grain.length(wheel.ticks(settings.get(setting)));
+        let length = |setting| {
+            let ticks = wheel.ticks(settings.get(setting)).0;
+            grain.length(Ticks(ticks * i32::from(Slip::WHOLE + i16::from(excess)) >> 8))
+        };
         // Each length takes time, which those that are off need not.
+        let or_off = |is_on, setting| if is_on { length(setting) } else { Length::ZERO };
         let is_guarded = settings.get(Setting::GuardSpacingMm) > 0;
-        let guarded = |setting| if is_guarded { length(setting) } else { Length::ZERO };
+        let has_second_beam = settings.get(Setting::SecondBeamMm) > 0;
         Self {
             wheel,
             grain,
             beam_to_tool: length(Setting::BeamToToolMm),
+            second_beam: or_off(has_second_beam, Setting::SecondBeamMm),
             margin: length(Setting::MarginMm),
             max_width: length(Setting::MaxWidthMm),
             merge_gap: length(Setting::MergeGapMm),
-            guard_spacing: guarded(Setting::GuardSpacingMm),
-            guard_scatter: guarded(Setting::GuardScatterMm),
+            guard_spacing: or_off(is_guarded, Setting::GuardSpacingMm),
+            guard_scatter: or_off(is_guarded, Setting::GuardScatterMm),
             memory: Length(grain.length(metre).0 * MEMORY_M),
         }
     }
@@ -173,7 +182,7 @@ mod tests {
             {
                 settings.set(setting, value).expect("within its range");
             }
-            let Geometry { grain, beam_to_tool, max_width, memory, .. } = Geometry::of(&settings);
+            let Geometry { grain, beam_to_tool, max_width, memory, .. } = Geometry::of(&settings, 0);
             let farthest = i32::from(memory.0) + 2 * i32::from(beam_to_tool.0) + i32::from(max_width.0);
             assert!(farthest < i16::MAX.into(), "{ticks_per_m} a metre: {farthest}");
             let error = grain.ticks(beam_to_tool).0 - 2 * i32::from(ticks_per_m);

@@ -87,6 +87,23 @@ impl Schedule {
         self.canopies.push(canopy).map_err(|_| ScheduleFull)
     }
 
+    /// A canopy that reaches to within a distance of a place goes as far as the place.
+    #[inline(never)]
+    pub fn widen(&mut self, place: Place, within: Length) {
+        for canopy in &mut self.canopies {
+            let (before, behind) = (canopy.leading - place, place - canopy.trailing);
+            if before > within || behind > within {
+                continue;
+            }
+            if before > Length::ZERO {
+                canopy.leading = place;
+            }
+            if behind > Length::ZERO {
+                canopy.trailing = place;
+            }
+        }
+    }
+
     /// Forgets what ends at a place or behind it: the machine has left it behind.
     pub fn leave(&mut self, place: Place) {
         if !place.is_ahead_of(self.known_from) {

@@ -32,12 +32,14 @@ impl Readings {
 /// What came from the beam since the last turn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Edge {
-    /// The beam broke or cleared.
+    /// The beam broke or cleared, or the second one did.
     Seen {
         /// What the encoder showed when it came.
         position: Position,
         /// Whether the beam is broken from here on.
         broken: bool,
+        /// Whether the second beam is; nobody looks at it where there is none.
+        second_broken: bool,
     },
     /// Edges found no room to wait in: what stood there is not known, and neither is the beam's level until then.
     Lost {

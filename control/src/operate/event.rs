@@ -27,6 +27,11 @@ pub enum Event {
     },
     /// A plant was due here, none was seen, and the ground is kept free all the same.
     Guarded(Position),
+    /// A plant has passed both beams, and this is the slip by the last of them, in thousandths.
+    Slip {
+        /// Above 0 where the wheel turns farther than the machine rolls.
+        permille: i16,
+    },
     /// The tool was told to leave the row or to come back.
     Swing {
         /// Out of the row, or back into it.

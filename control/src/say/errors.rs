@@ -41,6 +41,7 @@ pub(super) fn write_refusal(refusal: Refusal, setting: Option<Setting>, line: &m
         (Refusal::NotInHold, _) => texts::HOLD_FIRST,
         (Refusal::AlarmLatched, _) => texts::ALARM_LATCHED,
         (Refusal::Contradiction(Contradiction::PulsesEqual), _) => texts::PULSES_EQUAL,
+        (Refusal::Contradiction(Contradiction::SecondBeamAstray), _) => texts::SECOND_BEAM_ASTRAY,
         (Refusal::Contradiction(Contradiction::BeamTooNear { needed_mm }), _) => {
             line.counted(needed_mm);
             texts::BEAM_TOO_NEAR

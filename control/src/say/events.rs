@@ -28,6 +28,10 @@ pub fn write_event(event: &Event, line: &mut Line) {
             line.say(texts::POS);
             line.number(place.count());
         }
+        Event::Slip { permille } => {
+            line.say(texts::SLIP);
+            line.number(permille.into());
+        }
         Event::Swing { out, position } => {
             line.say(texts::SWING);
             line.say(place_name(out));

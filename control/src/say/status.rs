@@ -34,6 +34,16 @@ pub(super) fn write_status<C: Classifier, M: Memory>(controller: &Controller<C, 
     line.number(controller.speed_mm_s().into());
     line.counted(controller.windows().into());
     line.number(controller.unseen_mm().into());
+    if controller.has_second_beam() {
+        line.say(texts::SLIP_IS);
+        match controller.slip_permille() {
+            Some(permille) => {
+                line.say(texts::NUMBER);
+                line.number(permille.into());
+            }
+            None => line.say(texts::NONE),
+        }
+    }
 }
 
 pub(super) fn write_counts<C: Classifier, M: Memory>(controller: &Controller<C, M>, line: &mut Line) {

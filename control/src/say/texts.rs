@@ -71,6 +71,9 @@ said! {
     PLACE = " pos=# speed_mm_s=# windows=# unseen_mm=#";
     COUNTS = "lost=# jumps=# late=# missed=# mistakes=# dust=# stack_free=# reset=";
     WARNING_IS = " warning=";
+    SLIP_IS = " slip_permille=";
+    NONE = "none";
+    SLIP = "slip permille=#";
     OBJECT = " pos=# votes=# spacing=# delay=# hold=# actuation=#";
     GUARDED = "guarded";
     SWING = "swing tool=";
@@ -106,6 +109,7 @@ said! {
     HOLD_TO_SET = " changes where the tool is, hold first";
     HOLD_FIRST = "the machine is at work, hold first";
     PULSES_EQUAL = "servo_in_us and servo_out_us would be equal, and the tool would not move";
+    SECOND_BEAM_ASTRAY = "second_beam_mm is to be 0, or from 50 to less than beam_to_tool_mm, and that 1000 at most";
     BEAM_TOO_NEAR = "margin, leads and top speed would need beam_to_tool_mm # or more, change one of them first";
     NOTHING_TO_LABEL = "there is no object without a label, let the beam see one first";
     NOTHING_SAVED = "no settings are saved, save does it";

@@ -87,6 +87,8 @@ words! {
         BeamBlocked = "beam_blocked",
         BeamFlickers = "beam_flickers",
         BeamEdgesLost = "beam_edges_lost",
+        BeamBlind = "beam_blind",
+        SecondBeamBlind = "second_beam_blind",
         EncoderSilent = "encoder_silent",
         EncoderChannelDead = "encoder_channel_dead",
         EncoderJumps = "encoder_jumps",

@@ -87,6 +87,9 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     #[inline(never)]
     pub(super) fn follow_settings(&mut self) {
         self.configuration.follow();
+        if !self.is_working() {
+            self.ground.forget_slip();
+        }
         let settings = self.configuration.settings();
         self.ground.follow(settings, self.sensors.readings.position, self.sensors.meter.speed());
         self.limits = Limits::of(settings, self.ground.wheel());

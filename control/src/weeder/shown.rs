@@ -60,6 +60,16 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         self.ground.millimetres(self.ground.unseen())
     }
 
+    /// Whether there is a second beam.
+    pub fn has_second_beam(&self) -> bool {
+        self.ground.has_second_beam()
+    }
+
+    /// The wheel's slip in thousandths, above 0 where it turns farther than the machine rolls; none where nothing has told it.
+    pub fn slip_permille(&self) -> Option<i16> {
+        self.ground.slip_permille()
+    }
+
     /// Whether the encoder fell silent from one moment to the next, so that nobody knows how far the machine has rolled since.
     pub fn encoder_is_silent(&self) -> bool {
         self.sensors.encoder.is_silent()

@@ -158,7 +158,11 @@ impl Machine for Decisions {
     }
 
     fn beam_edge(&mut self, world: &World) {
-        self.weeder.take_edge(Edge::Seen { position: Position::new(world.count as i32), broken: world.broken });
+        self.weeder.take_edge(Edge::Seen {
+            position: Position::new(world.count as i32),
+            broken: world.broken,
+            second_broken: false,
+        });
     }
 
     fn lose_edges(&mut self, world: &World) -> Checked {

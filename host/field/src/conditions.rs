@@ -155,7 +155,7 @@ impl Conditions {
 
     /// The machine, whose servo and encoder are the `seed`'s of all the possible ones.
     pub fn machine(&self, seed: u64) -> Machine {
-        let Mechanism { beam_to_tool_mm, arm_mm, tool_width_mm, .. } = self.machine;
+        let Mechanism { beam_to_tool_mm, second_beam_mm, arm_mm, tool_width_mm, .. } = self.machine;
         let Mechanism { dead_time_ms, dead_time_scatter_ms, travel_ms, load_kg_cm, stall_kg_cm, .. } = self.machine;
         let scatter = Scatter { dead_time_ms: dead_time_scatter_ms, load: load_kg_cm / stall_kg_cm, seed };
         // The stroke is what the firmware is told of it.
@@ -164,6 +164,7 @@ impl Conditions {
         let out_us = self.setting_or(Setting::ServoOutUs, default.out_us);
         Machine {
             beam_to_tool_mm,
+            second_beam_mm,
             arm_mm,
             tool_width_mm,
             servo: Servo { in_us, out_us, dead_time_ms, travel_ms, scatter },

@@ -18,7 +18,7 @@ use crate::sight::half_covered;
 use crate::wiring;
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
-use signal::{CYCLES_PER_SECOND, PinChange};
+use signal::{CYCLES_PER_SECOND, Pin, PinChange};
 use std::f64::consts::PI;
 use std::ops::Range;
 
@@ -31,6 +31,8 @@ pub struct Machine {
     pub ticks_per_rev: u32,
     /// Distance from the beam back to the tool: the paper's X.
     pub beam_to_tool_mm: f64,
+    /// Distance from the beam back to a second one; 0 where there is none.
+    pub second_beam_mm: f64,
     /// Time after which the beam's sensor reports a change. A change that lasts less is not reported.
     pub beam_response_ms: f64,
     /// Diameter of the beam: its sensor reports it broken while more than half of it is. 0 is a line.
@@ -75,6 +77,7 @@ impl Default for Machine {
             wheel_mm: 400.0,
             ticks_per_rev: 2400,
             beam_to_tool_mm: 400.0,
+            second_beam_mm: 0.0,
             beam_response_ms: 1.0,
             beam_mm: 0.0,
             servo: Servo::default(),
@@ -156,8 +159,24 @@ impl Machine {
 
     /// The beam's level at power-up, before the motion begins.
     pub fn beam_before(&self, row: &Row, motion: &Motion) -> PinChange {
-        let broken = self.seen_mm(row).iter().any(|block| block.contains(&motion.start_mm()));
-        PinChange { cycle: 0, pin: wiring::BEAM, high: !broken }
+        self.level_before(wiring::BEAM, 0.0, row, motion)
+    }
+
+    /// As [`beam_before`](Self::beam_before), of the second beam, where there is one.
+    pub fn second_beam_before(&self, row: &Row, motion: &Motion) -> Option<PinChange> {
+        self.has_second_beam().then(|| self.level_before(wiring::SECOND_BEAM, self.second_beam_mm, row, motion))
+    }
+
+    /// The level of a beam that stands so far behind the first.
+    fn level_before(&self, pin: Pin, behind_mm: f64, row: &Row, motion: &Motion) -> PinChange {
+        let ground_mm = motion.start_mm() - behind_mm;
+        let broken = self.seen_mm(row).iter().any(|block| block.contains(&ground_mm));
+        PinChange { cycle: 0, pin, high: !broken }
+    }
+
+    /// Whether there is a second beam.
+    pub fn has_second_beam(&self) -> bool {
+        self.second_beam_mm > 0.0
     }
 
     /// The stretches over which the sensor has the beam broken.
@@ -171,6 +190,7 @@ impl Machine {
     pub fn pin_changes(&self, row: &Row, motion: &Motion, start_cycle: u64) -> Vec<PinChange> {
         let mut changes = self.encoder_changes(motion, start_cycle);
         changes.extend(self.beam_changes(row, motion, start_cycle));
+        changes.extend(self.second_beam_changes(row, motion, start_cycle));
         changes.sort_by_key(|change| change.cycle);
         changes
     }
@@ -196,6 +216,24 @@ impl Machine {
 
     /// The beam's line, low while the beam is broken, later than the leaves by the sensor's response.
     pub fn beam_changes(&self, row: &Row, motion: &Motion, start_cycle: u64) -> Vec<PinChange> {
+        self.changes(self.beam_before(row, motion), 0.0, row, motion, start_cycle)
+    }
+
+    /// As [`beam_changes`](Self::beam_changes), of the second beam; none where there is none.
+    pub fn second_beam_changes(&self, row: &Row, motion: &Motion, start_cycle: u64) -> Vec<PinChange> {
+        let before = self.second_beam_before(row, motion);
+        before.map_or_else(Vec::new, |before| self.changes(before, self.second_beam_mm, row, motion, start_cycle))
+    }
+
+    /// What a beam that stands so far behind the first does to its pin, which was at a level before.
+    fn changes(
+        &self,
+        before: PinChange,
+        behind_mm: f64,
+        row: &Row,
+        motion: &Motion,
+        start_cycle: u64,
+    ) -> Vec<PinChange> {
         let response_s = self.beam_response_ms / 1000.0;
 
         // Each end of a leaf that is passed toggles the beam, in whatever direction.
@@ -203,7 +241,7 @@ impl Machine {
             .seen_mm(row)
             .into_iter()
             .flat_map(|block| [block.start, block.end])
-            .flat_map(|end_mm| motion.passings(end_mm))
+            .flat_map(|end_mm| motion.passings(end_mm + behind_mm))
             .map(|passing| passing.time_s)
             .collect();
         toggles_s.sort_by(f64::total_cmp);
@@ -218,14 +256,13 @@ impl Machine {
             }
         }
 
-        let high_before = self.beam_before(row, motion).high;
         reported_s
             .into_iter()
             .enumerate()
             .map(|(index, time_s)| PinChange {
                 cycle: cycle_at(start_cycle, time_s + response_s),
-                pin: wiring::BEAM,
-                high: high_before == (index % 2 == 1),
+                pin: before.pin,
+                high: before.high == (index % 2 == 1),
             })
             .collect()
     }
@@ -340,6 +377,21 @@ mod tests {
             let time_s = time_at_s(START_CYCLE, change.cycle) - 0.001;
             assert!((motion.position_mm(time_s) - place_mm).abs() < 0.001, "{place_mm} mm");
         }
+    }
+
+    #[test]
+    fn the_second_beam_sees_what_the_first_saw_as_far_behind_it_as_it_stands() {
+        let machine = Machine { second_beam_mm: 220.0, ..Machine::default() };
+        let motion = Motion::steady(0.0, 1000.0, mm_s(2.0), 1300.0).with_slip(|| 0.2);
+        let second = machine.second_beam_changes(&row(), &motion, START_CYCLE);
+        assert_eq!(machine.second_beam_before(&row(), &motion).map(|before| before.high), Some(true));
+        for (change, place_mm) in second.iter().zip([425.0, 575.0, 792.5, 807.5]) {
+            let time_s = time_at_s(START_CYCLE, change.cycle) - 0.001;
+            assert!((motion.position_mm(time_s) - 220.0 - place_mm).abs() < 0.001, "{place_mm} mm");
+            assert_eq!(change.pin, wiring::SECOND_BEAM);
+        }
+        assert_eq!(second.len(), 4);
+        assert!(Machine::default().second_beam_changes(&row(), &motion, START_CYCLE).is_empty());
     }
 
     #[test]

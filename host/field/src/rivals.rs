@@ -50,8 +50,8 @@ pub fn as_in_the_paper(trial: &Trial) -> Vec<Pulse> {
     let mut canopy: Option<Range<i64>> = None;
     let mut slot: Option<Range<i64>> = None;
     swing(trial, servo, PAPER_TURN_S, 0, |time_s| {
-        while let Some((_, is_broken)) = sensors.next_edge(time_s) {
-            broken = is_broken;
+        while let Some((_, levels)) = sensors.next_edge(time_s) {
+            broken = levels.broken;
         }
         let position = sensors.position(time_s);
         match &mut canopy {

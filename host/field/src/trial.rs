@@ -81,7 +81,7 @@ impl Trial {
 
     /// The settings that the firmware gets, in an order in which machine and timing do not contradict each other on the way.
     pub fn firmware_settings(&self) -> Vec<(Setting, u16)> {
-        let Machine { wheel_mm, ticks_per_rev, beam_to_tool_mm, servo, .. } = self.machine;
+        let Machine { wheel_mm, ticks_per_rev, beam_to_tool_mm, second_beam_mm, servo, .. } = self.machine;
         let Timing { margin_mm, lead_out_ms, lead_in_ms } = self.timing;
         let notice_mm = beam_to_tool_mm - f64::from(margin_mm) - 2.0;
         // As the firmware counts: the lead, an eighth of it, and what the sensor may take.
@@ -93,6 +93,7 @@ impl Trial {
             (Setting::TicksPerRev, ticks_per_rev as u16),
             (Setting::WheelMm, wheel_mm.round() as u16),
             (Setting::BeamToToolMm, beam_to_tool_mm.round() as u16),
+            (Setting::SecondBeamMm, second_beam_mm.round() as u16),
             (Setting::MarginMm, margin_mm as u16),
             (Setting::LeadOutMs, lead_out_ms as u16),
             (Setting::LeadInMs, lead_in_ms as u16),

@@ -10,6 +10,7 @@
 use crate::machine::{Machine, time_at_s};
 use crate::motion::{Course, marks};
 use crate::trial::{Start, Trial};
+use crate::wiring;
 use control::ground::class::label;
 use control::ground::examples::EXAMPLES;
 use control::ground::features;
@@ -110,9 +111,11 @@ pub struct Sensors<'a> {
     course: Course<'a>,
     start_mm: f64,
     tick_mm: f64,
-    /// The beam's edges to come, and when the next one does.
+    /// The beams' edges to come, and when the next one does.
     edges: std::vec::IntoIter<PinChange>,
-    next: Option<(f64, bool)>,
+    next: Option<(f64, Levels)>,
+    /// Which of the beams are broken behind the last edge that was asked for.
+    levels: Levels,
     /// The pulse in which a clean encoder is, whether dirt hides it, and the counts that it has hidden before.
     pulse: i64,
     is_hidden: bool,
@@ -123,14 +126,22 @@ impl<'a> Sensors<'a> {
     /// Those of a trial, whose motion begins at time 0.
     pub fn new(trial: &'a Trial) -> Self {
         let Trial { machine, motion, row, .. } = trial;
-        let mut edges = machine.beam_changes(row, motion, 0).into_iter();
+        let mut edges = machine.beam_changes(row, motion, 0);
+        edges.extend(machine.second_beam_changes(row, motion, 0));
+        edges.sort_by_key(|edge| edge.cycle);
+        let levels = Levels {
+            broken: !machine.beam_before(row, motion).high,
+            second_broken: machine.second_beam_before(row, motion).is_some_and(|before| !before.high),
+        };
+        let mut edges = edges.into_iter();
         Self {
             machine,
             course: Course::along(motion),
             start_mm: motion.start_mm(),
             tick_mm: machine.tick_mm(),
-            next: edges.next().map(edge_of),
+            next: edges.next().map(|edge| levels.behind(edge)),
             edges,
+            levels,
             pulse: 0,
             is_hidden: machine.dirt.hides(0),
             hidden_ticks: 0,
@@ -155,17 +166,32 @@ impl<'a> Sensors<'a> {
         ticks - self.hidden_ticks - in_pulse
     }
 
-    /// The next edge of the beam before a time: when it comes, and whether the beam is broken from then on.
-    pub fn next_edge(&mut self, before_s: f64) -> Option<(f64, bool)> {
+    /// The next edge of a beam before a time: when it comes, and which of them are broken from then on.
+    pub fn next_edge(&mut self, before_s: f64) -> Option<(f64, Levels)> {
         let edge = self.next.filter(|&(edge_s, _)| edge_s <= before_s)?;
-        self.next = self.edges.next().map(edge_of);
+        self.levels = edge.1;
+        self.next = self.edges.next().map(|edge| self.levels.behind(edge));
         Some(edge)
     }
 }
 
-/// When an edge of the beam comes, and whether the beam is broken from then on.
-fn edge_of(edge: PinChange) -> (f64, bool) {
-    (time_at_s(0, edge.cycle), !edge.high)
+/// Which of the beams are broken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Levels {
+    /// The first.
+    pub broken: bool,
+    /// The second; no, where there is none.
+    pub second_broken: bool,
+}
+
+impl Levels {
+    /// When an edge comes, and which beams are broken from then on.
+    fn behind(self, edge: PinChange) -> (f64, Self) {
+        let broken = !edge.high;
+        let levels =
+            if edge.pin == wiring::BEAM { Self { broken, ..self } } else { Self { second_broken: broken, ..self } };
+        (time_at_s(0, edge.cycle), levels)
+    }
 }
 
 /// Has the decisions weed the trial's row. The motion begins at time and cycle 0.
@@ -195,8 +221,9 @@ pub fn weed(trial: &Trial) -> Result<Weeded, Refused> {
     for turn in 0..=turns {
         let time_s = turn as f64 * TURN_S;
         let mut edges = Vec::new();
-        while let Some((edge_s, broken)) = sensors.next_edge(time_s) {
-            edges.push(Edge::Seen { position: Position::new(sensors.position(edge_s) as i32), broken });
+        while let Some((edge_s, Levels { broken, second_broken })) = sensors.next_edge(time_s) {
+            let position = Position::new(sensors.position(edge_s) as i32);
+            edges.push(Edge::Seen { position, broken, second_broken });
         }
         let position = Position::new(sensors.position(time_s) as i32);
         let orders = weeder.turn(Readings::new(instant(turn), position), edges);

@@ -22,6 +22,9 @@ pub const END_SWITCH: Pin = Pin::D5;
 /// Beam, low = broken.
 pub const BEAM: Pin = Pin::D8;
 
+/// Optional second beam, low = broken.
+pub const SECOND_BEAM: Pin = Pin::D10;
+
 /// Servo signal, an output.
 pub const SERVO: Pin = Pin::D9;
 
@@ -30,13 +33,14 @@ pub const LED: Pin = Pin::D13;
 
 /// What is wired to the pins, in the order of the board's numbering. At rest the wheel is at a step where both channels are low, the
 /// beam is clear, the switches are open on their pull-ups, and the outputs are not driven yet.
-pub const WIRES: [Wire; 7] = [
+pub const WIRES: [Wire; 8] = [
     Wire { pin: ENCODER_A, name: "encoder_a", high_at_rest: false },
     Wire { pin: ENCODER_B, name: "encoder_b", high_at_rest: false },
     Wire { pin: WORK_SWITCH, name: "work_switch", high_at_rest: true },
     Wire { pin: END_SWITCH, name: "end_switch", high_at_rest: true },
     Wire { pin: BEAM, name: "beam", high_at_rest: true },
     Wire { pin: SERVO, name: "servo", high_at_rest: false },
+    Wire { pin: SECOND_BEAM, name: "second_beam", high_at_rest: true },
     Wire { pin: LED, name: "led", high_at_rest: false },
 ];
 
@@ -95,7 +99,7 @@ impl PullUp {
 }
 
 /// Every connection of a contact that carries a signal, in the order of the board's numbering.
-pub const CONNECTIONS: [Connection; 8] = [
+pub const CONNECTIONS: [Connection; 9] = [
     Connection {
         contact: Contact::Pin(ENCODER_A),
         goes_to: "encoder A",
@@ -131,6 +135,12 @@ pub const CONNECTIONS: [Connection; 8] = [
         goes_to: "servo's signal",
         pull_up: PullUp::None,
         note: "1500 us = 0 degrees, tool in the row; 2000 us = 45 degrees, out",
+    },
+    Connection {
+        contact: Contact::Pin(SECOND_BEAM),
+        goes_to: "second beam's output, optional",
+        pull_up: PullUp::External,
+        note: "low = broken; `set second_beam_mm` has it watched",
     },
     Connection {
         contact: Contact::Pin(LED),
@@ -171,6 +181,6 @@ mod tests {
     #[test]
     fn contacts_are_called_as_on_the_board() {
         let labels: Vec<String> = CONNECTIONS.iter().map(|connection| connection.contact.label()).collect();
-        assert_eq!(labels, ["D2", "D3", "D4", "D5", "D8", "D9", "D13", "D0, D1"]);
+        assert_eq!(labels, ["D2", "D3", "D4", "D5", "D8", "D9", "D10", "D13", "D0, D1"]);
     }
 }

@@ -8,6 +8,8 @@ pub fn alarm(alarm: Alarm) -> &'static str {
         Alarm::BeamBlocked => "clear the beam, align it, or raise `max_width_mm`",
         Alarm::BeamFlickers => "clean the beam's lenses, see to its plug and wires",
         Alarm::BeamEdgesLost => "see to the beam's wires and supply: its signal chatters",
+        Alarm::BeamBlind => "see to the first beam's wire at D8, its lens and aim",
+        Alarm::SecondBeamBlind => "see to the second beam's wire at D10, its lens and aim",
         Alarm::EncoderSilent => "see to the encoder's coupling; hold when you stop in wind",
         Alarm::EncoderChannelDead => "see to the wires at D2 and D3 and their pull-ups",
         Alarm::EncoderJumps => "see to the encoder's screen, ground and pull-ups",

@@ -38,6 +38,11 @@ pub enum EventLine {
         /// The middle of it, in ticks.
         position: i32,
     },
+    /// A plant has passed both beams.
+    Slip {
+        /// The slip by the last of them in thousandths, above 0 where the wheel turns farther than the machine rolls.
+        permille: i32,
+    },
     /// The machine went from one state to another.
     State(Mode),
     /// A fault was latched.
@@ -167,6 +172,7 @@ impl EventLine {
             "unknown" => object(Class::Unknown),
             "swing" => Some(Self::Swing { out: values.out()?, position: values.number("pos")? }),
             "guarded" => Some(Self::Guarded { position: values.number("pos")? }),
+            "slip" => Some(Self::Slip { permille: values.number("permille")? }),
             "state" => Some(Self::State(Mode::find(values.text("is")?)?)),
             "alarm" => Some(Self::Alarm {
                 alarm: Alarm::find(values.text("name")?.as_bytes())?,

@@ -72,6 +72,11 @@ pub fn explain(contradiction: Contradiction) -> String {
         Contradiction::PulsesEqual => {
             "servo_in_us and servo_out_us are equal, and the tool would not move: let them differ".to_owned()
         }
+        Contradiction::SecondBeamAstray => {
+            "a second beam stands 50 mm or more behind the first and ahead of the tool, and beam_to_tool_mm is then 1000 at most: \
+             change second_beam_mm or beam_to_tool_mm"
+                .to_owned()
+        }
         Contradiction::BeamTooNear { needed_mm } => format!(
             "margin_mm, lead_out_ms, beam_response_ms and top_speed_mm_s together need a beam_to_tool_mm of {needed_mm} or \
              more: raise it, or lower one of them"

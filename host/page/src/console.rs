@@ -39,6 +39,7 @@ fn read_event(event: &EventLine, line: &str) -> Value {
             },
         }),
         EventLine::Swing { out, .. } => json!({ "is": "swing", "out": out }),
+        EventLine::Slip { permille } => json!({ "is": "slip", "permille": permille }),
         EventLine::Guarded { .. } => json!({ "is": "guarded" }),
         EventLine::State(mode) => json!({ "is": "state", "mode": mode.name() }),
         EventLine::Alarm { .. } => json!({ "is": "alarm", "name": Values(line).text("name") }),

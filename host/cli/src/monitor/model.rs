@@ -138,6 +138,7 @@ impl Model {
             EventLine::Plot => return,
             EventLine::Swing { .. }
             | EventLine::Guarded { .. }
+            | EventLine::Slip { .. }
             | EventLine::State(_)
             | EventLine::Calibrated { .. } => {}
         }

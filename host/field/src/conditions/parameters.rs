@@ -123,6 +123,7 @@ parameters! {
     /// The machine.
     machine: Mechanism {
         beam_to_tool_mm: f64 = 400.0, 100 to 2000, "X, from the beam back to the tool", "assumed: the paper does not say it";
+        second_beam_mm: f64 = 0.0, 0 to 900, "from the beam back to a second one; 0 for none", "none: the paper's machine has one";
         arm_mm: f64 = 350.0, 100 to 1000, "length of the arm that swings the tool aside", "the paper's Table 1";
         tool_width_mm: f64 = 55.0, 10 to 200, "width of the tool in the row", "the paper's Table 1";
         sweeps_a_side: u32 = 2, 0 to 6, "sweeps between the rows, on each side of the row", "the paper's Eq. 7";

@@ -155,6 +155,7 @@ fn describe(heard: Option<&Heard>) -> String {
             format!("`alarm name={name} pos={position}`")
         }
         EventLine::Guarded { .. }
+        | EventLine::Slip { .. }
         | EventLine::State(_)
         | EventLine::Warning(_)
         | EventLine::Calibrated { .. }

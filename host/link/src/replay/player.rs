@@ -193,7 +193,11 @@ impl<'a> Player<'a> {
         let response = self.speed().distance_in_ms(self.controller.settings().get(Setting::BeamResponseMs));
         let ground = (Position::new(self.position) - response).count();
         let broken = is_in(&self.canopies, ground);
-        let edge = (broken != self.broken).then_some(Edge::Seen { position: Position::new(self.position), broken });
+        let edge = (broken != self.broken).then_some(Edge::Seen {
+            position: Position::new(self.position),
+            broken,
+            second_broken: false,
+        });
         self.broken = broken;
         // The edge may end the object before, which is judged by the time that another edge is asked for.
         let canopy = edge.and_then(|_| self.canopies.iter().find(|canopy| canopy.is_over(ground)));
@@ -227,7 +231,11 @@ impl<'a> Player<'a> {
                 Event::Alarm { .. } if std::mem::take(&mut self.swallows_alarm) => continue,
                 Event::Alarm { alarm, position } => EventLine::Alarm { alarm, position: position.count() },
                 // They rest on time, which the log has only roughly; or follow from the others.
-                Event::State(_) | Event::Warning(_) | Event::Calibrated { .. } | Event::Guarded(_) => continue,
+                Event::State(_)
+                | Event::Warning(_)
+                | Event::Calibrated { .. }
+                | Event::Guarded(_)
+                | Event::Slip { .. } => continue,
             };
             self.heard.push(Heard { line: 0, event, speed, is_given: false });
         }

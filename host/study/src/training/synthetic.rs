@@ -289,7 +289,9 @@ fn roll_past(row: &Row, headland_mm: f64, speed_mm_s: f64, slip: f64) -> Result<
             next_loop += LOOP_CYCLES;
         }
         match change.pin {
-            wiring::BEAM => edges.push(Edge::Seen { position: wheel.position, broken: !change.high }),
+            wiring::BEAM => {
+                edges.push(Edge::Seen { position: wheel.position, broken: !change.high, second_broken: false })
+            }
             _ => wheel.turn(change),
         }
     }

@@ -335,7 +335,7 @@ impl Field {
 
     fn edge(&mut self, broken: bool) {
         self.broken = broken;
-        self.edges.push(Edge::Seen { position: Position::new(self.count as i32), broken });
+        self.edges.push(Edge::Seen { position: Position::new(self.count as i32), broken, second_broken: false });
     }
 
     /// Takes what the machine tells.
