@@ -127,7 +127,7 @@ impl Ground {
         let Geometry { grain, second_beam: apart, merge_gap, .. } = self.geometry;
         let place = grain.place(position) - self.leads.response - apart;
         if broken != self.second_beam.is_broken() {
-            self.widen(place);
+            self.schedule.widen(place, Length(apart.0 >> 2));
         }
         self.second_beam.look(place, broken, apart, merge_gap, self.watch.open())
     }
@@ -135,11 +135,6 @@ impl Ground {
     /// The first beam has seen an object, which is to come to the second, if there is one.
     pub fn await_object(&mut self, object: Object) {
         self.second_beam.await_object(object);
-    }
-
-    /// What the second beam has an edge of is no smaller than that.
-    fn widen(&mut self, place: Place) {
-        self.schedule.widen(place, Length(self.geometry.second_beam.0 >> 2));
     }
 
     /// The machine has rolled to a position; returns the object that this completes.
@@ -201,12 +196,7 @@ impl Ground {
     pub fn keep(&mut self, plant: Object) -> Result<(), ScheduleFull> {
         self.last_plant = plant.leading;
         self.guard.see(&plant, &self.geometry);
-        self.schedule.push(plant, self.tool(), self.geometry.margin)?;
-        // The second beam may be at it already.
-        if let Some(begin) = self.second_beam.open() {
-            self.widen(begin);
-        }
-        Ok(())
+        self.schedule.push(plant, self.tool(), self.geometry.margin)
     }
 
     /// Guards the ground where a plant was due, once the beam has seen that none stands there; returns its middle.

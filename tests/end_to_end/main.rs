@@ -27,6 +27,7 @@ mod proved_bounds;
 mod random_walks;
 mod recordings;
 mod saved_while_the_servo_is_timed;
+mod second_beam;
 mod sensor_faults;
 mod serial_noise;
 mod servo_pulses;

@@ -56,23 +56,26 @@ impl Geometry {
         let metre = wheel.ticks(1000);
         let grain = Grain::of(metre);
         let length = |setting| {
-            let ticks = wheel.ticks(settings.get(setting)).0;
+            let millimetres = settings.get(setting);
+            // Each takes time, which those that are off need not.
+            if millimetres == 0 {
+                return Length::ZERO;
+            }
+            let ticks = wheel.ticks(millimetres).0;
             grain.length(Ticks(ticks * i32::from(Slip::WHOLE + i16::from(excess)) >> 8))
         };
-        // Each length takes time, which those that are off need not.
-        let or_off = |is_on, setting| if is_on { length(setting) } else { Length::ZERO };
-        let is_guarded = settings.get(Setting::GuardSpacingMm) > 0;
-        let has_second_beam = settings.get(Setting::SecondBeamMm) > 0;
+        let guard_spacing = length(Setting::GuardSpacingMm);
+        let is_guarded = guard_spacing > Length::ZERO;
         Self {
             wheel,
             grain,
             beam_to_tool: length(Setting::BeamToToolMm),
-            second_beam: or_off(has_second_beam, Setting::SecondBeamMm),
+            second_beam: length(Setting::SecondBeamMm),
             margin: length(Setting::MarginMm),
             max_width: length(Setting::MaxWidthMm),
             merge_gap: length(Setting::MergeGapMm),
-            guard_spacing: or_off(is_guarded, Setting::GuardSpacingMm),
-            guard_scatter: or_off(is_guarded, Setting::GuardScatterMm),
+            guard_spacing,
+            guard_scatter: if is_guarded { length(Setting::GuardScatterMm) } else { Length::ZERO },
             memory: Length(grain.length(metre).0 * MEMORY_M),
         }
     }

@@ -20,6 +20,9 @@ const CAPACITY: usize = 4;
 /// 0.8 mm, and sixteen ticks with any other.
 const SEEN_BY_BOTH: Length = Length(16);
 
+/// By how much the widths may differ of what is taken for the same object.
+const SAME_WIDTH: u16 = 20;
+
 /// Objects running that one beam alone has seen, until the other is taken for blind.
 const MISSED: i8 = 3;
 
@@ -60,7 +63,7 @@ impl Slip {
     pub fn permille(&self) -> Option<i16> {
         let turned = (Self::WHOLE + i16::from(self.excess)) as u16;
         let rolled_permille = (256_000 / u32::from(turned)) as i16;
-        (self.measured >= 2).then_some(1000 - rolled_permille)
+        (self.measured > 1).then_some(1000 - rolled_permille)
     }
 
     /// A plant passed both beams, which stand `apart` by the slip known so far, in another way; whether slip can be told by it.
@@ -75,7 +78,7 @@ impl Slip {
         let three = excess as i8;
         self.by_plant = [one, two, three];
         self.excess = one.min(two).max(one.max(two).min(three));
-        self.measured |= self.measured + 1;
+        self.measured = self.measured << 1 | 1;
         true
     }
 }
@@ -93,16 +96,20 @@ pub enum Compared {
     SecondIsBlind,
 }
 
+/// Where something begins and ends.
+#[derive(Clone, Copy, Debug)]
+struct Passed {
+    leading: Place,
+    trailing: Place,
+}
+
 /// The second beam. Its places are those that the first had when it was there, by the slip known so far.
 #[derive(Clone, Debug)]
 pub struct SecondBeam {
     watch: Watch,
-    /// Where what the first has seen begins and ends, and this one is to come to: the last of these, so many of them.
-    leading: [Place; CAPACITY],
-    trailing: [Place; CAPACITY],
+    /// What the first has seen, and this one is to come to: the last of these, so many of them.
+    passed: [Passed; CAPACITY],
     awaited: u8,
-    /// Whether the first has not seen what is in this one now.
-    is_alone: bool,
     /// Objects running that this one has missed and the first has seen; below 0, that the first has missed.
     missed: i8,
     slip: Slip,
@@ -112,10 +119,8 @@ impl SecondBeam {
     /// One that has seen nothing.
     pub const NONE: Self = Self {
         watch: Watch::NONE,
-        leading: [Place::new(0); CAPACITY],
-        trailing: [Place::new(0); CAPACITY],
+        passed: [Passed { leading: Place::new(0), trailing: Place::new(0) }; CAPACITY],
         awaited: 0,
-        is_alone: false,
         missed: 0,
         slip: Slip::NONE,
     };
@@ -124,7 +129,7 @@ impl SecondBeam {
     #[inline(never)]
     pub fn begin(&mut self, place: Place) {
         self.watch = Watch::start(place, false);
-        (self.awaited, self.is_alone, self.missed) = (0, false, 0);
+        (self.awaited, self.missed) = (0, 0);
         self.slip = Slip::NONE;
     }
 
@@ -138,14 +143,9 @@ impl SecondBeam {
         self.watch.is_broken()
     }
 
-    /// Where the object begins that is in it.
-    pub fn open(&self) -> Option<Place> {
-        self.watch.open()
-    }
-
-    /// As [`open`](Self::open), if the first has not seen it.
+    /// Where the object begins that is in it, if nothing is awaited that it could be.
     pub fn open_alone(&self) -> Option<Place> {
-        self.open().filter(|_| self.is_alone)
+        self.watch.open().filter(|_| self.awaited == 0)
     }
 
     /// The first beam has seen an object, which is to come to this one.
@@ -154,15 +154,12 @@ impl SecondBeam {
         if object.width() < SEEN_BY_BOTH {
             return;
         }
-        self.leading.copy_within(1.., 0);
-        self.trailing.copy_within(1.., 0);
-        self.leading[CAPACITY - 1] = object.leading;
-        self.trailing[CAPACITY - 1] = object.trailing;
+        self.passed.copy_within(1.., 0);
+        self.passed[CAPACITY - 1] = Passed { leading: object.leading, trailing: object.trailing };
         self.awaited += u8::from(usize::from(self.awaited) < CAPACITY);
     }
 
     /// It is at a place, broken or not, with the beams so far apart and with what the first has open.
-    #[inline(never)]
     pub fn look(
         &mut self,
         place: Place,
@@ -171,12 +168,7 @@ impl SecondBeam {
         gap: Length,
         open: Option<Place>,
     ) -> Option<Compared> {
-        let has_changed = broken != self.is_broken();
-        let complete = self.watch.edge(place, broken, gap);
-        if has_changed {
-            self.is_alone = self.open().is_some_and(|begin| self.partner(begin, apart, open).is_none());
-        }
-        let Some(seen) = complete else { return self.miss(apart, gap) };
+        let Some(seen) = self.watch.edge(place, broken, gap) else { return self.miss(apart, gap) };
         let Some(partner) = self.partner(seen.leading, apart, open) else {
             if seen.width() < SEEN_BY_BOTH {
                 return None;
@@ -184,37 +176,31 @@ impl SecondBeam {
             self.missed = self.missed.min(0) - 1;
             return Some(if self.missed > -MISSED { Compared::Alone(seen) } else { Compared::FirstIsBlind });
         };
-        let (&first_leading, &first_trailing) = (self.leading.get(partner)?, self.trailing.get(partner)?);
+        let first = self.passed.get(partner)?;
         // What came before it has passed as well.
         self.awaited = (CAPACITY - 1 - partner) as u8;
         self.missed = 0;
-        let (leading, trailing) = (seen.leading - first_leading, seen.trailing - first_trailing);
-        let is_same = (leading - trailing).0.unsigned_abs() <= apart.0 as u16 / 16;
+        let (leading, trailing) = (seen.leading - first.leading, seen.trailing - first.trailing);
+        let is_same = (leading - trailing).0.unsigned_abs() <= SAME_WIDTH;
         // By the middle, which a leaf at either end moves by half.
         let way = apart + Length((leading + trailing).0 >> 1);
         let is_measured = is_same && self.slip.measure(apart, way);
         is_measured.then_some(Compared::Slip)
     }
 
-    /// Which of those that the first has seen may stand where this one has something, whatever the wheel slips: the nearest one. The
-    /// one that the first has open is behind the last.
+    /// Which of those that the first has seen may stand where this one has something, whatever the wheel slips: the first one, as they
+    /// come in their order. The one that the first has open is behind the last.
     fn partner(&self, begin: Place, apart: Length, open: Option<Place>) -> Option<usize> {
-        let off = |leading: Place| (begin - leading).0.unsigned_abs();
-        let mut nearest = apart.0 as u16 / 2;
-        let mut partner = open.filter(|&leading| off(leading) < nearest).map(|_| CAPACITY);
-        for place in CAPACITY - usize::from(self.awaited)..CAPACITY {
-            let off = off(self.leading[place]);
-            if off < nearest {
-                (nearest, partner) = (off, Some(place));
-            }
-        }
-        partner
+        let is_near = |leading: Place| (begin - leading).0.unsigned_abs() < apart.0 as u16 / 2;
+        let first = CAPACITY - usize::from(self.awaited);
+        let seen = (first..CAPACITY).find(|&place| is_near(self.passed[place].leading));
+        seen.or(open.filter(|&leading| is_near(leading)).map(|_| CAPACITY))
     }
 
     /// Whether the first object that is awaited has passed unseen, and too many before it.
     fn miss(&mut self, apart: Length, gap: Length) -> Option<Compared> {
-        let &oldest = self.trailing.get(CAPACITY - usize::from(self.awaited))?;
-        if self.watch.frontier() - oldest <= gap + Length(apart.0 >> 1) {
+        let oldest = self.passed.get(CAPACITY - usize::from(self.awaited))?;
+        if self.watch.frontier() - oldest.trailing <= gap + Length(apart.0 >> 1) {
             return None;
         }
         self.awaited -= 1;
@@ -228,7 +214,7 @@ mod tests {
     extern crate std;
     use super::*;
     use proptest::prelude::*;
-    use std::vec::Vec;
+    use std::{vec, vec::Vec};
 
     const APART: Length = Length(400);
     const GAP: Length = Length(40);
@@ -247,7 +233,9 @@ mod tests {
                 things.iter().filter_map(|&(first, _)| first).find(|&(from, to)| (from..to + GAP.0).contains(&place));
             let open = open.map(|(from, _)| Place::new(from));
             let broken = things.iter().filter_map(|&(_, second)| second).any(|(from, to)| (from..to).contains(&place));
-            told.extend(second.look(Place::new(place) - APART, broken, APART, GAP, open));
+            // The machine's distances follow the slip.
+            let apart = Length((i32::from(APART.0) * (256 + i32::from(second.slip().excess())) >> 8) as i16);
+            told.extend(second.look(Place::new(place) - apart, broken, apart, GAP, open));
         }
         told
     }
@@ -265,15 +253,15 @@ mod tests {
 
     #[test]
     fn two_plants_tell_the_slip_and_one_that_was_half_seen_does_not() {
-        for (way, excess) in [(400, 0), (444, 28), (570, 108), (310, -58)] {
+        for (way, excess) in [(400, 0_i32), (444, 28), (540, 89), (330, -45)] {
             let mut second = begun();
             assert_eq!(compare(&mut second, &[plant(100, way)]), [Compared::Slip]);
             assert_eq!((second.slip().excess(), second.slip().permille()), (0, None), "{way}");
             // Of the next the second beam sees the hind part alone.
-            let half = (Some((3100, 3400)), Some((3250 + way, 3400 + way)));
+            let half = (Some((3100, 3400)), Some((3150 + way, 3400 + way)));
             assert_eq!(compare(&mut second, &[half, plant(5000, way)]), [Compared::Slip]);
-            assert_eq!(second.slip().excess(), excess, "{way}");
-            let permille = 1000 - 256_000 / (256 + i32::from(excess));
+            assert_eq!(i32::from(second.slip().excess()), excess, "{way}");
+            let permille = 1000 - 256_000 / (256 + excess);
             assert_eq!(second.slip().permille().map(i32::from), Some(permille));
         }
     }
@@ -289,9 +277,10 @@ mod tests {
 
     #[test]
     fn three_running_that_one_beam_alone_sees_have_the_other_blind() {
-        let only_first = |from| (Some((from, from + 300)), None);
-        let only_second = |from| (None, Some((from + 400, from + 700)));
-        let at = |leading| Object { leading: Place::new(leading), trailing: Place::new(leading + 300), cut: false };
+        let only_first = |from: i16| (Some((from, from + 300)), None);
+        let only_second = |from: i16| (None, Some((from + 400, from + 700)));
+        let at =
+            |leading: i16| Object { leading: Place::new(leading), trailing: Place::new(leading + 300), cut: false };
         let unseen = [only_first(0), only_first(1500), only_first(3000)];
         assert_eq!(compare(&mut begun(), &unseen), [Compared::SecondIsBlind]);
         let alone = [only_second(0), only_second(1500), only_second(3000)];
@@ -320,16 +309,17 @@ mod tests {
         assert_eq!(look(&mut second, 100, true, None), Some(Place::new(100)));
         assert_eq!(look(&mut second, 200, false, None), Some(Place::new(100)));
         assert_eq!(look(&mut second, 241, false, None), None);
-        // The first still sees it.
-        assert_eq!(look(&mut second, 1000, true, Some(Place::new(950))), None);
-        assert_eq!(look(&mut second, 1100, false, Some(Place::new(950))), None);
+        // The first has seen it.
+        second.await_object(Object { leading: Place::new(950), trailing: Place::new(1050), cut: false });
+        assert_eq!(look(&mut second, 1000, true, None), None);
+        assert_eq!(look(&mut second, 1100, false, None), None);
     }
 
     proptest! {
         /// Against a model that knows which edges belong together, and sorts.
         #[test]
         fn the_slip_is_the_median_of_the_last_three_plants_whatever_stands_between_them(
-            plants in prop::collection::vec((900_i16..1400, 60_i16..300, -80_i16..160, any::<bool>()), 1..12),
+            plants in prop::collection::vec((900_i16..1400, 60_i16..300, -50_i16..100, any::<bool>()), 1..12),
         ) {
             let mut second = begun();
             let (mut place, mut things, mut ways) = (0, Vec::new(), Vec::new());
@@ -345,18 +335,12 @@ mod tests {
             things.sort_by_key(|(first, _)| *first);
             let told = compare(&mut second, &things);
             prop_assert_eq!(told, ways.iter().map(|_| Compared::Slip).collect::<Vec<_>>());
-            // Each is told by what was known before it, here nothing: the beams stand as far apart as ever.
-            let mut expected: Vec<i32> = vec![0, 0, 0];
-            for &way in &ways {
-                let last = &expected[expected.len() - 3..];
-                let mut sorted = last.to_vec();
-                sorted.sort_unstable();
-                expected.push(((256 + sorted[1]) * i32::from(way) / i32::from(APART.0) - 256).clamp(-59, 110));
-            }
-            let mut last = expected[expected.len() - 3..].to_vec();
+            let mut last: Vec<i32> = vec![0; 3];
+            last.extend(ways.iter().map(|&way| 256 * i32::from(way) / i32::from(APART.0) - 256));
+            let mut last = last.split_off(last.len() - 3);
             last.sort_unstable();
-            let is_within = expected.iter().all(|excess| (-58..110).contains(excess));
-            prop_assert!(!is_within || i32::from(second.slip().excess()) == last[1], "{:?}", expected);
+            let excess = i32::from(second.slip().excess());
+            prop_assert!((excess - last[1]).abs() <= 2, "{} of {:?}", excess, last);
         }
     }
 }

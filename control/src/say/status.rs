@@ -36,13 +36,9 @@ pub(super) fn write_status<C: Classifier, M: Memory>(controller: &Controller<C, 
     line.number(controller.unseen_mm().into());
     if controller.has_second_beam() {
         line.say(texts::SLIP_IS);
-        match controller.slip_permille() {
-            Some(permille) => {
-                line.say(texts::NUMBER);
-                line.number(permille.into());
-            }
-            None => line.say(texts::NONE),
-        }
+        let slip = controller.slip_permille();
+        line.say(if slip.is_some() { texts::NUMBER } else { texts::NONE });
+        line.number(slip.unwrap_or(0).into());
     }
 }
 

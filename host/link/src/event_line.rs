@@ -256,6 +256,8 @@ mod tests {
         }
         let guarded = Event::Guarded(Position::new(-3));
         assert_eq!(EventLine::parse(&line(guarded)), Some(EventLine::Guarded { position: -3 }));
+        let slip = Event::Slip { permille: -52 };
+        assert_eq!(EventLine::parse(&line(slip)), Some(EventLine::Slip { permille: -52 }));
         let swing = Event::Swing { out: true, position: Position::new(12) };
         assert_eq!(EventLine::parse(&line(swing)), Some(EventLine::Swing { out: true, position: 12 }));
         assert_eq!(EventLine::parse(&line(Event::State(State::Work))), Some(EventLine::State(Mode::Work)));

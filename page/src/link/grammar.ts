@@ -70,6 +70,8 @@ export type Said =
     | { is: "swing"; out: boolean }
     /** Ground is kept free on which a plant was due and none was seen. */
     | { is: "guarded" }
+    /** The wheel's slip in thousandths, by the last plant that passed both beams. */
+    | { is: "slip"; permille: number }
     /** A fault was latched. */
     | { is: "alarm"; name: string }
     | { is: "warning"; name: string }
@@ -81,7 +83,7 @@ export type Said =
 
 /** Whether the machine says it by itself, and not as a part of an answer. */
 export function isTold({ is }: Said): boolean {
-    return ["object", "state", "swing", "guarded", "alarm", "warning", "calibrated", "plot"].includes(is);
+    return ["object", "state", "swing", "guarded", "slip", "alarm", "warning", "calibrated", "plot"].includes(is);
 }
 
 /** Reads a line. */

@@ -1,0 +1,105 @@
+//! A second beam: the wheel's slip is measured plant by plant, and a torn wire of either beam is told before it costs a plant.
+
+use crate::common::{Run, is_out_at_the_pin, number, status, steady, trial, value, woken_up};
+use field::machine::{Machine, cycle_at};
+use field::motion::mm_s;
+use field::row::{Row, Thing};
+use field::trial::{Start, Trial};
+use field::verdict::{Judgement, Verdict};
+use field::wiring;
+use signal::{Pin, PinChange};
+
+const SECOND_BEAM_MM: f64 = 200.0;
+
+/// Plants every 500 mm, the first at 600 mm.
+fn plants(count: usize) -> Row {
+    Row::new((0..count).map(|plant| Thing::plant(600.0 + 500.0 * plant as f64, 150.0)).collect())
+        .expect("the plants stand apart")
+}
+
+/// A machine with two beams and a wheel that slips by so much in a leg, along ten plants.
+fn slipping(speed_km_h: f64, second_beam_mm: f64, slip: impl FnMut() -> f64) -> Trial {
+    let trial = trial(plants(10), steady(mm_s(speed_km_h), 5800.0).with_slip(slip));
+    Trial { machine: Machine { second_beam_mm, ..Machine::default() }, start: Start::Now, ..trial }
+}
+
+fn count(judgement: &Judgement, verdict: Verdict) -> usize {
+    // Two plants tell the slip.
+    judgement.plants[2..].iter().filter(|plant| plant.verdict == verdict).count()
+}
+
+#[test]
+fn a_wheel_that_slips_by_a_tenth_keeps_every_plant_that_comes_behind_the_second() {
+    for (speed_km_h, slip) in [(0.5, 0.1), (2.5, 0.1), (2.5, -0.1)] {
+        let outcome = |second_beam_mm| {
+            let mut run = Run::begin(slipping(speed_km_h, second_beam_mm, || slip), &[]);
+            run.roll_to_the_end();
+            assert_eq!(run.events("alarm"), [""; 0]);
+            (count(&run.judgement(), Verdict::Kept), status(&mut run.uno))
+        };
+        let (kept, told) = outcome(SECOND_BEAM_MM);
+        assert_eq!(kept, 8, "{speed_km_h} km/h, slip {slip}");
+        assert!((number(&told, "slip_permille") as f64 - 1000.0 * slip).abs() < 8.0, "{told}");
+        let (kept, told) = outcome(0.0);
+        assert!(kept < 8 && !told.contains("slip"), "without it, margins are cut: {kept}, {told}");
+    }
+}
+
+#[test]
+fn the_slip_is_told_plant_by_plant_and_dropped_by_an_alarm() {
+    let mut run = Run::begin(slipping(1.0, SECOND_BEAM_MM, || 0.1), &[]);
+    run.roll_to(600.0);
+    assert_eq!(value(&status(&mut run.uno), "slip_permille"), "none");
+    run.roll_to(2400.0);
+    assert_eq!(run.events("slip").len(), 2, "of three plants that have passed, by the second on: {:#?}", run.lines());
+    let begin = run.uno.cycle() + 1600;
+    // Chatter of the first beam, faster than it can be taken.
+    run.uno.drive((0..400).map(|edge| PinChange { cycle: begin + edge * 160, pin: wiring::BEAM, high: edge % 2 == 1 }));
+    run.roll_to(2500.0);
+    let told = status(&mut run.uno);
+    assert_eq!((value(&told, "state"), value(&told, "slip_permille")), ("alarm", "none"), "{told}");
+}
+
+/// Ten plants at 2 km/h, with a beam whose wire is torn where the machine comes to a place: its pin stays on the pull-up.
+fn with_torn_wire(pin: Pin, torn_mm: f64) -> Run {
+    let trial = slipping(2.0, SECOND_BEAM_MM, || 0.0);
+    let torn_s = trial.motion.passings(torn_mm).first().expect("the machine comes there").time_s;
+    Run::begin_altered(trial, &[], |start_cycle, mut changes| {
+        let torn = cycle_at(start_cycle, torn_s);
+        changes.retain(|change| change.pin != pin || change.cycle < torn);
+        changes
+    })
+}
+
+#[test]
+fn a_torn_wire_of_either_beam_is_an_alarm_within_three_plants_and_costs_none() {
+    for (pin, alarm, code) in [(wiring::BEAM, "beam_blind", 14), (wiring::SECOND_BEAM, "second_beam_blind", 15)] {
+        // Between the fourth plant and the fifth, for both of the beams.
+        let mut run = with_torn_wire(pin, 2400.0);
+        run.roll_to(3525.0 + 3.0 * 75.0);
+        assert_eq!(run.events("alarm"), [""; 0], "two plants may be chance");
+        // The third is at 3600 mm, and has passed the second beam; the fourth is yet to come to the first.
+        run.roll_to(4020.0);
+        let told = run.events("alarm");
+        assert_eq!(told.len(), 1, "{:#?}", run.lines());
+        assert_eq!((value(&told[0], "name"), number(&told[0], "code")), (alarm, code));
+        run.roll_to_the_end();
+        assert!(is_out_at_the_pin(&run.uno));
+        assert_eq!(run.judgement().count(Verdict::Damaged), 0, "{:#?}", run.judgement().plants);
+    }
+}
+
+#[test]
+fn without_a_second_beam_its_pin_may_do_what_it_likes() {
+    let mut uno = woken_up();
+    let begin = uno.cycle();
+    uno.drive((0..5000).map(|edge| PinChange {
+        cycle: begin + edge * 320,
+        pin: wiring::SECOND_BEAM,
+        high: edge % 2 == 1,
+    }));
+    crate::common::run_for_ms(&mut uno, 150);
+    let told = status(&mut uno);
+    assert_eq!(value(&told, "state"), "hold", "{told}");
+    assert!(!told.contains("slip"), "{told}");
+}
