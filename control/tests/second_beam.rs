@@ -244,7 +244,7 @@ proptest! {
         mean in -12.0..15.0_f64,
         changes in prop::collection::vec((-2.5..2.5_f64, 700.0..2000.0_f64), 12),
         speed_mm_s in 140.0..700.0_f64,
-        gaps_mm in prop::collection::vec((180.0..500.0_f64, 60.0..220.0_f64), 24),
+        gaps_mm in prop::collection::vec((280.0..450.0_f64, 110.0..200.0_f64), 24),
     ) {
         let mut place_mm = 300.0;
         let plants: Vec<(f64, f64)> = gaps_mm.iter().map(|&(gap_mm, width_mm)| {

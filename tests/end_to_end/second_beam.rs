@@ -50,12 +50,12 @@ fn the_slip_is_told_plant_by_plant_and_dropped_by_an_alarm() {
     let mut run = Run::begin(slipping(1.0, SECOND_BEAM_MM, || 0.1), &[]);
     run.roll_to(600.0);
     assert_eq!(value(&status(&mut run.uno), "slip_permille"), "none");
-    run.roll_to(2400.0);
+    run.roll_to(2350.0);
     assert_eq!(run.events("slip").len(), 2, "of three plants that have passed, by the second on: {:#?}", run.lines());
     let begin = run.uno.cycle() + 1600;
     // Chatter of the first beam, faster than it can be taken.
     run.uno.drive((0..400).map(|edge| PinChange { cycle: begin + edge * 160, pin: wiring::BEAM, high: edge % 2 == 1 }));
-    run.roll_to(2500.0);
+    run.roll_to(2450.0);
     let told = status(&mut run.uno);
     assert_eq!((value(&told, "state"), value(&told, "slip_permille")), ("alarm", "none"), "{told}");
 }

@@ -122,6 +122,8 @@ pub struct Status {
     pub windows: u32,
     /// How far the machine has to roll until ground that the beam has seen reaches the tool.
     pub unseen_mm: i32,
+    /// The wheel's slip in thousandths, above 0 where it turns farther than the machine rolls; none where nothing has told it.
+    pub slip_permille: Option<i32>,
 }
 
 /// The words `key=value` of a line, by their keys.
@@ -214,6 +216,7 @@ impl Status {
             speed_mm_s: values.number("speed_mm_s")?,
             windows: values.number("windows")?,
             unseen_mm: values.number("unseen_mm")?,
+            slip_permille: values.number("slip_permille"),
         })
     }
 }
@@ -321,8 +324,14 @@ mod tests {
             speed_mm_s: -3,
             windows: 2,
             unseen_mm: 400,
+            slip_permille: None,
         };
         assert_eq!(Status::parse(line), Some(expected));
+        let slips = |told: &str| {
+            let line = format!("state=hold tool=out pos=1 speed_mm_s=2 windows=1 unseen_mm=0 slip_permille={told}");
+            Status::parse(&line).and_then(|status| status.slip_permille)
+        };
+        assert_eq!((slips("none"), slips("-52")), (None, Some(-52)));
         let working = Status::parse("state=work tool=out for=plant pos=1 speed_mm_s=2 windows=1 unseen_mm=0 new=1");
         assert_eq!(working.and_then(|status| status.reason).as_deref(), Some("plant"));
         assert_eq!(Status::parse("state=idle tool=out pos=1 speed_mm_s=2 windows=1 unseen_mm=0"), None);

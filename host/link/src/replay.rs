@@ -15,7 +15,8 @@
 //! - An alarm that encoder, beam, end switch or stack gave rests on what the log does not hold. It is raised where the log has it.
 //! - Where a log begins with ground already seen, what the tool did there is not judged.
 //! - A command that the firmware refused is left out, as it did nothing there.
-//! - A replay ends where the bench was used (`servo`, `calibrate`, `test`) or examples were forgotten.
+//! - A replay ends where the bench was used (`servo`, `calibrate`, `test`), examples were forgotten, or a second beam was set. A log of
+//!   a machine that has one already is not replayed.
 
 mod compare;
 mod judge;
@@ -193,6 +194,12 @@ impl<'a> Stretch<'a> {
     }
 
     fn replay(self, replayed: &mut Replayed) -> Result<(), ReplayError> {
+        if self.settings.get(Setting::SecondBeamMm) > 0 {
+            replayed
+                .notes
+                .push("a machine with a second beam is not replayed: the log does not hold what that saw".to_owned());
+            return Ok(());
+        }
         let judged_from = self.judged_from();
         if judged_from > i32::MIN {
             replayed.notes.push(format!(
@@ -385,6 +392,18 @@ mod tests {
         let taken = log(20, |status| if status == 2 { start("ok") } else { Vec::new() });
         let difference = replay(&taken).unwrap().difference.expect("the log has no swing");
         assert!(difference.replayed.contains("swing tool=in"), "{difference}");
+    }
+
+    #[test]
+    fn where_a_second_beam_sees_more_than_the_log_holds_nothing_is_replayed() {
+        let set = |status| {
+            if status == 2 { vec![(Kind::Command, "set second_beam_mm 200"), (Kind::Answer, "ok")] } else { Vec::new() }
+        };
+        assert_eq!(replay(&log(20, set)).unwrap().notes, ["line 5: not replayed from `set second_beam_mm 200` on"]);
+        let setting = "second_beam_mm=200 mm from 0 to 900, default 0, saved 0";
+        let mut has_one = log(20, |_| Vec::new());
+        has_one.insert(1, Entry { number: 2, time_ms: 0, kind: Kind::Setting, text: setting.to_owned() });
+        assert_eq!(replay(&has_one).unwrap().notes.len(), 1);
     }
 
     #[test]

@@ -49,8 +49,9 @@ fn draw_machine(model: &Model, frame: &mut Frame, area: Rect) {
         Span::raw(format!("tool {}{reason}", if status.tool_out { "out" } else { "in" })),
     ]);
     let km_h = f64::from(status.speed_mm_s) * 0.0036;
+    let slip = status.slip_permille.map_or_else(String::new, |slip| format!("   slip {:.1} %", f64::from(slip) / 10.0));
     let second = format!(
-        "speed {km_h:5.2} km/h   place {:8.2} m   windows {}   unseen {} mm",
+        "speed {km_h:5.2} km/h   place {:8.2} m   windows {}   unseen {} mm{slip}",
         model.millimetres(status.position) / 1000.0,
         status.windows,
         status.unseen_mm

@@ -277,6 +277,8 @@ impl<'a> Player<'a> {
             }
             Ok(Command::Hold) => self.controller.hold(),
             Ok(Command::Clear) => self.controller.clear(),
+            // What it sees is not in the log.
+            Ok(Command::Set(Setting::SecondBeamMm, 1..)) => return false,
             Ok(Command::Set(setting, value)) => {
                 // Where the answer was lost, it is refused here as there.
                 let _ = self.controller.set(setting, value);
