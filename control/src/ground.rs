@@ -129,7 +129,7 @@ impl Ground {
         if broken != self.second_beam.is_broken() {
             self.schedule.widen(place, Length(apart.0 >> 2));
         }
-        self.second_beam.look(place, broken, apart, merge_gap, self.watch.open())
+        self.second_beam.look(place, broken, apart, merge_gap)
     }
 
     /// The first beam has seen an object, which is to come to the second, if there is one.

@@ -11,7 +11,7 @@ use uno::{InterruptStatistics, Uno};
 
 /// Vector, name and budget in cycles; the encoder's two last.
 const BUDGETS: [(u8, &str, u64); 6] = [
-    (3, "PCINT0, the beam", 51),
+    (3, "PCINT0, the beams", 53),
     (16, "TIMER0_OVF, clock and heartbeat", 42),
     (18, "USART_RX", 51),
     (19, "USART_UDRE", 44),

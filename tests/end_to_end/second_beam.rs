@@ -11,15 +11,17 @@ use signal::{Pin, PinChange};
 
 const SECOND_BEAM_MM: f64 = 200.0;
 
+const PLANTS: usize = 7;
+
 /// Plants every 500 mm, the first at 600 mm.
 fn plants(count: usize) -> Row {
     Row::new((0..count).map(|plant| Thing::plant(600.0 + 500.0 * plant as f64, 150.0)).collect())
         .expect("the plants stand apart")
 }
 
-/// A machine with two beams and a wheel that slips by so much in a leg, along ten plants.
+/// A machine with two beams and a wheel that slips by so much in a leg, along seven plants.
 fn slipping(speed_km_h: f64, second_beam_mm: f64, slip: impl FnMut() -> f64) -> Trial {
-    let trial = trial(plants(10), steady(mm_s(speed_km_h), 5800.0).with_slip(slip));
+    let trial = trial(plants(PLANTS), steady(mm_s(speed_km_h), 4300.0).with_slip(slip));
     Trial { machine: Machine { second_beam_mm, ..Machine::default() }, start: Start::Now, ..trial }
 }
 
@@ -30,7 +32,7 @@ fn count(judgement: &Judgement, verdict: Verdict) -> usize {
 
 #[test]
 fn a_wheel_that_slips_by_a_tenth_keeps_every_plant_that_comes_behind_the_second() {
-    for (speed_km_h, slip) in [(0.5, 0.1), (2.5, 0.1), (2.5, -0.1)] {
+    for (speed_km_h, slip) in [(1.0, 0.1), (2.5, 0.1), (2.5, -0.1)] {
         let outcome = |second_beam_mm| {
             let mut run = Run::begin(slipping(speed_km_h, second_beam_mm, || slip), &[]);
             run.roll_to_the_end();
@@ -38,10 +40,10 @@ fn a_wheel_that_slips_by_a_tenth_keeps_every_plant_that_comes_behind_the_second(
             (count(&run.judgement(), Verdict::Kept), status(&mut run.uno))
         };
         let (kept, told) = outcome(SECOND_BEAM_MM);
-        assert_eq!(kept, 8, "{speed_km_h} km/h, slip {slip}");
+        assert_eq!(kept, PLANTS - 2, "{speed_km_h} km/h, slip {slip}");
         assert!((number(&told, "slip_permille") as f64 - 1000.0 * slip).abs() < 8.0, "{told}");
         let (kept, told) = outcome(0.0);
-        assert!(kept < 8 && !told.contains("slip"), "without it, margins are cut: {kept}, {told}");
+        assert!(kept < PLANTS - 2 && !told.contains("slip"), "without it, margins are cut: {kept}, {told}");
     }
 }
 
@@ -60,7 +62,7 @@ fn the_slip_is_told_plant_by_plant_and_dropped_by_an_alarm() {
     assert_eq!((value(&told, "state"), value(&told, "slip_permille")), ("alarm", "none"), "{told}");
 }
 
-/// Ten plants at 2 km/h, with a beam whose wire is torn where the machine comes to a place: its pin stays on the pull-up.
+/// Seven plants at 2 km/h, with a beam whose wire is torn where the machine comes to a place: its pin stays on the pull-up.
 fn with_torn_wire(pin: Pin, torn_mm: f64) -> Run {
     let trial = slipping(2.0, SECOND_BEAM_MM, || 0.0);
     let torn_s = trial.motion.passings(torn_mm).first().expect("the machine comes there").time_s;
@@ -78,7 +80,7 @@ fn a_torn_wire_of_either_beam_is_an_alarm_within_three_plants_and_costs_none() {
         let mut run = with_torn_wire(pin, 2400.0);
         run.roll_to(3525.0 + 3.0 * 75.0);
         assert_eq!(run.events("alarm"), [""; 0], "two plants may be chance");
-        // The third is at 3600 mm, and has passed the second beam; the fourth is yet to come to the first.
+        // The third is at 3600 mm, and has passed the second beam; a fourth would yet have to come to the first.
         run.roll_to(4020.0);
         let told = run.events("alarm");
         assert_eq!(told.len(), 1, "{:#?}", run.lines());

@@ -107,7 +107,7 @@ struct Passed {
 #[derive(Clone, Debug)]
 pub struct SecondBeam {
     watch: Watch,
-    /// What the first has seen, and this one is to come to: the last of these, so many of them.
+    /// What the first has seen, the last of it first, and so many of these that this one is yet to come to.
     passed: [Passed; CAPACITY],
     awaited: u8,
     /// Objects running that this one has missed and the first has seen; below 0, that the first has missed.
@@ -154,56 +154,45 @@ impl SecondBeam {
         if object.width() < SEEN_BY_BOTH {
             return;
         }
-        self.passed.copy_within(1.., 0);
-        self.passed[CAPACITY - 1] = Passed { leading: object.leading, trailing: object.trailing };
+        self.passed.copy_within(..CAPACITY - 1, 1);
+        self.passed[0] = Passed { leading: object.leading, trailing: object.trailing };
         self.awaited += u8::from(usize::from(self.awaited) < CAPACITY);
     }
 
-    /// It is at a place, broken or not, with the beams so far apart and with what the first has open.
-    pub fn look(
-        &mut self,
-        place: Place,
-        broken: bool,
-        apart: Length,
-        gap: Length,
-        open: Option<Place>,
-    ) -> Option<Compared> {
+    /// It is at a place, broken or not, with the beams so far apart, and with so long a gap behind what is over.
+    pub fn look(&mut self, place: Place, broken: bool, apart: Length, gap: Length) -> Option<Compared> {
         let Some(seen) = self.watch.edge(place, broken, gap) else { return self.miss(apart, gap) };
-        let Some(partner) = self.partner(seen.leading, apart, open) else {
-            if seen.width() < SEEN_BY_BOTH {
-                return None;
+        // Objects come in their order, and may stand off by this whatever the wheel slips.
+        let near = apart.0 as u16 / 2;
+        let mut awaited = self.awaited;
+        while let Some(first) = self.passed.get(usize::from(awaited).wrapping_sub(1)) {
+            awaited -= 1;
+            let leading = seen.leading - first.leading;
+            if leading.0.unsigned_abs() < near {
+                // What came before it has passed as well.
+                (self.awaited, self.missed) = (awaited, 0);
+                let trailing = seen.trailing - first.trailing;
+                let is_same = (leading - trailing).0.unsigned_abs() <= SAME_WIDTH;
+                // By the middle, which a leaf at either end moves by half.
+                let way = apart + Length((leading + trailing).0 >> 1);
+                return (is_same && self.slip.measure(apart, way)).then_some(Compared::Slip);
             }
-            self.missed = self.missed.min(0) - 1;
-            return Some(if self.missed > -MISSED { Compared::Alone(seen) } else { Compared::FirstIsBlind });
-        };
-        let first = self.passed.get(partner)?;
-        // What came before it has passed as well.
-        self.awaited = (CAPACITY - 1 - partner) as u8;
-        self.missed = 0;
-        let (leading, trailing) = (seen.leading - first.leading, seen.trailing - first.trailing);
-        let is_same = (leading - trailing).0.unsigned_abs() <= SAME_WIDTH;
-        // By the middle, which a leaf at either end moves by half.
-        let way = apart + Length((leading + trailing).0 >> 1);
-        let is_measured = is_same && self.slip.measure(apart, way);
-        is_measured.then_some(Compared::Slip)
-    }
-
-    /// Which of those that the first has seen may stand where this one has something, whatever the wheel slips: the first one, as they
-    /// come in their order. The one that the first has open is behind the last.
-    fn partner(&self, begin: Place, apart: Length, open: Option<Place>) -> Option<usize> {
-        let is_near = |leading: Place| (begin - leading).0.unsigned_abs() < apart.0 as u16 / 2;
-        let first = CAPACITY - usize::from(self.awaited);
-        let seen = (first..CAPACITY).find(|&place| is_near(self.passed[place].leading));
-        seen.or(open.filter(|&leading| is_near(leading)).map(|_| CAPACITY))
+        }
+        if seen.width() < SEEN_BY_BOTH {
+            return None;
+        }
+        self.missed = self.missed.min(0) - 1;
+        Some(if self.missed > -MISSED { Compared::Alone(seen) } else { Compared::FirstIsBlind })
     }
 
     /// Whether the first object that is awaited has passed unseen, and too many before it.
     fn miss(&mut self, apart: Length, gap: Length) -> Option<Compared> {
-        let oldest = self.passed.get(CAPACITY - usize::from(self.awaited))?;
+        let awaited = self.awaited.wrapping_sub(1);
+        let oldest = self.passed.get(usize::from(awaited))?;
         if self.watch.frontier() - oldest.trailing <= gap + Length(apart.0 >> 1) {
             return None;
         }
-        self.awaited -= 1;
+        self.awaited = awaited;
         self.missed = self.missed.max(0) + 1;
         (self.missed >= MISSED).then_some(Compared::SecondIsBlind)
     }
@@ -229,13 +218,10 @@ mod tests {
             if let Some((from, to)) = over {
                 second.await_object(Object { leading: Place::new(from), trailing: Place::new(to), cut: false });
             }
-            let open =
-                things.iter().filter_map(|&(first, _)| first).find(|&(from, to)| (from..to + GAP.0).contains(&place));
-            let open = open.map(|(from, _)| Place::new(from));
             let broken = things.iter().filter_map(|&(_, second)| second).any(|(from, to)| (from..to).contains(&place));
             // The machine's distances follow the slip.
             let apart = Length((i32::from(APART.0) * (256 + i32::from(second.slip().excess())) >> 8) as i16);
-            told.extend(second.look(Place::new(place) - apart, broken, apart, GAP, open));
+            told.extend(second.look(Place::new(place) - apart, broken, apart, GAP));
         }
         told
     }
@@ -302,17 +288,17 @@ mod tests {
     #[test]
     fn what_only_the_second_sees_is_open_from_its_edge_on() {
         let mut second = begun();
-        let look = |second: &mut SecondBeam, place, broken, open| {
-            second.look(Place::new(place), broken, APART, GAP, open);
+        let look = |second: &mut SecondBeam, place, broken| {
+            second.look(Place::new(place), broken, APART, GAP);
             second.open_alone()
         };
-        assert_eq!(look(&mut second, 100, true, None), Some(Place::new(100)));
-        assert_eq!(look(&mut second, 200, false, None), Some(Place::new(100)));
-        assert_eq!(look(&mut second, 241, false, None), None);
+        assert_eq!(look(&mut second, 100, true), Some(Place::new(100)));
+        assert_eq!(look(&mut second, 200, false), Some(Place::new(100)));
+        assert_eq!(look(&mut second, 241, false), None);
         // The first has seen it.
         second.await_object(Object { leading: Place::new(950), trailing: Place::new(1050), cut: false });
-        assert_eq!(look(&mut second, 1000, true, None), None);
-        assert_eq!(look(&mut second, 1100, false, None), None);
+        assert_eq!(look(&mut second, 1000, true), None);
+        assert_eq!(look(&mut second, 1100, false), None);
     }
 
     proptest! {
