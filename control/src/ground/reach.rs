@@ -61,8 +61,8 @@ impl Geometry {
             if millimetres == 0 {
                 return Length::ZERO;
             }
-            let ticks = wheel.ticks(millimetres).0;
-            grain.length(Ticks(ticks * i32::from(Slip::WHOLE + i16::from(excess)) >> 8))
+            let turned = wheel.ticks(millimetres).0 * i32::from(Slip::WHOLE + i16::from(excess));
+            grain.length(Ticks(turned >> 8))
         };
         let guard_spacing = length(Setting::GuardSpacingMm);
         let is_guarded = guard_spacing > Length::ZERO;

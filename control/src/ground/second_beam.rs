@@ -208,8 +208,11 @@ mod tests {
     const APART: Length = Length(400);
     const GAP: Length = Length(40);
 
-    /// Rolls past things, each seen from and to by the first beam and by the second, by the wheel, in this order; what is told of each.
-    fn compare(second: &mut SecondBeam, things: &[(Option<(i16, i16)>, Option<(i16, i16)>)]) -> Vec<Compared> {
+    /// From where to where the first beam sees something, and the second, by the wheel.
+    type Thing = (Option<(i16, i16)>, Option<(i16, i16)>);
+
+    /// Rolls past things, in this order; what is told of each.
+    fn compare(second: &mut SecondBeam, things: &[Thing]) -> Vec<Compared> {
         let mut told = Vec::new();
         let end = things.iter().flat_map(|(first, second)| [first, second]).flatten().map(|&(_, to)| to).max();
         for place in 0..end.unwrap_or(0) + 2 * APART.0 {
@@ -220,7 +223,7 @@ mod tests {
             }
             let broken = things.iter().filter_map(|&(_, second)| second).any(|(from, to)| (from..to).contains(&place));
             // The machine's distances follow the slip.
-            let apart = Length((i32::from(APART.0) * (256 + i32::from(second.slip().excess())) >> 8) as i16);
+            let apart = Length((i32::from(APART.0) * (256 + i32::from(second.slip().excess())) / 256) as i16);
             told.extend(second.look(Place::new(place) - apart, broken, apart, GAP));
         }
         told
@@ -233,7 +236,7 @@ mod tests {
     }
 
     /// A plant that the second beam sees so much farther on than the first.
-    fn plant(from: i16, way: i16) -> (Option<(i16, i16)>, Option<(i16, i16)>) {
+    fn plant(from: i16, way: i16) -> Thing {
         (Some((from, from + 300)), Some((from + way, from + way + 300)))
     }
 
