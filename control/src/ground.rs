@@ -127,7 +127,7 @@ impl Ground {
         let Geometry { grain, second_beam: apart, merge_gap, .. } = self.geometry;
         let place = grain.place(position) - self.leads.response - apart;
         if broken != self.second_beam.is_broken() {
-            self.schedule.widen(place, Length(apart.0 >> 2));
+            self.widen(place);
         }
         self.second_beam.look(place, broken, apart, merge_gap)
     }
@@ -196,7 +196,17 @@ impl Ground {
     pub fn keep(&mut self, plant: Object) -> Result<(), ScheduleFull> {
         self.last_plant = plant.leading;
         self.guard.see(&plant, &self.geometry);
-        self.schedule.push(plant, self.tool(), self.geometry.margin)
+        self.schedule.push(plant, self.tool(), self.geometry.margin)?;
+        // A wide one has come to the second beam before its end was seen by the first.
+        if let Some(begin) = self.second_beam.open() {
+            self.widen(begin);
+        }
+        Ok(())
+    }
+
+    /// What the second beam has an edge of goes that far.
+    fn widen(&mut self, place: Place) {
+        self.schedule.widen(place, Length(self.geometry.second_beam.0 >> 2));
     }
 
     /// Guards the ground where a plant was due, once the beam has seen that none stands there; returns its middle.

@@ -143,9 +143,14 @@ impl SecondBeam {
         self.watch.is_broken()
     }
 
-    /// Where the object begins that is in it, if nothing is awaited that it could be.
+    /// Where the object begins that is in it.
+    pub fn open(&self) -> Option<Place> {
+        self.watch.open()
+    }
+
+    /// As [`open`](Self::open), if nothing is awaited that it could be.
     pub fn open_alone(&self) -> Option<Place> {
-        self.watch.open().filter(|_| self.awaited == 0)
+        self.open().filter(|_| self.awaited == 0)
     }
 
     /// The first beam has seen an object, which is to come to this one.
