@@ -2,11 +2,12 @@
 //!
 //! Each object passes both beams. How far the wheel turned in between, against how far the beams stand apart, is what a turn of the
 //! wheel is worth on this ground ([`Slip`]): the median of the last three, so that one that was half seen counts for nothing, and
-//! two have to agree before any is believed. Objects are paired by where the first had them; two that are not as wide as each
-//! other may be two, and measure nothing.
+//! two have to agree before any is believed. Objects are paired in their order, by where the first had them; two that are not
+//! as wide as each other may be two, and measure nothing.
 //!
-//! What only the second sees is to be judged as if the first had seen it, and is closed from its edge on until then. Where it happens
-//! three times running that one of them alone sees something, the other is blind.
+//! What only the second sees is to be judged as if the first had seen it, and is closed from its edge on until then, unless the
+//! first has seen something that is yet to come. Where it happens three times running that one of them alone sees something, the other
+//! is blind.
 //!
 //! What it does not do: measure on ground where nothing stands, and see what stands nearer to the tool than itself.
 
