@@ -173,3 +173,15 @@ fn an_example_with_too_few_or_too_many_features_is_refused_and_the_next_one_begi
         assert_eq!(rolling.ask("teach plant"), "ok", "{features}");
     }
 }
+
+#[test]
+fn examples_are_told_in_hold_alone() {
+    let mut rolling = Rolling::new();
+    for feature in 0..5 {
+        assert_eq!(rolling.ask(&format!("teach {feature}")), "ok");
+    }
+    assert_eq!(rolling.ask("start"), "ok");
+    assert!(rolling.ask("teach plant").starts_with("error: "), "it is at work");
+    assert_eq!(rolling.ask("hold"), "ok");
+    assert_eq!(rolling.ask("teach plant"), "ok");
+}

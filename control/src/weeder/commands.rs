@@ -142,8 +142,12 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// a file.
     ///
     /// # Errors
-    /// [`Refusal::NotTold`] and [`Refusal::ExamplesFull`].
+    /// [`Refusal::NotInHold`], as an object that is judged while an example is written waits for its byte; [`Refusal::NotTold`] and
+    /// [`Refusal::ExamplesFull`].
     pub fn teach(&mut self, label: u8) -> Result<(), Refusal> {
+        if self.is_working() {
+            return Err(Refusal::NotInHold);
+        }
         let features = self.told.take().ok_or(Refusal::NotTold)?;
         self.classifier.keep(Example::new(features, label)).map_err(|ExamplesFull| Refusal::ExamplesFull)?;
         // Whoever teaches looks at what the objects are taken for.

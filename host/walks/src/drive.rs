@@ -675,7 +675,7 @@ impl<M: Machine> Drive<M> {
             self.saved = Some(saving);
         }
         let words = words(&line);
-        if matches!(words.first(), Some(&("label" | "forget"))) {
+        if matches!(words.first(), Some(&("label" | "teach" | "forget"))) {
             self.taught = self.machine.examples();
         }
         if !M::IS_OPEN && is_ok {
