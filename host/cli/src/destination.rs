@@ -1,7 +1,7 @@
 //! Where a command writes its files: one way for all, checked before any work is done.
 //!
 //! The rule for `--out`: a report, which is a page or several files, goes into a folder (`FOLDER`), which is made where there is
-//! none; a single table goes to a file (`FILE.csv`). An argument can only be written to once it has been checked, and a command
+//! none; a single table goes to a file (`FILE.csv`), and so does a study's part. An argument can only be written to once it has been checked, and a command
 //! checks before it works. What is wrong all the same after the work, such as a disk that has filled up, is told after the
 //! result has been printed.
 
@@ -57,6 +57,12 @@ impl FileName {
     /// The name.
     pub fn path(&self) -> &Path {
         &self.0
+    }
+}
+
+impl From<&FolderName> for FileName {
+    fn from(name: &FolderName) -> Self {
+        Self(name.0.clone())
     }
 }
 

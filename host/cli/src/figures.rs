@@ -1,8 +1,8 @@
 //! `weeder figures`: the figures that stand in the manual, each from the command that stands above it.
 //!
 //! A figure is a fenced block right behind a comment that names its command, such as `<!-- figures: weeder trial --speeds 1,2 -->`.
-//! The command is run, and what it prints becomes the block. What it prints of the time that it took, a line that begins with
-//! `Pace`, is left out: everything else is the same on every machine.
+//! The command is run, and what it prints becomes the block: that is the same on every machine. How long it took is told on standard
+//! error, which is left out.
 
 use crate::Finding;
 use crate::output::{say, tell};
@@ -82,7 +82,7 @@ fn renew(page: &str, path: &Path) -> Result<String> {
     Ok(anew)
 }
 
-/// What a command prints, without what depends on the machine that it runs on.
+/// What a command prints, which does not depend on the machine that it runs on.
 fn print(command: &str) -> Result<String> {
     let words = shlex::split(command).with_context(|| format!("unbalanced quotes in `{command}`"))?;
     let [program, arguments @ ..] = words.as_slice() else { bail!("there is no command") };
@@ -93,7 +93,7 @@ fn print(command: &str) -> Result<String> {
     // Status 1 is a finding, such as a plant that was damaged.
     ensure!(matches!(output.status.code(), Some(0 | 1)), "`{command}` fails: run it to see why");
     let printed = String::from_utf8(output.stdout).with_context(|| format!("`{command}` prints no text"))?;
-    let lines = printed.lines().map(str::trim_end).filter(|line| !line.starts_with("Pace"));
+    let lines = printed.lines().map(str::trim_end);
     let lines: Vec<&str> = lines.collect();
     let text = lines.join("\n");
     Ok(format!("{}\n", text.trim_matches('\n')))

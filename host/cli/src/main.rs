@@ -19,9 +19,11 @@ mod examples;
 mod figures;
 mod flash;
 mod hex;
+mod merge;
 mod monitor;
 mod numbers;
 mod output;
+mod part;
 mod plan;
 mod progress;
 mod record;
@@ -77,6 +79,8 @@ enum Command {
     Trial(Box<trial::Arguments>),
     /// Show a result of the simulated trial against one or two of its parameters.
     Sweep(Box<sweep::Arguments>),
+    /// Put together the parts of a trial, sweep or soak that several machines have computed.
+    Merge(merge::Arguments),
     /// Make an example table of labelled objects, and say how well it tells plants from weeds.
     Train(train::Arguments),
     /// Say what the firmware's classifier takes recorded objects for.
@@ -155,6 +159,7 @@ fn main() -> ExitCode {
         Command::Soak(arguments) => soak::run(&arguments),
         Command::Trial(arguments) => trial::run(&arguments),
         Command::Sweep(arguments) => sweep::run(&arguments).map(|()| Finding::Good),
+        Command::Merge(arguments) => merge::run(&arguments),
         Command::Train(arguments) => train::run(&arguments),
         Command::Classify(arguments) => classify::run(&arguments),
         Command::Monitor(arguments) => monitor::run(&arguments),

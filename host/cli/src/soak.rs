@@ -1,16 +1,23 @@
 //! `weeder soak`: hours of the decisions and minutes of the real firmware, with everything going wrong now and then.
 
 use crate::Finding;
+use crate::destination::FileName;
 use crate::numbers::whole_within;
-use crate::output::say;
+use crate::output::{say, tell};
+use crate::part::{self, Part};
 use crate::progress::Progress;
 use anyhow::{Result, ensure};
 use clap::Args;
+use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
+use study::shard::{Numbered, Shard};
 use trial::firmware;
 use trial::soak::{self, Plan, SoakError, Tally};
+
+/// What the parts of a soak say that they are of.
+pub const COMMAND: &str = "soak";
 
 /// What the user asks of a soak.
 #[derive(Args)]
@@ -19,6 +26,7 @@ Examples:
   weeder soak                                        a day of the decisions, half an hour of the firmware
   weeder soak --hours 0 --uno-minutes 6 --faults 900    the firmware alone, with a fault every four seconds
   weeder soak --hours 1 --uno-minutes 0 --json | jq .parts[0].alarms
+  weeder soak --hours 240 --shard 2/4 --out 2.part   the second of four parts, for `weeder merge`
 The status is 1 where something happened that must not.")]
 pub struct Arguments {
     /// Simulated hours of the decision core on the host, 0 to 10000; 0 leaves it out.
@@ -36,80 +44,162 @@ pub struct Arguments {
     /// Run this firmware instead of building the one in this repository.
     #[arg(long, value_name = "FILE.elf")]
     elf: Option<PathBuf>,
+    /// Work only the hours and rows of this shard, the Ith of N, and write what they have shown to the file of --out.
+    #[arg(long, value_name = "I/N", requires = "out", conflicts_with = "json")]
+    shard: Option<Shard>,
+    /// The file for the part of --shard.
+    #[arg(long, value_name = "FILE", requires = "shard")]
+    out: Option<FileName>,
     /// Print JSON for programs instead of words.
     #[arg(long)]
     json: bool,
 }
 
-/// Runs it and prints what it has shown.
+/// What decides a soak's result.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Study {
+    seed: u64,
+    faults: u32,
+    hours: u32,
+    uno_minutes: u32,
+    /// The check sum of the firmware, where it is run.
+    firmware: Option<String>,
+}
+
+impl Study {
+    fn plan(&self) -> Plan {
+        Plan { seed: self.seed, faults_an_hour: self.faults.into() }
+    }
+
+    /// Rows of the firmware on the virtual Uno.
+    fn rows(&self) -> Result<u64> {
+        Ok(soak::rows(self.plan(), self.uno_minutes.into())?)
+    }
+}
+
+/// Runs it and prints what it has shown, or writes a part of it.
 ///
 /// # Errors
 /// Where nothing is asked for, or the firmware cannot be built or run.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
+    let &Arguments { hours, uno_minutes, seed, faults, json, .. } = arguments;
     ensure!(
-        arguments.hours > 0 || arguments.uno_minutes > 0,
+        hours > 0 || uno_minutes > 0,
         "with --hours 0 and --uno-minutes 0 nothing is tried: one of them has to be above 0"
     );
-    let plan = Plan { seed: arguments.seed, faults_an_hour: arguments.faults.into() };
-    let mut parts = Vec::new();
-    if arguments.hours > 0 {
-        parts.push(Part::of("decisions", "The decision core on the host", arguments, |bar| {
-            soak::hours(plan, arguments.hours.into(), |share| bar.show(share))
+    let part = arguments.shard.zip(arguments.out.as_ref()).map(|(shard, out)| Part::new(shard, out)).transpose()?;
+    let elf = match &arguments.elf {
+        _ if uno_minutes == 0 => None,
+        Some(path) => Some(path.clone()),
+        None => Some(firmware::build()?),
+    };
+    let firmware = elf.as_deref().map(part::check_sum).transpose()?;
+    let study = Study { seed, faults, hours, uno_minutes, firmware };
+    if let Some(part) = part {
+        return write_part(&study, elf.as_deref(), part);
+    }
+    let mut stages = Vec::new();
+    if hours > 0 {
+        stages
+            .push(Stage::of(DECISIONS, json, |bar| soak::hours(study.plan(), hours.into(), |share| bar.show(share)))?);
+    }
+    if let Some(elf) = &elf {
+        stages.push(Stage::of(FIRMWARE, json, |bar| {
+            soak::minutes(study.plan(), uno_minutes.into(), elf, |share| bar.show(share))
         })?);
     }
-    if arguments.uno_minutes > 0 {
-        let elf = match &arguments.elf {
-            Some(path) => path.clone(),
-            None => firmware::build()?,
+    conclude(&study, &stages, json)
+}
+
+/// Computes a shard's hours and rows: the hours have the numbers from 0, and the rows those behind.
+fn write_part(study: &Study, elf: Option<&Path>, part: Part) -> Result<Finding> {
+    let hours = u64::from(study.hours);
+    let all = hours + study.rows()?;
+    let numbers = part.shard().numbers(all);
+    let count = numbers.len() as f64;
+    let bar = Progress::new("soaking");
+    let mut tallies = Vec::new();
+    for (number, begun) in numbers.zip(0..) {
+        let show = |share: f64| bar.show((f64::from(begun) + share) / count);
+        let outcome = match elf {
+            Some(elf) if number >= hours => soak::row(study.plan(), number - hours, elf)?,
+            _ => soak::hour(study.plan(), number, 1.0, show)?,
         };
-        parts.push(Part::of("firmware", "The firmware on the virtual Uno", arguments, |bar| {
-            soak::minutes(plan, arguments.uno_minutes.into(), &elf, |share| bar.show(share))
-        })?);
+        show(1.0);
+        tallies.push(Numbered { number, outcome });
     }
-    let is_good = parts.iter().all(|part| part.tally.violations.is_empty());
-    if arguments.json {
-        let parts = parts.iter().map(Part::in_json).collect::<Value>();
-        say!("{:#}", json!({ "seed": arguments.seed, "faults_an_hour": arguments.faults, "parts": parts }))?;
+    bar.finish();
+    part.write(COMMAND, all, study, tallies)?;
+    Ok(Finding::Good)
+}
+
+/// Prints what all hours and rows have shown, which were computed somewhere.
+///
+/// # Errors
+/// Where it cannot be printed.
+pub fn merge(study: &Study, mut tallies: Vec<Tally>, json: bool) -> Result<Finding> {
+    let rows = tallies.split_off((study.hours as usize).min(tallies.len()));
+    let mut stages = Vec::new();
+    for (title, tallies) in [(DECISIONS, tallies), (FIRMWARE, rows)] {
+        if !tallies.is_empty() {
+            let stage = Stage { title, tally: soak::total(tallies.into_iter().map(Ok::<_, SoakError>))? };
+            stage.say(json)?;
+            stages.push(stage);
+        }
+    }
+    conclude(study, &stages, json)
+}
+
+/// What is left to say of all stages, and whether all is well.
+fn conclude(study: &Study, stages: &[Stage], json: bool) -> Result<Finding> {
+    let &Study { seed, faults, .. } = study;
+    let is_good = stages.iter().all(|stage| stage.tally.violations.is_empty());
+    if json {
+        let stages = stages.iter().map(Stage::in_json).collect::<Value>();
+        say!("{:#}", json!({ "seed": seed, "faults_an_hour": faults, "parts": stages }))?;
     } else if !is_good {
-        say!("To see it again: weeder soak --seed {} --faults {}", arguments.seed, arguments.faults)?;
+        say!("To see it again: weeder soak --seed {seed} --faults {faults}")?;
     }
     Ok(if is_good { Finding::Good } else { Finding::Bad })
 }
 
-/// A part of a soak, and what it has shown.
-struct Part {
-    name: &'static str,
+/// A stage's name for programs, and for people.
+type Title = (&'static str, &'static str);
+
+const DECISIONS: Title = ("decisions", "The decision core on the host");
+const FIRMWARE: Title = ("firmware", "The firmware on the virtual Uno");
+
+/// A stage of a soak, and what it has shown.
+struct Stage {
+    title: Title,
     tally: Tally,
-    took_s: f64,
 }
 
-impl Part {
+impl Stage {
     /// Runs it behind its progress bar, and says what it has shown, unless that is for programs.
-    fn of(
-        name: &'static str,
-        title: &'static str,
-        arguments: &Arguments,
-        work: impl FnOnce(&Progress) -> Result<Tally, SoakError>,
-    ) -> Result<Self> {
+    fn of(title: Title, json: bool, work: impl FnOnce(&Progress) -> Result<Tally, SoakError>) -> Result<Self> {
         let began = Instant::now();
-        let bar = Progress::new(title);
+        let bar = Progress::new(title.1);
         let tally = work(&bar);
         bar.finish();
-        let part = Self { name, tally: tally?, took_s: began.elapsed().as_secs_f64() };
-        if !arguments.json {
-            let pace = part.tally.seconds / part.took_s;
-            say!("{title}\n{}Pace        {:.1} s, {pace:.0} times real time\n", part.tally, part.took_s)?;
-        }
-        Ok(part)
+        let stage = Self { title, tally: tally? };
+        stage.say(json)?;
+        let took_s = began.elapsed().as_secs_f64();
+        tell!("Pace        {took_s:.1} s, {:.0} times real time", stage.tally.seconds / took_s);
+        Ok(stage)
+    }
+
+    /// Says what it has shown, unless that is for programs.
+    fn say(&self, json: bool) -> Result<()> {
+        if json { Ok(()) } else { say!("{}\n{}", self.title.1, self.tally) }
     }
 
     fn in_json(&self) -> Value {
         let Tally { seconds, metres, rows, plants, weeded_metres, harmed, mistaken, blind, .. } = self.tally;
         let Tally { faults, alarms, resets, warnings, violations, .. } = &self.tally;
         json!({
-            "part": self.name,
+            "part": self.title.0,
             "seconds": seconds,
-            "took_s": self.took_s,
             "metres": metres,
             "rows": rows,
             "plants": plants,

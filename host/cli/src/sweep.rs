@@ -3,6 +3,7 @@
 use crate::destination::{FileName, OutFile};
 use crate::numbers::{number_within, whole_within};
 use crate::output::{print, say};
+use crate::part::Part;
 use crate::progress::Progress;
 use crate::source;
 use anyhow::Result;
@@ -13,8 +14,15 @@ use link::settings::{self, Setting};
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
 use std::fs;
-use study::experiment::Controller;
+use study::experiment::{Controller, PlotOutcome};
+use study::shard::Shard;
 use study::sweep::{Axis, Point, Results, SPACINGS_CM, SPEEDS_KM_H, Sweep};
+
+/// What the parts of a sweep say that they are of.
+pub const COMMAND: &str = "sweep";
+
+/// The result that is shown unless another one is asked for.
+pub const RESULT: &str = Results::NAMES[0];
 
 /// The examples in the help.
 const EXAMPLES: &str = "\
@@ -24,6 +32,7 @@ Examples:
   weeder sweep --controller paper --x speed=0.5..3:0.5 --y crop.protected_mm=60..140:20
   weeder sweep --x margin_mm=0..100:10 --y machine.load_kg_cm=0..40:10 --out margin.csv
   weeder sweep --x k=1..9:2 --json | jq .points[].plant_damage
+  weeder sweep --x k=1..9:2 --shard 2/4 --out 2.part      the second of four parts, for `weeder merge`
 An axis is `speed` in km/h, `spacing` in cm, a parameter of the field as in its TOML file, or a setting of the firmware.";
 
 /// The examples, and all that an axis can be.
@@ -59,7 +68,7 @@ pub struct Arguments {
     #[arg(long, value_name = "NAME=FROM..TO:STEP")]
     y: Option<Axis>,
     /// The result that a table with two axes shows.
-    #[arg(long, default_value = "plant_damage", value_parser = PossibleValuesParser::new(Results::NAMES))]
+    #[arg(long, default_value = RESULT, value_parser = PossibleValuesParser::new(Results::NAMES))]
     result: String,
     /// Who weeds: the firmware, the firmware without its leads, the paper's controller, or who knows every plant.
     #[arg(long, value_enum, default_value = "firmware")]
@@ -76,9 +85,12 @@ pub struct Arguments {
     /// Which of all the possible fields, 0 to 18446744073709551615.
     #[arg(long, default_value = "1", value_parser = whole_within(0..=u64::MAX))]
     seed: u64,
-    /// Write all results of all points to this file as well.
+    /// Write all results of all points to this file as well; with --shard, the part.
     #[arg(long, value_name = "FILE.csv")]
     out: Option<FileName>,
+    /// Weed only at the points of this shard, the Ith of N, and write what came of them to the file of --out.
+    #[arg(long, value_name = "I/N", requires = "out", conflicts_with = "json")]
+    shard: Option<Shard>,
     /// Print JSON for programs instead of a table: all results of all points.
     #[arg(long)]
     json: bool,
@@ -104,12 +116,22 @@ impl From<ControllerName> for Controller {
     }
 }
 
-/// Runs it and prints the result.
+/// How a sweep's points are to be shown.
+pub struct Shown {
+    /// Where they are written.
+    pub out: Option<FileName>,
+    /// Whether for programs.
+    pub json: bool,
+    /// Which of the results, where there are two axes.
+    pub result: String,
+}
+
+/// Runs it and prints the result, or writes a part of it.
 ///
 /// # Errors
 /// Where an axis or the field is wrong, or the file cannot be written.
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let out = arguments.out.as_ref().map(FileName::check).transpose()?;
+    let Arguments { out, json, result, .. } = arguments;
     let sweep = Sweep {
         x: arguments.x.clone(),
         y: arguments.y.clone(),
@@ -119,16 +141,38 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         spacing_cm: arguments.spacing,
         seed: arguments.seed,
     };
+    if let Some((shard, out)) = arguments.shard.zip(out.as_ref()) {
+        let part = Part::new(shard, out)?;
+        let bar = Progress::new("sweeping");
+        let outcomes = sweep.run_shard(shard, |share| bar.show(share))?;
+        bar.finish();
+        return part.write(COMMAND, sweep.size(), &sweep, outcomes);
+    }
+    let shown = Shown { out: out.clone(), json: *json, result: result.clone() };
+    let out = shown.out.as_ref().map(FileName::check).transpose()?;
     let bar = Progress::new("sweeping");
     let points = sweep.run(|share| bar.show(share))?;
     bar.finish();
-    let printed = match arguments.json {
-        true => say!("{:#}", in_json(&sweep, &points)),
-        false => print(format_args!("{}", in_words(arguments, &sweep, &points))),
+    show(&sweep, &points, &shown, out.as_ref())
+}
+
+/// Prints the result of all points' plots, which were weeded somewhere.
+///
+/// # Errors
+/// Where the file cannot be written.
+pub fn merge(sweep: &Sweep, outcomes: &[PlotOutcome], shown: &Shown) -> Result<()> {
+    let out = shown.out.as_ref().map(FileName::check).transpose()?;
+    show(sweep, &sweep.points(outcomes)?, shown, out.as_ref())
+}
+
+fn show(sweep: &Sweep, points: &[Point], shown: &Shown, out: Option<&OutFile>) -> Result<()> {
+    let printed = match shown.json {
+        true => say!("{:#}", in_json(sweep, points)),
+        false => print(format_args!("{}", in_words(&shown.result, sweep, points))),
     };
-    if let Some(out) = &out {
-        write(out, &sweep, &points)?;
-        if !arguments.json {
+    if let Some(out) = out {
+        write(out, sweep, points)?;
+        if !shown.json {
             say!("Written: {}", out.path().display())?;
         }
     }
@@ -136,14 +180,14 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 }
 
 /// The table, and what spoils it.
-fn in_words(arguments: &Arguments, sweep: &Sweep, points: &[Point]) -> String {
+fn in_words(result: &str, sweep: &Sweep, points: &[Point]) -> String {
     let mut text = match &sweep.y {
         Some(y) => format!(
             "{}, {} across, {} down\n{}\n",
-            arguments.result,
+            result,
             sweep.x.parameter,
             y.parameter,
-            grid(sweep, y, points, &arguments.result)
+            grid(sweep, y, points, result)
         ),
         None => format!("{}\n", list(sweep, points)),
     };

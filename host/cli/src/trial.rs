@@ -1,17 +1,19 @@
 //! `weeder trial`: the paper's experiment in a simulated field, with its report.
 
 use crate::Finding;
-use crate::destination::{FolderName, OutFolder};
+use crate::destination::{FileName, FolderName, OutFolder};
 use crate::examples;
 use crate::numbers::{number_within, whole_within};
-use crate::output::{self, say};
+use crate::output::{say, tell};
+use crate::part::{self, Part};
 use crate::progress::Progress;
 use crate::source;
 use anyhow::Result;
-use clap::{Args, ValueEnum};
+use clap::{Args, Command, FromArgMatches, ValueEnum};
 use comfy_table::{CellAlignment, Table, presets};
 use field::conditions::Conditions;
 use field::tool_path::{Effect, WeedCount, unweeded_strip_mm};
+use serde::{Deserialize, Serialize};
 use serde_json::json;
 use std::fs;
 use std::path::PathBuf;
@@ -19,9 +21,13 @@ use std::time::Instant;
 use study::evaluation::{Analysis, published};
 use study::experiment::{self, Controller, Engine, Experiment, PlotOutcome, Total};
 use study::page::{Page, RowPicture};
+use study::shard::{Numbered, Shard};
 use study::statistics::Share;
 use study::sweep::{SPACINGS_CM, SPEEDS_KM_H};
 use trial::{firmware, picture};
+
+/// What the parts of a trial say that they are of.
+pub const COMMAND: &str = "trial";
 
 /// What the user asks of a trial.
 #[derive(Args)]
@@ -33,7 +39,8 @@ Examples:
   weeder trial --brief                               what counts most, as a short table
   weeder trial --engine uno --replications 1         with the real firmware on the virtual Uno
   weeder trial --field my-field.toml --speeds 1,3 --spacings 30,40,50
-The status is 1 where the firmware damaged a plant, or an alarm stopped it.")]
+  weeder trial --replications 1000 --shard 2/4 --out 2.part    the second of four parts, for `weeder merge`
+The status is 1 where the firmware damaged a plant, or an alarm stopped it; with --shard, `weeder merge` says so.")]
 pub struct Arguments {
     /// What runs the firmware: its code compiled for this computer, or the ELF on the virtual Uno, some 500 times slower.
     #[arg(long, value_enum, default_value = "twin")]
@@ -63,9 +70,13 @@ pub struct Arguments {
     /// Run this firmware instead of building the one in this repository.
     #[arg(long, value_name = "FILE.elf")]
     elf: Option<PathBuf>,
-    /// Write report.html, trial.csv and controllers.csv into this folder, which is made where there is none.
+    /// Write report.html, trial.csv and controllers.csv into this folder, which is made where there is none; with --shard, the part
+    /// to this file.
     #[arg(long, value_name = "FOLDER")]
     out: Option<FolderName>,
+    /// Weed only the plots of this shard, the Ith of N, and write what came of them to the file of --out.
+    #[arg(long, value_name = "I/N", requires = "out", conflicts_with_all = ["json", "brief"])]
+    shard: Option<Shard>,
     /// Print what counts most of the table, and nothing else.
     #[arg(long, conflicts_with = "json")]
     brief: bool,
@@ -75,7 +86,8 @@ pub struct Arguments {
 }
 
 /// The engines by their names.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 enum EngineName {
     /// The firmware's code, compiled for this computer.
     Twin,
@@ -105,14 +117,86 @@ impl Arguments {
         };
         Controller::ALL.into_iter().filter(takes_part).collect()
     }
+
+    /// The command that gives the same result: what of it is not so by itself, always in one order.
+    fn words(&self) -> Result<Vec<String>> {
+        let nothing = Self::augment_args(Command::new(COMMAND)).try_get_matches_from([COMMAND])?;
+        let otherwise = Self::from_arg_matches(&nothing)?.options();
+        let mut words = vec!["weeder".to_owned(), COMMAND.to_owned()];
+        for ((option, value), (_, otherwise)) in self.options().into_iter().zip(otherwise) {
+            if let Some(value) = value.filter(|value| otherwise.as_ref() != Some(value)) {
+                words.extend([option.to_owned(), value]);
+            }
+        }
+        Ok(words)
+    }
+
+    /// What decides the result, as it would be typed.
+    fn options(&self) -> [(&'static str, Option<String>); 9] {
+        fn list<T>(values: &[T], word: impl Fn(&T) -> String) -> Option<String> {
+            Some(values.iter().map(word).collect::<Vec<_>>().join(","))
+        }
+        fn name(value: &impl ValueEnum) -> String {
+            value.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default()
+        }
+        let path = |path: &Option<PathBuf>| path.as_ref().map(|path| path.display().to_string());
+        [
+            ("--engine", Some(name(&self.engine))),
+            ("--replications", Some(self.replications.to_string())),
+            ("--speeds", list(&self.speeds, f64::to_string)),
+            ("--spacings", list(&self.spacings, f64::to_string)),
+            ("--field", Some(self.field.clone())),
+            ("--examples", path(&self.examples)),
+            ("--rivals", list(&self.rivals, name)),
+            ("--seed", Some(self.seed.to_string())),
+            ("--elf", path(&self.elf)),
+        ]
+    }
 }
 
-/// Runs it and prints the result.
+/// What decides a trial's result, and how it is asked for.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Study {
+    experiment: Experiment,
+    engine: EngineName,
+    /// The check sum of the firmware, where it is run on the virtual Uno.
+    firmware: Option<String>,
+    /// The field as it was named.
+    field: String,
+    /// The command that gives the same result, without what it is to do with it.
+    words: Vec<String>,
+}
+
+/// What came of a plot.
+#[derive(Serialize, Deserialize)]
+pub struct PlotPart {
+    /// By each controller.
+    by_controller: Vec<PlotOutcome>,
+    /// The first plot's brings the report's picture of a row along, which the merging machine may have no firmware for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    picture: Option<String>,
+}
+
+/// How a trial is to be shown.
+pub struct Shown {
+    /// Where its report goes.
+    pub out: Option<FolderName>,
+    /// Whether for programs.
+    pub json: bool,
+    /// Whether what counts most is enough.
+    pub brief: bool,
+}
+
+/// Runs it and prints the result, or writes a part of it.
 ///
 /// # Errors
 /// Where the field is wrong, the firmware cannot be built or run, or a file cannot be written.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
-    let folder = arguments.out.as_ref().map(FolderName::check).transpose()?;
+    let &Arguments { json, brief, .. } = arguments;
+    let file = arguments.out.as_ref().map(FileName::from);
+    let part = arguments.shard.zip(file.as_ref()).map(|(shard, file)| Part::new(shard, file)).transpose()?;
+    let shown = Shown { out: arguments.out.clone().filter(|_| part.is_none()), json, brief };
+    let folder = shown.out.as_ref().map(FolderName::check).transpose()?;
     let experiment = Experiment {
         speeds_km_h: ascending(&arguments.speeds),
         spacings_cm: ascending(&arguments.spacings),
@@ -127,34 +211,77 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
         (EngineName::Uno, Some(path)) => Engine::Uno(path.clone()),
         (EngineName::Uno, None) => Engine::Uno(firmware::build()?),
     };
+    let firmware = match &engine {
+        Engine::Twin => None,
+        Engine::Uno(elf) => Some(part::check_sum(elf)?),
+    };
+    let (field, words) = (arguments.field.clone(), arguments.words()?);
+    let study = Study { experiment, engine: arguments.engine, firmware, field, words };
     let (bar, began) = (Progress::new("weeding"), Instant::now());
-    let outcomes = experiment.run(&engine, |share| bar.show(share))?;
+    if let Some(part) = part {
+        let plots = study.experiment.run_shard(part.shard(), &engine, |share| bar.show(share))?;
+        bar.finish();
+        let with_picture = |Numbered { number, outcome: by_controller }| {
+            let picture = if number == 0 { picture_of(&study.experiment, &engine)? } else { None };
+            Ok(Numbered { number, outcome: PlotPart { by_controller, picture } })
+        };
+        let plots = plots.into_iter().map(with_picture).collect::<Result<Vec<_>>>()?;
+        part.write(COMMAND, study.experiment.size(), &study, plots)?;
+        return Ok(Finding::Good);
+    }
+    let outcomes = study.experiment.run(&engine, |share| bar.show(share))?;
     bar.finish();
-    let took_s = began.elapsed().as_secs_f64();
+    if !json && !brief {
+        let worked_s: f64 = outcomes.iter().map(|outcome| outcome.moved_s).sum();
+        let took_s = began.elapsed().as_secs_f64();
+        tell!("Pace: {:.1} h of work in {took_s:.1} s, {:.0} times real time.", worked_s / 3600.0, worked_s / took_s);
+    }
+    show(&study, &outcomes, &shown, folder.as_ref(), || picture_of(&study.experiment, &engine))
+}
 
-    let totals = experiment::totals(&outcomes);
-    let analysis = Analysis::of(experiment::records(&outcomes, Controller::Firmware))?;
-    let mut summary = summary(&experiment, &totals);
-    summary.extend(against_the_paper(&outcomes));
-    let printed = if arguments.json {
+/// Prints the result of all plots, which were weeded somewhere.
+///
+/// # Errors
+/// Where a file cannot be written.
+pub fn merge(study: Study, mut plots: Vec<PlotPart>, shown: &Shown) -> Result<Finding> {
+    let folder = shown.out.as_ref().map(FolderName::check).transpose()?;
+    let picture = plots.first_mut().and_then(|plot| plot.picture.take());
+    let outcomes: Vec<PlotOutcome> = plots.into_iter().flat_map(|plot| plot.by_controller).collect();
+    show(&study, &outcomes, shown, folder.as_ref(), || Ok(picture))
+}
+
+/// A picture of a row as the firmware weeded it, as SVG.
+fn picture_of(experiment: &Experiment, engine: &Engine) -> Result<Option<String>> {
+    let example = experiment.example(engine)?;
+    Ok(example.map(|(row, judgement)| picture::draw(&row, &judgement).to_string()))
+}
+
+/// Prints a trial's result, and writes its report.
+fn show(
+    study: &Study,
+    outcomes: &[PlotOutcome],
+    shown: &Shown,
+    folder: Option<&OutFolder>,
+    picture: impl FnOnce() -> Result<Option<String>>,
+) -> Result<Finding> {
+    let &Shown { json, brief, .. } = shown;
+    let totals = experiment::totals(outcomes);
+    let analysis = Analysis::of(experiment::records(outcomes, Controller::Firmware))?;
+    let mut summary = summary(&study.experiment, &totals);
+    summary.extend(against_the_paper(outcomes));
+    let printed = if json {
         say!("{:#}", json!({ "summary": summary, "plots": outcomes.iter().map(in_json).collect::<Vec<_>>() }))
-    } else if arguments.brief {
+    } else if brief {
         say!("{}", by_speed(&totals, true))
     } else {
-        let worked_s: f64 = outcomes.iter().map(|outcome| outcome.moved_s).sum();
-        let pace = format!(
-            "Pace: {:.1} h of work in {took_s:.1} s, {:.0} times real time.",
-            worked_s / 3600.0,
-            worked_s / took_s
-        );
-        say!("{}\n\n{}\n{pace}", by_speed(&totals, false), summary.join("\n"))
+        say!("{}\n\n{}", by_speed(&totals, false), summary.join("\n"))
     };
     let alarms: u32 = of(&totals, Controller::Firmware).map(|total| total.alarms).sum();
     let damaged: u32 = of(&totals, Controller::Firmware).map(|total| total.effect.injured()).sum();
-    if let Some(folder) = &folder {
-        let findings = Findings { outcomes: &outcomes, totals, analysis, summary };
-        write_report(folder, arguments, &experiment, &engine, &findings)?;
-        if !arguments.json {
+    if let Some(folder) = folder {
+        let findings = Findings { outcomes, totals, analysis, summary };
+        write_report(folder, study, picture()?, &findings)?;
+        if !json {
             say!("\nWritten: report.html, trial.csv and controllers.csv in {}", folder.path().display())?;
         }
     }
@@ -299,21 +426,16 @@ fn damage(totals: &[Total], controller: Controller) -> String {
     }
 }
 
-fn write_report(
-    folder: &OutFolder,
-    arguments: &Arguments,
-    experiment: &Experiment,
-    engine: &Engine,
-    findings: &Findings,
-) -> Result<()> {
-    let engine_name = match engine {
-        Engine::Twin => "the firmware's code, compiled for the host",
-        Engine::Uno(_) => "the firmware on the virtual Uno",
+fn write_report(folder: &OutFolder, study: &Study, picture: Option<String>, findings: &Findings) -> Result<()> {
+    let Study { experiment, field, .. } = study;
+    let engine_name = match study.engine {
+        EngineName::Twin => "the firmware's code, compiled for the host",
+        EngineName::Uno => "the firmware on the virtual Uno",
     };
     let mut parameters = vec![
         ("version".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
         ("engine".to_owned(), engine_name.to_owned()),
-        ("field".to_owned(), arguments.field.clone()),
+        ("field".to_owned(), field.clone()),
         ("seed".to_owned(), experiment.seed.to_string()),
     ];
     parameters.extend(experiment.conditions.values().map(|(parameter, value)| {
@@ -321,14 +443,15 @@ fn write_report(
     }));
     let settings = experiment.conditions.settings.iter();
     parameters.extend(settings.map(|(setting, value)| (format!("settings.{setting}"), value.to_string())));
-    let row = experiment.example(engine)?.map(|(row, judgement)| RowPicture {
-        drawing: picture::draw(&row, &judgement),
+    let row = picture.map(|drawing| RowPicture {
+        drawing,
         caption: "The first metres of a row at the highest speed, as the firmware weeded them.".to_owned(),
     });
+    let words = [study.words.clone(), vec!["--out".to_owned(), folder.path().display().to_string()]].concat();
     let page = Page {
         title: "Field trial of the intra-row weeder, simulated",
         summary: findings.summary.clone(),
-        command: &output::command_line()?,
+        command: &shlex::try_join(words.iter().map(String::as_str))?,
         parameters: &parameters,
         analysis: &findings.analysis,
         comparison: Some(&experiment::compare(&findings.totals)),

@@ -19,6 +19,7 @@ use crate::motion::Motion;
 use crate::servo::Stroke;
 use crate::stand::{Stand, Stem, Weed};
 use crate::steering::Steering;
+use serde::{Deserialize, Serialize};
 use signal::Pulse;
 use std::ops::{AddAssign, Range};
 
@@ -29,7 +30,7 @@ const TOUCH_MM: f64 = 1e-6;
 const LOOK_S: f64 = 0.000_5;
 
 /// Weeds, counted.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct WeedCount {
     /// Before weeding.
     pub before: u32,
@@ -52,7 +53,7 @@ impl AddAssign for WeedCount {
 }
 
 /// What the tools did to a stand.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Effect {
     /// Crop plants.
     pub plants: u32,

@@ -12,7 +12,7 @@ pub mod table;
 
 use crate::statistics::{AnalysisOfVariance, BinomialModel, Checks, Design, LinearModel, Mean, NoModel, Share};
 use published::Published;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 pub use table::{TableError, read_csv, write_csv};
 use thiserror::Error;
 
@@ -23,7 +23,7 @@ const M2_PER_HA: f64 = 10_000.0;
 const S_PER_H: f64 = 3600.0;
 
 /// One plot of a trial, as counted and measured in it.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlotRecord {
     /// Which repetition of its speed and spacing it is.
     pub replication: u32,

@@ -2,14 +2,17 @@
 //! same ground.
 //!
 //! Each plot's rows grow and are driven from the seed, the plot and the row alone, so that the result depends neither on the
-//! number of threads nor on which controllers take part. The firmware is either its native twin ([`field::twin`]) or the ELF on the
+//! number of threads or machines nor on which controllers take part. The firmware is either its native twin ([`field::twin`]) or the ELF on the
 //! virtual Uno ([`mod@trial`]); its rivals ([`field::rivals`]) are models in both cases. A plot comes out as somebody
 //! with a notebook would write it down ([`PlotRecord`]), and is judged by the same code as a real one.
+
+mod taught;
 
 pub mod table;
 pub mod total;
 
 use crate::evaluation::PlotRecord;
+use crate::shard::{Numbered, Shard};
 use control::ground::features;
 use control::operate::state::State;
 use field::bound::undamaged_share;
@@ -26,6 +29,7 @@ use knn::Example;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use signal::Pulse;
 use std::ops::AddAssign;
 use std::path::PathBuf;
@@ -46,7 +50,8 @@ pub enum Engine {
 }
 
 /// Who swings the tool.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Controller {
     /// The firmware with its leads.
     Firmware,
@@ -74,7 +79,7 @@ impl Controller {
 }
 
 /// An experiment: the full factorial of speeds and spacings.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Experiment {
     /// Forward speeds, km/h.
     pub speeds_km_h: Vec<f64>,
@@ -87,13 +92,14 @@ pub struct Experiment {
     /// Where.
     pub conditions: Conditions,
     /// What the firmware is taught beforehand.
+    #[serde(with = "taught")]
     pub examples: Vec<Example<{ features::COUNT }>>,
     /// Which of all the possible fields.
     pub seed: u64,
 }
 
 /// One plot, weeded by one controller.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlotOutcome {
     /// Who weeded it.
     pub controller: Controller,
@@ -117,7 +123,7 @@ pub struct PlotOutcome {
 
 /// Canopies as the beam sees them, and how the tool passed them: a stricter measure than damage, which is the tool in the zone
 /// round a stem ([`field::verdict`]).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Canopies {
     /// All of them; plants that have grown together have one.
     pub all: u32,
@@ -219,6 +225,11 @@ impl Experiment {
             .collect()
     }
 
+    /// Number of plots, each of which all controllers weed.
+    pub fn size(&self) -> u64 {
+        self.plots().len() as u64
+    }
+
     /// Number of rows that each controller weeds.
     pub fn rows(&self) -> usize {
         self.plots().len() * self.conditions.plot.rows as usize
@@ -230,14 +241,29 @@ impl Experiment {
     /// # Errors
     /// The first that a row meets.
     pub fn run(&self, engine: &Engine, progress: impl Fn(f64) + Sync) -> Result<Vec<PlotOutcome>, ExperimentError> {
-        let (done, all) = (AtomicUsize::new(0), self.rows() as f64);
+        let of_plots = self.run_shard(Shard::WHOLE, engine, progress)?;
+        Ok(of_plots.into_iter().flat_map(|plot| plot.outcome).collect())
+    }
+
+    /// Weeds a shard's plots: for each an outcome of each controller. All shards' together are what [`Experiment::run`] gives.
+    ///
+    /// # Errors
+    /// As [`Experiment::run`].
+    pub fn run_shard(
+        &self,
+        shard: Shard,
+        engine: &Engine,
+        progress: impl Fn(f64) + Sync,
+    ) -> Result<Vec<Numbered<Vec<PlotOutcome>>>, ExperimentError> {
+        let plots = self.plots();
+        let mine: Vec<&Plot> = shard.numbers(self.size()).map(|number| &plots[number as usize]).collect();
+        let (done, all) = (AtomicUsize::new(0), (mine.len() * self.conditions.plot.rows as usize) as f64);
         let row_done = || progress((done.fetch_add(1, Ordering::Relaxed) + 1) as f64 / all);
-        let of_plots: Vec<Vec<PlotOutcome>> = self
-            .plots()
-            .par_iter()
-            .map(|plot| self.weed_plot(plot, engine, &row_done))
-            .collect::<Result<_, ExperimentError>>()?;
-        Ok(of_plots.into_iter().flatten().collect())
+        let weed = |plot: &&Plot| {
+            let outcome = self.weed_plot(plot, engine, &row_done)?;
+            Ok(Numbered { number: plot.index, outcome })
+        };
+        mine.par_iter().map(weed).collect()
     }
 
     /// One row of the experiment, the first plot's at the highest speed, and what the firmware did to it: its first metres, to

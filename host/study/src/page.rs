@@ -14,7 +14,6 @@ use askama::Template;
 use figure::Figure;
 use plot::DrawingError;
 use response::Chapter;
-use svg::Document;
 use table::{Table, fixed, short};
 use thiserror::Error;
 
@@ -53,8 +52,8 @@ pub struct ControllerPoint {
 /// One row drawn along the ground, as [`trial::picture::draw`] draws it.
 #[derive(Debug, Clone)]
 pub struct RowPicture {
-    /// The drawing.
-    pub drawing: Document,
+    /// The drawing, as SVG.
+    pub drawing: String,
     /// What is to be seen in it, in a sentence.
     pub caption: String,
 }
@@ -114,7 +113,7 @@ impl Page<'_> {
             command: self.command,
             comparison,
             figures: figures.into_iter().collect::<Result<_, _>>()?,
-            row: self.row.map(|row| (row.drawing.to_string(), row.caption.as_str())),
+            row: self.row.map(|row| (row.drawing.clone(), row.caption.as_str())),
             chapters: analysis.responses.iter().map(|of| Chapter::of(analysis, of)).collect::<Result<_, _>>()?,
             means: means(analysis),
             plots: plots(analysis),

@@ -4,9 +4,10 @@
 //! ([`Axis`]). At each point the firmware's native twin weeds a plot, always the same ground for the same conditions.
 
 use crate::experiment::{Controller, Engine, Experiment, ExperimentError, PlotOutcome};
+use crate::shard::{Numbered, Shard};
 use field::conditions::{Conditions, WrongValue};
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::str::FromStr;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use thiserror::Error;
@@ -21,7 +22,7 @@ pub const SPACINGS_CM: (f64, f64) = (5.0, 500.0);
 const MOST_VALUES: usize = 1000;
 
 /// A parameter and the values that it takes.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Axis {
     /// `speed` in km/h, `spacing` in cm, or a name that [`Conditions::set`] takes.
     pub parameter: String,
@@ -127,7 +128,7 @@ impl Results {
 }
 
 /// A sweep.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Sweep {
     /// The first axis.
     pub x: Axis,
@@ -154,6 +155,13 @@ pub struct Point {
     pub y: Option<f64>,
     /// What came of it.
     pub results: Results,
+}
+
+/// Where a point is, and what is tried there.
+struct Place {
+    x: f64,
+    y: Option<f64>,
+    experiment: Experiment,
 }
 
 /// Why a sweep had no outcome.
@@ -195,30 +203,65 @@ impl Sweep {
     /// # Errors
     /// Before anything is weeded where an axis has a value that cannot be; else the first that a plot meets.
     pub fn run(&self, progress: impl Fn(f64) + Sync) -> Result<Vec<Point>, SweepError> {
+        let outcomes = self.run_shard(Shard::WHOLE, progress)?;
+        self.points(&outcomes.into_iter().map(|point| point.outcome).collect::<Vec<_>>())
+    }
+
+    /// Number of points.
+    pub fn size(&self) -> u64 {
+        (self.x.values.len() * self.y.as_ref().map_or(1, |y| y.values.len())) as u64
+    }
+
+    /// Weeds a plot at each of a shard's points.
+    ///
+    /// # Errors
+    /// As [`Sweep::run`].
+    pub fn run_shard(
+        &self,
+        shard: Shard,
+        progress: impl Fn(f64) + Sync,
+    ) -> Result<Vec<Numbered<PlotOutcome>>, SweepError> {
+        let places = self.places()?;
+        let mine: Vec<(u64, &Place)> =
+            shard.numbers(self.size()).map(|number| (number, &places[number as usize])).collect();
+        let done = AtomicUsize::new(0);
+        let weed = |&(number, place): &(u64, &Place)| {
+            let outcomes = place.experiment.run(&Engine::Twin, |_| ());
+            let outcomes = outcomes.map_err(|problem| SweepError::Point { place: self.describe(place), problem })?;
+            progress((done.fetch_add(1, Ordering::Relaxed) + 1) as f64 / mine.len() as f64);
+            // One speed, one spacing, one replication and one controller: one plot.
+            Ok(outcomes.into_iter().map(move |outcome| Numbered { number, outcome }).collect::<Vec<_>>())
+        };
+        mine.par_iter().map(weed).collect::<Result<Vec<_>, SweepError>>().map(|outcomes| outcomes.concat())
+    }
+
+    /// The points, of what came of all their plots.
+    ///
+    /// # Errors
+    /// Where an axis has a value that cannot be.
+    pub fn points(&self, outcomes: &[PlotOutcome]) -> Result<Vec<Point>, SweepError> {
+        let point = |(place, outcome): (&Place, &PlotOutcome)| {
+            let results = Results::of(outcome, place.experiment.conditions.plot.rows);
+            Point { x: place.x, y: place.y, results }
+        };
+        Ok(self.places()?.iter().zip(outcomes).map(point).collect())
+    }
+
+    /// Where all points are, the first axis running fastest.
+    fn places(&self) -> Result<Vec<Place>, SweepError> {
         if let Some(y) = self.y.as_ref().filter(|y| y.parameter == self.x.parameter) {
             return Err(SweepError::Twice(y.parameter.clone()));
         }
         let ys: Vec<Option<f64>> =
             self.y.as_ref().map_or(vec![None], |y| y.values.iter().map(|&value| Some(value)).collect());
         let places = ys.iter().flat_map(|&y| self.x.values.iter().map(move |&x| (x, y)));
-        let points: Vec<(f64, Option<f64>, Experiment)> =
-            places.map(|(x, y)| Ok((x, y, self.at(x, y)?))).collect::<Result<_, SweepError>>()?;
-        let done = AtomicUsize::new(0);
-        points
-            .par_iter()
-            .map(|(x, y, experiment)| {
-                let outcomes = experiment.run(&Engine::Twin, |_| ()).map_err(|problem| {
-                    let second = self.y.as_ref().zip(*y).map(|(axis, y)| format!(", {} = {y}", axis.parameter));
-                    let place = format!("{} = {x}{}", self.x.parameter, second.unwrap_or_default());
-                    SweepError::Point { place, problem }
-                })?;
-                progress((done.fetch_add(1, Ordering::Relaxed) + 1) as f64 / points.len() as f64);
-                // One speed, one spacing, one replication and one controller: one plot.
-                let results = outcomes.iter().map(|outcome| Results::of(outcome, experiment.conditions.plot.rows));
-                Ok(results.map(|results| Point { x: *x, y: *y, results }).collect::<Vec<_>>())
-            })
-            .collect::<Result<Vec<_>, SweepError>>()
-            .map(|points| points.concat())
+        places.map(|(x, y)| Ok(Place { x, y, experiment: self.at(x, y)? })).collect()
+    }
+
+    /// A place on the axes, in words.
+    fn describe(&self, place: &Place) -> String {
+        let second = self.y.as_ref().zip(place.y).map(|(axis, y)| format!(", {} = {y}", axis.parameter));
+        format!("{} = {}{}", self.x.parameter, place.x, second.unwrap_or_default())
     }
 
     /// The experiment at a point.

@@ -55,7 +55,7 @@ fn comparison() -> Comparison {
 fn row() -> RowPicture {
     let drawing =
         svg::Document::new().set("viewBox", (0, 0, 10, 10)).add(svg::node::element::Circle::new().set("r", 4));
-    RowPicture { drawing, caption: "Three plants & a weed".to_owned() }
+    RowPicture { drawing: drawing.to_string(), caption: "Three plants & a weed".to_owned() }
 }
 
 /// A page with everything on it.

@@ -1,8 +1,11 @@
 //! The soak: hours of field work with everything going wrong now and then.
 //!
 //! [`hours`] has the decision core, the code of the firmware with its real classifier, work rows by chance for simulated hours
-//! on the host; its clock and its count run over their ends on the way. [`minutes`] does the same for minutes with the real ELF
+//! on the host; in each hour its clock and its count run over their ends. [`minutes`] does the same for minutes with the real ELF
 //! on the virtual Uno. Both have faults injected by chance, and an operator who clears what is latched and starts again.
+//!
+//! Each hour of the decisions and each row of the firmware has a chance of its own, by the seed and its number, so that [`hour`] and
+//! [`row`] can be called anywhere: [`total`] of all of them is the same.
 //!
 //! A plant is *harmed* where the tool was not fully out over its canopy although the firmware could know of it: this must not
 //! be, and it ends the soak with the seed and the time at which it can be seen again. Excused are, and counted apart:
@@ -14,13 +17,17 @@
 mod core;
 mod elf;
 
-pub use self::core::hours;
-pub use self::elf::minutes;
+pub use self::core::{hour, hours};
+pub use self::elf::{minutes, row, rows};
 
 use crate::run::TrialError;
 use field::planting::PlantingError;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt;
+use std::ops::AddAssign;
 use thiserror::Error;
 
 /// What a soak is to be.
@@ -44,7 +51,7 @@ pub enum SoakError {
 }
 
 /// What a soak has shown.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Tally {
     /// Simulated seconds.
     pub seconds: f64,
@@ -70,7 +77,7 @@ pub struct Tally {
     pub resets: BTreeMap<String, u64>,
     /// Warnings by name.
     pub warnings: BTreeMap<String, u64>,
-    /// What must not be, each with its time.
+    /// What must not be, each with its hour or row and the time in it.
     pub violations: Vec<String>,
 }
 
@@ -79,6 +86,52 @@ impl Tally {
     fn violated(&mut self, time_s: f64, what: impl fmt::Display) {
         self.violations.push(format!("at {time_s:.3} s: {what}"));
     }
+}
+
+impl AddAssign for Tally {
+    fn add_assign(&mut self, other: Self) {
+        self.seconds += other.seconds;
+        self.metres += other.metres;
+        self.rows += other.rows;
+        self.plants += other.plants;
+        self.weeded_metres += other.weeded_metres;
+        self.harmed += other.harmed;
+        self.mistaken += other.mistaken;
+        self.blind += other.blind;
+        for (names, others) in [
+            (&mut self.faults, other.faults),
+            (&mut self.alarms, other.alarms),
+            (&mut self.resets, other.resets),
+            (&mut self.warnings, other.warnings),
+        ] {
+            for (name, times) in others {
+                *names.entry(name).or_default() += times;
+            }
+        }
+        self.violations.extend(other.violations);
+    }
+}
+
+/// All hours or rows of a soak, up to the first in which something must not have been: nothing behind it is asked for.
+///
+/// # Errors
+/// The first that one has.
+pub fn total<E>(tallies: impl IntoIterator<Item = Result<Tally, E>>) -> Result<Tally, E> {
+    let mut total = Tally::default();
+    for tally in tallies {
+        total += tally?;
+        if !total.violations.is_empty() {
+            break;
+        }
+    }
+    Ok(total)
+}
+
+/// The chance of an hour or a row.
+fn chance(plan: Plan, number: u64) -> ChaCha8Rng {
+    let mut rng = ChaCha8Rng::seed_from_u64(plan.seed);
+    rng.set_stream(number);
+    rng
 }
 
 /// Counts a name.

@@ -1,8 +1,8 @@
 //! Hours of the decision core on the host: a turn of the loop is a millisecond, and an edge of the beam comes at its tick.
 //!
-//! Clock and count go on over resets, unlike on the chip, and begin shortly before their ends, so that both run over them.
+//! Clock and count go on over resets, unlike on the chip, and begin shortly before their ends, so that in each hour both run over them.
 
-use super::{Plan, SoakError, Tally, count};
+use super::{Plan, SoakError, Tally, chance, count, total};
 use control::{
     ground::{class::Class, examples::EXAMPLES, nearest::Nearest},
     measure::{
@@ -24,16 +24,16 @@ use field::machine::Machine;
 use field::motion::mm_s;
 use field::planting::Planting;
 use field::row::{Kind, Row};
-use rand::{RngExt, SeedableRng};
+use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use std::{cell::RefCell, ops::Range, rc::Rc};
 
 /// A turn of the loop.
 const TURN_S: f64 = 0.001;
 
-/// Where clock and count begin: the clock a minute before its end, the count five kilometres.
+/// Where clock and count begin: the clock a minute before its end, the count two hundred metres.
 const FIRST_STEPS: u32 = u32::MAX - 15_000_000;
-const FIRST_COUNT: i32 = i32::MAX - 9_550_000;
+const FIRST_COUNT: i32 = i32::MAX - 382_000;
 
 /// Simulated time between two reports of progress.
 const PROGRESS_TURNS: u64 = 1_000_000;
@@ -165,18 +165,31 @@ struct Excuse {
 /// # Errors
 /// [`SoakError::Planting`].
 pub fn hours(plan: Plan, hours: f64, mut progress: impl FnMut(f64)) -> Result<Tally, SoakError> {
-    let machine = Machine::default();
-    let turns = (hours * 3600.0 / TURN_S) as u64;
-    Field::new(plan.seed, machine).work_until(turns, plan.faults_an_hour, &mut progress)
+    total((0..hours.ceil() as u64).map(|number| {
+        let begun = number as f64;
+        hour(plan, number, (hours - begun).min(1.0), |share| progress((begun + share) / hours))
+    }))
+}
+
+/// Works for an hour of a soak, with this number from 0, or for a part of it; `progress` is told how much of an hour is done.
+///
+/// # Errors
+/// [`SoakError::Planting`].
+pub fn hour(plan: Plan, number: u64, part: f64, mut progress: impl FnMut(f64)) -> Result<Tally, SoakError> {
+    let turns = (part * 3600.0 / TURN_S) as u64;
+    let field = Field::new(chance(plan, number), Machine::default());
+    let mut tally = field.work_until(turns, plan.faults_an_hour, &mut |share| progress(share * part))?;
+    tally.violations = tally.violations.iter().map(|what| format!("hour {}, {what}", number + 1)).collect();
+    Ok(tally)
 }
 
 impl Field {
-    fn new(seed: u64, machine: Machine) -> Self {
+    fn new(rng: ChaCha8Rng, machine: Machine) -> Self {
         let memories = [Shared::default(), Shared::default()];
         let readings = Readings::new(Instant::new(FIRST_STEPS), Position::new(FIRST_COUNT));
         let weeder = wake_up(&memories, readings, false, Cause::PowerOn);
         Self {
-            rng: ChaCha8Rng::seed_from_u64(seed),
+            rng,
             machine,
             weeder,
             memories,
@@ -554,10 +567,11 @@ fn name(bytes: impl Iterator<Item = u8>) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rand::SeedableRng;
 
     /// Six minutes of work without faults by a machine that was told its leads wrongly.
     fn with_leads(lead_out_ms: u16, lead_in_ms: u16) -> Tally {
-        let mut field = Field::new(1, Machine::default());
+        let mut field = Field::new(ChaCha8Rng::seed_from_u64(1), Machine::default());
         field.weeder.clear();
         field.weeder.set(Setting::LeadInMs, lead_in_ms).expect("in HOLD");
         field.weeder.set(Setting::LeadOutMs, lead_out_ms).expect("in HOLD");

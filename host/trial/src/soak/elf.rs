@@ -3,7 +3,7 @@
 //! After a reset the firmware is in HOLD, and the operator lets it roll to the end of the row: from there on nothing may be
 //! harmed. Rows whose encoder was made to lie are held only against their alarms.
 
-use super::{Plan, SoakError, Tally, count};
+use super::{Plan, SoakError, Tally, chance, count, total};
 use crate::console::ask;
 use crate::run::{TrialError, boot, set_up};
 use field::machine::{Machine, cycle_at, time_at_s};
@@ -12,7 +12,7 @@ use field::planting::Planting;
 use field::trial::Trial;
 use field::verdict::{Timing, Verdict, judge};
 use field::wiring;
-use rand::{Rng, RngExt, SeedableRng};
+use rand::{Rng, RngExt};
 use rand_chacha::ChaCha8Rng;
 use signal::{CYCLES_PER_SECOND, PinChange, Pulse};
 use std::path::Path;
@@ -79,20 +79,47 @@ impl Fault {
 /// # Errors
 /// Where a row does not grow or the firmware does not answer.
 pub fn minutes(plan: Plan, minutes: f64, elf: &Path, mut progress: impl FnMut(f64)) -> Result<Tally, SoakError> {
-    let mut rng = ChaCha8Rng::seed_from_u64(plan.seed);
-    let mut tally = Tally::default();
-    let seconds = minutes * 60.0;
-    while tally.seconds < seconds && tally.violations.is_empty() {
-        work(&mut rng, plan, elf, &mut tally)?;
-        progress(tally.seconds / seconds);
+    let rows = rows(plan, minutes)?;
+    total((0..rows).map(|number| {
+        let tally = row(plan, number, elf)?;
+        progress((number + 1) as f64 / rows as f64);
+        Ok(tally)
+    }))
+}
+
+/// How many rows take so many minutes, the last one perhaps some more.
+///
+/// # Errors
+/// Where a row does not grow.
+pub fn rows(plan: Plan, minutes: f64) -> Result<u64, SoakError> {
+    let (mut rows, mut seconds) = (0, 0.0);
+    while seconds < minutes * 60.0 {
+        seconds += draw(&mut chance(plan, rows))?.motion.duration_s();
+        rows += 1;
     }
+    Ok(rows)
+}
+
+/// Works a row of a soak, with this number from 0, with the firmware at `elf`. It has a new Uno, which keeps what the simulation
+/// remembers short.
+///
+/// # Errors
+/// As [`minutes`].
+pub fn row(plan: Plan, number: u64, elf: &Path) -> Result<Tally, SoakError> {
+    let mut tally = Tally::default();
+    work(&mut chance(plan, number), plan, elf, &mut tally)?;
+    tally.violations = tally.violations.iter().map(|what| format!("row {}, {what}", number + 1)).collect();
     Ok(tally)
 }
 
-/// Works a row with a new Uno, which keeps what the simulation remembers short.
-fn work(rng: &mut ChaCha8Rng, plan: Plan, elf: &Path, tally: &mut Tally) -> Result<(), SoakError> {
+/// Draws a row and the speed in it.
+fn draw(rng: &mut ChaCha8Rng) -> Result<Trial, SoakError> {
     let row = PLANTING.grow(rng.random())?;
-    let trial = Trial::at_speed(row, Machine::default(), Timing::default(), mm_s(rng.random_range(1.0..3.0)));
+    Ok(Trial::at_speed(row, Machine::default(), Timing::default(), mm_s(rng.random_range(1.0..3.0))))
+}
+
+fn work(rng: &mut ChaCha8Rng, plan: Plan, elf: &Path, tally: &mut Tally) -> Result<(), SoakError> {
+    let trial = draw(rng)?;
     let (machine, motion) = (trial.machine, &trial.motion);
     // A fault for the time that a row takes, as often as there are to be.
     let fails = rng.random_bool((plan.faults_an_hour * motion.duration_s() / 3600.0).min(1.0));
@@ -143,7 +170,6 @@ fn work(rng: &mut ChaCha8Rng, plan: Plan, elf: &Path, tally: &mut Tally) -> Resu
     uno.run_for_ms(200).map_err(TrialError::from)?;
     let heard = uno.received();
 
-    let began_s = tally.seconds;
     tally.seconds += motion.duration_s();
     tally.metres += (motion.end_mm() - motion.start_mm()).abs() / 1000.0;
     tally.rows += 1;
@@ -161,12 +187,12 @@ fn work(rng: &mut ChaCha8Rng, plan: Plan, elf: &Path, tally: &mut Tally) -> Resu
     }
     let was_reset = matches!(fault, Some(Fault::Reset | Fault::BrownOut | Fault::PowerCut));
     if was_reset != !uno.resets().iter().all(|reset| reset.cycle < start_cycle) {
-        tally.violated(began_s + fails_at_s, format_args!("{fault:?} and resets {:?}", uno.resets()));
+        tally.violated(fails_at_s, format_args!("{fault:?} and resets {:?}", uno.resets()));
     }
 
     let pulses: Vec<Pulse> = uno.pulses(wiring::SERVO);
     if was_reset {
-        still_out(&pulses, fails_at, began_s + fails_at_s, tally);
+        still_out(&pulses, fails_at, fails_at_s, tally);
     }
     let judgement = judge(&trial.row, &machine, motion, trial.timing, &pulses, start_cycle);
     let span = trial.row.span_mm();
@@ -192,7 +218,7 @@ fn work(rng: &mut ChaCha8Rng, plan: Plan, elf: &Path, tally: &mut Tally) -> Resu
         } else {
             tally.harmed += 1;
             tally.violated(
-                began_s,
+                reached.first().map_or(0.0, |times| times.start),
                 format_args!(
                     "a plant was harmed with {fault:?} at {fails_at_s:.3} s, at most {:.0} mm/s: {outcome:?}",
                     motion.top_speed_mm_s()

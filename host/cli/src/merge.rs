@@ -1,0 +1,105 @@
+//! `weeder merge`: the parts of a study put together, to the result that one machine would have given.
+//!
+//! It computes nothing anew: the parts hold all outcomes, which go to the code that shows those of an undivided study.
+
+use crate::{Finding, part, soak, sweep, trial};
+use anyhow::{Context, Result, bail, ensure};
+use clap::{Args, builder::PossibleValuesParser};
+use serde::de::DeserializeOwned;
+use serde_json::Value;
+use std::ffi::OsString;
+use std::fs::File;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+use study::shard::{self, Header, PartError};
+use study::sweep::Results;
+
+/// What the user asks for.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  weeder trial --shard 1/2 --out 1.part && weeder trial --shard 2/2 --out 2.part && weeder merge 1.part 2.part --out report
+  weeder merge parts/*.part --json
+What is printed and written is what the undivided command would have printed and written, and so is the status. Parts are of \
+`weeder trial`, `weeder sweep` or `weeder soak` with --shard; the shards may be computed anywhere and in any order, by the same program. \
+The manual's page on studies has a script for Slurm.")]
+pub struct Arguments {
+    /// The parts, all of one study, in any order.
+    #[arg(required = true, value_name = "PART")]
+    parts: Vec<PathBuf>,
+    /// A trial's folder for its report, or a sweep's file, as the --out of the command itself.
+    #[arg(long, value_name = "FOLDER|FILE.csv")]
+    out: Option<OsString>,
+    /// Print JSON for programs instead of tables or words.
+    #[arg(long)]
+    json: bool,
+    /// Print what counts most of a trial's table, and nothing else.
+    #[arg(long, conflicts_with = "json")]
+    brief: bool,
+    /// The result that a sweep's table with two axes shows, plant_damage unless told.
+    #[arg(long, value_parser = PossibleValuesParser::new(Results::NAMES))]
+    result: Option<String>,
+}
+
+/// Puts them together and prints the result.
+///
+/// # Errors
+/// Where the parts are not all of one study, or the result cannot be written.
+pub fn run(arguments: &Arguments) -> Result<Finding> {
+    let headers = arguments.parts.iter().map(|path| Ok((name(path), header(path)?)));
+    let headers: Vec<(String, Header)> = headers.collect::<Result<_>>()?;
+    shard::together(&headers, &part::program()?)?;
+    let (_, header) = headers.into_iter().next().context("no part is named")?;
+    let Arguments { parts, out, json, brief, result } = arguments;
+    let (json, brief, settings) = (*json, *brief, header.settings);
+    let of = |what: &str| format!("these are parts of a {what}");
+    ensure!(!brief || header.command == trial::COMMAND, "{}: --brief is for those of a trial", of(&header.command));
+    ensure!(
+        result.is_none() || header.command == sweep::COMMAND,
+        "{}: --result is for those of a sweep",
+        of(&header.command)
+    );
+    match header.command.as_str() {
+        trial::COMMAND => {
+            let shown = trial::Shown { out: out.clone().map(Into::into), json, brief };
+            trial::merge(read(settings)?, outcomes(parts)?, &shown)
+        }
+        sweep::COMMAND => {
+            let result = result.clone().unwrap_or_else(|| sweep::RESULT.to_owned());
+            let shown = sweep::Shown { out: out.clone().map(Into::into), json, result };
+            sweep::merge(&read(settings)?, &outcomes(parts)?, &shown).map(|()| Finding::Good)
+        }
+        soak::COMMAND => {
+            ensure!(out.is_none(), "{}, which writes no file: leave --out away", of(&header.command));
+            soak::merge(&read(settings)?, outcomes(parts)?, json)
+        }
+        other => bail!("these are parts of `weeder {other}`, which this program does not know"),
+    }
+}
+
+fn name(path: &Path) -> String {
+    path.display().to_string()
+}
+
+fn open(path: &Path) -> Result<BufReader<File>, PartError> {
+    let opened = File::open(path).map_err(|problem| PartError::Unreadable { name: name(path), problem });
+    Ok(BufReader::new(opened?))
+}
+
+fn header(path: &Path) -> Result<Header, PartError> {
+    shard::read_header(&name(path), &mut open(path)?)
+}
+
+/// All outcomes, in the order in which an undivided study has them.
+fn outcomes<T: DeserializeOwned>(parts: &[PathBuf]) -> Result<Vec<T>> {
+    let read = |path: &PathBuf| {
+        let mut file = open(path)?;
+        let header = shard::read_header(&name(path), &mut file)?;
+        shard::read_outcomes(&name(path), header, &mut file)
+    };
+    Ok(shard::outcomes(parts.iter().map(read).collect::<Result<_, PartError>>()?))
+}
+
+fn read<T: DeserializeOwned>(settings: Value) -> Result<T> {
+    serde_json::from_value(settings).context("the parts' settings are none that this program writes: compute them anew")
+}

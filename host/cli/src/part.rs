@@ -1,0 +1,75 @@
+//! `--shard`: a part of a study goes to a file, for `weeder merge`.
+//!
+//! A part tells by which program it was computed: by the version, and by a check sum of the program's own file, since what is not
+//! released yet has the version of what was.
+
+use crate::destination::{FileName, OutFile};
+use crate::output::{say, tell};
+use anyhow::{Context, Result};
+use serde::Serialize;
+use std::env;
+use std::fs;
+use std::path::Path;
+use std::time::Instant;
+use study::shard::{self, Header, Numbered, Program, Shard};
+
+/// A part that is to be written, to a file that could be written when it was checked.
+pub struct Part<'a> {
+    shard: Shard,
+    out: OutFile<'a>,
+    program: Program,
+    began: Instant,
+}
+
+impl<'a> Part<'a> {
+    /// A shard's.
+    ///
+    /// # Errors
+    /// Where the file could not be written, or this program cannot be read.
+    pub fn new(shard: Shard, out: &'a FileName) -> Result<Self> {
+        Ok(Self { shard, out: out.check()?, program: program()?, began: Instant::now() })
+    }
+
+    /// Which one it is.
+    pub fn shard(&self) -> Shard {
+        self.shard
+    }
+
+    /// Writes it whole, once all is computed, and says so.
+    ///
+    /// # Errors
+    /// Where the file cannot be written.
+    pub fn write<T: Serialize>(
+        self,
+        command: &str,
+        all: u64,
+        settings: &impl Serialize,
+        outcomes: Vec<Numbered<T>>,
+    ) -> Result<()> {
+        let settings = serde_json::to_value(settings)?;
+        let header = Header::new(self.program, command, self.shard, all, settings);
+        let count = outcomes.len();
+        self.out.write(|to| shard::write(&header, outcomes, to))?;
+        say!("Written: part {} of the {command}, {count} of {all}, to {}", self.shard, self.out.path().display())?;
+        tell!("Pace: {:.1} s", self.began.elapsed().as_secs_f64());
+        Ok(())
+    }
+}
+
+/// This program.
+///
+/// # Errors
+/// Where its file cannot be read.
+pub fn program() -> Result<Program> {
+    let file = env::current_exe().context("the running program cannot be found")?;
+    Ok(Program { version: env!("CARGO_PKG_VERSION").to_owned(), build: check_sum(&file)? })
+}
+
+/// A file's check sum, CRC-32 as of zip: it tells builds apart that differ by accident.
+///
+/// # Errors
+/// Where it cannot be read.
+pub fn check_sum(file: &Path) -> Result<String> {
+    let bytes = fs::read(file).with_context(|| format!("{} cannot be read", file.display()))?;
+    Ok(format!("{:08x}", crc32fast::hash(&bytes)))
+}

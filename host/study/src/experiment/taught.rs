@@ -1,0 +1,17 @@
+//! Examples in a study's settings: of each its features and its label. The classifier's crate is the chip's too, and knows no files.
+
+use control::ground::features;
+use knn::Example;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+/// An example as it is written down.
+type Written = ([u8; features::COUNT], u8);
+
+pub fn serialize<S: Serializer>(examples: &[Example<{ features::COUNT }>], serializer: S) -> Result<S::Ok, S::Error> {
+    examples.iter().map(|example| (example.features, example.label)).collect::<Vec<Written>>().serialize(serializer)
+}
+
+pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<Example<{ features::COUNT }>>, D::Error> {
+    let written = Vec::<Written>::deserialize(deserializer)?;
+    Ok(written.into_iter().map(|(features, label)| Example::new(features, label)).collect())
+}
