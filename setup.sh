@@ -4,6 +4,7 @@
 #
 #     ./setup.sh         all that cargo needs
 #     ./setup.sh page    and what the page and its tests need on top of that: Node.js 18 or later with npm, and Chromium
+#     ./setup.sh slurm   and a Slurm on which a study in shards is tried; several words may be said at once
 set -euo pipefail
 cd "$(dirname "$0")"
 
@@ -14,18 +15,24 @@ packages=(
     build-essential pkg-config clang libclang-dev libelf-dev zlib1g-dev libzstd-dev
 )
 
-case "${1-}" in
-    "") ;;
-    page)
-        # Whoever has a Node.js has it from somewhere else, mostly, and Debian's would not go beside it.
-        if ! command -v npm >/dev/null; then packages+=(nodejs npm); fi
-        if ! command -v chromium >/dev/null; then packages+=(chromium); fi
-        ;;
-    *)
-        echo "setup.sh: unknown word \`$1\`. Say nothing, or page." >&2
-        exit 1
-        ;;
-esac
+page=no
+for word in "$@"; do
+    case "$word" in
+        page)
+            page=yes
+            # Whoever has a Node.js has it from somewhere else, mostly, and Debian's would not go beside it.
+            if ! command -v npm >/dev/null; then packages+=(nodejs npm); fi
+            if ! command -v chromium >/dev/null; then packages+=(chromium); fi
+            ;;
+        slurm)
+            packages+=(munge slurm-client slurmctld slurmd)
+            ;;
+        *)
+            echo "setup.sh: unknown word \`$word\`. Say nothing, page, slurm, or both." >&2
+            exit 1
+            ;;
+    esac
+done
 
 missing=()
 if command -v dpkg-query >/dev/null; then
@@ -69,7 +76,7 @@ else
         --component rust-src --component rustfmt --component clippy
 fi
 
-if [ "${1-}" = page ]; then
+if [ "$page" = yes ]; then
     if ! node --eval 'process.exit(process.versions.node.split(".")[0] >= 18 ? 0 : 1)'; then
         echo "setup.sh: the page needs Node.js 18 or later, and this is $(node --version || echo none)." >&2
         exit 1

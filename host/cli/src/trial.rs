@@ -8,7 +8,7 @@ use crate::output::{say, tell};
 use crate::part::{self, Part};
 use crate::progress::Progress;
 use crate::source;
-use anyhow::Result;
+use anyhow::{Result, ensure};
 use clap::{Args, Command, FromArgMatches, ValueEnum};
 use comfy_table::{CellAlignment, Table, presets};
 use field::conditions::Conditions;
@@ -28,6 +28,9 @@ use trial::{firmware, picture};
 
 /// What the parts of a trial say that they are of.
 pub const COMMAND: &str = "trial";
+
+/// Most plants of a trial, roughly: what they come to is counted to four billion.
+const MOST_PLANTS: f64 = 2e9;
 
 /// What the user asks of a trial.
 #[derive(Args)]
@@ -206,6 +209,11 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
         examples: arguments.examples.as_deref().map(examples::in_table).transpose()?.unwrap_or_default(),
         seed: arguments.seed,
     };
+    let plants = experiment.plants();
+    ensure!(
+        plants <= MOST_PLANTS,
+        "this trial has some {plants:.0} plants, but has to have at most {MOST_PLANTS}: ask for fewer or shorter rows, or fewer replications"
+    );
     let engine = match (arguments.engine, &arguments.elf) {
         (EngineName::Twin, _) => Engine::Twin,
         (EngineName::Uno, Some(path)) => Engine::Uno(path.clone()),

@@ -29,19 +29,19 @@ const TOUCH_MM: f64 = 1e-6;
 /// Time between two looks at where the tool is in a protected zone: at 2.5 km/h it moves by a millimetre or so.
 const LOOK_S: f64 = 0.000_5;
 
-/// Weeds, counted.
+/// Weeds, counted: there are some ten a plant, and many plants in a study.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct WeedCount {
     /// Before weeding.
-    pub before: u32,
+    pub before: u64,
     /// After weeding, on the same ground.
-    pub after: u32,
+    pub after: u64,
 }
 
 impl WeedCount {
     /// Weeding efficiency (Eq. 22), in percent; none where no weed stood.
     pub fn efficiency_percent(self) -> Option<f64> {
-        (self.before > 0).then(|| 100.0 * f64::from(self.before - self.after) / f64::from(self.before))
+        (self.before > 0).then(|| 100.0 * (self.before - self.after) as f64 / self.before as f64)
     }
 }
 
@@ -126,7 +126,7 @@ pub fn effect(
     }
     effect.neighbours = stand.neighbours.iter().filter(|stem| tools.reaches(stem) && tools.damage(stem)).count() as u32;
     for weed in &stand.weeds {
-        let counted = WeedCount { before: 1, after: u32::from(!tools.remove(weed)) };
+        let counted = WeedCount { before: 1, after: u64::from(!tools.remove(weed)) };
         effect.in_plot += counted;
         if stand.counted_mm.contains(&weed.along_mm) {
             effect.counted += counted;

@@ -235,6 +235,13 @@ impl Experiment {
         self.plots().len() * self.conditions.plot.rows as usize
     }
 
+    /// Number of plants, roughly: as many as there are places for.
+    pub fn plants(&self) -> f64 {
+        let row_cm = 100.0 * self.conditions.plot.row_m;
+        let of_rows: f64 = self.spacings_cm.iter().map(|spacing_cm| row_cm / spacing_cm).sum();
+        of_rows * self.speeds_km_h.len() as f64 * f64::from(self.replications) * f64::from(self.conditions.plot.rows)
+    }
+
     /// Weeds the field: an outcome for each plot and each controller, by speed, spacing and replication. `progress` is told
     /// the share of the rows done, from 0 to 1.
     ///
@@ -444,11 +451,13 @@ impl PlotOutcome {
         self.alarms += u32::from(row.alarm);
         self.moved_s += row.moved_s;
         let Effect { plants, in_plot, counted, .. } = self.effect;
+        // As many as a plot can have stand in its record.
+        let in_a_plot = |weeds: u64| u32::try_from(weeds).unwrap_or(u32::MAX);
         // Where no weed stands on the ground that was to be counted, somebody counts the plot.
         let weeds = if counted.before > 0 { counted } else { in_plot };
         self.record = PlotRecord {
-            weeds_before: weeds.before,
-            weeds_after: weeds.after,
+            weeds_before: in_a_plot(weeds.before),
+            weeds_after: in_a_plot(weeds.after),
             plants,
             damaged: self.effect.injured(),
             time_s: self.record.time_s + row.seconds,

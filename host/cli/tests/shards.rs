@@ -1,0 +1,180 @@
+//! `--shard` and `weeder merge`: the parts of a study give the bytes of an undivided one, and what is no whole study is refused.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+use std::thread;
+use std::time::Duration;
+use tempfile::TempDir;
+
+/// A field so small that a trial in it takes a moment.
+const SMALL: &str = "[plot]\nrows = 1\nrow_m = 6\n";
+
+/// A trial in it.
+const TRIAL: [&str; 5] = ["trial", "--field", "small.toml", "--seed", "7"];
+
+/// Runs `weeder` with these arguments in a folder.
+fn weeder(folder: &Path, arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
+    command.current_dir(folder).args(arguments).output().expect("cargo has built the command")
+}
+
+/// A folder with the file `small.toml`.
+fn folder() -> TempDir {
+    let folder = TempDir::new().unwrap();
+    fs::write(folder.path().join("small.toml"), SMALL).unwrap();
+    folder
+}
+
+/// Has a study computed in `of` shards, each to the part `I.part`, the last one first.
+#[track_caller]
+fn compute_parts(folder: &Path, study: &[&str], of: u32) {
+    for number in (1..=of).rev() {
+        let (shard, out) = (format!("{number}/{of}"), format!("{number}.part"));
+        let output = weeder(folder, &[study, &["--shard", &shard, "--out", &out]].concat());
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    }
+}
+
+/// Asserts that four parts of a study, shown in this way, give what the undivided study gives: what is printed, the status, and these
+/// files.
+#[track_caller]
+fn assert_same(study: &[&str], shown: &[&str], files: &[&str]) {
+    let (single, merged) = (folder(), folder());
+    let expected = weeder(single.path(), &[study, shown].concat());
+    compute_parts(merged.path(), study, 4);
+    let parts = ["merge", "3.part", "1.part", "4.part", "2.part"];
+    let output = weeder(merged.path(), &[&parts[..], shown].concat());
+    assert_eq!(output.status.code(), expected.status.code(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(!output.stdout.is_empty());
+    assert_eq!(String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&expected.stdout));
+    for file in files {
+        let [single, merged] = [&single, &merged].map(|folder| fs::read(folder.path().join(file)).unwrap());
+        assert!(single == merged, "{file} differs");
+    }
+}
+
+#[test]
+fn a_trial_in_four_shards_is_the_undivided_trial_to_the_byte() {
+    assert_same(
+        &TRIAL,
+        &["--out", "report"],
+        &["report/report.html", "report/trial.csv", "report/controllers.csv"],
+    );
+    assert_same(&TRIAL, &["--json"], &[]);
+    assert_same(&[&TRIAL[..], &["--rivals", "paper", "--speeds", "7"]].concat(), &["--brief"], &[]);
+}
+
+#[test]
+fn a_sweep_in_four_shards_is_the_undivided_sweep_to_the_byte() {
+    let sweep = ["sweep", "--field", "small.toml", "--x", "lead_out_ms=0..180:60", "--y", "speed=1..7:3"];
+    assert_same(&sweep, &["--result", "in_row_weeding", "--out", "points.csv"], &["points.csv"]);
+    assert_same(&sweep, &["--json"], &[]);
+    assert_same(&["sweep", "--field", "small.toml", "--x", "k=1..3:1"], &[], &[]);
+}
+
+#[test]
+fn a_soak_in_four_shards_is_the_undivided_soak_to_the_byte() {
+    let soak = ["soak", "--hours", "3", "--uno-minutes", "1", "--faults", "900"];
+    assert_same(&soak, &[], &[]);
+    assert_same(&["soak", "--hours", "2", "--uno-minutes", "0"], &["--json"], &[]);
+}
+
+#[test]
+fn more_shards_than_plots_are_a_whole_study_too() {
+    let folder = folder();
+    let trial = [&TRIAL[..], &["--speeds", "1", "--spacings", "50", "--replications", "2"]].concat();
+    compute_parts(folder.path(), &trial, 3);
+    let merged = weeder(folder.path(), &["merge", "1.part", "2.part", "3.part"]);
+    assert_eq!(merged.stdout, weeder(folder.path(), &trial).stdout);
+}
+
+/// Asserts status 2 and a message that contains `words`, and that no report was written.
+#[track_caller]
+fn assert_refused(folder: &Path, arguments: &[&str], words: &str) {
+    let output = weeder(folder, arguments);
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{message}");
+    assert!(message.contains(words), "{message}");
+    assert!(output.stdout.is_empty() && !folder.join("report").exists());
+}
+
+#[test]
+fn parts_that_are_no_whole_study_are_refused_by_name() {
+    let folder = folder();
+    let path = folder.path();
+    compute_parts(path, &TRIAL, 3);
+    let merge = |parts: &[&'static str]| [&["merge", "--out", "report"], parts].concat();
+    assert_refused(path, &merge(&["1.part", "3.part"]), "part 2/3 is missing");
+    assert_refused(path, &merge(&["1.part", "2.part", "3.part", "2.part"]), "2.part and 2.part are both part 2/3");
+    let other = ["trial", "--field", "small.toml", "--seed", "8", "--shard", "2/3", "--out", "other.part"];
+    assert!(weeder(path, &other).status.success());
+    let seed = "other.part is of another study than 1.part: its experiment.seed is 8, and there it is 7";
+    assert_refused(path, &merge(&["1.part", "other.part", "3.part"]), seed);
+    let sweep = ["sweep", "--field", "small.toml", "--x", "k=1..9:1", "--shard", "2/3", "--out", "sweep.part"];
+    assert!(weeder(path, &sweep).status.success());
+    let command = "sweep.part is of another study than 1.part: its command is \"sweep\", and there it is \"trial\"";
+    assert_refused(path, &merge(&["1.part", "sweep.part", "3.part"]), command);
+
+    let text = fs::read_to_string(path.join("2.part")).unwrap();
+    let change = |name: &str, from: &str, to: &str| {
+        assert!(text.contains(from));
+        fs::write(path.join(name), text.replacen(from, to, 1)).unwrap();
+    };
+    let version = concat!("\"version\":\"", env!("CARGO_PKG_VERSION"), "\"");
+    change("older.part", version, "\"version\":\"0.0.9\"");
+    assert_refused(path, &merge(&["1.part", "older.part", "3.part"]), "older.part is of weeder 0.0.9 (build ");
+    change("built.part", "\"build\":\"", "\"build\":\"0");
+    assert_refused(path, &merge(&["1.part", "built.part", "3.part"]), "built.part is of weeder ");
+    fs::write(path.join("cut.part"), &text[..text.len() / 2]).unwrap();
+    assert_refused(path, &merge(&["1.part", "cut.part", "3.part"]), "cut.part, line ");
+    assert_refused(path, &merge(&["1.part", "small.toml", "3.part"]), "small.toml is no part of a study");
+    assert_refused(path, &merge(&["1.part", "no.part", "3.part"]), "no.part cannot be read: No such file");
+}
+
+#[test]
+fn what_does_not_go_with_parts_is_refused() {
+    let folder = folder();
+    let path = folder.path();
+    for shard in ["0/4", "5/4", "2", "x/y"] {
+        assert_refused(path, &[&TRIAL[..], &["--shard", shard, "--out", "p"]].concat(), "it has to be I/N, such as 2/4");
+    }
+    assert_refused(path, &[&TRIAL[..], &["--shard", "1/4"]].concat(), "--out <FOLDER>");
+    assert_refused(path, &["soak", "--out", "p"], "--shard <I/N>");
+    let soak = ["soak", "--hours", "1", "--uno-minutes", "0", "--shard", "1/1", "--out", "soak.part"];
+    assert!(weeder(path, &soak).status.success());
+    assert_refused(path, &["merge", "soak.part", "--out", "report"], "a soak, which writes no file");
+    assert_refused(path, &["merge", "soak.part", "--brief"], "--brief is for those of a trial");
+    assert_refused(path, &["merge", "soak.part", "--result", "alarms"], "--result is for those of a sweep");
+    let nowhere = [&TRIAL[..], &["--shard", "1/4", "--out", "no/such/folder/p"]].concat();
+    assert_refused(path, &nowhere, "no/such/folder/p cannot be written");
+}
+
+#[test]
+fn a_shard_that_is_killed_leaves_no_file_and_computes_the_same_when_it_starts_anew() {
+    let folder = folder();
+    let path = folder.path();
+    let endless = ["soak", "--hours", "10000", "--uno-minutes", "0", "--shard", "1/2", "--out", "1.part"];
+    let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
+    let mut shard = command.current_dir(path).args(endless).spawn().expect("cargo has built the command");
+    // However far it has come: it would take hours.
+    thread::sleep(Duration::from_millis(500));
+    assert!(shard.try_wait().unwrap().is_none(), "it computes");
+    shard.kill().unwrap();
+    shard.wait().unwrap();
+    let left: Vec<_> = fs::read_dir(path).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    assert_eq!(left, ["small.toml"]);
+
+    compute_parts(path, &TRIAL, 1);
+    let first = fs::read(path.join("1.part")).unwrap();
+    compute_parts(path, &TRIAL, 1);
+    assert!(first == fs::read(path.join("1.part")).unwrap(), "the same part, in the place of the first");
+}
+
+#[test]
+fn a_trial_of_more_plants_than_can_be_counted_is_refused() {
+    let folder = folder();
+    fs::write(folder.path().join("huge.toml"), "[plot]\nrows = 1000\nrow_m = 1000\n").unwrap();
+    let trial = ["trial", "--field", "huge.toml", "--replications", "1000"];
+    assert_refused(folder.path(), &trial, "has to have at most 2000000000");
+}
