@@ -36,10 +36,10 @@ speed_mm_s,spacing_mm,delay_mm,hold_mm,actuation_mm,answer,votes,label
 ";
 
 /// Programs that are not of this repository; what they do with their options is their business.
-const FOREIGN: [&str; 4] = ["avrdude", "echo", "npm", "sudo"];
+const FOREIGN: [&str; 6] = ["avrdude", "echo", "npm", "scontrol", "squeue", "sudo"];
 
 /// Subcommands that need neither an Uno nor much time.
-const CHEAP: [&str; 8] = ["classify", "design", "evaluate", "hex", "plan", "sweep", "train", "trial"];
+const CHEAP: [&str; 9] = ["classify", "design", "evaluate", "hex", "merge", "plan", "sweep", "train", "trial"];
 
 /// A page of the manual.
 struct Page {
@@ -174,6 +174,8 @@ fn commands_in_the_manual_that_need_no_uno_do_what_they_say() {
     fs::copy(Path::new(ROOT).join(example), folder.path().join(example)).expect("the manual has an example");
     // The reader makes it by `design --print-machine > my.toml`.
     fs::write(folder.path().join("my.toml"), "weeder.mass = \"60 kg\"\n").expect("a file in it");
+    // A study of many plants, without the many plants.
+    fs::write(folder.path().join("long.toml"), "[plot]\nrows = 1\n").expect("a file in it");
     let mut run = Vec::new();
     for (line, words) in shell_lines() {
         let Some(arguments) = weeder_arguments(&words) else { continue };
