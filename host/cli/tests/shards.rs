@@ -56,11 +56,7 @@ fn assert_same(study: &[&str], shown: &[&str], files: &[&str]) {
 
 #[test]
 fn a_trial_in_four_shards_is_the_undivided_trial_to_the_byte() {
-    assert_same(
-        &TRIAL,
-        &["--out", "report"],
-        &["report/report.html", "report/trial.csv", "report/controllers.csv"],
-    );
+    assert_same(&TRIAL, &["--out", "report"], &["report/report.html", "report/trial.csv", "report/controllers.csv"]);
     assert_same(&TRIAL, &["--json"], &[]);
     assert_same(&[&TRIAL[..], &["--rivals", "paper", "--speeds", "7"]].concat(), &["--brief"], &[]);
 }
@@ -137,7 +133,11 @@ fn what_does_not_go_with_parts_is_refused() {
     let folder = folder();
     let path = folder.path();
     for shard in ["0/4", "5/4", "2", "x/y"] {
-        assert_refused(path, &[&TRIAL[..], &["--shard", shard, "--out", "p"]].concat(), "it has to be I/N, such as 2/4");
+        assert_refused(
+            path,
+            &[&TRIAL[..], &["--shard", shard, "--out", "p"]].concat(),
+            "it has to be I/N, such as 2/4",
+        );
     }
     assert_refused(path, &[&TRIAL[..], &["--shard", "1/4"]].concat(), "--out <FOLDER>");
     assert_refused(path, &["soak", "--out", "p"], "--shard <I/N>");
