@@ -34,7 +34,7 @@ fn get(uno: &mut Uno, name: &str) -> String {
 /// An Uno with settings that no value of another setting contradicts.
 fn easily_set() -> Uno {
     let mut uno = woken_up();
-    for line in ["set lead_out_ms 0", "set margin_mm 0", "set beam_to_tool_mm 2000"] {
+    for line in ["set lead_out_ms 0", "set margin_mm 0", "set beam_to_tool_mm 1000"] {
         ask(&mut uno, line);
     }
     uno
@@ -119,8 +119,16 @@ fn settings_that_change_where_the_tool_is_are_refused_while_the_machine_works() 
             assert_eq!(get(&mut uno, &name), least);
         }
     }
-    let names =
-        ["ticks_per_rev", "wheel_mm", "ticks_per_m", "beam_to_tool_mm", "margin_mm", "servo_in_us", "servo_out_us"];
+    let names = [
+        "ticks_per_rev",
+        "wheel_mm",
+        "ticks_per_m",
+        "beam_to_tool_mm",
+        "second_beam_mm",
+        "margin_mm",
+        "servo_in_us",
+        "servo_out_us",
+    ];
     assert_eq!(refused, names);
 
     ask(&mut uno, "hold");
