@@ -150,10 +150,10 @@ pub const TABLE_MARK: u16 = {
 };
 
 /// The second beam stands no nearer to the first: slip is measured over the way between them, to a tick or two.
-const SECOND_BEAM_LEAST_MM: u16 = 50;
+pub const SECOND_BEAM_LEAST_MM: u16 = 50;
 
 /// With a second beam, X is no longer: what slip makes of it has to fit into what is remembered.
-const SLIPPING_BEAM_TO_TOOL_MM: u16 = 1000;
+pub const SLIPPING_BEAM_TO_TOOL_MM: u16 = 1000;
 
 /// Settings that cannot be right together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -9,6 +9,7 @@ import { basename, extname, join } from "node:path";
 import test, { after, before } from "node:test";
 import type { Browser, Page } from "playwright-core";
 import hex from "weeder.hex";
+import { BOARDS } from "../src/flasher/boards.ts";
 import { FLASH_BYTES } from "../src/uno/chip.ts";
 import { readHex } from "../src/uno/hex.ts";
 import { close, inspect, launch, open, PHONE } from "./browser.ts";
@@ -16,9 +17,6 @@ import { type Device, Foreign, VirtualUno } from "./ports.ts";
 
 const OPTIBOOT = ["--bootloader", "optiboot"];
 const OLD = ["--bootloader", "/usr/share/arduino/hardware/arduino/avr/bootloaders/atmega/ATmegaBOOT_168_atmega328.hex"];
-
-/** What the old bootloader leaves of the flash. */
-const OLD_LEAVES_BYTES = 30_720;
 
 let browser: Browser;
 
@@ -65,8 +63,10 @@ test("an Uno with an empty flash is flashed through its bootloader, and is worke
 test("an old bootloader is flashed at its own rate and its fault is told, or that it leaves too little", async (test) => {
     const uno = await VirtualUno.start(test, ...OLD);
     const opened = await open(browser, "flash", undefined, [uno]);
-    await opened.page.getByLabel("Board").selectOption({ label: "Nano or Duemilanove, old bootloader" });
-    const fits = readHex(hex, FLASH_BYTES).findLastIndex((byte) => byte !== 0xff) < OLD_LEAVES_BYTES;
+    const board = BOARDS.find(({ isOld }) => isOld);
+    assert(board);
+    await opened.page.getByLabel("Board").selectOption({ label: board.name });
+    const fits = readHex(hex, FLASH_BYTES).findLastIndex((byte) => byte !== 0xff) < board.roomBytes;
     assert.match(
         await flash(opened.page),
         fits

@@ -12,7 +12,7 @@ mod parameters;
 use crate::machine::{Dirt, Machine};
 use crate::servo::{Scatter, Servo};
 use crate::verdict::Timing;
-use control::settings::Setting;
+use control::settings::{SECOND_BEAM_LEAST_MM, SLIPPING_BEAM_TO_TOOL_MM, Setting};
 pub use errors::{ConditionsError, WrongValue};
 use errors::{explain, line, line_at};
 pub use parameters::{Conditions, Crop, Driving, Ground, Mechanism, PARAMETERS, Parameter, Plot, Sensors, Weeds};
@@ -90,6 +90,7 @@ impl Conditions {
             }
         }
         self.check_sweeps()?;
+        self.check_beams()?;
         for (key, &value) in &self.settings {
             let setting =
                 Setting::find(key.as_bytes()).ok_or_else(|| WrongValue::Unknown(format!("settings.{key}")))?;
@@ -123,6 +124,22 @@ impl Conditions {
             return Ok(());
         };
         Err(WrongValue::Sweeps { from_mm, why })
+    }
+
+    /// Whether the second beam stands where the firmware takes one.
+    fn check_beams(&self) -> Result<(), WrongValue> {
+        const NAME: &str = "machine.second_beam_mm";
+        let Mechanism { beam_to_tool_mm, second_beam_mm, .. } = self.machine;
+        let least = f64::from(SECOND_BEAM_LEAST_MM);
+        let is_too_far = beam_to_tool_mm.round() > f64::from(SLIPPING_BEAM_TO_TOOL_MM);
+        let (least, greatest) = if is_too_far { (0.0, 0.0) } else { (least, beam_to_tool_mm.round() - 1.0) };
+        if second_beam_mm == 0.0 || (least..=greatest).contains(&second_beam_mm.round()) {
+            return Ok(());
+        }
+        let meaning = format!(
+            "0 for none, behind the first beam and ahead of the tool, which may be {SLIPPING_BEAM_TO_TOOL_MM} mm behind the first then"
+        );
+        Err(WrongValue::OutOfRange { name: NAME.to_owned(), value: second_beam_mm, least, greatest, meaning })
     }
 
     /// Changes a parameter, named `table.key`, or a setting of the firmware, named as the firmware does.
@@ -246,6 +263,14 @@ mod tests {
                 "[settings]\nlead_out_ms = 900\n",
                 "field.toml, line 2: settings.lead_out_ms is 900, but has to be 0 to 500",
             ),
+            (
+                "[machine]\nsecond_beam_mm = 400\n",
+                "field.toml, line 2: machine.second_beam_mm is 400, but has to be 50 to 399",
+            ),
+            (
+                "[machine]\nbeam_to_tool_mm = 1001\nsecond_beam_mm = 200\n",
+                "field.toml, line 3: machine.second_beam_mm is 200, but has to be 0 to 0",
+            ),
             ("[settings]\nlead = 9\n", "field.toml, line 2: settings.lead is neither a parameter of the field"),
             ("[ground]\nslip = 4\n", "field.toml, line 2: unknown field `slip`, expected `slip_percent`"),
             (
@@ -267,6 +292,8 @@ mod tests {
             let mut conditions = Conditions::default();
             // Without sweeps, which are in the way of many an extreme.
             conditions.set("machine.sweeps_a_side", 0.0).unwrap();
+            // As far as a second beam lets the first stand ahead.
+            conditions.set("machine.beam_to_tool_mm", SLIPPING_BEAM_TO_TOOL_MM.into()).unwrap();
             for end in [parameter.least, parameter.greatest] {
                 if parameter.name == "machine.sweeps_a_side" && end > 0.0 {
                     continue;

@@ -4,7 +4,7 @@
 //! [`example_of`] the bytes. Both mean something only where this program has the firmware's table, so the built-in examples
 //! that the firmware lists are compared first. Nothing is sent where not all of it can be taught.
 
-use super::{Class, Link, LinkError, Said};
+use super::{Class, Link, LinkError, Mode, Said, settings};
 use control::ground::class::{Classifier, label};
 use control::ground::examples::{EXAMPLES, SCALE};
 use control::ground::features::{COUNT, Features};
@@ -39,6 +39,9 @@ pub enum ExamplesError {
         /// Its number.
         number: u16,
     },
+    /// The machine is at work, where it is not taught.
+    #[error("the machine is at work, where it is not taught: hold it first, by its switch or `hold`; nothing was sent")]
+    AtWork,
     /// They do not find room.
     #[error(
         "{new} examples are new to the machine, which has room for {free} of its {CAPACITY}: leave some out, or have it forget what \
@@ -92,7 +95,7 @@ pub fn read(link: &mut Link) -> Result<Vec<(u16, Taught)>, ExamplesError> {
 /// Has the machine know these examples, and with `replace` no others; those that it has already are not taught again.
 ///
 /// # Errors
-/// As said, [`ExamplesError::NoRoom`] before anything is sent, and [`ExamplesError::NotTaken`].
+/// As said, [`ExamplesError::AtWork`] and [`ExamplesError::NoRoom`] before anything is sent, and [`ExamplesError::NotTaken`].
 pub fn push(link: &mut Link, wanted: &[Taught], replace: bool) -> Result<Pushed, ExamplesError> {
     let before = read(link)?;
     let (known, named) = (set(before.iter().map(|(_, example)| example)), set(wanted));
@@ -108,11 +111,15 @@ pub fn push(link: &mut Link, wanted: &[Taught], replace: bool) -> Result<Pushed,
     if new.len() > free {
         return Err(ExamplesError::NoRoom { new: new.len(), free });
     }
+    if settings::status(link)?.mode == Mode::Work {
+        return Err(ExamplesError::AtWork);
+    }
     for number in &stale {
         link.ask(&format!("forget {number}"))?;
     }
-    for line in new.iter().flat_map(lines) {
-        link.ask(&line)?;
+    for example in &new {
+        // Where somebody has left features behind, these are too many: that is refused, and the next time begins anew.
+        teach(link, example).or_else(|_| teach(link, example))?;
     }
     let after = read(link)?;
     let after = set(after.iter().map(|(_, example)| example));
@@ -121,6 +128,10 @@ pub fn push(link: &mut Link, wanted: &[Taught], replace: bool) -> Result<Pushed,
         return Err(ExamplesError::NotTaken { missing });
     }
     Ok(Pushed { taught: new.len(), forgotten: stale.len() })
+}
+
+fn teach(link: &mut Link, example: &Taught) -> Result<(), LinkError> {
+    lines(example).try_for_each(|line| link.ask(&line).map(drop))
 }
 
 /// The lines of the console that teach an example.

@@ -399,7 +399,7 @@ mod tests {
         let set = |status| {
             if status == 2 { vec![(Kind::Command, "set second_beam_mm 200"), (Kind::Answer, "ok")] } else { Vec::new() }
         };
-        assert_eq!(replay(&log(20, set)).unwrap().notes, ["line 5: not replayed from `set second_beam_mm 200` on"]);
+        assert_eq!(replay(&log(20, set)).unwrap().notes, ["line 6: not replayed from `set second_beam_mm 200` on"]);
         let setting = "second_beam_mm=200 mm from 0 to 900, default 0, saved 0";
         let mut has_one = log(20, |_| Vec::new());
         has_one.insert(1, Entry { number: 2, time_ms: 0, kind: Kind::Setting, text: setting.to_owned() });

@@ -206,9 +206,9 @@ pub fn push(link: &mut Link, wanted: &[(Setting, u16)], save: bool) -> Result<Ve
 }
 
 /// What the machine is doing.
-fn status(link: &mut Link) -> Result<Status, SettingsError> {
+pub(super) fn status(link: &mut Link) -> Result<Status, LinkError> {
     let lines = link.ask("status")?;
-    lines.iter().find_map(|line| Status::parse(line)).ok_or_else(|| LinkError::NotTheWeeder(lines.join(" ")).into())
+    lines.iter().find_map(|line| Status::parse(line)).ok_or_else(|| LinkError::NotTheWeeder(lines.join(" ")))
 }
 
 #[cfg(test)]

@@ -1,6 +1,18 @@
 //! A link at ports that answer by a script: good ones, silent ones, noisy ones.
 
 use super::*;
+use crate::examples::ExamplesError;
+use control::ground::class::label;
+use control::ground::examples::EXAMPLES;
+use control::ground::features::Features;
+use control::ground::nearest::Nearest;
+use control::measure::readings::{Readings, WakeUp};
+use control::measure::reset::Cause;
+use control::memory::Volatile;
+use control::say::{self, command, line::Line};
+use control::units::{Instant, Position};
+use control::weeder::Controller;
+use std::cell::RefCell;
 use std::io::{Read, Write};
 
 /// A port that answers each line by what `answer` says, and before the first one says `greeting`.
@@ -143,4 +155,50 @@ fn a_port_that_goes_away_says_so() {
     }
     let error = Link::over(Unplugged, false).err().unwrap();
     assert_eq!(error.to_string(), "the port is gone: plug the Uno in again");
+}
+
+/// A link to the firmware's decisions in HOLD, with its built-in examples, after these lines were typed.
+fn link_to_machine(typed: &[&str]) -> Link {
+    let wake_up = WakeUp {
+        readings: Readings::new(Instant::new(0), Position::new(0)),
+        beam_broken: false,
+        cause: Cause::PowerOn,
+    };
+    let nearest = Nearest::new(&EXAMPLES[..], Volatile::new());
+    let machine = RefCell::new(Controller::new(nearest, Volatile::new(), wake_up));
+    let answer = move |line: &str| {
+        let mut machine = machine.borrow_mut();
+        let mut answer = say::execute(command::parse(line.as_bytes()), &mut machine);
+        let mut said = Vec::new();
+        while !answer.is_done() {
+            let mut written = Line::new();
+            answer.write_line(&machine, &mut written);
+            said.extend(written);
+        }
+        said
+    };
+    ["clear"].iter().chain(typed).for_each(|line| drop(answer(line)));
+    link(answer)
+}
+
+#[test]
+fn examples_are_taught_whatever_features_somebody_has_left_behind() {
+    let wanted = [examples::example_of(&Features::describe(278, 250, 20), label::PLANT)];
+    for left in 0..=6 {
+        let mut link = link_to_machine(&vec!["teach 7"; left]);
+        let pushed = examples::push(&mut link, &wanted, false).expect("it is taught");
+        assert_eq!((pushed.taught, pushed.forgotten), (1, 0), "{left}");
+        assert_eq!(examples::read(&mut link).expect("it lists them"), [(0, wanted[0])], "{left}");
+    }
+}
+
+#[test]
+fn a_machine_at_work_is_not_taught_and_forgets_nothing() {
+    let [one, other] = [20, 24].map(|width| examples::example_of(&Features::describe(278, 250, width), label::PLANT));
+    let mut link = link_to_machine(&[]);
+    examples::push(&mut link, &[one], false).expect("it is in HOLD");
+    link.ask("start").expect("it goes to work");
+    let refused = examples::push(&mut link, &[other], true);
+    assert!(matches!(refused, Err(ExamplesError::AtWork)), "{refused:?}");
+    assert_eq!(examples::read(&mut link).expect("it lists them"), [(0, one)]);
 }
