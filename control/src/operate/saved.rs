@@ -1,7 +1,9 @@
 //! The settings as they are kept without power: two copies, written in turn.
 //!
 //! A copy is the table's mark, the number of values, a sequence number, the values, and a CRC-16 of all that. A save
-//! overwrites the older copy, a byte at a time, so that the power may go away at any moment: the newer one is still whole.
+//! overwrites the older copy, a byte at a time, so that the power may go away at any moment: the newer one is still whole. The first
+//! byte of the mark is spoiled before and put right in the end, so that what is half written is no copy, whatever stood there: a
+//! copy of which a byte had been lost could else become whole again by that one byte.
 //! On waking up the newest copy counts that is whole, of this firmware's table, and within its ranges.
 
 use crate::{
@@ -21,10 +23,13 @@ const END: usize = HEADER + 2 * Setting::COUNT as usize;
 /// Bytes of a copy, its CRC included.
 pub const COPY: usize = END + 2;
 
+/// A save writes each byte, and the first twice.
+const STEPS: u8 = COPY as u8 + 1;
+
 /// Each copy has half the memory, so that the table may grow without moving them.
 const STRIDE: u16 = SIZE as u16 / 2;
 
-const _: () = assert!(COPY <= STRIDE as usize && COPY <= u8::MAX as usize);
+const _: () = assert!(COPY <= STRIDE as usize && COPY < u8::MAX as usize);
 
 /// The settings in the memory.
 #[derive(Clone, Debug)]
@@ -35,7 +40,7 @@ pub struct SavedSettings<M> {
     sequence: u8,
     /// What was to be saved when that was asked for, whatever is set meanwhile.
     image: [u8; COPY],
-    /// Bytes of it that are still to be written, the last ones.
+    /// Steps that are still to be taken: the first byte is spoiled, the others are written, and it is.
     left: u8,
     /// Whether there is a copy.
     exists: bool,
@@ -76,7 +81,7 @@ impl<M: Memory> SavedSettings<M> {
         self.older ^= 1;
         self.sequence = self.sequence.wrapping_add(1);
         self.image = image(settings, self.sequence);
-        self.left = COPY as u8;
+        self.left = STEPS;
     }
 
     /// Carries on with a save, without waiting; whether all has been written.
@@ -85,8 +90,9 @@ impl<M: Memory> SavedSettings<M> {
             return false;
         }
         while self.left > 0 {
-            let place = COPY as u8 - self.left;
-            let (address, byte) = (self.newest() + u16::from(place), self.image[usize::from(place)]);
+            let place = if self.left > 1 { STEPS - self.left } else { 0 };
+            let right = self.image[usize::from(place)];
+            let (address, byte) = (self.newest() + u16::from(place), if self.left == STEPS { !right } else { right });
             self.left -= 1;
             // What is right already is left alone: an EEPROM wears out.
             if self.memory.read(address) != byte {
@@ -225,12 +231,12 @@ mod tests {
             for k in 0..before {
                 memory = save(memory, &with_k(k + 1));
             }
-            for power in 0..=COPY {
+            for power in 0..=COPY + 1 {
                 let mut failing = memory.clone();
                 failing.lose_power_after(power);
                 let after = load(&save(failing, &with_k(9)).with_power());
                 assert!(after == Some(with_k(before)) || after == Some(with_k(9)), "{power}: {after:?}");
-                assert!(power < COPY || after == Some(with_k(9)), "nothing was lost");
+                assert!(power <= COPY || after == Some(with_k(9)), "nothing was lost");
             }
         }
     }
@@ -244,14 +250,16 @@ mod tests {
                     let mut spoiled = memory.clone();
                     spoiled.bytes[usize::from(address(copy)) + place] ^= 1 << bit;
                     assert_eq!(load(&spoiled), Some(with_k(left)), "byte {place}, bit {bit}");
-                    // The copy that is left is never the one to be overwritten. Where what was spoiled has become what is to be
-                    // written, two bytes may be all that was missing.
-                    let mut failing = spoiled.clone();
-                    failing.lose_power_after(2);
-                    let memory = save(failing, &with_k(9)).with_power();
-                    let (after, is_all_written) = (load(&memory), memory.bytes == save(spoiled, &with_k(9)).bytes);
-                    let is_left = [5, 7].map(|k| Some(with_k(k))).contains(&after);
-                    assert!(is_left || is_all_written, "byte {place}, bit {bit}: {after:?}");
+                    // The copy that is left is never the one to be overwritten, and what was lost does not come back.
+                    for power in 0..=COPY + 1 {
+                        let mut failing = spoiled.clone();
+                        failing.lose_power_after(power);
+                        let memory = save(failing, &with_k(9)).with_power();
+                        let (after, is_all_written) =
+                            (load(&memory), memory.bytes == save(spoiled.clone(), &with_k(9)).bytes);
+                        let expected = with_k(if is_all_written { 9 } else { left });
+                        assert_eq!(after, Some(expected), "byte {place}, bit {bit}, {power} writes");
+                    }
                 }
             }
         }
@@ -293,8 +301,8 @@ mod tests {
     fn bytes_that_are_right_are_not_written_again() {
         let memory = save(save(Volatile::new(), &with_k(5)), &with_k(5));
         let mut writes_few = memory.clone();
-        // The sequence number and the CRC.
-        writes_few.lose_power_after(3);
+        // The first byte, twice, the sequence number and the CRC.
+        writes_few.lose_power_after(5);
         assert_eq!(save(writes_few, &with_k(5)).bytes, save(memory, &with_k(5)).bytes);
         assert_eq!(Volatile::new().bytes[0], ERASED);
     }

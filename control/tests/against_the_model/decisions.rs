@@ -161,7 +161,7 @@ impl Machine for Decisions {
         self.weeder.take_edge(Edge::Seen {
             position: Position::new(world.count as i32),
             broken: world.broken,
-            second_broken: false,
+            second_broken: world.second_broken,
         });
     }
 
@@ -172,6 +172,10 @@ impl Machine for Decisions {
 
     fn place(&self, count: i64) -> i64 {
         unwrapped(count, self.odometer.place(Position::new(count as i32)))
+    }
+
+    fn own_count(&self, count: i64) -> i32 {
+        count as i32
     }
 
     fn turn(&mut self, before: &World, now: &World) -> Result<i64, TestCaseError> {

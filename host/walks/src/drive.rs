@@ -119,6 +119,7 @@ impl<M: Machine> Drive<M> {
             count: beginning.count.into(),
             jumps: 0,
             broken: row[0],
+            second_broken: false,
             switch_on: false,
             end_switch_on: false,
             stack_is_low: false,
@@ -440,7 +441,16 @@ impl<M: Machine> Drive<M> {
 
     fn beam_at(&mut self, ground: i64) -> Checked {
         self.farthest = self.farthest.max(ground);
-        let broken = ground <= self.bare_from && self.row[ground.rem_euclid(self.row.len() as i64) as usize];
+        let stands_at =
+            |place: i64| place <= self.bare_from && self.row[place.rem_euclid(self.row.len() as i64) as usize];
+        let apart = self.ticks(Setting::SecondBeamMm);
+        let (broken, second_broken) = (stands_at(ground), apart > 0 && stands_at(ground - apart));
+        if second_broken != self.world.second_broken {
+            self.world.second_broken = second_broken;
+            if !self.edges_get_lost {
+                self.machine.beam_edge(&self.world);
+            }
+        }
         if broken == self.world.broken { Ok(()) } else { self.edge(broken) }
     }
 
@@ -574,6 +584,8 @@ impl<M: Machine> Drive<M> {
             && !self.model.is_unseen(tool)
             // What is guarded may not have been told.
             && self.guard_spacings.is_empty()
+            // What the second beam widens a window by is no part of the model.
+            && self.ticks(Setting::SecondBeamMm) == 0
             && !self.model.is_shifted;
         if !is_calm {
             self.left_for = None;
@@ -598,7 +610,9 @@ impl<M: Machine> Drive<M> {
         // A millimetre, and what lies between it and the next.
         let millimetre = i64::from(wheel.ticks(1).0) + 1;
         let told = self.model.weed(self.here(), wheel.ticks(width_mm as u16).0.into(), millimetre);
-        prop_assert!(told.is_ok() || self.model.is_shifted, "{}", told.unwrap_err());
+        // One that only the second beam has seen opens nothing.
+        let is_right = told.is_ok() || self.model.is_shifted || self.ticks(Setting::SecondBeamMm) > 0;
+        prop_assert!(is_right, "{}", told.unwrap_err());
         Ok(())
     }
 
@@ -634,7 +648,7 @@ impl<M: Machine> Drive<M> {
             return Ok(());
         };
         let here = self.here();
-        let due = here + i64::from(told.wrapping_sub(here as i32));
+        let due = here + i64::from(told.wrapping_sub(self.machine.own_count(here)));
         // It was decided a moment ago, and the settings may have changed since.
         let guarded: Vec<_> =
             self.guard_spacings.iter().map(|&spacing| self.model.guard(due, spacing, self.guard_scatter)).collect();

@@ -23,6 +23,8 @@ pub struct World {
     pub jumps: u16,
     /// Whether the beam is broken.
     pub broken: bool,
+    /// Whether the second beam is, if there is one.
+    pub second_broken: bool,
     /// Whether the work switch is on.
     pub switch_on: bool,
     /// Whether the end switch says that the tool is out.
@@ -64,7 +66,7 @@ pub trait Machine: Sized {
     /// for it.
     fn spike(&mut self, world: &mut World, ticks: i32) -> i64;
 
-    /// The beam has changed to what the world shows.
+    /// The beam, or the second one, has changed to what the world shows.
     fn beam_edge(&mut self, world: &World);
 
     /// Edges of the beam got lost; it is now as the world shows it.
@@ -75,6 +77,9 @@ pub trait Machine: Sized {
 
     /// The place that the machine takes itself to be at by a count: without the noise that it does not believe.
     fn place(&self, count: i64) -> i64;
+
+    /// What the machine's own counter shows at a count: a counter may begin anew when the machine wakes up.
+    fn own_count(&self, count: i64) -> i32;
 
     /// A turn of the loop, from one world to another; the place of what was read in it.
     ///

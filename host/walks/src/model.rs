@@ -208,16 +208,17 @@ impl Model {
             let (leading, trailing) = (self.runs[first].leading, self.runs[last - 1].trailing);
             let tolerance =
                 tolerance + self.slack + 2 * self.runs[first..last].iter().map(|run| run.blur).max().unwrap_or(0);
-            let set: Vec<i64> = self.merge_gaps_since(leading).collect();
-            let (shortest, longest) = (set.iter().min().unwrap_or(&0), set.iter().max().unwrap_or(&0));
-            let before = first.checked_sub(1).map(|before| leading - self.runs[before].trailing);
-            let is_whole =
-                before.is_none_or(|gap| gap >= shortest - tolerance) && place - trailing >= shortest - tolerance;
+            let shortest_since = |place| self.merge_gaps_since(place).min().unwrap_or(0);
+            let before = first.checked_sub(1).map(|before| self.runs[before].trailing);
+            // What lies before it may have come to its end under another setting.
+            let begins = before.is_none_or(|end| leading - end >= shortest_since(end) - tolerance);
+            let is_whole = begins && place - trailing >= shortest_since(leading) - tolerance;
             if is_whole && (trailing - leading).abs_diff(width) <= tolerance as u64 {
                 self.runs[first..last].iter_mut().for_each(|run| run.is_free = true);
                 return Ok(());
             }
-            if before.is_none_or(|gap| gap > longest + tolerance) {
+            let longest = self.merge_gaps_since(leading).max().unwrap_or(0);
+            if before.is_none_or(|end| leading - end > longest + tolerance) {
                 break;
             }
         }

@@ -225,6 +225,10 @@ fn line() -> BoxedStrategy<String> {
         1 => (90_u32..1500).prop_map(|mm_s| format!("test row {mm_s}")),
         1 => (400_u32..2600).prop_map(|us| format!("servo {us}")),
         1 => (0_u32..40).prop_map(|number| format!("forget {number}")),
+        1 => any::<u8>().prop_map(|feature| format!("teach {feature}")),
+        1 => (prop::sample::select(vec!["plant", "weed"]), prop::array::uniform5(any::<u8>())).prop_map(
+            |(label, [a, b, c, d, e])| format!("teach {a}\nteach {b}\nteach {c}\nteach {d}\nteach {e}\nteach {label}")
+        ),
         1 => "[ -~]{0,90}",
     ]
     .boxed()
@@ -250,6 +254,7 @@ fn setting() -> BoxedStrategy<String> {
         1 => (Just("servo_in_us"), 500_u32..=2500),
         2 => (Just("guard_spacing_mm"), 0_u32..=700),
         1 => (Just("guard_scatter_mm"), 0_u32..=100),
+        1 => (Just("second_beam_mm"), 0_u32..=300),
         1 => (Just("min_width_mm"), 0_u32..=60),
         1 => (Just("misfit_after"), 0_u32..=6),
         1 => (Just("k"), 1_u32..=15),
@@ -259,6 +264,7 @@ fn setting() -> BoxedStrategy<String> {
         "wheel_mm",
         "ticks_per_m",
         "beam_to_tool_mm",
+        "second_beam_mm",
         "margin_mm",
         "lead_out_ms",
         "lead_in_ms",

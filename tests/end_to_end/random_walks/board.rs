@@ -80,6 +80,8 @@ pub struct Board {
     to_come: Vec<(Vec<(Pin, bool)>, bool)>,
     /// Where the encoder is in its cycle.
     phase: usize,
+    /// The world's count at which the firmware's was 0.
+    zero: i64,
     servo: ServoLine,
     /// Lines that were typed and are yet to be answered, and the one that is being answered.
     typed: VecDeque<String>,
@@ -230,6 +232,7 @@ impl Machine for Board {
     fn new(beginning: &Beginning, world: &World) -> Result<Self, Failure> {
         let mut uno = Uno::boot(&ELF).map_err(stopped)?;
         uno.set(wiring::BEAM, !world.broken);
+        uno.set(wiring::SECOND_BEAM, !world.second_broken);
         uno.run_until_symbol("main", GREETING_CYCLES).map_err(stopped)?;
         let (count, overflows) = (beginning.count.to_le_bytes(), (beginning.steps >> 8).to_le_bytes());
         uno.write("weeder_firmware::encoder::COUNT_LOW", &count[..2]).map_err(stopped)?;
@@ -240,6 +243,7 @@ impl Machine for Board {
             uno,
             to_come: Vec::new(),
             phase: 0,
+            zero: 0,
             servo: ServoLine::default(),
             typed: VecDeque::new(),
             current: None,
@@ -274,7 +278,8 @@ impl Machine for Board {
     }
 
     fn beam_edge(&mut self, world: &World) {
-        self.to_come.push((vec![(wiring::BEAM, !world.broken)], false));
+        let levels = vec![(wiring::BEAM, !world.broken), (wiring::SECOND_BEAM, !world.second_broken)];
+        self.to_come.push((levels, false));
     }
 
     fn lose_edges(&mut self, _: &World) -> Checked {
@@ -283,6 +288,10 @@ impl Machine for Board {
 
     fn place(&self, count: i64) -> i64 {
         count
+    }
+
+    fn own_count(&self, count: i64) -> i32 {
+        (count - self.zero) as i32
     }
 
     fn turn(&mut self, before: &World, now: &World) -> Result<i64, Failure> {
@@ -396,7 +405,7 @@ impl Machine for Board {
         all.map(|(listed, _)| listed).filter(|listed| listed.from_field).collect()
     }
 
-    fn reset(&mut self, cause: Cause, torn: Option<u8>, _: &World) -> Checked {
+    fn reset(&mut self, cause: Cause, torn: Option<u8>, world: &World) -> Checked {
         // A line that is on its way would go on to the machine that wakes up.
         while self.uno.bytes_on_their_way() > 0 {
             self.uno.run_for_ms(1).map_err(stopped)?;
@@ -411,6 +420,7 @@ impl Machine for Board {
             },
         }
         self.uno.received();
+        self.zero = world.count;
         let greeting = self.wake_up()?;
         let text: String = cause.text().bytes().map(char::from).collect();
         if !greeting.contains(&format!("reset by {text},")) {
