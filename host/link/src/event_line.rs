@@ -69,7 +69,12 @@ pub enum EventLine {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Timed {
     /// By the end switch.
-    EndSwitch,
+    EndSwitch {
+        /// The longest that the tool took to be out, in milliseconds.
+        out_ms: u16,
+        /// The shortest until it began to come back.
+        in_ms: u16,
+    },
     /// By the operator, who has seen it swing.
     Eye,
     /// In vain: the end switch did not follow.
@@ -183,7 +188,9 @@ impl EventLine {
             "warning" => Warning::find(values.text("name")?.as_bytes()).map(Self::Warning),
             "calibrated" => {
                 let by = match values.text("by") {
-                    None => Timed::EndSwitch,
+                    None => {
+                        Timed::EndSwitch { out_ms: values.number("lead_out_ms")?, in_ms: values.number("lead_in_ms")? }
+                    }
                     Some("eye,") => Timed::Eye,
                     Some("none,") => Timed::None,
                     Some(_) => return None,
@@ -270,9 +277,10 @@ mod tests {
             assert_eq!(EventLine::parse(&line(Event::State(State::Alarm(alarm)))), Some(EventLine::State(Mode::Alarm)));
         }
         let measured = Outcome::Measured(SwingTimes { out_ms: 150, in_ms: 40 });
+        let by_the_switch = Timed::EndSwitch { out_ms: 150, in_ms: 40 };
         for (outcome, fits, by) in [
-            (measured, true, Timed::EndSwitch),
-            (measured, false, Timed::EndSwitch),
+            (measured, true, by_the_switch),
+            (measured, false, by_the_switch),
             (Outcome::Shown, false, Timed::Eye),
             (Outcome::Failed, false, Timed::None),
         ] {

@@ -22,6 +22,7 @@ mod port;
 pub mod replay;
 mod said;
 pub mod session;
+pub mod set_up;
 pub mod settings;
 pub mod settings_file;
 

@@ -46,7 +46,7 @@ fn read_event(event: &EventLine, line: &str) -> Value {
         EventLine::Warning(_) => json!({ "is": "warning", "name": Values(line).text("name") }),
         EventLine::Calibrated { by, is_set } => {
             let by = match by {
-                Timed::EndSwitch => "end switch",
+                Timed::EndSwitch { .. } => "end switch",
                 Timed::Eye => "eye",
                 Timed::None => "none",
             };

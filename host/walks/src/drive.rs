@@ -105,6 +105,8 @@ pub struct Drive<M> {
     /// what was set a moment ago.
     guard_scatter: i64,
     guard_spacings: Vec<i64>,
+    /// Whether there has been a second beam. What it widens, and what it alone has seen, is no part of the model: that is closed besides.
+    had_second_beam: bool,
 }
 
 impl<M: Machine> Drive<M> {
@@ -158,6 +160,7 @@ impl<M: Machine> Drive<M> {
             steady_swings: 0,
             guard_scatter: i64::MAX,
             guard_spacings: Vec::new(),
+            had_second_beam: false,
         };
         drive.say("clear")?;
         Ok(drive)
@@ -405,6 +408,7 @@ impl<M: Machine> Drive<M> {
         // What is narrower than the settings have it is dust, of which nothing is said either.
         let narrow_mm = M::NARROW_MM.max(self.machine.settings().get(Setting::MinWidthMm));
         self.guard_scatter = self.guard_scatter.min(self.ticks(Setting::GuardScatterMm));
+        self.had_second_beam |= self.ticks(Setting::SecondBeamMm) > 0;
         let spacing = self.ticks(Setting::GuardSpacingMm);
         if spacing > 0 && !self.guard_spacings.contains(&spacing) {
             self.guard_spacings.push(spacing);
@@ -584,8 +588,7 @@ impl<M: Machine> Drive<M> {
             && !self.model.is_unseen(tool)
             // What is guarded may not have been told.
             && self.guard_spacings.is_empty()
-            // What the second beam widens a window by is no part of the model.
-            && self.ticks(Setting::SecondBeamMm) == 0
+            && !self.had_second_beam
             && !self.model.is_shifted;
         if !is_calm {
             self.left_for = None;
@@ -611,7 +614,7 @@ impl<M: Machine> Drive<M> {
         let millimetre = i64::from(wheel.ticks(1).0) + 1;
         let told = self.model.weed(self.here(), wheel.ticks(width_mm as u16).0.into(), millimetre);
         // One that only the second beam has seen opens nothing.
-        let is_right = told.is_ok() || self.model.is_shifted || self.ticks(Setting::SecondBeamMm) > 0;
+        let is_right = told.is_ok() || self.model.is_shifted || self.had_second_beam;
         prop_assert!(is_right, "{}", told.unwrap_err());
         Ok(())
     }
@@ -652,7 +655,7 @@ impl<M: Machine> Drive<M> {
         // It was decided a moment ago, and the settings may have changed since.
         let guarded: Vec<_> =
             self.guard_spacings.iter().map(|&spacing| self.model.guard(due, spacing, self.guard_scatter)).collect();
-        let is_right = guarded.iter().any(Result::is_ok) || self.model.is_shifted;
+        let is_right = guarded.iter().any(Result::is_ok) || self.model.is_shifted || self.had_second_beam;
         prop_assert!(is_right, "{guarded:?}");
         Ok(())
     }
