@@ -51,6 +51,8 @@ pub struct Model {
     grain_slack: i64,
     /// Whether the encoder's count has gone wrong.
     pub is_shifted: bool,
+    /// Whether the machine has been so near to the end of its memory that it may have begun anew, or not.
+    may_have_begun_anew: bool,
 }
 
 impl Model {
@@ -69,6 +71,7 @@ impl Model {
             slack: 0,
             grain_slack: 0,
             is_shifted: false,
+            may_have_begun_anew: false,
         };
         model.touch(0);
         model
@@ -79,6 +82,7 @@ impl Model {
     pub fn follow(&mut self, place: i64, merge_gap: i64, metre: i64) {
         if self.frontier - place > 8 * metre - metre / 20 {
             self.known_from = self.known_from.min(place);
+            self.may_have_begun_anew = true;
         }
         // The machine has done so by now, at eight metres as near as its turns let it.
         if self.frontier - place > 8 * metre + metre / 64 {
@@ -91,6 +95,11 @@ impl Model {
         if self.merge_gaps.last().is_none_or(|&(_, gap)| gap != merge_gap) {
             self.merge_gaps.push((self.frontier, merge_gap));
         }
+    }
+
+    /// Whether what the machine says of the ground may be of other ground than the model holds: nothing is to be held against it.
+    pub fn is_in_doubt(&self) -> bool {
+        self.is_shifted || self.may_have_begun_anew
     }
 
     /// The machine's places may be off by so many ticks more.
@@ -107,7 +116,7 @@ impl Model {
     pub fn begin_anew(&mut self, place: i64) {
         self.known_from = self.known_from.min(place);
         self.begin = self.begin.min(place);
-        (self.frontier, self.is_growing) = (place, false);
+        (self.frontier, self.is_growing, self.may_have_begun_anew) = (place, false, false);
         self.runs.retain(|run| run.leading < place);
         self.runs.iter_mut().for_each(|run| run.trailing = run.trailing.min(place - 1));
         self.guarded.retain(|guarded| guarded.trailing < place);

@@ -179,6 +179,8 @@ impl Board {
             Command::CalibrateServo => self.times_the_servo = true,
             Command::Hold | Command::Start { .. } | Command::Servo(_) | Command::ServoIn | Command::ServoOut => {
                 self.in_doubt |= std::mem::take(&mut self.times_the_servo);
+                // What was moved by hand has yet to come back.
+                self.rest_anew();
             }
             Command::TestRow { .. } => self.in_doubt |= std::mem::take(&mut self.times_the_servo),
             _ => {}
