@@ -25,7 +25,7 @@ for word in "$@"; do
             if ! command -v chromium >/dev/null; then packages+=(chromium); fi
             ;;
         slurm)
-            packages+=(munge slurm-client slurmctld slurmd)
+            packages+=(munge procps slurm-client slurmctld slurmd)
             ;;
         *)
             echo "setup.sh: unknown word \`$word\`. Say nothing, page, slurm, or both." >&2
