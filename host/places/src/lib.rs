@@ -1,0 +1,21 @@
+//! Where on the ground things are: a satellite receiver's lines, the antenna's track along the wheel's distance, and a map of a job.
+//!
+//! - [`sentence`] reads a line of NMEA 0183, [`receiver`] makes fixes and marks of them, and [`track`] finds what happened between
+//!   fixes by the wheel's distance. [`plane`] knows the earth's shape.
+//! - [`job`] reads a record so, and [`summary`] counts it. [`map`] is it as GeoJSON, [`picture`] as a drawing.
+//!
+//! It opens no file and no port: a log's lines are given to it. It compiles for a browser as [`link`] does.
+
+pub mod antenna;
+pub mod job;
+pub mod map;
+pub mod picture;
+pub mod plane;
+pub mod receiver;
+pub mod sentence;
+pub mod summary;
+pub mod track;
+
+pub use antenna::Antenna;
+pub use job::{Job, Wanted};
+pub use receiver::Receiver;
