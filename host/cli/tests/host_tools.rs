@@ -14,6 +14,7 @@ fn uno() -> Background {
         bootloader: None,
         eeprom: None,
         link: None,
+        receiver: None,
         course: None,
         fast: true,
         keeps_running_when_opened: false,

@@ -86,6 +86,11 @@ impl Kind {
         }
     }
 
+    /// Whether such a line tells the operator of a receiver that it comes, goes or is wrong.
+    pub fn is_for_the_operator(self) -> bool {
+        matches!(self, Self::GpsFound | Self::GpsLost | Self::GpsMark)
+    }
+
     fn find(word: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|kind| kind.name() == word)
     }
@@ -184,6 +189,14 @@ impl LogWriter {
         }
     }
 
+    /// Writes lines of some kinds at a time, of what is no [`Happening`].
+    ///
+    /// # Errors
+    /// Where the file cannot be written.
+    pub fn lines_at(&mut self, time_ms: u64, lines: &[(Kind, String)]) -> Result<(), LogError> {
+        lines.iter().try_for_each(|(kind, line)| self.line(time_ms, *kind, line))
+    }
+
     /// Lines in the file, the header left out.
     pub fn lines(&self) -> u64 {
         self.found + self.added
@@ -194,11 +207,7 @@ impl LogWriter {
         self.added
     }
 
-    /// Writes a line of a kind at a time, for what is no [`Happening`].
-    ///
-    /// # Errors
-    /// Where the file cannot be written.
-    pub fn line(&mut self, time_ms: u64, kind: Kind, line: &str) -> Result<(), LogError> {
+    fn line(&mut self, time_ms: u64, kind: Kind, line: &str) -> Result<(), LogError> {
         self.added += 1;
         self.record([time_ms.to_string().as_str(), kind.name(), line])
     }

@@ -27,7 +27,7 @@ use std::ops::Range;
 const STANDING_MS: f64 = 1000.0;
 
 /// The longest way between two statuses in ticks, some hundred metres.
-const LONGEST_WAY: u32 = 1_000_000;
+pub(crate) const LONGEST_WAY: u32 = 1_000_000;
 
 /// What is asked of a record beside what stands in it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -347,13 +347,8 @@ fn lines(way_m: &Range<f64>, find: impl Fn(f64) -> Result<Found, Missing>) -> Ve
 }
 
 impl Reading {
-    /// Millimetres in a tick.
     fn tick_mm(&self) -> f64 {
-        let value = |setting| self.settings.as_ref().map_or(0.0, |settings| f64::from(settings.get(setting)));
-        match value(Setting::TicksPerM) {
-            0.0 => PI * value(Setting::WheelMm) / value(Setting::TicksPerRev).max(1.0),
-            ticks_per_m => 1000.0 / ticks_per_m,
-        }
+        self.settings.as_ref().map_or(0.0, tick_mm)
     }
 
     fn mm(&self, setting: Setting) -> f64 {
@@ -503,6 +498,15 @@ impl Reading {
         let is_object = |thing: &&Thing| matches!(thing.what, What::Object { .. });
         let Some(object) = self.things.iter().rev().find(is_object).cloned() else { return };
         self.things.push(Thing { what: What::Label(class), line, text: command.to_owned(), time_ms, ..object });
+    }
+}
+
+/// Millimetres in a tick of the encoder.
+pub(crate) fn tick_mm(settings: &Settings) -> f64 {
+    let value = |setting| f64::from(settings.get(setting));
+    match value(Setting::TicksPerM) {
+        0.0 => PI * value(Setting::WheelMm) / value(Setting::TicksPerRev).max(1.0),
+        ticks_per_m => 1000.0 / ticks_per_m,
     }
 }
 

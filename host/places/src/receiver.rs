@@ -8,15 +8,18 @@
 //! - **When.** A line comes some time after the moment that it tells of, and more or less so by turns: others go before it on
 //!   the wire, and the computer is busy. The least delay of the last minute or two is taken for that of all, and less it
 //!   cannot be; what is left of it is the antenna's setting `delay_ms`.
-//! - **Jumps.** A fix that is farther from the last one than the wheel has rolled, and than both errors explain, is none. Where
-//!   [`AGREEING`] such agree with each other, it is those before that were wrong, or the truth has moved: the track begins anew.
+//! - **Jumps.** A fix that is farther from the last one than the wheel has rolled, and than both errors explain, is none. Where such
+//!   agree with each other for [`AGREEING_MS`], those before may have been the wrong ones: the track begins anew with the first.
 
 use crate::plane::Place;
 use crate::sentence::{DAY_MS, Line, Quality, Report};
 use std::fmt;
 
-/// Fixes that have jumped and agree with each other, after which they are believed.
-pub const AGREEING: usize = 5;
+/// Fixes that have jumped are believed once they have agreed with each other for so long, in ms.
+pub const AGREEING_MS: f64 = 10_000.0;
+
+/// And so many they have to be.
+const AGREEING: usize = 5;
 
 /// How many standard deviations two fixes may be off before they have jumped: with noise alone, one in ten million has.
 const DEVIATIONS: f64 = 8.0;
@@ -320,7 +323,8 @@ impl Receiver {
             self.jumped.clear();
         }
         self.jumped.push(here);
-        if self.jumped.len() == AGREEING {
+        let agree_ms = self.jumped.first().map_or(0.0, |first| fix.time_ms - first.fix.time_ms);
+        if self.jumped.len() >= AGREEING && agree_ms >= AGREEING_MS {
             self.track += 1;
             heard.marks.push(Mark::Stayed);
             for mut jumped in std::mem::take(&mut self.jumped) {
@@ -551,7 +555,7 @@ mod tests {
     #[test]
     fn fixes_that_stay_where_they_have_jumped_to_are_another_track() {
         let (heard, receiver) = off(10..30);
-        assert_eq!(receiver.counts(), Counts { fixes: 30, losses: 0, jumps: AGREEING as u64, damaged: 0 });
+        assert_eq!(receiver.counts(), Counts { fixes: 30, losses: 0, jumps: 11, damaged: 0 });
         assert_eq!(marks(&heard).last(), Some(&Mark::Stayed));
         let tracks: Vec<u32> = fixes(&heard).iter().map(|fix| fix.track).collect();
         assert_eq!(tracks, [vec![0; 10], vec![1; 20]].concat());
