@@ -21,11 +21,11 @@ use trial::receiver::{ReceiverSetup, SimulatedReceiver, Trouble};
 use trial::{UnoPort, firmware};
 
 /// From plant to plant, and how many there are.
-const SPACING_MM: f64 = 400.0;
-const PLANTS: usize = 60;
+const SPACING_MM: f64 = 500.0;
+const PLANTS: usize = 48;
 
 /// Which of them has not come up.
-const MISSING: usize = 30;
+const MISSING: usize = 24;
 
 /// When the machine sets off after the session has begun, in cycles.
 const SETS_OFF: u64 = CYCLES_PER_SECOND;
@@ -33,7 +33,7 @@ const SETS_OFF: u64 = CYCLES_PER_SECOND;
 /// A row of 24 m with one plant missing, and a weed between every tenth and the next.
 fn row() -> Row {
     let plants = (0..PLANTS).filter(|&plant| plant != MISSING);
-    let plants = plants.map(|plant| Thing::plant(600.0 + SPACING_MM * plant as f64, 140.0 + (plant % 5) as f64));
+    let plants = plants.map(|plant| Thing::plant(600.0 + SPACING_MM * plant as f64, 148.0 + (plant % 5) as f64));
     let weeds = (5..PLANTS).step_by(10).map(|plant| Thing::weed(600.0 + SPACING_MM * (plant as f64 + 0.5), 15.0));
     let mut things: Vec<Thing> = plants.chain(weeds).collect();
     things.sort_by(|one, other| one.position_mm.total_cmp(&other.position_mm));
@@ -101,9 +101,10 @@ fn recorded(
     log.lines_at(0, &lines).expect("the log can be written");
     log.lines_at(0, &recorder.found(0, "simulated")).expect("the log can be written");
     while time_s() < end_s {
+        let happened = session.turn(began + Duration::from_secs_f64(time_s() - began_s));
         let since_s = time_s() - began_s;
         let time_ms = (since_s * 1000.0) as u64;
-        for happening in session.turn(began + Duration::from_secs_f64(since_s)) {
+        for happening in happened {
             assert!(!matches!(happening, Happening::Lost(_)), "{happening:?}");
             log.write_at(time_ms, &happening).expect("the log can be written");
             recorder.happened(time_ms, &happening);
@@ -141,17 +142,18 @@ fn errors_m(job: &Job, row: &Row, setup: &ReceiverSetup) -> Vec<(f64, Basis)> {
     assert_eq!(objects.len(), row.things().len());
     let error = |(thing, object): (&Thing, &&job::Thing)| {
         let place = truth.place(thing.position_mm / 1000.0, Offset::default());
-        let class = if thing.kind == Grown::Plant { Class::Plant } else { Class::Weed };
-        assert!(matches!(object.what, What::Object { class: found, .. } if found == class), "{object:?}");
+        // A plant behind a gap is like nothing that the examples know, and kept.
+        let is_weed = matches!(object.what, What::Object { class: Class::Weed, .. });
+        assert_eq!(is_weed, thing.kind == Grown::Weed, "{object:?}");
         let found = object.found.ok()?;
         Some((found.place.distance_m(place), found.basis))
     };
     row.things().iter().zip(&objects).filter_map(error).collect()
 }
 
-/// The machine's clock, its wheel and its log add this to the receiver's error at the most, in metres: 20 ms of the way at 0.7 m/s, and 6 mm of canopies
-/// whose edges the beam has by the tick.
-const MACHINE_M: f64 = 0.02;
+/// The machine and its record add this to the receiver's error at the most, in metres: a status has been on its way for some 10 ms
+/// when it is written down, which is 7 mm of the way, and the beam has a canopy's edges by the tick.
+const MACHINE_M: f64 = 0.015;
 
 #[test]
 fn places_come_back_within_the_receivers_error_through_outages_jumps_and_damaged_lines() {
@@ -168,13 +170,14 @@ fn places_come_back_within_the_receivers_error_through_outages_jumps_and_damaged
     assert_eq!(errors.len(), row.things().len(), "all have places");
     let interpolated = errors.iter().filter(|(_, basis)| *basis == Basis::Interpolated).count();
     assert!((10..40).contains(&interpolated), "{interpolated}");
-    // Four standard deviations of a fix to the east and to the north at once, and two of the heading's at 0.65 m.
-    let sigma_m = setup.error_mm / 1000.0;
+    // The length of an error that is normal to the east and to the north is beyond four standard deviations once in 3000 times. A fix's is
+    // one part, and the heading's at 0.65 m from the antenna the other; between two fixes it is less.
+    let sigma_m = (setup.error_mm / 1000.0).hypot(0.02 * 0.65);
     let farthest = errors.iter().map(|(error, _)| *error).fold(0.0, f64::max);
-    assert!(farthest < 4.0 * sigma_m * 2_f64.sqrt() + 2.0 * 0.02 * 0.65 + MACHINE_M, "{farthest} {errors:?}");
-    // The mean of such an error is 1.25 standard deviations.
+    assert!(farthest < 4.0 * sigma_m + MACHINE_M, "{farthest} {errors:?}");
+    // Its mean is 1.25 standard deviations.
     let mean = errors.iter().map(|(error, _)| error).sum::<f64>() / errors.len() as f64;
-    assert!(mean < 1.25 * sigma_m + 0.02 * 0.65 + MACHINE_M, "{mean}");
+    assert!(mean < 1.25 * sigma_m + MACHINE_M, "{mean}");
 
     // What went wrong stands in the record, in lines of their own, and none of the machine's is lost.
     let marks = |begin: &str| log.iter().filter(|it| it.kind == Kind::GpsMark && it.text.starts_with(begin)).count();
@@ -195,12 +198,12 @@ fn places_come_back_within_the_receivers_error_through_outages_jumps_and_damaged
     assert!((30_000..60_000).contains(&(utc_ms - setup.began_ms)), "{utc_ms}");
 
     let summary = Summary::of(&job, &Stand { row_spacing_mm: 600.0, spacing_mm: None });
-    assert_eq!((summary.plants, summary.unknown, summary.weeds, summary.missing), (59, 0, 6, 1), "{summary:?}");
+    assert_eq!((summary.plants, summary.unknown, summary.weeds, summary.missing), (47, 1, 5, 1), "{summary:?}");
     let spacing_mm = summary.spacing_mean_mm.expect("there are plants");
     assert!((spacing_mm - SPACING_MM).abs() < 2.0, "{spacing_mm}");
     assert!(summary.spacing_scatter_mm.is_some_and(|scatter| scatter < 5.0), "{summary:?}");
     assert!((24.0..26.0).contains(&summary.worked_m), "{summary:?}");
-    assert_eq!(summary.area_ha, summary.worked_m * 0.6 / 10_000.0);
+    assert!((summary.area_ha - summary.worked_m * 0.6 / 10_000.0).abs() < 1e-12, "{summary:?}");
 }
 
 #[test]
