@@ -3,8 +3,9 @@
 //! What its lines mean stands in [`places`]. A file takes the place of a port as well: it is read at the pace of the times in it.
 
 use crate::numbers::{number_within, whole_within};
-use anyhow::{Result, ensure};
+use anyhow::{Result, anyhow, ensure};
 use clap::Args;
+use link::LinkError;
 use link::session::Happening;
 use places::recorder::Lines;
 use places::sentence::{DAY_MS, Line};
@@ -151,7 +152,13 @@ impl Source {
             let text = fs::read(path)?;
             return Ok(Self::File(Paced::new(&String::from_utf8_lossy(&text), Instant::now())));
         }
-        Ok(Self::Port(link::listen(name, baud)?))
+        Ok(Self::Port(link::listen(name, baud).map_err(|error| match error {
+            LinkError::Absent(port) => {
+                anyhow!("there is no port {port} for --gps: plug the receiver in, and name its port")
+            }
+            LinkError::Busy(port) => anyhow!("{port} is in use: end what else listens to the receiver, such as gpsd"),
+            other => other.into(),
+        })?))
     }
 
     /// How many bytes have come.

@@ -13,7 +13,6 @@
 use crate::antenna::Antenna;
 use crate::plane::Place;
 use crate::receiver::{Counts, Fix, Heard, Mark, Receiver};
-use crate::sentence::Quality;
 use crate::track::{Basis, Found, Missing, Offset, Track};
 use link::log::{Entry, Kind};
 use link::settings::{Setting, Settings, shown};
@@ -135,8 +134,6 @@ pub struct Stretch {
     pub ground: Vec<Ground>,
     /// When it began and ended, by the record's clock.
     pub time_ms: Range<u64>,
-    /// How far beam and tool are apart, in mm.
-    pub beam_to_tool_mm: f64,
 }
 
 /// A fix that has jumped.
@@ -159,8 +156,6 @@ pub struct Job {
     pub stretches: Vec<Stretch>,
     /// What was counted of the receiver.
     pub counts: Counts,
-    /// Fixes of each quality.
-    pub qualities: Vec<(Quality, u64)>,
     /// Fixes that have jumped.
     pub jumps: Vec<Jump>,
     /// How often the receiver was lost, by the record.
@@ -268,10 +263,6 @@ impl Job {
 
     fn heard(&mut self, heard: Heard, reading: &mut Reading, entry: &Entry) {
         for fix in heard.fixes {
-            match self.qualities.iter_mut().find(|(quality, _)| *quality == fix.quality) {
-                Some((_, count)) => *count += 1,
-                None => self.qualities.push((fix.quality, 1)),
-            }
             reading.fixes.push(Fix { time_ms: fix.time_ms - self.antenna.delay_ms, ..fix });
         }
         for mark in heard.marks {
@@ -317,7 +308,7 @@ impl Job {
             Ground { did: passed.did, way_m, time_ms: passed.time_ms, lines }
         };
         let ground = read.ground.into_iter().map(passed).collect();
-        self.stretches.push(Stretch { things, ground, time_ms: read.time_ms.unwrap_or_default(), beam_to_tool_mm });
+        self.stretches.push(Stretch { things, ground, time_ms: read.time_ms.unwrap_or_default() });
     }
 
     /// Everything that happened.

@@ -15,6 +15,9 @@ use link::session::Happening;
 /// A receiver that says nothing for so long is lost, in ms. None has less than a line in five seconds.
 const SILENCE_MS: u64 = 5_000;
 
+/// So many lines that came damaged, and none that did not, are no accident.
+const DAMAGED_IN_A_ROW: u32 = 20;
+
 /// Lines of the log: what they are, and what stands there.
 pub type Lines = Vec<(Kind, String)>;
 
@@ -27,6 +30,8 @@ pub struct Recorder {
     is_first: bool,
     /// When something came for the last time; none where that it does not was told.
     heard_ms: Option<u64>,
+    /// Lines that came damaged since one that did not.
+    damaged: u32,
     tick_m: f64,
     /// The encoder's count, and ticks since the Uno began.
     wheel: Option<(i32, i64)>,
@@ -91,16 +96,24 @@ impl Recorder {
         while let Some(line) = self.lines.next_line() {
             self.heard_ms = Some(time_ms);
             let is_first = std::mem::take(&mut self.is_first);
-            let kind = match Line::parse(&line) {
+            let parsed = Line::parse(&line);
+            // The port was opened in the middle of it.
+            if parsed == Line::Damaged && is_first && !line.starts_with('$') {
+                continue;
+            }
+            self.damaged = if parsed == Line::Damaged { self.damaged.saturating_add(1) } else { 0 };
+            let kind = match parsed {
                 Line::Other => continue,
-                // The port was opened in the middle of it.
-                Line::Damaged if is_first && !line.starts_with('$') => continue,
                 Line::Damaged => Kind::GpsDamaged,
                 Line::Report(_) => Kind::Gps,
             };
             let heard = self.receiver.take(time_ms as f64, &line);
             lines.push((kind, line));
             lines.extend(marks(&heard));
+            if self.damaged == DAMAGED_IN_A_ROW {
+                let why = "nothing that comes is NMEA 0183: see that --gps-baud is the receiver's, and to its cable";
+                lines.push((Kind::GpsMark, why.to_owned()));
+            }
         }
         if self.heard_ms.is_some_and(|heard_ms| time_ms.saturating_sub(heard_ms) > SILENCE_MS) {
             lines.extend(self.lost("the receiver says nothing"));
@@ -138,6 +151,16 @@ mod tests {
             assert_eq!(kinds(&lines), [Kind::Gps, Kind::GpsDamaged, Kind::GpsDamaged, Kind::Gps], "{length}");
             assert_eq!(lines[0].1, GGA);
         }
+    }
+
+    #[test]
+    fn noise_alone_as_with_another_baud_rate_is_told_once() {
+        let (mut recorder, _) = Recorder::new(&Antenna::default());
+        recorder.found(0, "a port");
+        let lines: Lines = (0..200).flat_map(|_| recorder.take(10, &[0x80, b'x', 0xFF, b'\n'])).collect();
+        let told: Vec<_> = lines.iter().filter(|(kind, _)| *kind == Kind::GpsMark).collect();
+        assert_eq!((told.len(), lines.len()), (1, 200), "{told:?}");
+        assert!(told[0].1.contains("--gps-baud"), "{told:?}");
     }
 
     #[test]

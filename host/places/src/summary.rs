@@ -151,7 +151,7 @@ fn spacings_mm(job: &Job) -> Vec<f64> {
     for stretch in &job.stretches {
         let is_plant = |thing: &&Thing| matches!(thing.what, What::Object { class: Class::Plant | Class::Unknown, .. });
         let plants: Vec<f64> = stretch.things.iter().filter(is_plant).map(|plant| plant.way_m).collect();
-        // The tool is on the ground later by this way than the beam, and a row that is left is left there.
+        // Both are told by where the wheel was.
         let rests: Vec<_> = stretch.ground.iter().filter(|ground| ground.did == Did::Rolled).collect();
         for pair in plants.windows(2) {
             let is_between = |way_m: f64| (pair[0]..pair[1]).contains(&way_m);

@@ -257,7 +257,7 @@ proptest! {
                 let at = at % line.len().max(1);
                 match how {
                     0 => line.truncate(at),
-                    1 => line.iter_mut().nth(at).into_iter().for_each(|it| *it = byte),
+                    1 => line.get_mut(at).into_iter().for_each(|it| *it = byte),
                     2 => kind = Kind::GpsDamaged,
                     _ => return vec![(Kind::GpsLost, "unplugged".to_owned())],
                 }
