@@ -31,7 +31,7 @@ An Uno with an empty flash and a bootloader, to be flashed by avrdude:
 
 With a satellite receiver half a metre behind the beam, at a port of its own:
 
-  weeder virtual-uno --link /tmp/uno --gps-link /tmp/gps --gps-trouble
+  weeder virtual-uno --no-reset --link /tmp/uno --gps-link /tmp/gps --gps-trouble
   weeder record --port /tmp/uno --gps /tmp/gps --beam-ahead 500 --out field.csv
 
 Or with the old bootloader, as Debian's arduino-core-avr has it:

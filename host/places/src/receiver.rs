@@ -28,7 +28,7 @@ const DEVIATIONS: f64 = 8.0;
 const SWAY_M: f64 = 0.25;
 
 /// How much farther the machine may come than the wheel has rolled: one that skids.
-const SKIDDING: f64 = 1.3;
+const SKIDDING: f64 = 1.1;
 
 /// The least delay is sought among the lines of this time and the one before, in ms of the record.
 const DELAYS_MS: f64 = 60_000.0;
@@ -457,10 +457,10 @@ mod tests {
             let (heard, receiver) = rolling(FIELD, 0, 30, hurt);
             let fixes = fixes(&heard);
             let hurt: std::collections::BTreeSet<i64> = seconds.iter().copied().collect();
-            // A letter of the checksum that has become a small one is the same.
+            // A letter of the checksum that has become a small one is the same, and one line of a moment is enough.
             prop_assert!(fixes.len() >= 30 - hurt.len());
             prop_assert!(receiver.counts().damaged <= 2 * hurt.len() as u64);
-            prop_assert_eq!(fixes.len() as u64 * 2 + receiver.counts().damaged, 60);
+            prop_assert!((60..=60 + hurt.len() as u64).contains(&(fixes.len() as u64 * 2 + receiver.counts().damaged)));
             let plane = Plane::around(FIELD);
             for fix in fixes {
                 let at = plane.metres(fix.place);

@@ -29,6 +29,10 @@ const INTERVALS: f64 = 1.5;
 /// How far behind the farthest place a machine rolls back and forth, in metres: what was told is sought so far back.
 const ROLLED_BACK_M: f64 = 50.0;
 
+/// How much later than it was told something may have happened, in ms: the record has a status, a fix and what was told each with a
+/// delay of its own.
+const TOLD_EARLY_MS: f64 = 1000.0;
+
 /// The wheel stands while it rolls less, in metres.
 const STANDING_M: f64 = 0.005;
 
@@ -187,7 +191,7 @@ impl Track {
 
     /// The first of the two fixes between which the wheel rolled over this distance for the last time before something was told.
     fn passed(&self, way_m: f64, told_ms: f64) -> Result<usize, Missing> {
-        let before = self.stations.partition_point(|station| station.time_ms <= told_ms);
+        let before = self.stations.partition_point(|station| station.time_ms <= told_ms + TOLD_EARLY_MS);
         for first in (0..before).rev() {
             let from_m = self.stations[first].way_m;
             let Some(to) = self.stations.get(first + 1) else { continue };
@@ -322,7 +326,7 @@ mod tests {
         let track = Track::through(&fixes, None, 20.0).expect("there are fixes");
         assert_eq!(track.find(-0.1, 5000.0, Offset::default()), Err(Missing::NoFixBefore));
         assert_eq!(track.find(4.6, 9000.0, Offset::default()), Err(Missing::NoFixBehind));
-        assert_eq!(track.find(1.0, -5.0, Offset::default()), Err(Missing::NoFixBefore));
+        assert_eq!(track.find(1.0, -1500.0, Offset::default()), Err(Missing::NoFixBefore));
         assert!(Track::through(&[], None, 20.0).is_none());
     }
 
