@@ -6,7 +6,7 @@
 //! - **Moments.** RMC and GGA of the same time are one fix, which is told when the next moment begins, or by [`Receiver::end`].
 //!   A date counts for the days before and behind it; a time that jumps back by half a day or more is past midnight.
 //! - **When.** A line comes some time after the moment that it tells of, and more or less so by turns: others go before it on
-//!   the wire, and the computer is busy. The least delay of the last minute or two is taken for that of all, and less it
+//!   the wire, and the computer is busy. The least delay of the last ten or twenty seconds is taken for that of all, and less it
 //!   cannot be; what is left of it is the antenna's setting `delay_ms`.
 //! - **Jumps.** A fix that is farther from the last one than the wheel has rolled, and than both errors explain, is none. Where such
 //!   agree with each other for [`AGREEING_MS`], those before may have been the wrong ones: the track begins anew with the first.
@@ -31,7 +31,7 @@ const SWAY_M: f64 = 0.25;
 const SKIDDING: f64 = 1.1;
 
 /// The least delay is sought among the lines of this time and the one before, in ms of the record.
-const DELAYS_MS: f64 = 60_000.0;
+const DELAYS_MS: f64 = 10_000.0;
 
 /// By how much a delay may differ from the least: a receiver whose time jumps by more has only now found the right one.
 const LONGEST_DELAY_MS: f64 = 30_000.0;
