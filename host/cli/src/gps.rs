@@ -1,6 +1,7 @@
 //! A satellite receiver beside a record: its options, and its port, which is opened again where it went away.
 //!
-//! What its lines mean stands in [`places`]. A file takes the place of a port as well: it is read at the pace of the times in it.
+//! What its lines mean stands in [`places`]. A file takes the place of a port as well: it is read at the pace of the
+//! times in it.
 
 use crate::numbers::{number_within, whole_within};
 use anyhow::{Result, anyhow, ensure};
@@ -25,7 +26,8 @@ pub struct AntennaArguments {
     /// How far the beam stands ahead of the antenna in mm, -20000 to 20000; below 0 behind it. 0 where it is not told.
     #[arg(long, value_name = "MM", value_parser = number_within(-20_000.0..=20_000.0))]
     beam_ahead: Option<f64>,
-    /// How far it crosses the row to the right of the antenna, seen forward, in mm, -20000 to 20000; below 0 to the left. 0 where it is not told.
+    /// How far it crosses the row to the right of the antenna, seen forward, in mm, -20000 to 20000; below 0 to the
+    /// left. 0 where it is not told.
     #[arg(long, value_name = "MM", value_parser = number_within(-20_000.0..=20_000.0))]
     beam_right: Option<f64>,
     /// The same of the tool, -20000 to 20000; as far behind the beam as `beam_to_tool_mm` where it is not told.

@@ -1,11 +1,12 @@
-//! Where beam and tool stand beside the receiver's antenna, and how late its lines come: what a record says of it, and what the user.
+//! Where beam and tool stand beside the receiver's antenna, and how late its lines come: what a record says of it, and
+//! what the user.
 
 use crate::track::Offset;
 use link::Values;
 use std::fmt;
 
-/// Where beam and tool stand beside the antenna, and what else is to be known of the receiver. Millimetres are to the front and to the right; below 0
-/// they are to the back and to the left.
+/// Where beam and tool stand beside the antenna, and what else is to be known of the receiver. Millimetres are to the
+/// front and to the right; below 0 they are to the back and to the left.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Antenna {
     /// How far the beam stands ahead of the antenna.

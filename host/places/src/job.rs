@@ -1,13 +1,16 @@
 //! A record read as a job: what the machine met and did, each with its distance, its place and its time.
 //!
-//! [`Job::read`] goes through a log's lines in their order. From one start of the Uno to the next, or to where its wheel is set anew, or the log was
-//! opened again, is a stretch: the wheel's distance goes on within one alone. In each the fixes get the distance at which they
-//! were taken, by the statuses around them, and what was told gets its place by [`Track`].
+//! [`Job::read`] goes through a log's lines in their order. From one start of the Uno to the next, or to where its
+//! wheel is set anew, or the log was opened again, is a stretch: the wheel's distance goes on within one alone. In each
+//! the fixes get the distance at which they were taken, by the statuses around them, and what was told gets its place
+//! by [`Track`].
 //!
-//! - A plant or weed is the middle of what the beam saw of it, and stands where the beam was. So is ground that was guarded.
-//! - Swings and alarms are where the tool was when they were told; a swing is the command, which the tool follows by its lead.
-//! - Ground is weeded where the machine is at work and the tool is told to be in the row, not weeded where it is told to be out. Ground is
-//!   passed once: rolling back over it, and over it again, adds nothing.
+//! - A plant or weed is the middle of what the beam saw of it, and stands where the beam was. So is ground that was
+//!   guarded.
+//! - Swings and alarms are where the tool was when they were told; a swing is the command, which the tool follows by
+//!   its lead.
+//! - Ground is weeded where the machine is at work and the tool is told to be in the row, not weeded where it is told
+//!   to be out. Ground is passed once: rolling back over it, and over it again, adds nothing.
 //! - A label is what the last object was, where the machine took it.
 
 use crate::antenna::Antenna;
@@ -21,8 +24,8 @@ use std::collections::VecDeque;
 use std::f64::consts::PI;
 use std::ops::Range;
 
-/// Time at either end of a stretch for which the machine is taken to have stood, in ms: a fix in it is where the stretch begins or
-/// ends.
+/// Time at either end of a stretch for which the machine is taken to have stood, in ms: a fix in it is where the
+/// stretch begins or ends.
 const STANDING_MS: f64 = 1000.0;
 
 /// The longest way between two statuses in ticks, some hundred metres.
@@ -160,7 +163,8 @@ pub struct Job {
     pub jumps: Vec<Jump>,
     /// How often the receiver was lost, by the record.
     pub unplugged: u64,
-    /// Milliseconds from 1970 to the midnight from which [`Found::utc_ms`] counts; none where the receiver told no date.
+    /// Milliseconds from 1970 to the midnight from which [`Found::utc_ms`] counts; none where the receiver told no
+    /// date.
     pub midnight_ms: Option<i64>,
     /// Where beam and tool were taken to be.
     pub antenna: Antenna,
@@ -177,7 +181,7 @@ struct Reading {
     fixes: Vec<Fix>,
     things: Vec<Thing>,
     ground: Vec<Passed>,
-    /// Since it was opened or the settings changed, commands that wait for their answers.
+    /// Commands that wait for their answers: the line, its time, and what was typed.
     unanswered: VecDeque<(u64, u64, String)>,
     time_ms: Option<Range<u64>>,
 }
@@ -245,7 +249,14 @@ impl Job {
                     if let Some(settings) = reading.answer(&entry.text) {
                         job.heard(receiver.end(), &mut reading, entry);
                         receiver.wheel_lost();
+                        // What waits for its answer still does, and the machine is where it was.
+                        let unanswered = std::mem::take(&mut reading.unanswered);
+                        let last_status = reading.last_status.take();
                         job.close(&mut reading, wanted, Some(settings));
+                        reading.unanswered = unanswered;
+                        if let Some(status) = last_status {
+                            reading.status(status, entry.time_ms);
+                        }
                     }
                 }
                 Kind::Example | Kind::Antenna | Kind::GpsFound | Kind::GpsMark => {}

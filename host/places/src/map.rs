@@ -1,7 +1,8 @@
 //! A job as GeoJSON (RFC 7946), for QGIS and whatever else draws maps.
 //!
-//! It is one FeatureCollection: a point for each plant, weed, swing, alarm, label and jump of the receiver, and a line for each piece of ground
-//! weeded or not. What has no place stands there without a geometry, and with the reason. The crate `geojson` writes it.
+//! It is one FeatureCollection: a point for each plant, weed, swing, alarm, label and jump of the receiver, and a line
+//! for each piece of ground weeded or not. What has no place stands there without a geometry, and with the reason. The
+//! crate `geojson` writes it.
 
 use crate::job::{Did, Ground, Job, Thing, What};
 use crate::plane::Place;

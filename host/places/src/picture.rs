@@ -1,6 +1,7 @@
 //! A job as a drawing: the ground weeded and not weeded, plants, weeds and alarms from above, north at the top.
 //!
-//! Points that lie less than a pixel apart are drawn once. What has no place is not drawn; the legend says how much that is.
+//! Points that lie less than a pixel apart are drawn once. What has no place is not drawn; the legend says how much
+//! that is.
 
 use crate::job::{Did, Job, What};
 use crate::plane::{Metres, Place, Plane};

@@ -1,8 +1,8 @@
 //! Places on the earth, and a flat field around one of them.
 //!
-//! A [`Plane`] gives each place by its metres to the east and to the north of an origin: the length and the azimuth of the geodesic
-//! from there, on the ellipsoid of WGS84. Within 10 km of the origin distances are true to a part in a million, over a pole
-//! and over the 180th meridian too. The geodesics are geographiclib's.
+//! A [`Plane`] gives each place by its metres to the east and to the north of an origin: the length and the azimuth of
+//! the geodesic from there, on the ellipsoid of WGS84. Within 10 km of the origin distances are true to a part in a
+//! million, over a pole and over the 180th meridian too. The geodesics are geographiclib's.
 
 use geographiclib_rs::{DirectGeodesic, Geodesic, InverseGeodesic};
 

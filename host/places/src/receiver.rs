@@ -1,15 +1,18 @@
 //! A receiver, heard line by line: its fixes by the record's clock, and what is wrong with them.
 //!
-//! [`Receiver::take`] is given each line with the time at which it came, and [`Receiver::rolled`] how far the wheel has rolled. Both
-//! while a record is written, which has the marks, and when it is read: the same lines give the same fixes and marks.
+//! [`Receiver::take`] is given each line with the time at which it came, and [`Receiver::rolled`] how far the wheel has
+//! rolled. Both while a record is written, which has the marks, and when it is read: the same lines give the same fixes
+//! and marks.
 //!
-//! - **Moments.** RMC and GGA of the same time are one fix, which is told when the next moment begins, or by [`Receiver::end`].
-//!   A date counts for the days before and behind it; a time that jumps back by half a day or more is past midnight.
-//! - **When.** A line comes some time after the moment that it tells of, and more or less so by turns: others go before it on
-//!   the wire, and the computer is busy. The least delay of the last ten or twenty seconds is taken for that of all, and less it
-//!   cannot be; what is left of it is the antenna's setting `delay_ms`.
-//! - **Jumps.** A fix that is farther from the last one than the wheel has rolled, and than both errors explain, is none. Where such
-//!   agree with each other for [`AGREEING_MS`], those before may have been the wrong ones: the track begins anew with the first.
+//! - **Moments.** RMC and GGA of the same time are one fix, which is told when the next moment begins, or by
+//!   [`Receiver::end`]. A date counts for the days before and behind it; a time that jumps back by half a day or more
+//!   is past midnight.
+//! - **When.** A line comes some time after the moment that it tells of, and more or less so by turns: others go before
+//!   it on the wire, and the computer is busy. The least delay of the last ten or twenty seconds is taken for that of
+//!   all, and less it cannot be; what is left of it is the antenna's setting `delay_ms`.
+//! - **Jumps.** A fix that is farther from the last one than the wheel has rolled, and than both errors explain, is
+//!   none. Where such agree with each other for [`AGREEING_MS`], those before may have been the wrong ones: the track
+//!   begins anew with the first.
 
 use crate::plane::Place;
 use crate::sentence::{DAY_MS, Line, Quality, Report};
@@ -148,7 +151,8 @@ pub struct Receiver {
     days: i64,
     /// Days from 1970 to the first line's.
     first_day: Option<i64>,
-    /// The least of what the record's clock is ahead of UTC, in this stretch of time and the one before, and when this one began.
+    /// The least of what the record's clock is ahead of UTC, in this stretch of time and the one before, and when this
+    /// one began.
     ahead_ms: [Option<f64>; 2],
     delays_since_ms: f64,
     has_fix: Option<bool>,
@@ -160,8 +164,8 @@ pub struct Receiver {
 }
 
 impl Receiver {
-    /// One that has said nothing. The error is the standard deviation of a fix to the east and to the north, in metres; where none is
-    /// known, that which is usual for the quality that it tells.
+    /// One that has said nothing. The error is the standard deviation of a fix to the east and to the north, in metres;
+    /// where none is known, that which is usual for the quality that it tells.
     pub fn new(error_m: Option<f64>) -> Self {
         Self { error_m, ..Self::default() }
     }
@@ -171,8 +175,8 @@ impl Receiver {
         self.counts
     }
 
-    /// Milliseconds from the first of January 1970 to the midnight from which the fixes' [`Fix::utc_ms`] counts; none where no line
-    /// had a date.
+    /// Milliseconds from the first of January 1970 to the midnight from which the fixes' [`Fix::utc_ms`] counts; none
+    /// where no line had a date.
     pub fn midnight_ms(&self) -> Option<i64> {
         Some(self.first_day? * DAY_MS)
     }
@@ -298,7 +302,8 @@ impl Receiver {
     /// Holds a fix against the last one, and against the wheel.
     fn judge(&mut self, fix: Fix, wheel: Option<Wheel>, heard: &mut Heard) {
         let rolled_m = wheel.map_or(0.0, |wheel| {
-            // It is heard of ten times a second; a line that came far too late tells of a place that is not known any more here.
+            // It is heard of ten times a second; a line that came far too late tells of a place that is not known any
+            // more here.
             let since_s = ((fix.time_ms - wheel.time_ms) / 1000.0).clamp(-1.0, 1.0);
             wheel.rolled_m + wheel.speed_mm_s / 1000.0 * since_s
         });
@@ -308,7 +313,8 @@ impl Receiver {
             self.accept(here, heard);
             return;
         };
-        // As the wheel rolls on, the machine could have come to where the fixes have jumped: but they agree with each other.
+        // As the wheel rolls on, the machine could have come to where the fixes have jumped: but they agree with each
+        // other.
         let agrees = self.jumped.last().is_some_and(|jumped| self.follows(jumped, &here));
         if !agrees && self.follows(&last, &here) {
             self.jumped.clear();
@@ -386,7 +392,8 @@ mod tests {
         sentence(&format!("GPRMC,{},A,{},1.0,90.0,{date},,,A", clock(utc_ms), coordinates(place)))
     }
 
-    /// A receiver that rolls half a metre a second to the east of a place, told of once a second from a time of the day on.
+    /// A receiver that rolls half a metre a second to the east of a place, told of once a second from a time of the day
+    /// on.
     fn rolling(
         from: Place,
         start_ms: i64,

@@ -1,8 +1,9 @@
 //! What a record has of a receiver, while it is written: its lines, and what is noticed of them.
 //!
-//! [`Recorder::take`] makes lines of the log out of bytes as they come. Sentences that tell of place or time stand there as they came, and so does
-//! every line that came damaged; other sentences are left out. Marks are those that a reader of the record finds anew. It knows
-//! no port: who has one tells by [`Recorder::found`] and [`Recorder::lost`] when it comes and goes.
+//! [`Recorder::take`] makes lines of the log out of bytes as they come. Sentences that tell of place or time stand
+//! there as they came, and so does every line that came damaged; other sentences are left out. Marks are those that a
+//! reader of the record finds anew. It knows no port: who has one tells by [`Recorder::found`] and [`Recorder::lost`]
+//! when it comes and goes.
 
 use crate::antenna::Antenna;
 use crate::job::{LONGEST_WAY, tick_mm};

@@ -1,8 +1,8 @@
 //! A line of a receiver: NMEA 0183, by the crate `nmea`.
 //!
-//! Place, date and quality come from the sentences RMC and GGA, of whichever satellites. Others are passed over. A line counts as
-//! damaged where it has not the form of a sentence, or its checksum is missing or another: what such a line says is not
-//! asked. A sentence with the right checksum whose fields make no sense says that there is no fix.
+//! Place, date and quality come from the sentences RMC and GGA, of whichever satellites. Others are passed over. A line
+//! counts as damaged where it has not the form of a sentence, or its checksum is missing or another: what such a line
+//! says is not asked. A sentence with the right checksum whose fields make no sense says that there is no fix.
 
 use crate::plane::Place;
 use chrono::{Datelike, Timelike};
@@ -37,7 +37,8 @@ impl Quality {
         }
     }
 
-    /// The standard deviation of a fix to the east and to the north, in metres, that such receivers have under an open sky.
+    /// The standard deviation of a fix to the east and to the north, in metres, that such receivers have under an open
+    /// sky.
     pub fn usual_error_m(self) -> f64 {
         match self {
             Self::Satellites => 1.5,
@@ -138,7 +139,8 @@ fn quality(fix: FixType) -> Option<Quality> {
     }
 }
 
-/// Whether a line is `$`, a text and behind `*` the exclusive or of its bytes. `nmea` says so only of sentences that it knows.
+/// Whether a line is `$`, a text and behind `*` the exclusive or of its bytes. `nmea` says so only of sentences that it
+/// knows.
 fn has_right_checksum(line: &str) -> bool {
     let parts = line.strip_prefix('$').and_then(|line| line.split_once('*'));
     let Some((text, checksum)) = parts.filter(|(_, checksum)| checksum.len() == 2) else { return false };

@@ -1,8 +1,8 @@
 //! A job in numbers: the stand, the ground, the time, and how many places there are.
 //!
-//! Spacings are those between plants that follow each other on ground over which the machine was at work all the time, so that a
-//! headland is no gap in the stand: the work switch tells where the row ends. Where a spacing is longer than one and a half of the
-//! usual one, plants are missing in it. What was unknown was kept, and counts as a plant.
+//! Spacings are those between plants that follow each other on ground over which the machine was at work all the time,
+//! so that a headland is no gap in the stand: the work switch tells where the row ends. Where a spacing is longer than
+//! one and a half of the usual one, plants are missing in it. What was unknown was kept, and counts as a plant.
 
 use crate::job::{Did, Job, Thing, What, is_interpolated};
 use link::Class;

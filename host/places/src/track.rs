@@ -1,15 +1,17 @@
 //! The antenna's track along the wheel's distance, and the places of what happened on it.
 //!
-//! A thing happened where the wheel had rolled some distance, and stands some way ahead of the antenna and to the right of it.
+//! A thing happened where the wheel had rolled some distance, and stands some way ahead of the antenna and to the right
+//! of it.
 //!
-//! - **The antenna's place** there lies between two fixes, at the wheel's share of the way. The machine may have rolled over the
-//!   same distance several times: the last time counts before the thing was told. What is fixed several times while the wheel
-//!   stands is fixed at the mean.
-//! - **The heading** is that of the straight line that fits so many fixes around there, by least squares over the wheel's distance, that
-//!   its error is [`HEADING_ERROR`]; [`LONGEST_CHORD_M`] are fitted at the most. It is the machine's, not its motion's: a machine that rolls
-//!   back keeps it.
-//! - **Outages.** Two fixes follow each other where no more than one and a half of the receiver's intervals lie between. Else
-//!   the machine is taken to have gone straight between them, by the wheel's distance, if that is not longer than is allowed.
+//! - **The antenna's place** there lies between two fixes, at the wheel's share of the way. The machine may have rolled
+//!   over the same distance several times: the last time counts before the thing was told. What is fixed several times
+//!   while the wheel stands is fixed at the mean.
+//! - **The heading** is that of the straight line that fits so many fixes around there, by least squares over the
+//!   wheel's distance, that its error is [`HEADING_ERROR`]; [`LONGEST_CHORD_M`] are fitted at the most. It is the
+//!   machine's, not its motion's: a machine that rolls back keeps it.
+//! - **Outages.** Two fixes follow each other where no more than one and a half of the receiver's intervals lie
+//!   between. Else the machine is taken to have gone straight between them, by the wheel's distance, if that is not
+//!   longer than is allowed.
 
 use crate::plane::{Metres, Place, Plane};
 use crate::receiver::Fix;
@@ -29,8 +31,8 @@ const INTERVALS: f64 = 1.5;
 /// How far behind the farthest place a machine rolls back and forth, in metres: what was told is sought so far back.
 const ROLLED_BACK_M: f64 = 50.0;
 
-/// How much later than it was told something may have happened, in ms: the record has a status, a fix and what was told each with a
-/// delay of its own.
+/// How much later than it was told something may have happened, in ms: the record has a status, a fix and what was told
+/// each with a delay of its own.
 const TOLD_EARLY_MS: f64 = 1000.0;
 
 /// The wheel stands while it rolls less, in metres.
@@ -120,8 +122,8 @@ pub struct Track {
 }
 
 impl Track {
-    /// The track through these fixes, in order of time, each with how far the wheel had rolled, in metres; none where there is no fix.
-    /// The error is the standard deviation of a fix, where that is known.
+    /// The track through these fixes, in order of time, each with how far the wheel had rolled, in metres; none where
+    /// there is no fix. The error is the standard deviation of a fix, where that is known.
     pub fn through(fixes: &[(f64, Fix)], error_m: Option<f64>, longest_outage_m: f64) -> Option<Self> {
         let plane = Plane::around(fixes.first()?.1.place);
         let mut stations: Vec<Station> = Vec::with_capacity(fixes.len());
@@ -158,8 +160,8 @@ impl Track {
         Some(Self { plane, stations, interval_ms, longest_outage_m })
     }
 
-    /// The place of something that stands so beside the antenna, where the wheel had rolled so far, and that was told at that time of
-    /// the record's clock.
+    /// The place of something that stands so beside the antenna, where the wheel had rolled so far, and that was told
+    /// at that time of the record's clock.
     ///
     /// # Errors
     /// Why it has none.
@@ -189,7 +191,8 @@ impl Track {
         Ok(Found { place: self.plane.place(at), basis, error_m, utc_ms: utc_ms.round() as i64 })
     }
 
-    /// The first of the two fixes between which the wheel rolled over this distance for the last time before something was told.
+    /// The first of the two fixes between which the wheel rolled over this distance for the last time before something
+    /// was told.
     fn passed(&self, way_m: f64, told_ms: f64) -> Result<usize, Missing> {
         let before = self.stations.partition_point(|station| station.time_ms <= told_ms + TOLD_EARLY_MS);
         for first in (0..before).rev() {
@@ -235,7 +238,8 @@ impl Track {
     }
 }
 
-/// The direction of the straight line that fits these fixes over the wheel's distance, and its standard deviation in radians.
+/// The direction of the straight line that fits these fixes over the wheel's distance, and its standard deviation in
+/// radians.
 fn fitted(stations: &[Station]) -> (Metres, f64) {
     let count = stations.len() as f64;
     let (mut mean_m, mut middle, mut error_m) = (0.0, Metres::default(), 0.0_f64);

@@ -198,8 +198,16 @@ fn a_log_that_was_opened_again_and_an_uno_that_was_reset_begin_the_way_anew() {
 #[test]
 fn a_wheel_that_is_set_anew_begins_a_stretch_of_its_own() {
     let mut log = whole();
-    insert(&mut log, vec![(Kind::Command, "set ticks_per_m 1000"), (Kind::Answer, "ok")]);
+    let set = vec![
+        (Kind::Command, "set ticks_per_m 1000"),
+        (Kind::Command, "label plant"),
+        (Kind::Answer, "ok"),
+        (Kind::Event, "swing tool=out pos=30100"),
+        (Kind::Answer, "error: there is no object to label"),
+    ];
+    insert(&mut log, set);
     let job = Job::read(&log, &Wanted::default());
+    assert_eq!(job.things().count(), PLANTS + SWINGS + 1, "nothing told is left out");
     let [one, other] = job.stretches.as_slice() else { panic!("{}", job.stretches.len()) };
     let spacing_m = |things: &[Thing]| {
         let plants: Vec<f64> = things.iter().filter(is_object).map(|plant| plant.way_m).collect();

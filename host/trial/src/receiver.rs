@@ -1,10 +1,12 @@
 //! A simulated satellite receiver on the machine: what its antenna is told by satellites, as lines of NMEA 0183.
 //!
-//! The machine goes straight on from a place on the earth in one direction. So often a second, RMC and GGA tell where the antenna is,
-//! with noise to the east and to the north that is normal and independent from fix to fix; they come some time after the moment that they tell of.
-//! [`Trouble`] has the fix lost, has it jump, and has bytes of lines changed.
+//! The machine goes straight on from a place on the earth in one direction. So often a second, RMC and GGA tell where
+//! the antenna is, with noise to the east and to the north that is normal and independent from fix to fix; they come
+//! some time after the moment that they tell of. [`Trouble`] has the fix lost, has it jump, and has bytes of lines
+//! changed.
 //!
-//! A real one's error wanders for minutes instead of changing from fix to fix. That a machine sways and turns is left out too.
+//! A real one's error wanders for minutes instead of changing from fix to fix. That a machine sways and turns is left
+//! out too.
 
 use places::plane::{Metres, Place, Plane};
 use places::sentence::DAY_MS;
@@ -94,7 +96,8 @@ impl SimulatedReceiver {
         Self { setup, plane, noise, told: 0 }
     }
 
-    /// Where something stands that the beam reaches when the machine has rolled so far, and that is so far beside the beam.
+    /// Where something stands that the beam reaches when the machine has rolled so far, and that is so far beside the
+    /// beam.
     pub fn place(&self, way_m: f64, beside: Offset) -> Place {
         self.plane.place(self.metres(way_m, beside))
     }
@@ -105,7 +108,8 @@ impl SimulatedReceiver {
         forward.times(way_m + beside.ahead_m).plus(forward.turned_right().times(beside.right_m))
     }
 
-    /// What has come by this time, in seconds since the Uno was powered up. `way_m` says how far the machine had rolled at a time.
+    /// What has come by this time, in seconds since the Uno was powered up. `way_m` says how far the machine had rolled
+    /// at a time.
     pub fn bytes_until(&mut self, time_s: f64, way_m: impl Fn(f64) -> f64) -> Vec<u8> {
         let mut bytes = Vec::new();
         loop {

@@ -1,5 +1,5 @@
-//! The real firmware weeds a row, a simulated receiver says where, and the record gives the places back: all of it by the virtual
-//! Uno's clock.
+//! The real firmware weeds a row, a simulated receiver says where, and the record gives the places back: all of it by
+//! the virtual Uno's clock.
 
 use field::machine::Machine;
 use field::motion::Motion;
@@ -64,7 +64,8 @@ impl Write for Clocked {
     }
 }
 
-/// The record of a machine with a receiver that weeds the row; at a second it is unplugged, for some seconds, where that is told.
+/// The record of a machine with a receiver that weeds the row; at a second it is unplugged, for some seconds, where
+/// that is told.
 fn recorded(
     row: &Row,
     motion: &Motion,
@@ -135,7 +136,8 @@ fn motion() -> Motion {
     Motion::steady(0.0, 500.0, 700.0, end_mm).change_speed(0.0, 500.0)
 }
 
-/// How far off the places of the row's plants and weeds are, in metres, with how each was found. Each thing of the row is in the record.
+/// How far off the places of the row's plants and weeds are, in metres, with how each was found. Each thing of the row
+/// is in the record.
 fn errors_m(job: &Job, row: &Row, setup: &ReceiverSetup) -> Vec<(f64, Basis)> {
     let truth = SimulatedReceiver::new(setup.clone());
     let objects: Vec<_> = job.things().filter(|thing| matches!(thing.what, What::Object { .. })).collect();
@@ -151,8 +153,8 @@ fn errors_m(job: &Job, row: &Row, setup: &ReceiverSetup) -> Vec<(f64, Basis)> {
     row.things().iter().zip(&objects).filter_map(error).collect()
 }
 
-/// The machine and its record add this to the receiver's error at the most, in metres: a status has been on its way for some 10 ms
-/// when it is written down, which is 7 mm of the way, and the beam has a canopy's edges by the tick.
+/// The machine and its record add this to the receiver's error at the most, in metres: a status has been on its way for
+/// some 10 ms when it is written down, which is 7 mm of the way, and the beam has a canopy's edges by the tick.
 const MACHINE_M: f64 = 0.015;
 
 #[test]
@@ -170,8 +172,9 @@ fn places_come_back_within_the_receivers_error_through_outages_jumps_and_damaged
     assert_eq!(errors.len(), row.things().len(), "all have places");
     let interpolated = errors.iter().filter(|(_, basis)| *basis == Basis::Interpolated).count();
     assert!((10..40).contains(&interpolated), "{interpolated}");
-    // The length of an error that is normal to the east and to the north is beyond four standard deviations once in 3000 times. A fix's is
-    // one part, and the heading's at 0.65 m from the antenna the other; between two fixes it is less.
+    // The length of an error that is normal to the east and to the north is beyond four standard deviations once in
+    // 3000 times. A fix's is one part, and the heading's at 0.65 m from the antenna the other; between two fixes it is
+    // less.
     let sigma_m = (setup.error_mm / 1000.0).hypot(0.02 * 0.65);
     let farthest = errors.iter().map(|(error, _)| *error).fold(0.0, f64::max);
     assert!(farthest < 4.0 * sigma_m + MACHINE_M, "{farthest} {errors:?}");
