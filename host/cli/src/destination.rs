@@ -13,7 +13,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 /// How files end that commands write: a folder is hardly meant to.
-const FILE_ENDINGS: [&str; 8] = ["csv", "hex", "html", "json", "rs", "svg", "toml", "vcd"];
+const FILE_ENDINGS: [&str; 9] = ["csv", "geojson", "hex", "html", "json", "rs", "svg", "toml", "vcd"];
 
 /// A file's name, as it was typed.
 #[derive(Clone, Debug)]

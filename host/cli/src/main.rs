@@ -18,7 +18,9 @@ mod evaluate;
 mod examples;
 mod figures;
 mod flash;
+mod gps;
 mod hex;
+mod map;
 mod merge;
 mod monitor;
 mod numbers;
@@ -93,6 +95,8 @@ enum Command {
     Record(record::Arguments),
     /// Decide anew on the host what a log's machine met, and say where that differs.
     Replay(replay::Arguments),
+    /// Make a map of a record with a satellite receiver, and count the stand.
+    Map(Box<map::Arguments>),
     /// Keep what the machine was taught in a table, teach it from one, or compare both.
     Examples(examples::Arguments),
     /// Keep the machine's settings in a file, set them from it, or compare both.
@@ -166,6 +170,7 @@ fn main() -> ExitCode {
         Command::Serve(arguments) => serve::run(&arguments).map(|()| Finding::Good),
         Command::Record(arguments) => record::run(&arguments).map(|()| Finding::Good),
         Command::Replay(arguments) => replay::run(&arguments),
+        Command::Map(arguments) => map::run(&arguments).map(|()| Finding::Good),
         Command::Examples(arguments) => examples::run(&arguments),
         Command::Settings(arguments) => settings::run(&arguments),
         Command::Design(arguments) => design::run(&arguments).map(|()| Finding::Good),

@@ -1,6 +1,7 @@
 //! `weeder virtual-uno`: an Uno without an Uno, at a pseudo terminal that any serial program opens.
 
 use crate::course::CourseArguments;
+use crate::numbers::number_within;
 use crate::output::{say, tell};
 use anyhow::{Context, Result};
 use clap::Args;
@@ -8,8 +9,10 @@ use field::motion::mm_s;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{SystemTime, UNIX_EPOCH};
 use trial::firmware;
 use trial::live::{Course, LiveUno, Setup};
+use trial::receiver::{ReceiverSetup, Trouble};
 use uno::hex::{Bootloader, HexError};
 
 /// What the user asks of the virtual Uno.
@@ -25,6 +28,11 @@ An Uno with an empty flash and a bootloader, to be flashed by avrdude:
 
   weeder virtual-uno --link /tmp/uno --bootloader optiboot
   weeder flash --port /tmp/uno
+
+With a satellite receiver half a metre behind the beam, at a port of its own:
+
+  weeder virtual-uno --no-reset --link /tmp/uno --gps-link /tmp/gps --gps-trouble
+  weeder record --port /tmp/uno --gps /tmp/gps --beam-ahead 500 --out field.csv
 
 Or with the old bootloader, as Debian's arduino-core-avr has it:
 
@@ -51,6 +59,18 @@ pub struct Arguments {
     /// Make a symbolic link to the port here, and remove it at the end.
     #[arg(long, value_name = "PATH")]
     link: Option<PathBuf>,
+    /// Put a satellite receiver on the machine, which speaks NMEA 0183 at a pseudo terminal of its own, with a symbolic link here.
+    #[arg(long, value_name = "PATH", conflicts_with = "bootloader")]
+    gps_link: Option<PathBuf>,
+    /// Its fixes a second, 1 to 10.
+    #[arg(long, value_name = "HZ", default_value = "5", value_parser = number_within(1.0..=10.0), requires = "gps_link")]
+    gps_rate: f64,
+    /// The standard deviation of its fixes in mm, 0 to 10000.
+    #[arg(long, value_name = "MM", default_value = "15", value_parser = number_within(0.0..=10_000.0), requires = "gps_link")]
+    gps_error: f64,
+    /// Have it lose its fix, jump and send damaged lines each minute.
+    #[arg(long, requires = "gps_link")]
+    gps_trouble: bool,
     /// Leave the chip alone when a program opens the port, as an Uno whose RESET-EN trace is cut.
     #[arg(long)]
     no_reset: bool,
@@ -80,6 +100,12 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         (None, Some(_)) => None,
         (None, None) => Some(firmware::build()?),
     };
+    let receiver = arguments.gps_link.clone().map(|link| {
+        let trouble = arguments.gps_trouble.then(Trouble::default);
+        let began_ms = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_millis() as i64);
+        let (rate_hz, error_mm) = (arguments.gps_rate, arguments.gps_error);
+        (ReceiverSetup { rate_hz, error_mm, began_ms, trouble, ..ReceiverSetup::default() }, Some(link))
+    });
     let stop = Arc::new(AtomicBool::new(false));
     let asked_to_stop = Arc::clone(&stop);
     ctrlc::set_handler(move || asked_to_stop.store(true, Ordering::Relaxed)).context("Ctrl-C cannot be caught")?;
@@ -89,6 +115,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         bootloader,
         eeprom: arguments.eeprom.clone(),
         link: arguments.link.clone(),
+        receiver,
         course: (!arguments.stand).then_some(course),
         fast: arguments.fast,
         keeps_running_when_opened: arguments.no_reset,

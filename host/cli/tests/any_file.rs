@@ -9,6 +9,7 @@ use field::verdict::Timing;
 use field::wiring;
 use files::csv_table;
 use link::{log, replay, settings_file};
+use places::{Job, Wanted, map, picture};
 use proptest::prelude::*;
 use std::error::Error;
 use std::fs;
@@ -49,20 +50,27 @@ const READERS: [Reader; 10] = [
         "log.csv",
         |path| {
             let log = log::read(path)?;
+            let job = Job::read(&log, &Wanted::default());
+            assert!(map::features(&[("log", &job)]).features.len() >= job.things().count());
+            picture::draw(&[&job]);
             replay::replay(&log)?;
             Ok(())
         },
         || {
             let lines = [
                 "time_ms,kind,line",
+                "0,antenna,beam_ahead_mm=500 beam_right_mm=0 delay_ms=0",
+                "0,gps_found,/dev/ttyUSB0",
                 "0,connected,0.1.0",
                 "0,setting,k=3",
                 "0,setting,margin_mm=50",
                 "0,example,built_in 0 plant 1 2 3 4 5",
                 "5,status,state=hold tool=out pos=100 speed_mm_s=500 windows=0 unseen_mm=300",
+                "6,gps,\"$GPGGA,092750.000,5321.6802,N,00630.3372,W,1,8,1.03,61.7,M,55.2,M,,*76\"",
                 "20,command,start now",
                 "22,event,state is=work",
                 "90,event,plant pos=944 votes=3 spacing=944 delay=668 hold=477 actuation=1145",
+                "110,gps,\"$GPGGA,092750.100,5321.6802,N,00630.3371,W,1,8,1.03,61.7,M,55.2,M,,*74\"",
                 "120,status,state=work tool=in pos=1500 speed_mm_s=500 windows=1 unseen_mm=0",
                 "150,event,swing tool=out pos=1510",
                 "160,event,alarm name=beam_blocked code=11 pos=1600",

@@ -4,8 +4,74 @@ use std::fs;
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
+use std::thread;
+use std::time::Duration;
 use trial::firmware;
 use trial::live::{Background, LiveUno, Setup};
+use uno::pty::Pty;
+
+/// How many lines of a kind a log has by now.
+fn lines_of(log: &Path, kind: &str) -> usize {
+    let text = fs::read_to_string(log).unwrap_or_default();
+    text.lines().filter(|line| line.split(',').nth(1) == Some(kind)).count()
+}
+
+/// Says a line to whoever listens to this receiver until the log has so many lines of a kind.
+#[track_caller]
+fn say_until(receiver: Option<&mut Pty>, log: &Path, kind: &str, count: usize) {
+    const GGA: &[u8] = b"$GPGGA,092750.000,5321.6802,N,00630.3372,W,1,8,1.03,61.7,M,55.2,M,,*76\r\n";
+    let mut receiver = receiver;
+    for _ in 0..2000 {
+        if lines_of(log, kind) >= count {
+            return;
+        }
+        if let Some(receiver) = &mut receiver {
+            receiver.write(GGA).expect("the terminal works");
+        }
+        thread::sleep(Duration::from_millis(50));
+    }
+    panic!("there is no {kind} in the log: {}", fs::read_to_string(log).unwrap_or_default());
+}
+
+#[test]
+fn a_receiver_that_is_unplugged_and_plugged_in_again_goes_on_in_the_record() {
+    let uno = uno();
+    let folder = tempfile::tempdir().expect("there is room for files");
+    let [port, log, map] = ["gps", "field.csv", "field.geojson"].map(|name| folder.path().join(name));
+    let plug_in = || {
+        let mut receiver = Pty::open().expect("there is a pseudo terminal");
+        receiver.link(&port).expect("there is room for a link");
+        receiver
+    };
+    let mut receiver = plug_in();
+    let mut record = Command::new(env!("CARGO_BIN_EXE_weeder"))
+        .args(["record", "--beam-ahead", "500", "--out"])
+        .args([&log, Path::new("--gps"), &port, Path::new("--port"), uno.path()])
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("cargo has built the command");
+    say_until(Some(&mut receiver), &log, "gps", 3);
+    drop(receiver);
+    say_until(None, &log, "gps_lost", 1);
+    let statuses = lines_of(&log, "status");
+    say_until(None, &log, "status", statuses + 3);
+    let mut receiver = plug_in();
+    say_until(Some(&mut receiver), &log, "gps_found", 2);
+    let sentences = lines_of(&log, "gps");
+    say_until(Some(&mut receiver), &log, "gps", sentences + 3);
+    let stop = Command::new("kill").args(["-INT", &record.id().to_string()]).status();
+    assert!(stop.expect("there is kill").success() && record.wait().expect("it ends").success());
+
+    let mapped =
+        Command::new(env!("CARGO_BIN_EXE_weeder")).arg("map").arg(&log).arg("-o").arg(&map).arg("--json").output();
+    let counted: serde_json::Value = serde_json::from_str(&printed(&mapped.expect("it ends"), 0)).expect("it is JSON");
+    let count = |name: &str| counted[0]["count"][name].as_u64().expect("a number");
+    assert_eq!((counted[0]["record"].as_str(), count("receiver_losses"), count("plants")), (Some("field.csv"), 1, 0));
+    assert!(count("fixes") >= 1, "{counted}");
+    let map: serde_json::Value =
+        serde_json::from_str(&fs::read_to_string(&map).expect("it was written")).expect("JSON");
+    assert_eq!((map["type"].as_str(), map["features"].as_array().map(Vec::len)), (Some("FeatureCollection"), Some(0)));
+}
 
 /// A virtual Uno at rest that runs as fast as it can.
 fn uno() -> Background {
@@ -14,6 +80,7 @@ fn uno() -> Background {
         bootloader: None,
         eeprom: None,
         link: None,
+        receiver: None,
         course: None,
         fast: true,
         keeps_running_when_opened: false,

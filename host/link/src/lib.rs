@@ -29,7 +29,7 @@ pub mod settings_file;
 pub use self::event_line::{EventLine, Mode, Status, Timed, Values};
 pub use self::lines::LineReader;
 #[cfg(not(target_arch = "wasm32"))]
-pub use self::port::{find_uno, try_port};
+pub use self::port::{find_uno, listen, try_port};
 pub use self::said::{Said, Shown};
 pub use control::ground::class::Class;
 

@@ -1,7 +1,8 @@
 //! The log of a session: what happened, a line each, as a CSV file that can be read anywhere and replayed.
 //!
 //! The columns are `time_ms` since the log was opened, `kind` and `line`. A line stands as the firmware wrote it. What the
-//! machine was when it connected, its settings and its examples, stands there too, so that a log can be replayed by itself.
+//! machine was when it connected, its settings and its examples, stands there too, so that a log can be replayed by itself; and what a
+//! satellite receiver has said, whose lines' kinds begin with `gps`.
 //! Each line is written out before the next is waited for: what is in the file when power goes stays whole but for its
 //! last line.
 
@@ -33,10 +34,22 @@ pub enum Kind {
     Command,
     /// What it answered.
     Answer,
+    /// Where beam and tool stand beside a satellite receiver's antenna.
+    Antenna,
+    /// The receiver's port is there; which.
+    GpsFound,
+    /// The receiver's port is gone, or silent; why.
+    GpsLost,
+    /// A sentence of the receiver.
+    Gps,
+    /// A line of the receiver that came damaged.
+    GpsDamaged,
+    /// What was noticed of the receiver's fixes.
+    GpsMark,
 }
 
 impl Kind {
-    const ALL: [Self; 8] = [
+    const ALL: [Self; 14] = [
         Self::Connected,
         Self::Lost,
         Self::Setting,
@@ -45,6 +58,12 @@ impl Kind {
         Self::Event,
         Self::Command,
         Self::Answer,
+        Self::Antenna,
+        Self::GpsFound,
+        Self::GpsLost,
+        Self::Gps,
+        Self::GpsDamaged,
+        Self::GpsMark,
     ];
 
     /// As it stands in the file.
@@ -58,7 +77,18 @@ impl Kind {
             Self::Event => "event",
             Self::Command => "command",
             Self::Answer => "answer",
+            Self::Antenna => "antenna",
+            Self::GpsFound => "gps_found",
+            Self::GpsLost => "gps_lost",
+            Self::Gps => "gps",
+            Self::GpsDamaged => "gps_damaged",
+            Self::GpsMark => "gps_mark",
         }
+    }
+
+    /// Whether such a line tells the operator of a receiver that it comes, goes or is wrong.
+    pub fn is_for_the_operator(self) -> bool {
+        matches!(self, Self::GpsFound | Self::GpsLost | Self::GpsMark)
     }
 
     fn find(word: &str) -> Option<Self> {
@@ -122,27 +152,49 @@ impl LogWriter {
         Ok(log)
     }
 
+    /// The time that a line gets which is written now, in milliseconds.
+    pub fn now_ms(&self) -> u64 {
+        u64::try_from(self.began.elapsed().as_millis()).unwrap_or(u64::MAX)
+    }
+
     /// Writes down what happened.
     ///
     /// # Errors
     /// Where the file cannot be written.
     pub fn write(&mut self, happening: &Happening) -> Result<(), LogError> {
+        self.write_at(self.now_ms(), happening)
+    }
+
+    /// Writes down what happened at a time that another clock tells.
+    ///
+    /// # Errors
+    /// Where the file cannot be written.
+    pub fn write_at(&mut self, time_ms: u64, happening: &Happening) -> Result<(), LogError> {
         match happening {
             Happening::Connected { version, settings, examples } => {
-                self.line(Kind::Connected, version)?;
+                self.line(time_ms, Kind::Connected, version)?;
                 for setting in Setting::all() {
-                    self.line(Kind::Setting, &format!("{}={}", name(setting), settings.get(setting)))?;
+                    let line = format!("{}={}", name(setting), settings.get(setting));
+                    self.line(time_ms, Kind::Setting, &line)?;
                 }
-                examples.iter().try_for_each(|example| self.line(Kind::Example, example))
+                examples.iter().try_for_each(|example| self.line(time_ms, Kind::Example, example))
             }
-            Happening::Lost(why) => self.line(Kind::Lost, why),
-            Happening::Status(_, line) => self.line(Kind::Status, line),
-            Happening::Event(_, line) => self.line(Kind::Event, line),
-            Happening::Command(line) => self.line(Kind::Command, line),
-            Happening::Answer(line) => self.line(Kind::Answer, line),
+            Happening::Lost(why) => self.line(time_ms, Kind::Lost, why),
+            Happening::Status(_, line) => self.line(time_ms, Kind::Status, line),
+            Happening::Event(_, line) => self.line(time_ms, Kind::Event, line),
+            Happening::Command(line) => self.line(time_ms, Kind::Command, line),
+            Happening::Answer(line) => self.line(time_ms, Kind::Answer, line),
             // They follow from the commands.
             Happening::Settings(_) => Ok(()),
         }
+    }
+
+    /// Writes lines of some kinds at a time, of what is no [`Happening`].
+    ///
+    /// # Errors
+    /// Where the file cannot be written.
+    pub fn lines_at(&mut self, time_ms: u64, lines: &[(Kind, String)]) -> Result<(), LogError> {
+        lines.iter().try_for_each(|(kind, line)| self.line(time_ms, *kind, line))
     }
 
     /// Lines in the file, the header left out.
@@ -155,10 +207,9 @@ impl LogWriter {
         self.added
     }
 
-    fn line(&mut self, kind: Kind, line: &str) -> Result<(), LogError> {
-        let time_ms = self.began.elapsed().as_millis().to_string();
+    fn line(&mut self, time_ms: u64, kind: Kind, line: &str) -> Result<(), LogError> {
         self.added += 1;
-        self.record([time_ms.as_str(), kind.name(), line])
+        self.record([time_ms.to_string().as_str(), kind.name(), line])
     }
 
     fn record<'a>(&mut self, fields: impl IntoIterator<Item = &'a str>) -> Result<(), LogError> {

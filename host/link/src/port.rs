@@ -4,7 +4,7 @@
 
 use super::LinkError;
 use serialport::{ErrorKind, SerialPort, SerialPortInfo, SerialPortType, UsbPortInfo};
-use std::io;
+use std::io::{self, Read};
 use std::time::Duration;
 
 /// Bits in a second on the firmware's serial line.
@@ -69,6 +69,15 @@ pub(super) fn open(name: &str) -> Result<(Box<dyn SerialPort>, bool), LinkError>
     // The line that pulls an Uno's reset; a pseudo-terminal has none.
     let resets = port.write_data_terminal_ready(true).is_ok();
     Ok((port, resets))
+}
+
+/// Opens the port of something that only talks, such as a satellite receiver, at so many bits in a second.
+///
+/// # Errors
+/// Where it is absent, in use, forbidden, or no serial port.
+pub fn listen(name: &str, baud: u32) -> Result<Box<dyn Read + Send>, LinkError> {
+    let port = serialport::new(name, baud).timeout(Duration::from_millis(1)).open();
+    Ok(Box::new(port.map_err(|error| explain(name, error))?))
 }
 
 /// Why a port does not open.

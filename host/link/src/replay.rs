@@ -184,6 +184,8 @@ impl<'a> Stretch<'a> {
                     }
                 }
                 Kind::Connected | Kind::Lost => {}
+                // Where the machine was on the earth changes nothing that it decides.
+                Kind::Antenna | Kind::GpsFound | Kind::GpsLost | Kind::Gps | Kind::GpsDamaged | Kind::GpsMark => {}
             }
         }
         let first = happened.iter().find_map(|(_, happened)| match happened {

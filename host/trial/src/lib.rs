@@ -3,7 +3,7 @@
 //! - [`run()`] has the firmware, which [`firmware`] builds, weed the row of a [`Trial`]; [`report`] and [`picture`] show the [`Outcome`].
 //!   [`replay`] plays a recording to it instead of a row.
 //! - [`console`] talks to it as an operator would, and [`port`] makes it a port for the [`link`].
-//! - [`live`] runs it in real time, at a serial port that other programs open.
+//! - [`live`] runs it in real time, at a serial port that other programs open; a [`receiver`] on the machine is at another.
 //! - [`soak`] has everything go wrong now and then, for hours; [`mod@bench`] counts cycles and bytes.
 //!
 //! What the machine does and what a verdict is stands in [`field`], how the chip works in [`uno`]. Many rows are not compared here.
@@ -14,6 +14,7 @@ pub mod firmware;
 pub mod live;
 pub mod picture;
 pub mod port;
+pub mod receiver;
 pub mod replay;
 pub mod report;
 mod run;

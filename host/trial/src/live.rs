@@ -12,8 +12,10 @@
 //!   program's wrong one goes unnoticed. What no program has read is lost when the next one opens the port.
 //! - **The machine.** It stands, gains its speed ahead of the row, rolls past it and brakes behind it; after a few seconds it does
 //!   so again, forward, with the same row before it. The tool does what the firmware says and the row does not mind.
+//! - **The receiver.** Where there is a satellite receiver on the machine, it has a pseudo terminal of its own.
 //! - **EEPROM.** It is read from a file at the start, where there is one, and written to it whenever it has changed.
 
+use crate::receiver::{ReceiverSetup, SimulatedReceiver};
 use field::machine::{Machine, cycle_at};
 use field::motion::Motion;
 use field::row::Row;
@@ -43,6 +45,8 @@ pub struct Setup {
     pub eeprom: Option<PathBuf>,
     /// Where to make a symbolic link to the pseudo terminal.
     pub link: Option<PathBuf>,
+    /// The satellite receiver on the machine, and where to make a symbolic link to its pseudo terminal.
+    pub receiver: Option<(ReceiverSetup, Option<PathBuf>)>,
     /// What the machine rolls along; without it, it stands.
     pub course: Option<Course>,
     /// Whether to run as fast as the host can, not in real time.
@@ -135,18 +139,74 @@ impl Course {
             .change_speed(0.0, ACCELERATION_MM_S2)
     }
 
-    /// What the machine does to the pins, beginning at a cycle, and the cycle at which it stands again.
-    fn roll_along(&self, start_cycle: u64) -> (Vec<PinChange>, u64) {
+    /// What the machine does to the pins, beginning at a cycle, the cycle at which it stands again, and how it rolls.
+    fn roll_along(&self, start_cycle: u64) -> (Vec<PinChange>, u64, Motion) {
         let motion = self.motion();
-        (self.machine.pin_changes(&self.row, &motion, start_cycle), cycle_at(start_cycle, motion.duration_s()))
+        let end = cycle_at(start_cycle, motion.duration_s());
+        (self.machine.pin_changes(&self.row, &motion, start_cycle), end, motion)
     }
+}
+
+/// How far the machine has rolled in all: so many millimetres before it set off the last time, when that was, and how it rolls since.
+struct Way {
+    before_mm: f64,
+    since: Option<(f64, Motion)>,
+}
+
+impl Way {
+    /// How far it had rolled at a time in seconds, in metres.
+    fn rolled_m(&self, time_s: f64) -> f64 {
+        let since_mm = self.since.as_ref().map_or(0.0, |(set_off_s, motion)| {
+            motion.position_mm((time_s - set_off_s).clamp(0.0, motion.duration_s())) - motion.start_mm()
+        });
+        (self.before_mm + since_mm) / 1000.0
+    }
+}
+
+/// The satellite receiver on the machine, and its terminal.
+struct Receiver {
+    simulated: SimulatedReceiver,
+    pty: Pty,
+    unread: VecDeque<u8>,
+}
+
+impl Receiver {
+    fn start((setup, link): (ReceiverSetup, Option<PathBuf>)) -> Result<Self, LiveError> {
+        let mut pty = Pty::open()?;
+        if let Some(link) = &link {
+            pty.link(link)?;
+        }
+        Ok(Self { simulated: SimulatedReceiver::new(setup), pty, unread: VecDeque::new() })
+    }
+
+    /// Passes on what it has said by now.
+    fn serve(&mut self, time_s: f64, way: &Way) -> Result<(), LiveError> {
+        // It talks whether or not anybody listens, and takes no commands.
+        if self.pty.was_opened()? {
+            self.unread.clear();
+        }
+        self.pty.read(&mut [0; MOST_BYTES_ON_THEIR_WAY])?;
+        self.unread.extend(self.simulated.bytes_until(time_s, |time_s| way.rolled_m(time_s)));
+        give(&mut self.pty, &mut self.unread)
+    }
+}
+
+/// Gives a program what waits for it, as far as it has room, and forgets what is too much.
+fn give(pty: &mut Pty, unread: &mut VecDeque<u8>) -> Result<(), LiveError> {
+    let written = pty.write(unread.make_contiguous())?;
+    unread.drain(..written);
+    let too_many = unread.len().saturating_sub(MOST_BYTES_UNREAD);
+    unread.drain(..too_many);
+    Ok(())
 }
 
 /// A virtual Uno at a pseudo terminal.
 pub struct LiveUno {
     uno: Uno,
     pty: Pty,
+    receiver: Option<Receiver>,
     course: Option<Course>,
+    way: Way,
     /// When the machine sets off again.
     sets_off: u64,
     eeprom: Option<EepromFile>,
@@ -178,7 +238,9 @@ impl LiveUno {
         Ok(LiveUno {
             uno,
             pty,
+            receiver: setup.receiver.map(Receiver::start).transpose()?,
             course: setup.course,
+            way: Way { before_mm: 0.0, since: None },
             sets_off: STANDING_S * CYCLES_PER_SECOND,
             eeprom,
             unread: VecDeque::new(),
@@ -190,6 +252,11 @@ impl LiveUno {
     /// The path under which programs open its serial port.
     pub fn path(&self) -> &Path {
         self.pty.path()
+    }
+
+    /// The path under which programs open the receiver's port, where there is one.
+    pub fn receiver_path(&self) -> Option<&Path> {
+        self.receiver.as_ref().map(|receiver| receiver.pty.path())
     }
 
     /// Runs until `stop` is set.
@@ -226,13 +293,14 @@ impl LiveUno {
     /// Runs in a thread until the handle is dropped.
     pub fn run_in_background(mut self) -> Background {
         let path = self.path().to_owned();
+        let receiver_path = self.receiver_path().map(Path::to_owned);
         let stop = Arc::new(AtomicBool::new(false));
         let stop_there = Arc::clone(&stop);
         let thread = thread::spawn(move || {
             self.run(&stop_there)?;
             Ok(self)
         });
-        Background { path, stop, thread: Some(thread) }
+        Background { path, receiver_path, stop, thread: Some(thread) }
     }
 
     /// The Uno itself.
@@ -255,11 +323,11 @@ impl LiveUno {
         self.uno.send(&buffer[..count]);
 
         self.unread.extend(self.uno.received_bytes().iter().map(|received| received.byte));
-        let written = self.pty.write(self.unread.make_contiguous())?;
-        self.unread.drain(..written);
-        let too_many = self.unread.len().saturating_sub(MOST_BYTES_UNREAD);
-        self.unread.drain(..too_many);
-        Ok(())
+        give(&mut self.pty, &mut self.unread)?;
+        match &mut self.receiver {
+            Some(receiver) => receiver.serve(self.uno.cycle() as f64 / CYCLES_PER_SECOND as f64, &self.way),
+            None => Ok(()),
+        }
     }
 
     /// Sets the machine off once it has stood for long enough.
@@ -267,8 +335,10 @@ impl LiveUno {
         if let Some(course) = &self.course
             && self.uno.cycle() >= self.sets_off
         {
-            let (changes, end) = course.roll_along(self.uno.cycle());
+            let (changes, end, motion) = course.roll_along(self.uno.cycle());
             self.uno.drive(changes);
+            let set_off_s = self.uno.cycle() as f64 / CYCLES_PER_SECOND as f64;
+            self.way = Way { before_mm: 1000.0 * self.way.rolled_m(set_off_s), since: Some((set_off_s, motion)) };
             self.sets_off = end + STANDING_S * CYCLES_PER_SECOND;
         }
     }
@@ -284,6 +354,7 @@ impl LiveUno {
 /// A live Uno that runs in a thread. Dropped, it ends, its terminal and link with it.
 pub struct Background {
     path: PathBuf,
+    receiver_path: Option<PathBuf>,
     stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<Result<LiveUno, LiveError>>>,
 }
@@ -292,6 +363,11 @@ impl Background {
     /// The path under which programs open its serial port.
     pub fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// The path under which programs open the receiver's port, where there is one.
+    pub fn receiver_path(&self) -> Option<&Path> {
+        self.receiver_path.as_deref()
     }
 
     /// Stops it, and gives it back.

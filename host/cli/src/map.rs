@@ -1,0 +1,160 @@
+//! `weeder map`: records with a satellite receiver as a map, and what they come to.
+
+use crate::destination::FileName;
+use crate::gps::AntennaArguments;
+use crate::numbers::number_within;
+use crate::output::{print, say, tell};
+use crate::source;
+use anyhow::Result;
+use clap::Args;
+use comfy_table::{Table, presets};
+use link::log;
+use places::job::{self, Wanted};
+use places::summary::{Stand, Summary};
+use places::{Job, map, picture};
+use serde_json::json;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// What the user asks of the map.
+#[derive(Args)]
+#[command(after_help = "\
+It is GeoJSON (WGS84), which QGIS opens as it is: a point for each plant, weed, swing, alarm and label, and lines of the ground weeded and \
+not weeded. docs/map.md says what error to expect. What is told of the antenna here goes before what the record says.\n\n\
+Examples:
+  weeder map field.csv -o field.geojson --svg field.svg
+  weeder map monday.csv tuesday.csv -o field.geojson --row-spacing 750 --table field-table.csv
+  weeder map field.csv -o field.geojson --beam-ahead 610 --gps-delay 120     measured better since")]
+pub struct Arguments {
+    /// Records, as `weeder record --gps` writes them; - for standard input.
+    #[arg(value_name = "LOG.csv", required = true, value_parser = source::file)]
+    logs: Vec<PathBuf>,
+    /// The map.
+    #[arg(long, short, value_name = "FILE.geojson")]
+    out: FileName,
+    /// Draw it too.
+    #[arg(long, value_name = "FILE.svg")]
+    svg: Option<FileName>,
+    /// Write the count as a table, a line a record.
+    #[arg(long, value_name = "FILE.csv")]
+    table: Option<FileName>,
+    /// From row to row in mm, 50 to 5000, for the area.
+    #[arg(long, value_name = "MM", default_value = "600", value_parser = number_within(50.0..=5000.0))]
+    row_spacing: f64,
+    /// From plant to plant in mm, 20 to 5000, for those that are missing; the median of those found where it is not told.
+    #[arg(long, value_name = "MM", value_parser = number_within(20.0..=5000.0))]
+    spacing: Option<f64>,
+    /// The longest way without a fix over which places are interpolated, in m, 0 to 1000.
+    #[arg(long, value_name = "M", default_value = "20", value_parser = number_within(0.0..=1000.0))]
+    longest_outage: f64,
+    #[command(flatten)]
+    antenna: AntennaArguments,
+    /// Print the count as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Reads the records, writes the map, and prints the count.
+///
+/// # Errors
+/// Where a record cannot be read, or a file not be written.
+pub fn run(arguments: &Arguments) -> Result<()> {
+    let out = arguments.out.check()?;
+    let svg = arguments.svg.as_ref().map(FileName::check).transpose()?;
+    let table = arguments.table.as_ref().map(FileName::check).transpose()?;
+    let stand = Stand { row_spacing_mm: arguments.row_spacing, spacing_mm: arguments.spacing };
+    let mut jobs = Vec::new();
+    for path in &arguments.logs {
+        let log = log::read(path)?;
+        let antenna = arguments.antenna.over(job::antenna_of(&log).unwrap_or_default());
+        let wanted = Wanted { antenna: Some(antenna), longest_outage_m: arguments.longest_outage };
+        jobs.push((name(path), Job::read(&log, &wanted)));
+    }
+    let counted: Vec<(&str, Summary)> =
+        jobs.iter().map(|(name, job)| (name.as_str(), Summary::of(job, &stand))).collect();
+    let printed = match arguments.json {
+        true => {
+            let records = counted.iter().map(|(record, summary)| json!({ "record": record, "count": summary }));
+            say!("{:#}", serde_json::Value::from_iter(records))
+        }
+        false => print(format_args!("{}\n", shown(&counted))),
+    };
+    let named: Vec<(&str, &Job)> = jobs.iter().map(|(name, job)| (name.as_str(), job)).collect();
+    out.write(|to| writeln!(to, "{}", map::features(&named)))?;
+    if let Some(svg) = &svg {
+        let jobs: Vec<&Job> = jobs.iter().map(|(_, job)| job).collect();
+        match picture::draw(&jobs) {
+            Some(drawn) => svg.write(|to| svg::write(to, &drawn))?,
+            None => tell!("{} is not drawn: nothing in the records has a place", svg.path().display()),
+        }
+    }
+    if let Some(table) = &table {
+        table.write(|to| write_csv(&counted, to))?;
+    }
+    if counted.iter().all(|(_, summary)| summary.fixes == 0) {
+        tell!(
+            "There is no fix in the records, so that nothing has a place: `weeder record --gps PORT` writes them with a receiver"
+        );
+    }
+    printed
+}
+
+/// A record's name on the map: that of its file.
+fn name(path: &Path) -> String {
+    path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
+}
+
+/// What is counted, in words, for a table that people read.
+fn rows(summary: &Summary) -> [(&'static str, String); 19] {
+    let mm = |value: Option<f64>| value.map_or("unknown".to_owned(), |value| format!("{value:.0}"));
+    [
+        ("plants, those unknown among them", summary.plants.to_string()),
+        ("  of them unknown", summary.unknown.to_string()),
+        ("  distance between them, mm", mm(summary.spacing_mean_mm)),
+        ("  its scatter (standard deviation), mm", mm(summary.spacing_scatter_mm)),
+        ("  missing", summary.missing.to_string()),
+        ("tall weeds", summary.weeds.to_string()),
+        ("swings out of the row", summary.swings.to_string()),
+        ("alarms", summary.alarms.to_string()),
+        ("ground of the row worked, m", format!("{:.1}", summary.worked_m)),
+        ("  weeded, m", format!("{:.1}", summary.weeded_m)),
+        ("  weeded, %", summary.weeded_percent.map_or("unknown".to_owned(), |share| format!("{share:.1}"))),
+        ("area, ha", format!("{:.4}", summary.area_ha)),
+        ("hours at work, of those recorded", format!("{:.2} of {:.2}", summary.work_h, summary.record_h)),
+        ("places measured", summary.measured.to_string()),
+        ("  interpolated over an outage", summary.interpolated.to_string()),
+        ("  without a place", summary.without_place.to_string()),
+        ("fixes", summary.fixes.to_string()),
+        ("  that had jumped", summary.jumps.to_string()),
+        (
+            "fix lost, receiver lost, damaged lines",
+            format!("{}, {}, {}", summary.fix_losses, summary.receiver_losses, summary.damaged_lines),
+        ),
+    ]
+}
+
+fn shown(counted: &[(&str, Summary)]) -> Table {
+    let mut table = Table::new();
+    table.load_style(presets::UTF8_BORDERS_ONLY);
+    table.set_header([""].into_iter().chain(counted.iter().map(|(name, _)| *name)));
+    let columns: Vec<_> = counted.iter().map(|(_, summary)| rows(summary)).collect();
+    let Some(first) = columns.first() else { return table };
+    for (row, (title, _)) in first.iter().enumerate() {
+        let cells = columns.iter().map(|column| column[row].1.clone());
+        table.add_row([(*title).to_owned()].into_iter().chain(cells));
+    }
+    table
+}
+
+/// A line a record, with the names of the JSON.
+fn write_csv(counted: &[(&str, Summary)], to: &mut dyn Write) -> Result<()> {
+    #[derive(serde::Serialize)]
+    struct Line<'a> {
+        record: &'a str,
+    }
+    let mut csv = csv::Writer::from_writer(to);
+    for (record, summary) in counted {
+        csv.serialize((Line { record }, summary))?;
+    }
+    Ok(csv.flush()?)
+}

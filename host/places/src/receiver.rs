@@ -1,0 +1,579 @@
+//! A receiver, heard line by line: its fixes by the record's clock, and what is wrong with them.
+//!
+//! [`Receiver::take`] is given each line with the time at which it came, and [`Receiver::rolled`] how far the wheel has
+//! rolled. Both while a record is written, which has the marks, and when it is read: the same lines give the same fixes
+//! and marks.
+//!
+//! - **Moments.** RMC and GGA of the same time are one fix, which is told when the next moment begins, or by
+//!   [`Receiver::end`]. A date counts for the days before and behind it; a time that jumps back by half a day or more
+//!   is past midnight.
+//! - **When.** A line comes some time after the moment that it tells of, and more or less so by turns: others go before
+//!   it on the wire, and the computer is busy. The least delay of the last ten or twenty seconds is taken for that of
+//!   all, and less it cannot be; what is left of it is the antenna's setting `delay_ms`.
+//! - **Jumps.** A fix that is farther from the last one than the wheel has rolled, and than both errors explain, is
+//!   none. Where such agree with each other for [`AGREEING_MS`], those before may have been the wrong ones: the track
+//!   begins anew with the first.
+
+use crate::plane::Place;
+use crate::sentence::{DAY_MS, Line, Quality, Report};
+use std::fmt;
+
+/// Fixes that have jumped are believed once they have agreed with each other for so long, in ms.
+pub const AGREEING_MS: f64 = 10_000.0;
+
+/// And so many they have to be.
+const AGREEING: usize = 5;
+
+/// How many standard deviations two fixes may be off before they have jumped: with noise alone, one in ten million has.
+const DEVIATIONS: f64 = 8.0;
+
+/// How far off two fixes of the best receiver may be for other reasons, such as the antenna's swaying, in metres.
+const SWAY_M: f64 = 0.25;
+
+/// How much farther the machine may come than the wheel has rolled: one that skids.
+const SKIDDING: f64 = 1.1;
+
+/// The least delay is sought among the lines of this time and the one before, in ms of the record.
+const DELAYS_MS: f64 = 10_000.0;
+
+/// By how much a delay may differ from the least: a receiver whose time jumps by more has only now found the right one.
+const LONGEST_DELAY_MS: f64 = 30_000.0;
+
+/// A fix.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fix {
+    /// By the record's clock, in milliseconds, less the receiver's own delay.
+    pub time_ms: f64,
+    /// Milliseconds UTC since some midnight, see [`Receiver::midnight_ms`].
+    pub utc_ms: i64,
+    /// Where the antenna was.
+    pub place: Place,
+    /// How good it is.
+    pub quality: Quality,
+    /// Which track it belongs to: where fixes have jumped for good, a new one begins.
+    pub track: u32,
+}
+
+/// Something that is wrong with what a receiver says, or no longer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Mark {
+    /// There is a fix now, and there was none before.
+    Found(Quality),
+    /// There is no fix any more.
+    Lost,
+    /// A fix that has jumped, and is not used.
+    Jumped {
+        /// Where it says that the antenna is.
+        place: Place,
+        /// By the record's clock.
+        time_ms: f64,
+        /// Metres from the last fix that is used.
+        far_m: f64,
+        /// Metres that the wheel has rolled since.
+        rolled_m: f64,
+    },
+    /// The fixes stay where they have jumped to, and are used from there on.
+    Stayed,
+}
+
+impl fmt::Display for Mark {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Found(quality) => write!(formatter, "fix by {quality}"),
+            Self::Lost => formatter.write_str("no fix"),
+            Self::Jumped { far_m, rolled_m, .. } => {
+                write!(formatter, "jumped {far_m:.2} m while the wheel rolled {rolled_m:.2} m: not used")
+            }
+            Self::Stayed => formatter.write_str("stays where it has jumped to: used from here on"),
+        }
+    }
+}
+
+/// What a line has brought.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Heard {
+    /// Fixes that are sure to be complete. Several come where they had jumped and are believed after all.
+    pub fixes: Vec<Fix>,
+    /// What is to be marked.
+    pub marks: Vec<Mark>,
+}
+
+/// What was counted of a receiver.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Fixes that are used.
+    pub fixes: u64,
+    /// Times at which there was no fix any more.
+    pub losses: u64,
+    /// Fixes that have jumped.
+    pub jumps: u64,
+    /// Lines that came damaged.
+    pub damaged: u64,
+}
+
+/// A moment of which something was told.
+#[derive(Clone, Copy, Debug)]
+struct Moment {
+    arrived_ms: f64,
+    utc_ms: i64,
+    place: Option<Place>,
+    is_valid: bool,
+    quality: Option<Quality>,
+    /// The wheel when the first line came.
+    wheel: Option<Wheel>,
+    /// Whether it is over, and what comes late of it is not used.
+    is_over: bool,
+}
+
+/// How the wheel was when it was heard of: by the record's clock.
+#[derive(Clone, Copy, Debug)]
+struct Wheel {
+    time_ms: f64,
+    rolled_m: f64,
+    speed_mm_s: f64,
+}
+
+/// A fix, and how far the wheel had rolled.
+#[derive(Clone, Copy, Debug)]
+struct Rolled {
+    fix: Fix,
+    rolled_m: f64,
+}
+
+/// A receiver.
+#[derive(Clone, Debug, Default)]
+pub struct Receiver {
+    /// The fix's standard deviation, where the user knows it.
+    error_m: Option<f64>,
+    counts: Counts,
+    moment: Option<Moment>,
+    /// Midnights since the first line.
+    days: i64,
+    /// Days from 1970 to the first line's.
+    first_day: Option<i64>,
+    /// The least of what the record's clock is ahead of UTC, in this stretch of time and the one before, and when this
+    /// one began.
+    ahead_ms: [Option<f64>; 2],
+    delays_since_ms: f64,
+    has_fix: Option<bool>,
+    wheel: Option<Wheel>,
+    last: Option<Rolled>,
+    /// Fixes that have jumped and agree with each other.
+    jumped: Vec<Rolled>,
+    track: u32,
+}
+
+impl Receiver {
+    /// One that has said nothing. The error is the standard deviation of a fix to the east and to the north, in metres;
+    /// where none is known, that which is usual for the quality that it tells.
+    pub fn new(error_m: Option<f64>) -> Self {
+        Self { error_m, ..Self::default() }
+    }
+
+    /// What was counted so far.
+    pub fn counts(&self) -> Counts {
+        self.counts
+    }
+
+    /// Milliseconds from the first of January 1970 to the midnight from which the fixes' [`Fix::utc_ms`] counts; none
+    /// where no line had a date.
+    pub fn midnight_ms(&self) -> Option<i64> {
+        Some(self.first_day? * DAY_MS)
+    }
+
+    /// The wheel has rolled so far in all, by the record's clock, and rolls on at this speed, in mm/s.
+    pub fn rolled(&mut self, time_ms: f64, rolled_m: f64, speed_mm_s: f64) {
+        self.wheel = Some(Wheel { time_ms, rolled_m, speed_mm_s });
+    }
+
+    /// Nobody knows how far the wheel rolls between this and what is heard of it next: the Uno has begun anew.
+    pub fn wheel_lost(&mut self) {
+        self.wheel = None;
+        if let Some(moment) = &mut self.moment {
+            moment.wheel = None;
+        }
+        self.last = None;
+        self.jumped.clear();
+    }
+
+    /// A line, without its end, that came at this time of the record's clock.
+    pub fn take(&mut self, time_ms: f64, line: &str) -> Heard {
+        match Line::parse(line) {
+            Line::Report(report) => self.report(time_ms, report),
+            Line::Other => Heard::default(),
+            Line::Damaged => {
+                self.counts.damaged += 1;
+                Heard::default()
+            }
+        }
+    }
+
+    /// Nothing more comes: the last moment's fix is complete.
+    pub fn end(&mut self) -> Heard {
+        let mut heard = Heard::default();
+        self.complete(&mut heard);
+        heard
+    }
+
+    /// The receiver is gone, or says nothing.
+    pub fn silent(&mut self) -> Heard {
+        let mut heard = self.end();
+        self.no_fix(&mut heard);
+        heard
+    }
+
+    fn report(&mut self, arrived_ms: f64, report: Report) -> Heard {
+        let Some(time_ms) = report.time_ms else {
+            // One that has not seen a satellite yet knows no time.
+            return self.silent();
+        };
+        let mut heard = Heard::default();
+        if let Some(moment) = &self.moment {
+            let before_ms = moment.utc_ms.rem_euclid(DAY_MS);
+            if before_ms == time_ms && arrived_ms - moment.arrived_ms < LONGEST_DELAY_MS {
+                self.add(report);
+                return heard;
+            }
+            // Past midnight forward, or back over it by a receiver that has only now found the time.
+            self.days += i64::from(time_ms < before_ms - DAY_MS / 2) - i64::from(time_ms > before_ms + DAY_MS / 2);
+        }
+        self.complete(&mut heard);
+        let utc_ms = self.days * DAY_MS + time_ms;
+        let wheel = self.wheel;
+        self.moment =
+            Some(Moment { arrived_ms, utc_ms, place: None, is_valid: true, quality: None, wheel, is_over: false });
+        self.add(report);
+        heard
+    }
+
+    /// Adds what a sentence tells to its moment.
+    fn add(&mut self, report: Report) {
+        if let Some(day) = report.day {
+            self.first_day = Some(day - self.days);
+        }
+        let Some(moment) = &mut self.moment else { return };
+        moment.is_valid &= report.place.is_some();
+        moment.place = moment.place.or(report.place);
+        moment.quality = moment.quality.max(report.quality);
+    }
+
+    fn no_fix(&mut self, heard: &mut Heard) {
+        if self.has_fix != Some(false) {
+            self.has_fix = Some(false);
+            self.counts.losses += 1;
+            heard.marks.push(Mark::Lost);
+        }
+    }
+
+    /// The moment that was under way is over.
+    fn complete(&mut self, heard: &mut Heard) {
+        let Some(moment) = self.moment.as_mut().filter(|moment| !moment.is_over) else { return };
+        moment.is_over = true;
+        let moment = *moment;
+        let (Some(place), true) = (moment.place, moment.is_valid) else {
+            self.no_fix(heard);
+            return;
+        };
+        let quality = moment.quality.unwrap_or(Quality::Satellites);
+        if self.has_fix != Some(true) {
+            self.has_fix = Some(true);
+            heard.marks.push(Mark::Found(quality));
+        }
+        let time_ms = moment.utc_ms as f64 + self.ahead_ms(moment);
+        let fix = Fix { time_ms, utc_ms: moment.utc_ms, place, quality, track: self.track };
+        self.judge(fix, moment.wheel, heard);
+    }
+
+    /// By how much the record's clock is ahead of UTC, and of the receiver's least delay.
+    fn ahead_ms(&mut self, moment: Moment) -> f64 {
+        let ahead_ms = moment.arrived_ms - moment.utc_ms as f64;
+        let is_another = |least: f64| (ahead_ms - least).abs() > LONGEST_DELAY_MS;
+        if self.ahead_ms.into_iter().flatten().any(is_another) {
+            self.ahead_ms = [None; 2];
+        }
+        if !(0.0..DELAYS_MS).contains(&(moment.arrived_ms - self.delays_since_ms)) {
+            self.ahead_ms = [None, self.ahead_ms[0]];
+            self.delays_since_ms = moment.arrived_ms;
+        }
+        self.ahead_ms[0] = Some(self.ahead_ms[0].map_or(ahead_ms, |least| least.min(ahead_ms)));
+        self.ahead_ms.into_iter().flatten().fold(ahead_ms, f64::min)
+    }
+
+    /// Holds a fix against the last one, and against the wheel.
+    fn judge(&mut self, fix: Fix, wheel: Option<Wheel>, heard: &mut Heard) {
+        let rolled_m = wheel.map_or(0.0, |wheel| {
+            // It is heard of ten times a second; a line that came far too late tells of a place that is not known any
+            // more here.
+            let since_s = ((fix.time_ms - wheel.time_ms) / 1000.0).clamp(-1.0, 1.0);
+            wheel.rolled_m + wheel.speed_mm_s / 1000.0 * since_s
+        });
+        let here = Rolled { fix, rolled_m };
+        let Some(last) = self.last.filter(|_| wheel.is_some()) else {
+            self.jumped.clear();
+            self.accept(here, heard);
+            return;
+        };
+        // As the wheel rolls on, the machine could have come to where the fixes have jumped: but they agree with each
+        // other.
+        let agrees = self.jumped.last().is_some_and(|jumped| self.follows(jumped, &here));
+        if !agrees && self.follows(&last, &here) {
+            self.jumped.clear();
+            self.accept(here, heard);
+            return;
+        }
+        self.counts.jumps += 1;
+        let far_m = last.fix.place.distance_m(fix.place);
+        let rolled_m = (rolled_m - last.rolled_m).abs();
+        heard.marks.push(Mark::Jumped { place: fix.place, time_ms: fix.time_ms, far_m, rolled_m });
+        if !agrees {
+            self.jumped.clear();
+        }
+        self.jumped.push(here);
+        let agree_ms = self.jumped.first().map_or(0.0, |first| fix.time_ms - first.fix.time_ms);
+        if self.jumped.len() >= AGREEING && agree_ms >= AGREEING_MS {
+            self.track += 1;
+            heard.marks.push(Mark::Stayed);
+            for mut jumped in std::mem::take(&mut self.jumped) {
+                jumped.fix.track = self.track;
+                self.accept(jumped, heard);
+            }
+        }
+    }
+
+    /// Whether the machine can have come from one fix to the other.
+    fn follows(&self, from: &Rolled, to: &Rolled) -> bool {
+        let error_m = |rolled: &Rolled| self.error_m.unwrap_or_else(|| rolled.fix.quality.usual_error_m());
+        let room_m = SWAY_M + DEVIATIONS * error_m(from).max(error_m(to));
+        let far_m = from.fix.place.distance_m(to.fix.place);
+        far_m <= SKIDDING * (to.rolled_m - from.rolled_m).abs() + room_m
+    }
+
+    fn accept(&mut self, here: Rolled, heard: &mut Heard) {
+        self.counts.fixes += 1;
+        heard.fixes.push(here.fix);
+        self.last = Some(here);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plane::{Metres, Plane};
+    use proptest::prelude::*;
+
+    /// A day's midnight from 1970, the 31st of December 2026, and its date as sentences have it.
+    const DAYS: [(i64, &str); 2] = [(20_818, "311226"), (20_819, "010127")];
+
+    fn sentence(text: &str) -> String {
+        format!("${text}*{:02X}", text.bytes().fold(0, |sum, byte| sum ^ byte))
+    }
+
+    fn angle(degrees: f64, digits: usize, sides: [&str; 2]) -> String {
+        // Whole ten millionths of a minute, so that none is sixty.
+        let units = (degrees.abs() * 60e7).round() as u64;
+        let (whole, minutes) = (units / 600_000_000, (units % 600_000_000) as f64 / 1e7);
+        format!("{whole:0digits$}{minutes:010.7},{}", sides[usize::from(degrees < 0.0)])
+    }
+
+    fn coordinates(place: Place) -> String {
+        format!("{},{}", angle(place.latitude, 2, ["N", "S"]), angle(place.longitude, 3, ["E", "W"]))
+    }
+
+    fn clock(utc_ms: i64) -> String {
+        let ms = utc_ms.rem_euclid(DAY_MS);
+        format!("{:02}{:02}{:02}.{:03}", ms / 3_600_000, ms / 60_000 % 60, ms / 1000 % 60, ms % 1000)
+    }
+
+    fn gga(utc_ms: i64, place: Place) -> String {
+        sentence(&format!("GPGGA,{},{},4,12,0.7,10.0,M,0.0,M,,", clock(utc_ms), coordinates(place)))
+    }
+
+    fn rmc(utc_ms: i64, place: Place, date: &str) -> String {
+        sentence(&format!("GPRMC,{},A,{},1.0,90.0,{date},,,A", clock(utc_ms), coordinates(place)))
+    }
+
+    /// A receiver that rolls half a metre a second to the east of a place, told of once a second from a time of the day
+    /// on.
+    fn rolling(
+        from: Place,
+        start_ms: i64,
+        seconds: i64,
+        change: impl Fn(i64, String) -> Vec<String>,
+    ) -> (Vec<Heard>, Receiver) {
+        let plane = Plane::around(from);
+        let mut receiver = Receiver::new(None);
+        let mut heard = Vec::new();
+        for second in 0..seconds {
+            let utc_ms = start_ms + 1000 * second;
+            let place = plane.place(Metres { east: 0.5 * second as f64, north: 0.0 });
+            let time_ms = 1000.0 * second as f64;
+            receiver.rolled(time_ms, 0.5 * second as f64, 500.0);
+            let (_, date) = DAYS[usize::from(utc_ms >= DAY_MS)];
+            for line in change(second, gga(utc_ms, place)).into_iter().chain(change(second, rmc(utc_ms, place, date))) {
+                heard.push(receiver.take(time_ms + 80.0, &line));
+            }
+        }
+        heard.push(receiver.end());
+        (heard, receiver)
+    }
+
+    fn fixes(heard: &[Heard]) -> Vec<Fix> {
+        heard.iter().flat_map(|heard| &heard.fixes).copied().collect()
+    }
+
+    fn marks(heard: &[Heard]) -> Vec<Mark> {
+        heard.iter().flat_map(|heard| &heard.marks).copied().collect()
+    }
+
+    const FIELD: Place = Place { latitude: 52.1, longitude: 8.5 };
+
+    proptest! {
+        #[test]
+        fn midnight_the_antimeridian_and_either_hemisphere_change_nothing(
+            latitude in -80.0..80.0_f64, near in 0..4_usize, off in -0.0001..0.0001_f64, start_s in -30..30_i64,
+        ) {
+            let longitude = [180.0 - off.abs(), -180.0 + off.abs(), off, 100.0][near];
+            let start_ms = DAY_MS + 1000 * start_s;
+            let (heard, receiver) = rolling(Place { latitude, longitude }, start_ms, 40, |_, line| vec![line]);
+            let fixes = fixes(&heard);
+            prop_assert_eq!(fixes.len(), 40);
+            prop_assert_eq!(receiver.counts(), Counts { fixes: 40, ..Counts::default() });
+            prop_assert_eq!(marks(&heard), vec![Mark::Found(Quality::Rtk)]);
+            let midnight_ms = receiver.midnight_ms().expect("RMC has a date");
+            for (second, pair) in fixes.windows(2).enumerate() {
+                prop_assert_eq!(midnight_ms + pair[0].utc_ms, DAYS[0].0 * DAY_MS + start_ms + 1000 * second as i64);
+                let far_m = pair[0].place.distance_m(pair[1].place);
+                prop_assert!((far_m - 0.5).abs() < 1e-3, "{}", far_m);
+                prop_assert!((pair[1].time_ms - pair[0].time_ms - 1000.0).abs() < 1e-6);
+            }
+        }
+
+        #[test]
+        fn lines_that_came_damaged_are_counted_and_make_no_fix(
+            at in 0..200_usize, by in 1..127_u8, seconds in prop::collection::vec(0..30_i64, 0..12),
+        ) {
+            let hurt = |second: i64, line: String| {
+                if !seconds.contains(&second) {
+                    return vec![line];
+                }
+                let mut bytes = line.into_bytes();
+                let at = at % bytes.len();
+                bytes[at] ^= by;
+                vec![String::from_utf8_lossy(&bytes).into_owned()]
+            };
+            let (heard, receiver) = rolling(FIELD, 0, 30, hurt);
+            let fixes = fixes(&heard);
+            let hurt: std::collections::BTreeSet<i64> = seconds.iter().copied().collect();
+            // A letter of the checksum that has become a small one is the same, and one line of a moment is enough.
+            prop_assert!(fixes.len() >= 30 - hurt.len());
+            prop_assert!(receiver.counts().damaged <= 2 * hurt.len() as u64);
+            prop_assert!((60..=60 + hurt.len() as u64).contains(&(fixes.len() as u64 * 2 + receiver.counts().damaged)));
+            let plane = Plane::around(FIELD);
+            for fix in fixes {
+                let at = plane.metres(fix.place);
+                prop_assert!((at.east - 0.5 * (fix.utc_ms / 1000) as f64).abs() < 1e-3 && at.north.abs() < 1e-3);
+            }
+        }
+
+        #[test]
+        fn a_stream_that_is_cut_at_any_byte_has_no_wrong_fix(from in 0..4000_usize, to in 0..4000_usize) {
+            let mut stream = String::new();
+            for second in 0..20 {
+                stream += &format!("{}\r\n{}\r\n", gga(1000 * second, FIELD), rmc(1000 * second, FIELD, DAYS[0].1));
+            }
+            let (from, to) = (from % stream.len(), to % stream.len());
+            let mut receiver = Receiver::new(None);
+            let cut = stream[..from].to_owned() + &stream[from.max(to)..];
+            let heard: Vec<Heard> = cut.lines().enumerate().map(|(at, line)| receiver.take(500.0 * at as f64, line)).collect();
+            for fix in fixes(&heard) {
+                prop_assert!(fix.place.distance_m(FIELD) < 1e-3);
+            }
+            prop_assert!(receiver.counts().damaged <= 1);
+        }
+    }
+
+    #[test]
+    fn a_line_that_comes_late_does_not_make_its_fix_later() {
+        let mut receiver = Receiver::new(None);
+        let mut heard = Vec::new();
+        for second in 0..20_i64 {
+            let late = [0.0, 300.0, 35.0, 1900.0][second as usize % 4];
+            let utc_ms = 1000 * second;
+            heard.push(receiver.take(utc_ms as f64 + 70.0 + late, &gga(utc_ms, FIELD)));
+        }
+        for fix in fixes(&heard) {
+            assert!((fix.time_ms - fix.utc_ms as f64 - 70.0).abs() < 1e-6, "{fix:?}");
+        }
+    }
+
+    #[test]
+    fn a_computer_whose_clock_runs_away_from_the_satellites_is_followed() {
+        let mut receiver = Receiver::new(None);
+        let mut heard = Vec::new();
+        for second in 0..7200_i64 {
+            // 100 in a million too fast: 0.7 s in two hours.
+            heard.push(receiver.take(1000.1 * second as f64 + 70.0, &gga(1000 * second, FIELD)));
+        }
+        for fix in fixes(&heard) {
+            let true_ms = 1.0001 * fix.utc_ms as f64 + 70.0;
+            assert!((fix.time_ms - true_ms).abs() <= 12.1, "{fix:?}");
+        }
+    }
+
+    #[test]
+    fn a_lost_fix_is_marked_once_and_so_is_the_next_one() {
+        let lost = |second: i64, line: String| {
+            if (10..15).contains(&second) {
+                vec![sentence(&format!("GPRMC,{},V,,,,,,,311226,,,N", clock(1000 * second)))]
+            } else {
+                vec![line]
+            }
+        };
+        let (heard, receiver) = rolling(FIELD, 0, 30, lost);
+        assert_eq!(marks(&heard), [Mark::Found(Quality::Rtk), Mark::Lost, Mark::Found(Quality::Rtk)]);
+        assert_eq!(receiver.counts(), Counts { fixes: 25, losses: 1, jumps: 0, damaged: 0 });
+    }
+
+    /// As [`rolling`], with the fixes of some seconds two metres off.
+    fn off(seconds: std::ops::Range<i64>) -> (Vec<Heard>, Receiver) {
+        let plane = Plane::around(FIELD);
+        rolling(FIELD, 0, 30, |second, line| {
+            let place = plane.place(Metres { east: 0.5 * second as f64, north: 2.0 });
+            if !seconds.contains(&second) {
+                vec![line]
+            } else if line.contains("GGA") {
+                vec![gga(1000 * second, place)]
+            } else {
+                vec![rmc(1000 * second, place, DAYS[0].1)]
+            }
+        })
+    }
+
+    #[test]
+    fn fixes_that_jump_and_come_back_are_marked_and_not_used() {
+        let (heard, receiver) = off(10..13);
+        assert_eq!(receiver.counts(), Counts { fixes: 27, losses: 0, jumps: 3, damaged: 0 });
+        let jumped =
+            marks(&heard).into_iter().filter(|mark| matches!(mark, Mark::Jumped { far_m, .. } if *far_m >= 2.0));
+        assert_eq!(jumped.count(), 3);
+        assert!(fixes(&heard).iter().all(|fix| fix.track == 0));
+    }
+
+    #[test]
+    fn fixes_that_stay_where_they_have_jumped_to_are_another_track() {
+        let (heard, receiver) = off(10..30);
+        assert_eq!(receiver.counts(), Counts { fixes: 30, losses: 0, jumps: 11, damaged: 0 });
+        assert_eq!(marks(&heard).last(), Some(&Mark::Stayed));
+        let tracks: Vec<u32> = fixes(&heard).iter().map(|fix| fix.track).collect();
+        assert_eq!(tracks, [vec![0; 10], vec![1; 20]].concat());
+    }
+
+    #[test]
+    fn a_receiver_without_a_fix_from_the_beginning_is_marked_so() {
+        let mut receiver = Receiver::new(None);
+        let heard: Vec<Heard> =
+            (0..5).map(|second| receiver.take(1000.0 * f64::from(second), &sentence("GPRMC,,V,,,,,,,,,,N"))).collect();
+        assert_eq!(marks(&heard), [Mark::Lost]);
+        assert_eq!(receiver.midnight_ms(), None);
+    }
+}

@@ -1,0 +1,196 @@
+//! What a record has of a receiver, while it is written: its lines, and what is noticed of them.
+//!
+//! [`Recorder::take`] makes lines of the log out of bytes as they come. Sentences that tell of place or time stand
+//! there as they came, and so does every line that came damaged; other sentences are left out. Marks are those that a
+//! reader of the record finds anew. It knows no port: who has one tells by [`Recorder::found`] and [`Recorder::lost`]
+//! when it comes and goes.
+
+use crate::antenna::Antenna;
+use crate::job::{LONGEST_WAY, tick_mm};
+use crate::receiver::{Heard, Receiver};
+use crate::sentence::Line;
+use link::LineReader;
+use link::log::Kind;
+use link::session::Happening;
+
+/// A receiver that says nothing for so long is lost, in ms. None has less than a line in five seconds.
+const SILENCE_MS: u64 = 5_000;
+
+/// So many lines that came damaged, and none that did not, are no accident.
+const DAMAGED_IN_A_ROW: u32 = 20;
+
+/// Lines of the log: what they are, and what stands there.
+pub type Lines = Vec<(Kind, String)>;
+
+/// What a record has of a receiver.
+#[derive(Debug, Default)]
+pub struct Recorder {
+    receiver: Receiver,
+    lines: LineReader,
+    /// Whether nothing has ended yet since the port was opened, in the middle of a line.
+    is_first: bool,
+    /// When something came for the last time; none where that it does not was told.
+    heard_ms: Option<u64>,
+    /// Lines that came damaged since one that did not.
+    damaged: u32,
+    tick_m: f64,
+    /// The encoder's count, and ticks since the Uno began.
+    wheel: Option<(i32, i64)>,
+}
+
+impl Recorder {
+    /// One that has heard nothing, and the first line of the record: where the antenna is.
+    pub fn new(antenna: &Antenna) -> (Self, Lines) {
+        let recorder = Self { receiver: Receiver::new(antenna.error_m()), ..Self::default() };
+        (recorder, vec![(Kind::Antenna, antenna.to_string())])
+    }
+
+    /// The machine's side of the record.
+    pub fn happened(&mut self, time_ms: u64, happening: &Happening) {
+        match happening {
+            Happening::Connected { settings, .. } | Happening::Settings(settings) => {
+                let tick_m = tick_mm(settings) / 1000.0;
+                if matches!(happening, Happening::Connected { .. }) || tick_m != self.tick_m {
+                    self.wheel_lost();
+                }
+                self.tick_m = tick_m;
+            }
+            Happening::Lost(_) => self.wheel_lost(),
+            Happening::Status(status, _) => {
+                let step = |last: i32| status.position.wrapping_sub(last);
+                if self.wheel.is_some_and(|(last, _)| step(last).unsigned_abs() > LONGEST_WAY) {
+                    self.wheel_lost();
+                }
+                let ticks = self.wheel.map_or(0, |(last, ticks)| ticks + i64::from(step(last)));
+                self.wheel = Some((status.position, ticks));
+                self.receiver.rolled(time_ms as f64, ticks as f64 * self.tick_m, f64::from(status.speed_mm_s));
+            }
+            Happening::Event(..) | Happening::Command(_) | Happening::Answer(_) => {}
+        }
+    }
+
+    fn wheel_lost(&mut self) {
+        self.wheel = None;
+        self.receiver.wheel_lost();
+    }
+
+    /// The receiver's port is there, of this name.
+    pub fn found(&mut self, time_ms: u64, port: &str) -> Lines {
+        self.lines = LineReader::new();
+        self.is_first = true;
+        self.heard_ms = Some(time_ms);
+        vec![(Kind::GpsFound, port.to_owned())]
+    }
+
+    /// It is gone; why.
+    pub fn lost(&mut self, why: &str) -> Lines {
+        self.heard_ms = None;
+        let mut lines = vec![(Kind::GpsLost, why.to_owned())];
+        lines.extend(marks(&self.receiver.silent()));
+        lines
+    }
+
+    /// These bytes have come, or none have.
+    pub fn take(&mut self, time_ms: u64, bytes: &[u8]) -> Lines {
+        self.lines.take(bytes);
+        let mut lines = Lines::new();
+        while let Some(line) = self.lines.next_line() {
+            self.heard_ms = Some(time_ms);
+            let is_first = std::mem::take(&mut self.is_first);
+            let parsed = Line::parse(&line);
+            // The port was opened in the middle of it.
+            if parsed == Line::Damaged && is_first && !line.starts_with('$') {
+                continue;
+            }
+            self.damaged = if parsed == Line::Damaged { self.damaged.saturating_add(1) } else { 0 };
+            let kind = match parsed {
+                Line::Other => continue,
+                Line::Damaged => Kind::GpsDamaged,
+                Line::Report(_) => Kind::Gps,
+            };
+            let heard = self.receiver.take(time_ms as f64, &line);
+            lines.push((kind, line));
+            lines.extend(marks(&heard));
+            if self.damaged == DAMAGED_IN_A_ROW {
+                let why = "nothing that comes is NMEA 0183: see that --gps-baud is the receiver's, and to its cable";
+                lines.push((Kind::GpsMark, why.to_owned()));
+            }
+        }
+        if self.heard_ms.is_some_and(|heard_ms| time_ms.saturating_sub(heard_ms) > SILENCE_MS) {
+            lines.extend(self.lost("the receiver says nothing"));
+        }
+        lines
+    }
+
+    /// What was counted so far.
+    pub fn counts(&self) -> crate::receiver::Counts {
+        self.receiver.counts()
+    }
+}
+
+fn marks(heard: &Heard) -> Lines {
+    heard.marks.iter().map(|mark| (Kind::GpsMark, mark.to_string())).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GGA: &str = "$GPGGA,092750.000,5321.6802,N,00630.3372,W,1,8,1.03,61.7,M,55.2,M,,*76";
+
+    fn kinds(lines: &Lines) -> Vec<Kind> {
+        lines.iter().map(|(kind, _)| *kind).collect()
+    }
+
+    #[test]
+    fn lines_are_kept_however_they_come_in_pieces_and_damaged_ones_too() {
+        let stream = format!("80.1,M*12\r\n{GGA}\r\n$GPGSV,3,1,09*00\r\n{}\r\n{GGA}\r\n", GGA.replace("5321", "5322"));
+        for length in 1..60 {
+            let (mut recorder, _) = Recorder::new(&Antenna::default());
+            recorder.found(0, "a port");
+            let lines: Lines = stream.as_bytes().chunks(length).flat_map(|piece| recorder.take(10, piece)).collect();
+            assert_eq!(kinds(&lines), [Kind::Gps, Kind::GpsDamaged, Kind::GpsDamaged, Kind::Gps], "{length}");
+            assert_eq!(lines[0].1, GGA);
+        }
+    }
+
+    #[test]
+    fn noise_alone_as_with_another_baud_rate_is_told_once() {
+        let (mut recorder, _) = Recorder::new(&Antenna::default());
+        recorder.found(0, "a port");
+        let lines: Lines = (0..200).flat_map(|_| recorder.take(10, &[0x80, b'x', 0xFF, b'\n'])).collect();
+        let told: Vec<_> = lines.iter().filter(|(kind, _)| *kind == Kind::GpsMark).collect();
+        assert_eq!((told.len(), lines.len()), (1, 200), "{told:?}");
+        assert!(told[0].1.contains("--gps-baud"), "{told:?}");
+    }
+
+    #[test]
+    fn a_receiver_that_falls_silent_is_lost_once_and_so_is_its_fix() {
+        let (mut recorder, _) = Recorder::new(&Antenna::default());
+        recorder.found(0, "a port");
+        recorder.take(100, format!("{GGA}\r\n").as_bytes());
+        let later: Vec<Lines> = (1..10).map(|second| recorder.take(1000 * second, b"")).collect();
+        let told: Lines = later.into_iter().flatten().collect();
+        assert_eq!(kinds(&told), [Kind::GpsLost, Kind::GpsMark, Kind::GpsMark], "{told:?}");
+        assert_eq!(told[2].1, "no fix");
+        assert_eq!(kinds(&recorder.lost("unplugged")), [Kind::GpsLost]);
+    }
+
+    #[test]
+    fn what_the_record_says_of_the_antenna_is_read_again() {
+        for antenna in [
+            Antenna::default(),
+            Antenna { beam_ahead_mm: -250.5, beam_right_mm: 30.0, delay_ms: 80.0, ..Antenna::default() },
+            Antenna {
+                tool_ahead_mm: Some(-700.0),
+                tool_right_mm: Some(-5.0),
+                error_mm: Some(20.0),
+                ..Antenna::default()
+            },
+        ] {
+            let (_, lines) = Recorder::new(&antenna);
+            assert_eq!(Antenna::parse(&lines[0].1), Some(antenna));
+        }
+        assert_eq!(Antenna::parse("beam_ahead_mm=nan beam_right_mm=0 delay_ms=0"), None);
+    }
+}

@@ -1,0 +1,168 @@
+//! A job in numbers: the stand, the ground, the time, and how many places there are.
+//!
+//! Spacings are those between plants that follow each other on ground over which the machine was at work all the time,
+//! so that a headland is no gap in the stand: the work switch tells where the row ends. Where a spacing is longer than
+//! one and a half of the usual one, plants are missing in it. What was unknown was kept, and counts as a plant.
+
+use crate::job::{Did, Job, Thing, What, is_interpolated};
+use link::Class;
+use serde::Serialize;
+
+/// A spacing in which plants are missing is longer than so many usual ones.
+const GAP: f64 = 1.5;
+
+/// What is asked of the count.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stand {
+    /// From row to row, in mm.
+    pub row_spacing_mm: f64,
+    /// From plant to plant, in mm; none where it is the median of those found.
+    pub spacing_mm: Option<f64>,
+}
+
+/// A job in numbers.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Summary {
+    /// Plants, with those that were unknown and kept.
+    pub plants: u64,
+    /// Of them unknown.
+    pub unknown: u64,
+    /// Mean distance between plants that follow each other with none missing between, in mm.
+    pub spacing_mean_mm: Option<f64>,
+    /// Its standard deviation.
+    pub spacing_scatter_mm: Option<f64>,
+    /// Plants that are missing.
+    pub missing: u64,
+    /// Tall weeds.
+    pub weeds: u64,
+    /// Swings out of the row.
+    pub swings: u64,
+    /// Alarms.
+    pub alarms: u64,
+    /// What somebody has labelled.
+    pub labels: u64,
+    /// Ground of the row over which the machine was at work, in metres.
+    pub worked_m: f64,
+    /// Of it weeded.
+    pub weeded_m: f64,
+    /// The same as a share.
+    pub weeded_percent: Option<f64>,
+    /// Area: the ground worked, as wide as the rows are apart.
+    pub area_ha: f64,
+    /// Hours at work.
+    pub work_h: f64,
+    /// Hours of the record.
+    pub record_h: f64,
+    /// Things with a place between two fixes that follow each other.
+    pub measured: u64,
+    /// Things with a place over an outage.
+    pub interpolated: u64,
+    /// Things without a place.
+    pub without_place: u64,
+    /// Fixes that are used.
+    pub fixes: u64,
+    /// Times at which there was no fix any more.
+    pub fix_losses: u64,
+    /// Fixes that have jumped.
+    pub jumps: u64,
+    /// Lines of the receiver that came damaged.
+    pub damaged_lines: u64,
+    /// Times at which the receiver was gone or silent.
+    pub receiver_losses: u64,
+}
+
+impl Summary {
+    /// That of a job.
+    pub fn of(job: &Job, stand: &Stand) -> Self {
+        let mut summary = Self {
+            fixes: job.counts.fixes,
+            fix_losses: job.counts.losses,
+            jumps: job.counts.jumps,
+            damaged_lines: job.counts.damaged,
+            receiver_losses: job.unplugged,
+            ..Self::default()
+        };
+        for thing in job.things() {
+            match thing.what {
+                What::Object { class: Class::Weed, .. } => summary.weeds += 1,
+                What::Object { class, .. } => {
+                    summary.plants += 1;
+                    summary.unknown += u64::from(class == Class::Unknown);
+                }
+                What::SwingOut => summary.swings += 1,
+                What::Alarm => summary.alarms += 1,
+                What::Label(_) => summary.labels += 1,
+                What::SwingIn | What::Guarded => {}
+            }
+            match thing.found {
+                Err(_) => summary.without_place += 1,
+                Ok(_) if is_interpolated(thing) => summary.interpolated += 1,
+                Ok(_) => summary.measured += 1,
+            }
+        }
+        let (mut work_ms, mut record_ms) = (0, 0);
+        for stretch in &job.stretches {
+            record_ms += stretch.time_ms.end - stretch.time_ms.start;
+            for ground in stretch.ground.iter().filter(|ground| ground.did != Did::Rolled) {
+                let length_m = ground.way_m.end - ground.way_m.start;
+                summary.worked_m += length_m;
+                summary.weeded_m += if ground.did == Did::Weeded { length_m } else { 0.0 };
+                work_ms += ground.time_ms.end - ground.time_ms.start;
+            }
+        }
+        summary.weeded_percent = (summary.worked_m > 0.0).then(|| 100.0 * summary.weeded_m / summary.worked_m);
+        summary.area_ha = summary.worked_m * stand.row_spacing_mm / 1000.0 / 10_000.0;
+        summary.work_h = hours(work_ms);
+        summary.record_h = hours(record_ms);
+        summary.count_spacings(&spacings_mm(job), stand);
+        summary
+    }
+
+    fn count_spacings(&mut self, spacings_mm: &[f64], stand: &Stand) {
+        let mut sorted = spacings_mm.to_vec();
+        sorted.sort_by(f64::total_cmp);
+        let Some(usual_mm) = stand.spacing_mm.or_else(|| sorted.get(sorted.len() / 2).copied()) else { return };
+        if usual_mm <= 0.0 {
+            return;
+        }
+        let whole = |spacing_mm: &f64| (spacing_mm / usual_mm).round().max(1.0) as u64;
+        self.missing = spacings_mm.iter().filter(|&spacing| *spacing > GAP * usual_mm).map(|to| whole(to) - 1).sum();
+        let single: Vec<f64> = spacings_mm.iter().copied().filter(|&spacing| spacing <= GAP * usual_mm).collect();
+        let count = single.len() as f64;
+        if single.is_empty() {
+            return;
+        }
+        let mean = single.iter().sum::<f64>() / count;
+        self.spacing_mean_mm = Some(mean);
+        if single.len() > 1 {
+            let squares: f64 = single.iter().map(|spacing| (spacing - mean).powi(2)).sum();
+            self.spacing_scatter_mm = Some((squares / (count - 1.0)).sqrt());
+        }
+    }
+}
+
+fn hours(time_ms: u64) -> f64 {
+    time_ms as f64 / 3_600_000.0
+}
+
+/// The distances between plants that follow each other, in mm, where the machine was at work from one to the other.
+fn spacings_mm(job: &Job) -> Vec<f64> {
+    let mut spacings = Vec::new();
+    for stretch in &job.stretches {
+        let is_plant = |thing: &&Thing| matches!(thing.what, What::Object { class: Class::Plant | Class::Unknown, .. });
+        let plants: Vec<f64> = stretch.things.iter().filter(is_plant).map(|plant| plant.way_m).collect();
+        // Both are told by where the wheel was.
+        let rests: Vec<_> = stretch.ground.iter().filter(|ground| ground.did == Did::Rolled).collect();
+        for pair in plants.windows(2) {
+            let is_between = |way_m: f64| (pair[0]..pair[1]).contains(&way_m);
+            let rested = rests.iter().any(|rest| {
+                let contains_both = rest.way_m.start <= pair[0] && pair[1] <= rest.way_m.end;
+                contains_both || is_between(rest.way_m.start) || is_between(rest.way_m.end)
+            });
+            if !rested && pair[1] > pair[0] {
+                spacings.push(1000.0 * (pair[1] - pair[0]));
+            }
+        }
+    }
+    spacings
+}

@@ -1,0 +1,375 @@
+//! The antenna's track along the wheel's distance, and the places of what happened on it.
+//!
+//! A thing happened where the wheel had rolled some distance, and stands some way ahead of the antenna and to the right
+//! of it.
+//!
+//! - **The antenna's place** there lies between two fixes, at the wheel's share of the way. The machine may have rolled
+//!   over the same distance several times: the last time counts before the thing was told. What is fixed several times
+//!   while the wheel stands is fixed at the mean.
+//! - **The heading** is that of the straight line that fits so many fixes around there, by least squares over the
+//!   wheel's distance, that its error is [`HEADING_ERROR`]; [`LONGEST_CHORD_M`] are fitted at the most. It is the
+//!   machine's, not its motion's: a machine that rolls back keeps it.
+//! - **Outages.** Two fixes follow each other where no more than one and a half of the receiver's intervals lie
+//!   between. Else the machine is taken to have gone straight between them, by the wheel's distance, if that is not
+//!   longer than is allowed.
+
+use crate::plane::{Metres, Place, Plane};
+use crate::receiver::Fix;
+
+/// The heading's error that is aimed at, in radians: 20 mm for a metre from the antenna.
+pub const HEADING_ERROR: f64 = 0.02;
+
+/// The longest way over which a heading is sought, in metres. Rows are straighter than that is long.
+pub const LONGEST_CHORD_M: f64 = 30.0;
+
+/// A heading with a greater error is none, in radians.
+const NO_HEADING: f64 = 0.5;
+
+/// Fixes that follow each other are not farther apart than so many of the receiver's intervals.
+const INTERVALS: f64 = 1.5;
+
+/// How far behind the farthest place a machine rolls back and forth, in metres: what was told is sought so far back.
+const ROLLED_BACK_M: f64 = 50.0;
+
+/// How much later than it was told something may have happened, in ms: the record has a status, a fix and what was told
+/// each with a delay of its own.
+const TOLD_EARLY_MS: f64 = 1000.0;
+
+/// The wheel stands while it rolls less, in metres.
+const STANDING_M: f64 = 0.005;
+
+/// Where something stands beside the antenna.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Offset {
+    /// Metres ahead of the antenna; below 0 behind it.
+    pub ahead_m: f64,
+    /// Metres to the right of it, seen forward; below 0 to the left.
+    pub right_m: f64,
+}
+
+/// How a place was found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Basis {
+    /// Between two fixes that follow each other.
+    Measured,
+    /// Over an outage.
+    Interpolated,
+}
+
+/// Why there is no place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Missing {
+    /// There is no fix from before.
+    NoFixBefore,
+    /// There is no fix from behind.
+    NoFixBehind,
+    /// The way between both fixes is longer than is allowed.
+    OutageTooLong,
+    /// The fixes have jumped between, for good.
+    Jumped,
+    /// The fixes around do not tell how the machine was headed.
+    NoHeading,
+}
+
+impl Missing {
+    /// In words.
+    pub fn text(self) -> &'static str {
+        match self {
+            Self::NoFixBefore => "no fix before it",
+            Self::NoFixBehind => "no fix behind it",
+            Self::OutageTooLong => "the outage is too long",
+            Self::Jumped => "the fixes have jumped there",
+            Self::NoHeading => "the fixes do not tell the heading",
+        }
+    }
+}
+
+/// A place that was found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Found {
+    /// The place.
+    pub place: Place,
+    /// How it was found.
+    pub basis: Basis,
+    /// The standard deviation, in metres, that the fixes' own has it have. What an outage adds is not in it.
+    pub error_m: f64,
+    /// Milliseconds UTC as the fixes have them, when the antenna was there.
+    pub utc_ms: i64,
+}
+
+/// A fix on the way.
+#[derive(Clone, Copy, Debug)]
+struct Station {
+    time_ms: f64,
+    utc_ms: i64,
+    way_m: f64,
+    at: Metres,
+    error_m: f64,
+    track: u32,
+    /// Fixes that it is the mean of.
+    fixes: f64,
+    /// When the last of them was.
+    until_ms: f64,
+}
+
+/// The antenna's track along the wheel's distance.
+#[derive(Clone, Debug)]
+pub struct Track {
+    plane: Plane,
+    stations: Vec<Station>,
+    interval_ms: f64,
+    longest_outage_m: f64,
+}
+
+impl Track {
+    /// The track through these fixes, in order of time, each with how far the wheel had rolled, in metres; none where
+    /// there is no fix. The error is the standard deviation of a fix, where that is known.
+    pub fn through(fixes: &[(f64, Fix)], error_m: Option<f64>, longest_outage_m: f64) -> Option<Self> {
+        let plane = Plane::around(fixes.first()?.1.place);
+        let mut stations: Vec<Station> = Vec::with_capacity(fixes.len());
+        let mut intervals = Vec::new();
+        for &(way_m, fix) in fixes {
+            let at = plane.metres(fix.place);
+            let error_m = error_m.unwrap_or_else(|| fix.quality.usual_error_m());
+            let station = Station {
+                time_ms: fix.time_ms,
+                utc_ms: fix.utc_ms,
+                way_m,
+                at,
+                error_m,
+                track: fix.track,
+                fixes: 1.0,
+                until_ms: fix.time_ms,
+            };
+            let Some(last) = stations.last_mut() else {
+                stations.push(station);
+                continue;
+            };
+            intervals.push(fix.time_ms - last.until_ms);
+            if last.track == fix.track && (way_m - last.way_m).abs() < STANDING_M {
+                last.fixes += 1.0;
+                last.at = last.at.plus(at.minus(last.at).times(1.0 / last.fixes));
+                last.error_m = last.error_m.max(error_m);
+                last.until_ms = fix.time_ms;
+            } else {
+                stations.push(station);
+            }
+        }
+        intervals.sort_by(f64::total_cmp);
+        let interval_ms = intervals.get(intervals.len() / 2).copied().unwrap_or(f64::INFINITY);
+        Some(Self { plane, stations, interval_ms, longest_outage_m })
+    }
+
+    /// The place of something that stands so beside the antenna, where the wheel had rolled so far, and that was told
+    /// at that time of the record's clock.
+    ///
+    /// # Errors
+    /// Why it has none.
+    pub fn find(&self, way_m: f64, told_ms: f64, offset: Offset) -> Result<Found, Missing> {
+        let first = self.passed(way_m, told_ms)?;
+        let (from, to) = (&self.stations[first], &self.stations[first + 1]);
+        if from.track != to.track {
+            return Err(Missing::Jumped);
+        }
+        let basis = if self.follow(from, to) { Basis::Measured } else { Basis::Interpolated };
+        if basis == Basis::Interpolated && (to.way_m - from.way_m).abs() > self.longest_outage_m {
+            return Err(Missing::OutageTooLong);
+        }
+        let share = (way_m - from.way_m) / (to.way_m - from.way_m);
+        let antenna = from.at.plus(to.at.minus(from.at).times(share));
+        let mut error_m = from.error_m.max(to.error_m);
+        let mut at = antenna;
+        let beside_m = offset.ahead_m.hypot(offset.right_m);
+        if beside_m > 0.0 {
+            let (forward, heading_error) = self.heading(first, way_m).ok_or(Missing::NoHeading)?;
+            at = at.plus(forward.times(offset.ahead_m)).plus(forward.turned_right().times(offset.right_m));
+            error_m = error_m.hypot(beside_m * heading_error);
+        }
+        // The wheel stands at the beginning of the pair, and at its end.
+        let began = from.utc_ms as f64 + (from.until_ms - from.time_ms);
+        let utc_ms = began + share * (to.utc_ms as f64 - began);
+        Ok(Found { place: self.plane.place(at), basis, error_m, utc_ms: utc_ms.round() as i64 })
+    }
+
+    /// The first of the two fixes between which the wheel rolled over this distance for the last time before something
+    /// was told.
+    fn passed(&self, way_m: f64, told_ms: f64) -> Result<usize, Missing> {
+        let before = self.stations.partition_point(|station| station.time_ms <= told_ms + TOLD_EARLY_MS);
+        for first in (0..before).rev() {
+            let from_m = self.stations[first].way_m;
+            let Some(to) = self.stations.get(first + 1) else { continue };
+            let (low, high) = (from_m.min(to.way_m), from_m.max(to.way_m));
+            if (low..=high).contains(&way_m) && high > low {
+                return Ok(first);
+            }
+            if high < way_m - ROLLED_BACK_M.max(self.longest_outage_m) {
+                break;
+            }
+        }
+        // It was told before the next fix, or in front of all.
+        let farthest = self.stations[..before].iter().map(|station| station.way_m).fold(f64::NEG_INFINITY, f64::max);
+        Err(if way_m > farthest && before > 0 { Missing::NoFixBehind } else { Missing::NoFixBefore })
+    }
+
+    /// Whether one fix follows the other without an outage.
+    fn follow(&self, from: &Station, to: &Station) -> bool {
+        to.time_ms - from.until_ms <= INTERVALS * self.interval_ms
+    }
+
+    /// The machine's heading between a fix and the next, as a metre forward, and its standard deviation in radians.
+    fn heading(&self, first: usize, way_m: f64) -> Option<(Metres, f64)> {
+        let stations = &self.stations;
+        let track = stations[first].track;
+        let is_in =
+            |station: &Station| station.track == track && (station.way_m - way_m).abs() <= LONGEST_CHORD_M / 2.0;
+        let (mut begin, mut end) = (first, first + 2);
+        loop {
+            let (heading, error) = fitted(&stations[begin..end]);
+            let behind = begin.checked_sub(1).filter(|&at| is_in(&stations[at]));
+            let ahead = stations.get(end).filter(|station| is_in(station));
+            let is_done = error <= HEADING_ERROR || (behind.is_none() && ahead.is_none());
+            if is_done {
+                let length = heading.length();
+                return (error <= NO_HEADING && length > 0.0).then(|| (heading.times(1.0 / length), error));
+            }
+            begin = behind.unwrap_or(begin);
+            end += usize::from(ahead.is_some());
+        }
+    }
+}
+
+/// The direction of the straight line that fits these fixes over the wheel's distance, and its standard deviation in
+/// radians.
+fn fitted(stations: &[Station]) -> (Metres, f64) {
+    let count = stations.len() as f64;
+    let (mut mean_m, mut middle, mut error_m) = (0.0, Metres::default(), 0.0_f64);
+    for station in stations {
+        mean_m += station.way_m / count;
+        middle = middle.plus(station.at.times(1.0 / count));
+        error_m = error_m.max(station.error_m);
+    }
+    let (mut spread, mut slope) = (0.0, Metres::default());
+    for station in stations {
+        let way_m = station.way_m - mean_m;
+        spread += way_m * way_m;
+        slope = slope.plus(station.at.minus(middle).times(way_m));
+    }
+    (slope, error_m / spread.sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sentence::Quality;
+    use proptest::prelude::*;
+
+    const FIELD: Place = Place { latitude: -33.4, longitude: -179.999_99 };
+
+    /// Fixes once a second, at half a metre a second, of a machine whose antenna is there after so many metres.
+    fn driven(ways_m: impl IntoIterator<Item = f64>, at: impl Fn(f64) -> Metres) -> Vec<(f64, Fix)> {
+        let plane = Plane::around(FIELD);
+        let fix = |(second, way_m): (usize, f64)| {
+            let (time_ms, utc_ms) = (1000.0 * second as f64, 1000 * second as i64);
+            let fix = Fix { time_ms, utc_ms, place: plane.place(at(way_m)), quality: Quality::Rtk, track: 0 };
+            (way_m, fix)
+        };
+        ways_m.into_iter().enumerate().map(fix).collect()
+    }
+
+    fn every_half_metre(count: u32) -> impl Iterator<Item = f64> {
+        (0..count).map(|second| 0.5 * f64::from(second))
+    }
+
+    #[track_caller]
+    fn off_m(found: Result<Found, Missing>, metres: Metres) -> f64 {
+        Plane::around(FIELD).metres(found.expect("it has a place").place).minus(metres).length()
+    }
+
+    proptest! {
+        #[test]
+        fn on_a_straight_row_a_place_is_where_it_is_whatever_the_direction_and_the_offset(
+            direction in 0.0..std::f64::consts::TAU, way_m in 0.1..29.4_f64, ahead_m in -3.0..3.0_f64, right_m in -3.0..3.0_f64,
+        ) {
+            let forward = Metres { east: direction.sin(), north: direction.cos() };
+            let fixes = driven(every_half_metre(60), |way_m| forward.times(way_m));
+            let track = Track::through(&fixes, None, 20.0).expect("there are fixes");
+            let found = track.find(way_m, 2000.0 * way_m, Offset { ahead_m, right_m });
+            let expected = forward.times(way_m + ahead_m).plus(forward.turned_right().times(right_m));
+            prop_assert!(off_m(found, expected) < 1e-4);
+            prop_assert_eq!(found.expect("it has a place").utc_ms, (2000.0 * way_m).round() as i64);
+        }
+
+        #[test]
+        fn what_happened_in_an_outage_is_between_the_fixes_on_both_sides_where_the_way_may_be_so_long(
+            lost in 2..50_u32, length in 1..40_u32, way_m in 0.0..29.0_f64,
+        ) {
+            let fixes = driven(every_half_metre(60), |way_m| Metres { east: way_m, north: 0.0 });
+            let kept: Vec<_> =
+                fixes.iter().enumerate().filter(|(at, _)| !(lost..lost + length).contains(&(*at as u32))).map(|(_, it)| *it).collect();
+            let track = Track::through(&kept, None, 10.0).expect("there are fixes");
+            let found = track.find(way_m, 2000.0 * way_m, Offset::default());
+            let outage = 0.5 * f64::from(lost - 1)..0.5 * f64::from(lost + length);
+            let expected = Metres { east: way_m, north: 0.0 };
+            if !outage.contains(&way_m) {
+                prop_assert_eq!(found.map(|found| found.basis), Ok(Basis::Measured));
+                prop_assert!(off_m(found, expected) < 1e-4);
+            } else if outage.end > 29.5 {
+                prop_assert_eq!(found, Err(Missing::NoFixBehind));
+            } else if outage.end - outage.start > 10.0 {
+                prop_assert_eq!(found, Err(Missing::OutageTooLong));
+            } else {
+                prop_assert_eq!(found.map(|found| found.basis), Ok(Basis::Interpolated));
+                prop_assert!(off_m(found, expected) < 1e-4);
+            }
+        }
+    }
+
+    #[test]
+    fn before_the_first_fix_and_behind_the_last_there_is_no_place() {
+        let fixes = driven(every_half_metre(10), |way_m| Metres { east: way_m, north: 0.0 });
+        let track = Track::through(&fixes, None, 20.0).expect("there are fixes");
+        assert_eq!(track.find(-0.1, 5000.0, Offset::default()), Err(Missing::NoFixBefore));
+        assert_eq!(track.find(4.6, 9000.0, Offset::default()), Err(Missing::NoFixBehind));
+        assert_eq!(track.find(1.0, -1500.0, Offset::default()), Err(Missing::NoFixBefore));
+        assert!(Track::through(&[], None, 20.0).is_none());
+    }
+
+    #[test]
+    fn a_machine_that_rolls_back_keeps_its_heading_and_the_last_pass_counts() {
+        // Four metres on, two back along its way, and on along another, a metre to the north.
+        let ways = (0..=8).chain((4..8).rev()).chain(5..=12).map(|step| 0.5 * f64::from(step));
+        let mut fixes = driven(ways, |way_m| Metres { east: way_m, north: 0.0 });
+        let plane = Plane::around(FIELD);
+        for (way_m, fix) in &mut fixes[13..] {
+            fix.place = plane.place(Metres { east: *way_m, north: 1.0 });
+        }
+        let track = Track::through(&fixes, None, 20.0).expect("there are fixes");
+        let ahead = Offset { ahead_m: 1.0, right_m: 0.0 };
+        assert!(off_m(track.find(3.25, 7000.0, ahead), Metres { east: 4.25, north: 0.0 }) < 1e-3);
+        assert!(off_m(track.find(3.25, 10_400.0, ahead), Metres { east: 4.25, north: 0.0 }) < 1e-3, "on the way back");
+        let later = track.find(3.25, 16_000.0, Offset::default());
+        assert!(off_m(later, Metres { east: 3.25, north: 1.0 }) < 1e-3);
+    }
+
+    #[test]
+    fn where_the_fixes_have_jumped_for_good_nothing_is_interpolated() {
+        let mut fixes = driven(every_half_metre(20), |way_m| Metres { east: way_m, north: 0.0 });
+        fixes[10..].iter_mut().for_each(|(_, fix)| fix.track = 1);
+        let track = Track::through(&fixes, None, 20.0).expect("there are fixes");
+        assert_eq!(track.find(4.75, 9500.0, Offset::default()), Err(Missing::Jumped));
+        assert!(track.find(4.25, 9500.0, Offset { ahead_m: 1.0, right_m: 0.0 }).is_ok());
+    }
+
+    #[test]
+    fn a_standing_machine_is_at_the_mean_of_its_fixes_and_two_alone_tell_no_heading_through_noise() {
+        let mut fixes = driven([0.0, 0.0, 0.0, 0.5], |way_m| Metres { east: way_m, north: 0.0 });
+        let plane = Plane::around(FIELD);
+        for (at, north) in [(0, 0.3), (1, -0.3), (2, 0.6)] {
+            fixes[at].1.place = plane.place(Metres { east: 0.0, north });
+        }
+        let track = Track::through(&fixes, Some(0.5), 20.0).expect("there are fixes");
+        assert!(off_m(track.find(0.0, 4000.0, Offset::default()), Metres { east: 0.0, north: 0.2 }) < 1e-4);
+        let beside = Offset { ahead_m: 1.0, right_m: 0.0 };
+        assert_eq!(track.find(0.25, 4000.0, beside), Err(Missing::NoHeading));
+    }
+}

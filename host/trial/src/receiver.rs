@@ -1,0 +1,194 @@
+//! A simulated satellite receiver on the machine: what its antenna is told by satellites, as lines of NMEA 0183.
+//!
+//! The machine goes straight on from a place on the earth in one direction. So often a second, RMC and GGA tell where
+//! the antenna is, with noise to the east and to the north that is normal and independent from fix to fix; they come
+//! some time after the moment that they tell of. [`Trouble`] has the fix lost, has it jump, and has bytes of lines
+//! changed.
+//!
+//! A real one's error wanders for minutes instead of changing from fix to fix. That a machine sways and turns is left
+//! out too.
+
+use places::plane::{Metres, Place, Plane};
+use places::sentence::DAY_MS;
+use places::track::Offset;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use std::ops::Range;
+
+/// A receiver and where its antenna is.
+#[derive(Clone, Debug)]
+pub struct ReceiverSetup {
+    /// Fixes a second.
+    pub rate_hz: f64,
+    /// The standard deviation of a fix to the east, and to the north.
+    pub error_mm: f64,
+    /// From the moment of a fix until its lines have come.
+    pub delay_ms: f64,
+    /// Where the beam stands beside the antenna.
+    pub beam: Offset,
+    /// Where the beam is when the machine has not rolled yet.
+    pub from: Place,
+    /// Where the machine is headed: degrees from north to the east.
+    pub direction_degrees: f64,
+    /// When the Uno is powered up: milliseconds from 1970, UTC.
+    pub began_ms: i64,
+    /// What goes wrong, if anything does.
+    pub trouble: Option<Trouble>,
+    /// Which of all the possible errors.
+    pub seed: u64,
+}
+
+/// What goes wrong with a receiver, over and over.
+#[derive(Clone, Debug)]
+pub struct Trouble {
+    /// Seconds after which it begins anew.
+    pub every_s: f64,
+    /// When there is no fix, in seconds of that.
+    pub outage_s: Range<f64>,
+    /// When the fixes are somewhere else.
+    pub jump_s: Range<f64>,
+    /// How far that is, in metres to the north.
+    pub jump_m: f64,
+    /// The share of lines of which a byte is changed.
+    pub damaged: f64,
+}
+
+impl Default for ReceiverSetup {
+    /// A receiver with RTK on a machine whose antenna is half a metre behind its beam.
+    fn default() -> Self {
+        Self {
+            rate_hz: 5.0,
+            error_mm: 15.0,
+            delay_ms: 0.0,
+            beam: Offset { ahead_m: 0.5, right_m: 0.0 },
+            from: Place { latitude: 52.279, longitude: 8.0255 },
+            direction_degrees: 75.0,
+            began_ms: 1_780_000_000_000,
+            trouble: None,
+            seed: 1,
+        }
+    }
+}
+
+impl Default for Trouble {
+    /// Each minute six seconds without a fix, and three of them two metres off; a line in a hundred comes damaged.
+    fn default() -> Self {
+        Self { every_s: 60.0, outage_s: 40.0..46.0, jump_s: 20.0..23.0, jump_m: 2.0, damaged: 0.01 }
+    }
+}
+
+/// A simulated receiver.
+#[derive(Clone, Debug)]
+pub struct SimulatedReceiver {
+    setup: ReceiverSetup,
+    plane: Plane,
+    noise: ChaCha8Rng,
+    /// Fixes that were told.
+    told: u64,
+}
+
+impl SimulatedReceiver {
+    /// One that has told nothing.
+    pub fn new(setup: ReceiverSetup) -> Self {
+        let plane = Plane::around(setup.from);
+        let noise = ChaCha8Rng::seed_from_u64(setup.seed);
+        Self { setup, plane, noise, told: 0 }
+    }
+
+    /// Where something stands that the beam reaches when the machine has rolled so far, and that is so far beside the
+    /// beam.
+    pub fn place(&self, way_m: f64, beside: Offset) -> Place {
+        self.plane.place(self.metres(way_m, beside))
+    }
+
+    fn metres(&self, way_m: f64, beside: Offset) -> Metres {
+        let (east, north) = self.setup.direction_degrees.to_radians().sin_cos();
+        let forward = Metres { east, north };
+        forward.times(way_m + beside.ahead_m).plus(forward.turned_right().times(beside.right_m))
+    }
+
+    /// What has come by this time, in seconds since the Uno was powered up. `way_m` says how far the machine had rolled
+    /// at a time.
+    pub fn bytes_until(&mut self, time_s: f64, way_m: impl Fn(f64) -> f64) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        loop {
+            let moment_s = self.told as f64 / self.setup.rate_hz;
+            if moment_s + self.setup.delay_ms / 1000.0 > time_s {
+                return bytes;
+            }
+            self.told += 1;
+            for line in self.sentences(moment_s, way_m(moment_s)) {
+                bytes.extend(self.sent(line));
+            }
+        }
+    }
+
+    fn sentences(&mut self, moment_s: f64, way_m: f64) -> [String; 2] {
+        let Offset { ahead_m, right_m } = self.setup.beam;
+        let mut at = self.metres(way_m, Offset { ahead_m: -ahead_m, right_m: -right_m });
+        let error_m = self.setup.error_mm / 1000.0;
+        at = at.plus(Metres { east: self.normal(), north: self.normal() }.times(error_m));
+        let mut has_fix = true;
+        if let Some(trouble) = &self.setup.trouble {
+            let second = moment_s.rem_euclid(trouble.every_s);
+            has_fix = !trouble.outage_s.contains(&second);
+            if trouble.jump_s.contains(&second) {
+                at.north += trouble.jump_m;
+            }
+        }
+        let utc_ms = self.setup.began_ms + (moment_s * 1000.0).round() as i64;
+        let (clock, date) = (clock(utc_ms), date(utc_ms));
+        if !has_fix {
+            return [format!("GNRMC,{clock},V,,,,,,,{date},,,N"), format!("GNGGA,{clock},,,,,0,00,99.9,,M,,M,,")];
+        }
+        let place = coordinates(self.plane.place(at));
+        let (mode, quality) = match self.setup.error_mm {
+            ..=50.0 => ('R', 4),
+            ..=400.0 => ('F', 5),
+            ..=1000.0 => ('D', 2),
+            _ => ('A', 1),
+        };
+        [
+            format!("GNRMC,{clock},A,{place},,,{date},,,{mode}"),
+            format!("GNGGA,{clock},{place},{quality},14,0.7,60.0,M,46.0,M,,"),
+        ]
+    }
+
+    fn normal(&mut self) -> f64 {
+        StandardNormal.sample(&mut self.noise)
+    }
+
+    /// A sentence with its frame, as it goes over the wire.
+    fn sent(&mut self, text: String) -> Vec<u8> {
+        let checksum = text.bytes().fold(0, |sum, byte| sum ^ byte);
+        let mut bytes = format!("${text}*{checksum:02X}\r\n").into_bytes();
+        let damaged = self.setup.trouble.as_ref().map_or(0.0, |trouble| trouble.damaged);
+        if damaged > 0.0 && self.noise.random_bool(damaged) {
+            let at = self.noise.random_range(0..text.len());
+            bytes[at] ^= 1 << self.noise.random_range(0..7);
+        }
+        bytes
+    }
+}
+
+fn clock(utc_ms: i64) -> String {
+    let ms = utc_ms.rem_euclid(DAY_MS);
+    format!("{:02}{:02}{:02}.{:03}", ms / 3_600_000, ms / 60_000 % 60, ms / 1000 % 60, ms % 1000)
+}
+
+fn date(utc_ms: i64) -> String {
+    let date = chrono::DateTime::from_timestamp_millis(utc_ms).unwrap_or_default();
+    date.format("%d%m%y").to_string()
+}
+
+fn coordinates(place: Place) -> String {
+    // Minutes with seven decimals are 0.2 mm. Counted whole, none of them becomes sixty.
+    let angle = |degrees: f64| {
+        let units = (degrees.abs() * 6e8).round() as u64;
+        (units / 600_000_000, (units % 600_000_000) as f64 / 1e7)
+    };
+    let ((north, north_minutes), (east, east_minutes)) = (angle(place.latitude), angle(place.longitude));
+    let (ns, ew) = (if place.latitude < 0.0 { 'S' } else { 'N' }, if place.longitude < 0.0 { 'W' } else { 'E' });
+    format!("{north:02}{north_minutes:010.7},{ns},{east:03}{east_minutes:010.7},{ew}")
+}
