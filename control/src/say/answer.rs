@@ -135,7 +135,7 @@ impl Answer {
                 Self::Done
             }
             Self::Refused(refusal, setting) => {
-                write_refusal(refusal, setting, line);
+                write_refusal(refusal, setting, controller, line);
                 Self::Done
             }
         };
