@@ -10,7 +10,7 @@ use crate::{
     ground::{examples, features},
     memory::{ERASED, Memory, checksum},
 };
-use knn::{Example, Examples, Neighbour};
+use knn::{Example, Examples, Nearest};
 
 /// Examples that can be taught.
 pub const CAPACITY: u8 = 32;
@@ -176,15 +176,10 @@ impl<M: Memory> Examples<{ features::COUNT }> for FieldExamples<M> {
     }
 
     /// Reads each slot once.
-    fn keep_nearest(
-        &self,
-        query: &[u8; features::COUNT],
-        nearest: &mut [Neighbour],
-        level: &mut impl FnMut(Neighbour),
-    ) {
+    fn keep_nearest<const CLASSES: usize>(&self, query: &[u8; features::COUNT], nearest: &mut Nearest<CLASSES>) {
         for (number, &slot) in (0..).zip(&self.slots) {
             if slot == Slot::Held {
-                example_in(self.read(number)).neighbour_of(query).join(nearest, level);
+                nearest.join(example_in(self.read(number)).neighbour_of(query));
             }
         }
     }

@@ -5,7 +5,7 @@ use crate::{
     ground::class::Classifier,
     measure::{quadrature, readings::Readings, reset::Cause},
     memory::Memory,
-    operate::{calibration::Distance, event::Event, lamp, objects::Judged, plot::Plot, state::State},
+    operate::{calibration::Distance, event::Event, lamp, objects::Objects, plot::Plot, state::State},
     settings::{Setting, Settings},
     units::Ticks,
 };
@@ -125,9 +125,9 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         &self.classifier
     }
 
-    /// The last objects, the oldest first.
-    pub fn objects(&self) -> &[Judged] {
-        self.objects.all()
+    /// The last objects.
+    pub fn objects(&self) -> &Objects {
+        &self.objects
     }
 
     /// Why the machine was reset.
