@@ -3,7 +3,7 @@
 //! Features come from few values, or from the extremes, as often as from all bytes: level distances, on which the rules
 //! for ties rest, are then common.
 
-use knn::{Answer, ClassifyError, Example, Examples, Kind, MAX_K, Nearest, Neighbour, Scale, Table, classify};
+use knn::{Answer, ClassifyError, Example, Examples, Kind, MAX_K, Nearest, Scale, Table, classify};
 use proptest::prelude::*;
 use smartcore::{
     dataset::iris,

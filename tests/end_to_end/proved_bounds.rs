@@ -133,9 +133,16 @@ fn loops_are_said_to_turn_as_often_as_the_constants_behind_them_have_it() {
     for function in ["say::packed::Text::find", "say::command::split_word", "say::command::number"] {
         assert_eq!(passes(&format!("control::{function}")), LINE_LENGTH + 1, "{function}");
     }
-    assert_eq!(passes("control::say::answer::Answer::write_line"), usize::from(field_examples::CAPACITY) + 1);
+    for function in ["answer::Answer::write_line", "execute::execute"] {
+        assert_eq!(
+            passes(&format!("control::say::{function}")),
+            usize::from(field_examples::CAPACITY) + 1,
+            "{function}"
+        );
+    }
+    assert_eq!(passes("knn::nearest::Nearest::are_level"), usize::from(u8::MAX) + 1);
     assert_eq!(passes("knn::classify::search"), usize::from(field_examples::CAPACITY).max(examples::COUNT) + 1);
-    for function in ["knn::neighbour::Neighbour::displace", "control::ground::nearest::Nearest::vote"] {
+    for function in ["knn::nearest::Nearest::join", "control::ground::nearest::Nearest::vote"] {
         assert_eq!(passes(function), usize::from(MAX_K) + 1, "{function}");
     }
     // What is copied lies in a variable or on the stack.

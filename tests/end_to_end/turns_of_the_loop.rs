@@ -5,6 +5,7 @@
 //! is counted in cycles from one reset of the watchdog to the next, what interrupts take of it included.
 
 use crate::common::{Run, ask, run_for_ms, steady, trial, woken_up};
+use control::ground::field_examples;
 use control::say::command::{LINE_LENGTH, Word};
 use control::settings::Setting;
 use field::planting::Planting;
@@ -127,10 +128,15 @@ fn lines() -> Vec<String> {
 
 /// A machine on its way along a row at 5 km/h, telling all that it sees.
 fn under_way() -> Run {
+    under_way_after(&["plot on"])
+}
+
+/// The same, behind commands that it got before.
+fn under_way_after(commands: &[&str]) -> Run {
     let row = Planting { plants: 60, weeds: 30, spacing_mm: 300.0, ragged: true, ..Planting::default() }.grow(1);
     let row = row.expect("everything has room");
     let end_mm = row.span_mm().end;
-    Run::begin(trial(row, steady(1000.0, end_mm)), &["plot on"])
+    Run::begin(trial(row, steady(1000.0, end_mm)), commands)
 }
 
 #[test]
@@ -173,6 +179,23 @@ fn a_turn_that_has_fifteen_examples_vote_takes_at_most_a_millisecond_and_a_half(
     let longest = run.uno.turns().expect("they are measured").longest;
     println!("{longest} of {} cycles", TURN * 3 / 2);
     assert!(longest <= TURN * 3 / 2, "a turn took {longest} cycles");
+}
+
+#[test]
+fn a_turn_that_asks_as_many_examples_as_can_be_taught_takes_at_most_two_milliseconds() {
+    // In the midst of the built-in ones, so that they find places among the nearest.
+    let teach = |number| {
+        let features = [128, 100 + number, 128, 90 + 2 * number, 128].map(|feature| format!("teach {feature}"));
+        features.into_iter().chain([format!("teach {}", if number % 2 == 0 { "plant" } else { "weed" })])
+    };
+    let mut commands: Vec<String> = (0..field_examples::CAPACITY).flat_map(teach).collect();
+    commands.extend(["set k 15", "plot on"].map(str::to_owned));
+    let mut run = under_way_after(&commands.iter().map(String::as_str).collect::<Vec<_>>());
+    run.uno.measure_turns();
+    run.roll_to_the_end();
+    let longest = run.uno.turns().expect("they are measured").longest;
+    println!("{longest} of {} cycles", TURN * 2);
+    assert!(longest <= TURN * 2, "a turn took {longest} cycles");
 }
 
 /// Types a line and waits for its verdict; returns the cycles of the longest turn until then.
