@@ -143,8 +143,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// a file.
     ///
     /// # Errors
-    /// [`Refusal::NotInHold`], as an object that is judged while an example is written waits for its byte; [`Refusal::NotTold`] and
-    /// [`Refusal::ExamplesFull`].
+    /// [`Refusal::NotInHold`], as what is told has not been seen by this machine; [`Refusal::NotTold`] and [`Refusal::ExamplesFull`].
     pub fn teach(&mut self, label: u8) -> Result<(), Refusal> {
         if self.is_working() {
             return Err(Refusal::NotInHold);
