@@ -288,7 +288,7 @@ mod tests {
         let mut store = store();
         store.add(example(0)).unwrap();
         while !store.carry_on() {}
-        let [a, b, c, d, e, label, ..] = store.read(0);
+        let Example { features: [a, b, c, d, e], label } = example(0);
         let [low, high] = checksum(&[a, b, c, d, e, label, !SCALE_MARK[0], SCALE_MARK[1]]).to_le_bytes();
         store.memory.bytes[6..SLOT].copy_from_slice(&[low, high]);
         let store = restart(store);
