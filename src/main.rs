@@ -2,8 +2,7 @@
 //!
 //! The crate `control` decides, and each file beside this one knows one peripheral with its interrupt, which only counts,
 //! stamps or moves bytes. This is the only file that knows them all. The loop never waits for the serial line or the
-//! field; the one thing that it may wait for is a byte on its way into the EEPROM, when an object is to be judged just
-//! then.
+//! field, nor for a byte on its way into the EEPROM.
 
 #![no_std]
 #![no_main]

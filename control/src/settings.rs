@@ -265,8 +265,14 @@ impl Settings {
     }
 
     /// The ground wheel as its diameter and its encoder give it, whatever was measured.
-    pub fn nominal_wheel(&self) -> Wheel {
+    fn nominal_wheel(&self) -> Wheel {
         Wheel::of_diameter(self.get(Setting::TicksPerRev), self.get(Setting::WheelMm))
+    }
+
+    /// Ticks a metre of that wheel.
+    #[inline(never)]
+    pub fn nominal_ticks_per_m(&self) -> u16 {
+        self.nominal_wheel().ticks(1000).0 as u16
     }
 
     /// A setting in millimetres as ticks of the present wheel.

@@ -181,7 +181,8 @@ fn whatever_the_eeprom_holds_the_machine_wakes_up_with_whole_settings_or_none_an
         }
 
         // A save on top of all that, and the power goes.
-        let power = usize::from(eeprom.power) % (COPY + 1);
+        // A save writes the first byte twice.
+        let power = usize::from(eeprom.power) % (COPY + 2);
         let new = settings(&[(0, 1), (10, eeprom.power.into())]);
         let mut failing = memory;
         failing.lose_power_after(power);
@@ -190,6 +191,6 @@ fn whatever_the_eeprom_holds_the_machine_wakes_up_with_whole_settings_or_none_an
         let once_saved = eeprom.saved.iter().any(|changes| after == Some(settings(changes)));
         let filled = eeprom.filled_with.is_some();
         assert!(after == found || after.as_ref() == Some(&new) || once_saved || filled, "{power} bytes: {after:?}");
-        assert!(power < COPY || after == Some(new), "nothing was lost");
+        assert!(power <= COPY || after == Some(new), "nothing was lost");
     });
 }

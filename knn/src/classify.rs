@@ -1,9 +1,8 @@
 //! The search for the k nearest examples, and their vote.
 //!
-//! One pass over the examples keeps the k nearest so far, sorted, and counts those that are as far as the k-th of them but
-//! have found no place: they vote too.
+//! One pass over the examples keeps the [`Nearest`] so far.
 
-use crate::{Examples, Neighbour};
+use crate::{Examples, Nearest, Neighbour};
 
 /// The largest k.
 pub const MAX_K: u8 = 15;
@@ -97,59 +96,46 @@ pub fn classify<const FEATURES: usize, const CLASSES: usize>(
 ) -> Result<Answer<CLASSES>, ClassifyError> {
     const { assert!(CLASSES > 0 && CLASSES <= 256, "there are 1 to 256 classes") };
     // Clearing room for all 15 takes 200 cycles more than for 3 on an ATmega328P.
-    const FREE: Neighbour = Neighbour::FARTHEST;
+    const FREE: Neighbour = Neighbour::new(0, 0);
     match k {
-        1..=3 => search(examples, features, [FREE, FREE, FREE].get_mut(..usize::from(k)), radius),
-        _ => search(examples, features, [FREE; MAX_K as usize].get_mut(..usize::from(k)), radius),
+        1..=3 => search(examples, features, k, &mut [FREE, FREE, FREE], radius),
+        _ => search(examples, features, k, &mut [FREE; MAX_K as usize], radius),
     }
 }
 
-/// [`classify`] with places for the k nearest, nothing in any of them yet.
+/// [`classify`] with places for the k nearest, at least.
 ///
 /// Out of line, because AVR reaches the first 63 bytes of a stack frame by far the fastest: the places lie in the caller's.
 #[inline(never)]
 fn search<const FEATURES: usize, const CLASSES: usize>(
     examples: &(impl Examples<FEATURES> + ?Sized),
     features: &[u8; FEATURES],
-    nearest: Option<&mut [Neighbour]>,
+    k: u8,
+    places: &mut [Neighbour],
     radius: u32,
 ) -> Result<Answer<CLASSES>, ClassifyError> {
-    let Some(nearest @ [_, ..]) = nearest else { return Err(ClassifyError::KOutOfRange) };
-    // Those that found no place although they are as far as the farthest that has one. Where a nearer one is the farthest
-    // later on, they were none after all.
-    let mut level = Level::at(Neighbour::FARTHEST);
-    examples.keep_nearest(features, nearest, &mut |neighbour| level.count(neighbour));
-    let (Some(last), Some(first)) = (nearest.first(), nearest.last()) else {
-        return Err(ClassifyError::KOutOfRange);
-    };
-    if last.is_none() {
-        return Err(if first.is_none() { ClassifyError::NoExamples } else { ClassifyError::TooFewExamples });
+    let Some(places @ [_, ..]) = places.get_mut(..k.into()) else { return Err(ClassifyError::KOutOfRange) };
+    let mut nearest = Nearest::new(places);
+    examples.keep_nearest(features, &mut nearest);
+    if !nearest.is_full() {
+        return Err(if nearest.is_empty() { ClassifyError::NoExamples } else { ClassifyError::TooFewExamples });
     }
-    if !level.neighbour.is_as_far_as(last) {
-        (level.votes, level.unknown) = ([0; CLASSES], false);
-    }
-    for neighbour in nearest.iter() {
-        level.vote(neighbour.label());
-    }
-    let Level { votes, unknown: false, .. } = level else { return Err(ClassifyError::UnknownLabel) };
-    let (mut label, mut most, mut tie, mut class) = (0, votes[0], false, 0);
-    while class + 1 < CLASSES {
-        class += 1;
-        if votes[class] > most {
-            (label, most, tie) = (class as u8, votes[class], false);
-        } else if votes[class] == most {
-            tie = true;
-        }
-    }
+    let (places, ballot) = nearest.vote();
+    let Some(nearest) = places.last() else { return Err(ClassifyError::KOutOfRange) };
+    let Some(votes) = ballot.votes() else { return Err(ClassifyError::UnknownLabel) };
+    let (mut label, most, tie) = lead(&votes);
     if tie {
         // Neighbours are sorted by distance and then by label, and the examples that found no place are behind them
         // in the same order: the first leading class met this way is the nearest, and the smallest among equals.
         // Where none is met, `label` is the smallest already. Of two classes, both lead.
-        let mut labels = nearest.iter().rev().map(|neighbour| neighbour.label());
-        let mut leads = |label: &u8| CLASSES == 2 || votes.get(usize::from(*label)) == Some(&most);
-        label = labels.find(&mut leads).unwrap_or(label);
+        if CLASSES == 2 {
+            label = nearest.label();
+        } else {
+            let mut labels = places.iter().rev().map(|neighbour| neighbour.label());
+            label = labels.find(|label| votes.get(usize::from(*label)) == Some(&most)).unwrap_or(label);
+        }
     }
-    let nearest = first.distance();
+    let nearest = nearest.distance();
     let kind = match (nearest > radius, tie) {
         (true, _) => Kind::Stranger,
         (false, true) => Kind::Tie,
@@ -158,42 +144,19 @@ fn search<const FEATURES: usize, const CLASSES: usize>(
     Ok(Answer { label, votes, nearest, kind })
 }
 
-/// The votes of those that are as far as the k-th nearest and found no place among them.
-struct Level<const CLASSES: usize> {
-    /// One of them.
-    neighbour: Neighbour,
-    votes: [usize; CLASSES],
-    /// Whether a voter's label is not a class.
-    unknown: bool,
-}
-
-impl<const CLASSES: usize> Level<CLASSES> {
-    /// None, at the distance of a neighbour.
-    #[inline(always)]
-    fn at(neighbour: Neighbour) -> Self {
-        Self { neighbour, votes: [0; CLASSES], unknown: false }
+/// The class with the most votes, the smallest among equals; its votes; and whether another one has as many.
+#[inline(always)]
+fn lead<const CLASSES: usize>(votes: &[usize; CLASSES]) -> (u8, usize, bool) {
+    if let [zeros, ones] = votes.as_slice() {
+        return (u8::from(ones > zeros), *zeros.max(ones), ones == zeros);
     }
-
-    fn count(&mut self, neighbour: Neighbour) {
-        if !self.neighbour.is_as_far_as(&neighbour) {
-            *self = Self::at(neighbour);
-        }
-        self.vote(neighbour.label());
-    }
-
-    #[inline(always)]
-    fn vote(&mut self, label: u8) {
-        if CLASSES == 2 {
-            // The chip asks which of two it is in fewer cycles than it takes to find the place.
-            match (label, self.votes.as_mut_slice()) {
-                (0, [votes, _]) | (1, [_, votes]) => *votes = votes.wrapping_add(1),
-                _ => self.unknown = true,
-            }
-            return;
-        }
-        match self.votes.get_mut(usize::from(label)) {
-            Some(votes) => *votes = votes.wrapping_add(1),
-            None => self.unknown = true,
+    let (mut label, mut most, mut tie) = (0, 0, false);
+    for (class, &votes) in votes.iter().enumerate() {
+        if votes > most {
+            (label, most, tie) = (class as u8, votes, false);
+        } else if votes == most {
+            tie = true;
         }
     }
+    (label, most, tie)
 }

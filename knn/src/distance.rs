@@ -6,13 +6,8 @@
 /// The most features that an example can have: 258 differences of 255, squared, still add up within 24 bits.
 pub const MAX_FEATURES: usize = 258;
 
-/// One more than the largest number of 24 bits.
-pub(crate) const DISTANCE_LIMIT: u32 = 1 << 24;
-
-const _: () = assert!(
-    MAX_FEATURES as u64 * 255 * 255 < DISTANCE_LIMIT as u64 - (1 << 8),
-    "in no distance are the upper two of three bytes all ones, which stands for `no neighbour`"
-);
+const _: () =
+    assert!(MAX_FEATURES as u64 * 255 * 255 < (1 << 24) - 1, "a distance has 24 bits, and never are all of them ones");
 
 /// Squared Euclidean distance, from 0 to `FEATURES * 65_025`.
 ///

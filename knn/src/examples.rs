@@ -4,7 +4,7 @@
 //! among the nearest found so far. A store that can hand out an example has that for nothing; one with a faster way, such as an
 //! assembly loop that reads flash, overrides [`Examples::keep_nearest`]. A pair of stores is a store.
 
-use crate::{Neighbour, squared_distance};
+use crate::{Nearest, Neighbour, squared_distance};
 
 /// A labelled example: what was measured, and what it was.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -53,13 +53,13 @@ pub trait Examples<const FEATURES: usize> {
     fn example(&self, index: usize) -> Option<Example<FEATURES>>;
 
     /// Gives those of its examples that are near enough to `query` a place among the `nearest`: each does what
-    /// [`Neighbour::join`] does, in any order.
+    /// [`Nearest::join`] does, in any order.
     ///
     /// Distances must equal those of [`squared_distance`].
     #[inline]
-    fn keep_nearest(&self, query: &[u8; FEATURES], nearest: &mut [Neighbour], level: &mut impl FnMut(Neighbour)) {
+    fn keep_nearest<const CLASSES: usize>(&self, query: &[u8; FEATURES], nearest: &mut Nearest<CLASSES>) {
         for example in (0..self.len()).filter_map(|index| self.example(index)) {
-            example.neighbour_of(query).join(nearest, level);
+            nearest.join(example.neighbour_of(query));
         }
     }
 
@@ -84,9 +84,9 @@ impl<const FEATURES: usize> Examples<FEATURES> for [Example<FEATURES>] {
     }
 
     #[inline]
-    fn keep_nearest(&self, query: &[u8; FEATURES], nearest: &mut [Neighbour], level: &mut impl FnMut(Neighbour)) {
+    fn keep_nearest<const CLASSES: usize>(&self, query: &[u8; FEATURES], nearest: &mut Nearest<CLASSES>) {
         for example in self {
-            example.neighbour_of(query).join(nearest, level);
+            nearest.join(example.neighbour_of(query));
         }
     }
 }
@@ -101,8 +101,8 @@ impl<const FEATURES: usize, const N: usize> Examples<FEATURES> for [Example<FEAT
     }
 
     #[inline]
-    fn keep_nearest(&self, query: &[u8; FEATURES], nearest: &mut [Neighbour], level: &mut impl FnMut(Neighbour)) {
-        self.as_slice().keep_nearest(query, nearest, level)
+    fn keep_nearest<const CLASSES: usize>(&self, query: &[u8; FEATURES], nearest: &mut Nearest<CLASSES>) {
+        self.as_slice().keep_nearest(query, nearest)
     }
 }
 
@@ -116,8 +116,8 @@ impl<const FEATURES: usize, Store: Examples<FEATURES> + ?Sized> Examples<FEATURE
     }
 
     #[inline]
-    fn keep_nearest(&self, query: &[u8; FEATURES], nearest: &mut [Neighbour], level: &mut impl FnMut(Neighbour)) {
-        (**self).keep_nearest(query, nearest, level)
+    fn keep_nearest<const CLASSES: usize>(&self, query: &[u8; FEATURES], nearest: &mut Nearest<CLASSES>) {
+        (**self).keep_nearest(query, nearest)
     }
 }
 
@@ -137,8 +137,8 @@ impl<const FEATURES: usize, First: Examples<FEATURES>, Second: Examples<FEATURES
     }
 
     #[inline]
-    fn keep_nearest(&self, query: &[u8; FEATURES], nearest: &mut [Neighbour], level: &mut impl FnMut(Neighbour)) {
-        self.0.keep_nearest(query, nearest, level);
-        self.1.keep_nearest(query, nearest, level);
+    fn keep_nearest<const CLASSES: usize>(&self, query: &[u8; FEATURES], nearest: &mut Nearest<CLASSES>) {
+        self.0.keep_nearest(query, nearest);
+        self.1.keep_nearest(query, nearest);
     }
 }

@@ -70,9 +70,11 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
+mod ballot;
 mod classify;
 mod distance;
 mod examples;
+mod nearest;
 mod neighbour;
 mod scale;
 mod table;
@@ -80,6 +82,7 @@ mod table;
 pub use classify::{Answer, ClassifyError, Kind, MAX_K, classify};
 pub use distance::{MAX_FEATURES, squared_distance};
 pub use examples::{Example, Examples};
+pub use nearest::Nearest;
 pub use neighbour::Neighbour;
 pub use scale::{Range, Scale};
 pub use table::Table;

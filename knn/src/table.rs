@@ -1,6 +1,6 @@
 //! Examples in SRAM, in an array of fixed capacity, which can be added and removed while the machine works.
 
-use crate::{Example, Examples, Neighbour};
+use crate::{Example, Examples, Nearest};
 
 /// Up to `CAPACITY` examples in SRAM: `CAPACITY * (FEATURES + 1)` bytes and a `usize`.
 ///
@@ -81,7 +81,7 @@ impl<const FEATURES: usize, const CAPACITY: usize> Examples<FEATURES> for Table<
     }
 
     #[inline]
-    fn keep_nearest(&self, query: &[u8; FEATURES], nearest: &mut [Neighbour], level: &mut impl FnMut(Neighbour)) {
-        self.as_slice().keep_nearest(query, nearest, level);
+    fn keep_nearest<const CLASSES: usize>(&self, query: &[u8; FEATURES], nearest: &mut Nearest<CLASSES>) {
+        self.as_slice().keep_nearest(query, nearest);
     }
 }

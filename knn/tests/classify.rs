@@ -3,7 +3,7 @@
 //! Features come from few values, or from the extremes, as often as from all bytes: level distances, on which the rules
 //! for ties rest, are then common.
 
-use knn::{Answer, ClassifyError, Example, Examples, Kind, MAX_K, Neighbour, Scale, Table, classify};
+use knn::{Answer, ClassifyError, Example, Examples, Kind, MAX_K, Nearest, Scale, Table, classify};
 use proptest::prelude::*;
 use smartcore::{
     dataset::iris,
@@ -107,6 +107,7 @@ macro_rules! for_features {
                     }
                     prop_assert_eq!(classify(&(&table, left), &query, k, radius), answer);
                     prop_assert_eq!(classify(&OneByOne(&shuffled), &query, k, radius), answer);
+                    prop_assert_eq!(classify(&(AtOnce(left), AtOnce(right)), &query, k, radius), answer);
                 }
             }
         }
@@ -124,6 +125,37 @@ impl<const FEATURES: usize> Examples<FEATURES> for OneByOne<'_, FEATURES> {
 
     fn example(&self, index: usize) -> Option<Example<FEATURES>> {
         self.0.get(index).copied()
+    }
+}
+
+/// A store that has its examples join all at once.
+struct AtOnce<'a, const FEATURES: usize>(&'a [Example<FEATURES>]);
+
+impl<const FEATURES: usize> Examples<FEATURES> for AtOnce<'_, FEATURES> {
+    fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    fn example(&self, index: usize) -> Option<Example<FEATURES>> {
+        self.0.get(index).copied()
+    }
+
+    fn keep_nearest<const CLASSES: usize>(&self, query: &[u8; FEATURES], nearest: &mut Nearest<CLASSES>) {
+        let (places, free) = nearest.places();
+        let mut all = places[free..].to_vec();
+        all.extend(self.0.iter().map(|example| example.neighbour_of(query)));
+        all.sort_by_key(|neighbour| neighbour.key());
+        let found = all.len().min(places.len());
+        let free = places.len() - found;
+        for (place, neighbour) in places.iter_mut().rev().zip(&all) {
+            *place = *neighbour;
+        }
+        nearest.have_joined(free);
+        for out in &all[found..] {
+            if out.distance() == all[found - 1].distance() {
+                nearest.are_level(out.label(), 1);
+            }
+        }
     }
 }
 
@@ -251,16 +283,6 @@ fn level_examples_vote_whenever_they_are_met_and_only_while_they_are_level_with_
     let near = [at(5, 0), at(5, 1), at(5, 1), at(5, 1), at(1, 0)];
     assert_eq!(answer(&[&far[..], &near].concat()), Ok([2, 3]));
     assert_eq!(answer(&[&near[..], &far].concat()), Ok([2, 3]));
-}
-
-#[test]
-fn a_neighbour_of_another_class_is_as_far() {
-    for distance in [0, 1, 0x12_34_56, 258 * 255 * 255] {
-        let other = Neighbour::new(distance, 1).with_label(200);
-        assert_eq!((other.distance(), other.label()), (distance, 200));
-        assert_eq!(other, Neighbour::new(distance, 200));
-        assert!(!other.is_none());
-    }
 }
 
 #[test]

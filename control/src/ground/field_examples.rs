@@ -3,14 +3,15 @@
 //! Each of [`CAPACITY`] examples has a slot of eight bytes: five features, the label, and a CRC-16 of both and of the scale
 //! by which the features became bytes, as under another scale they would mean something else. An erased slot reads as ones.
 //! A slot whose CRC does not fit, because the power went away while it was written or a bit fell over, is dropped, and
-//! counted so that it can be told. Which slots hold an example is kept in SRAM, as checking them all takes longer than
-//! searching them. The bytes of a slot go to the memory one at a time, whenever it can take one.
+//! counted so that it can be told. What the slots hold is read once, when the machine wakes up, and kept in SRAM: a search would take
+//! twice a turn of the loop to read them, and more to check them, and would wait for a byte that is being written. The bytes of a
+//! slot go to the memory one at a time, whenever it can take one.
 
 use crate::{
     ground::{examples, features},
     memory::{ERASED, Memory, checksum},
 };
-use knn::{Example, Examples, Neighbour};
+use knn::{Example, Examples, Nearest};
 
 /// Examples that can be taught.
 pub const CAPACITY: u8 = 32;
@@ -29,6 +30,8 @@ const SCALE_MARK: [u8; 2] = checksum(&examples::SCALE_BYTES).to_le_bytes();
 pub struct FieldExamples<M> {
     memory: M,
     slots: [Slot; CAPACITY as usize],
+    /// The examples of the slots that hold one.
+    examples: [Taught; CAPACITY as usize],
     spoiled: u8,
     /// The slot that is being written.
     writing: u8,
@@ -52,16 +55,21 @@ impl<M: Memory> FieldExamples<M> {
     /// The store in a memory that nobody has looked through.
     pub const fn asleep(memory: M) -> Self {
         let slots = [Slot::Free; CAPACITY as usize];
-        Self { memory, slots, spoiled: 0, writing: 0, bytes: [0; SLOT], left: 0 }
+        let examples = [Example::new([0; features::COUNT], 0); CAPACITY as usize];
+        Self { memory, slots, examples, spoiled: 0, writing: 0, bytes: [0; SLOT], left: 0 }
     }
 
     /// Looks through the memory for the examples that it holds.
     pub fn wake_up(&mut self) {
         self.spoiled = 0;
-        for number in 0..CAPACITY {
-            let bytes = self.read(number);
-            if bytes == encode(example_in(bytes)) {
-                self.slots[usize::from(number)] = Slot::Held;
+        for (number, (slot, example)) in (0..).zip(self.slots.iter_mut().zip(&mut self.examples)) {
+            let mut bytes = [0; SLOT];
+            for (address, byte) in (address(number)..).zip(&mut bytes) {
+                *byte = self.memory.read(address);
+            }
+            *example = example_in(bytes);
+            if bytes == encode(*example) {
+                *slot = Slot::Held;
             } else if bytes != [ERASED; SLOT] {
                 self.spoiled += 1;
             }
@@ -76,7 +84,7 @@ impl<M: Memory> FieldExamples<M> {
     /// The example in a slot.
     pub fn slot(&self, number: u8) -> Option<Taught> {
         match self.slots.get(usize::from(number)) {
-            Some(Slot::Held) => Some(example_in(self.read(number))),
+            Some(Slot::Held) => self.examples.get(usize::from(number)).copied(),
             _ => None,
         }
     }
@@ -91,7 +99,7 @@ impl<M: Memory> FieldExamples<M> {
             return Err(example);
         };
         while !self.write_next_byte() {}
-        self.slots[number] = Slot::Held;
+        (self.slots[number], self.examples[number]) = (Slot::Held, example);
         self.begin(number as u8, encode(example));
         Ok(number as u8)
     }
@@ -125,18 +133,6 @@ impl<M: Memory> FieldExamples<M> {
     /// The memory, to be looked at or put into another machine.
     pub fn into_memory(self) -> M {
         self.memory
-    }
-
-    /// What lies in a slot, or will lie there once it is written.
-    fn read(&self, number: u8) -> [u8; SLOT] {
-        if self.left > 0 && number == self.writing {
-            return self.bytes;
-        }
-        let mut bytes = [0; SLOT];
-        for (address, byte) in (address(number)..).zip(&mut bytes) {
-            *byte = self.memory.read(address);
-        }
-        bytes
     }
 
     #[inline(never)]
@@ -175,16 +171,10 @@ impl<M: Memory> Examples<{ features::COUNT }> for FieldExamples<M> {
         (0..CAPACITY).filter_map(|slot| self.slot(slot)).nth(index)
     }
 
-    /// Reads each slot once.
-    fn keep_nearest(
-        &self,
-        query: &[u8; features::COUNT],
-        nearest: &mut [Neighbour],
-        level: &mut impl FnMut(Neighbour),
-    ) {
-        for (number, &slot) in (0..).zip(&self.slots) {
+    fn keep_nearest<const CLASSES: usize>(&self, query: &[u8; features::COUNT], nearest: &mut Nearest<CLASSES>) {
+        for (&slot, example) in self.slots.iter().zip(&self.examples) {
             if slot == Slot::Held {
-                example_in(self.read(number)).neighbour_of(query).join(nearest, level);
+                nearest.join(example.neighbour_of(query));
             }
         }
     }
@@ -298,7 +288,7 @@ mod tests {
         let mut store = store();
         store.add(example(0)).unwrap();
         while !store.carry_on() {}
-        let [a, b, c, d, e, label, ..] = store.read(0);
+        let Example { features: [a, b, c, d, e], label } = example(0);
         let [low, high] = checksum(&[a, b, c, d, e, label, !SCALE_MARK[0], SCALE_MARK[1]]).to_le_bytes();
         store.memory.bytes[6..SLOT].copy_from_slice(&[low, high]);
         let store = restart(store);

@@ -13,7 +13,7 @@ use crate::{
     },
     memory::Memory,
 };
-use knn::{Answer, Example, Examples, Kind, Neighbour};
+use knn::{Answer, Example, Examples, Kind};
 
 /// Classifies by the nearest of the built-in examples in `B` and those taught in the field, kept in `M`.
 #[derive(Clone, Debug)]
@@ -75,14 +75,9 @@ impl<M: Memory> Examples<{ features::COUNT }> for FromField<'_, M> {
         self.examples.example(index).filter(|_| self.vote)
     }
 
-    fn keep_nearest(
-        &self,
-        query: &[u8; features::COUNT],
-        nearest: &mut [Neighbour],
-        level: &mut impl FnMut(Neighbour),
-    ) {
+    fn keep_nearest<const CLASSES: usize>(&self, query: &[u8; features::COUNT], nearest: &mut knn::Nearest<CLASSES>) {
         if self.vote {
-            self.examples.keep_nearest(query, nearest, level);
+            self.examples.keep_nearest(query, nearest);
         }
     }
 }

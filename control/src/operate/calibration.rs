@@ -4,7 +4,10 @@
 //! [`Swings`] times the servo by the end switch: from the command until the tool is out, and until it begins to come back.
 //! Without an end switch the same swings let the operator time them from a film, with the LED to mark the commands.
 
-use crate::units::{Instant, Interval, Position};
+use crate::{
+    operate::refusal::Refusal,
+    units::{Instant, Interval, Position},
+};
 
 /// The shortest stretch that tells the wheel to better than 0.1 %.
 pub const SHORTEST_MM: u16 = 1000;
@@ -12,55 +15,48 @@ pub const SHORTEST_MM: u16 = 1000;
 /// By how much a calibrated wheel may differ from what its diameter gives, in tenths: 30 %.
 const TOLERANCE_TENTHS: u32 = 3;
 
-/// Why a stretch tells nothing of the wheel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Unfit {
-    /// Nobody has said where the stretch begins.
-    NotBegun,
-    /// It is shorter than [`SHORTEST_MM`].
-    TooShort,
-    /// The wheel would differ by more than 30 % from its diameter.
-    Differs {
-        /// Ticks a metre, as counted; what 16 bits hold.
-        counted: u16,
-        /// Ticks a metre, by the diameter.
-        nominal: u16,
-    },
-}
-
 /// The stretch that is being measured.
 #[derive(Clone, Copy, Debug)]
-pub struct Distance(Option<Position>);
+pub struct Distance {
+    begin: Option<Position>,
+    counted: u16,
+}
 
 impl Distance {
     /// None that has begun.
-    pub const NONE: Self = Self(None);
+    pub const NONE: Self = Self { begin: None, counted: 0 };
 
     /// The stretch begins here.
     pub const fn begin(&mut self, position: Position) {
-        self.0 = Some(position);
+        self.begin = Some(position);
     }
 
     /// Ticks a metre of a stretch of `length_mm` that ends at `position`, forward or back; `nominal` is what the wheel's diameter
     /// gives, from which it may differ as far as it likes if it is `forced`.
     ///
     /// # Errors
-    /// [`Unfit`]; the stretch can be ended again.
-    pub fn end(&self, position: Position, length_mm: u16, nominal: u16, forced: bool) -> Result<u16, Unfit> {
-        let begin = self.0.ok_or(Unfit::NotBegun)?;
+    /// [`Refusal::NotBegun`], [`Refusal::TooShort`] and [`Refusal::WheelDiffers`]; the stretch can be ended again.
+    pub fn end(&mut self, position: Position, length_mm: u16, nominal: u16, forced: bool) -> Result<u16, Refusal> {
+        let begin = self.begin.ok_or(Refusal::NotBegun)?;
         if length_mm < SHORTEST_MM {
-            return Err(Unfit::TooShort);
+            return Err(Refusal::TooShort);
         }
         let length_mm = u32::from(length_mm);
         // Up to 4 million ticks, 250 m of the finest wheel, which nobody measures by hand.
         let ticks = (position - begin).0.unsigned_abs().min(u32::MAX / 1000 - 1);
         let counted = ((ticks * 1000 + length_mm / 2) / length_mm).min(u16::MAX.into()) as u16;
+        self.counted = counted;
         // Whole ticks differ by more than the tolerance where they do by more than its whole ticks.
         let differs = counted.abs_diff(nominal) > (u32::from(nominal) * TOLERANCE_TENTHS / 10) as u16;
         if counted == 0 || differs && !forced {
-            return Err(Unfit::Differs { counted, nominal });
+            return Err(Refusal::WheelDiffers);
         }
         Ok(counted)
+    }
+
+    /// Ticks a metre, as they were counted last; what 16 bits hold.
+    pub const fn counted(&self) -> u16 {
+        self.counted
     }
 }
 
@@ -166,10 +162,21 @@ impl Swings {
 mod tests {
     use super::*;
 
-    fn counted(ticks: i32, length_mm: u16, forced: bool) -> Result<u16, Unfit> {
-        let mut distance = Distance::NONE;
+    fn end(distance: &mut Distance, ticks: i32, length_mm: u16, forced: bool) -> Result<u16, Refusal> {
         distance.begin(Position::new(i32::MAX - 100));
         distance.end(Position::new((i32::MAX - 100).wrapping_add(ticks)), length_mm, 1910, forced)
+    }
+
+    fn counted(ticks: i32, length_mm: u16, forced: bool) -> Result<u16, Refusal> {
+        let mut distance = Distance::NONE;
+        end(&mut distance, ticks, length_mm, forced)
+    }
+
+    /// What was counted of a stretch that is refused.
+    fn refused(ticks: i32, length_mm: u16, forced: bool) -> u16 {
+        let mut distance = Distance::NONE;
+        assert_eq!(end(&mut distance, ticks, length_mm, forced), Err(Refusal::WheelDiffers));
+        distance.counted()
     }
 
     #[test]
@@ -182,14 +189,15 @@ mod tests {
 
     #[test]
     fn a_stretch_that_cannot_be_right_is_refused_and_can_be_forced() {
-        assert_eq!(Distance::NONE.end(Position::new(0), 5000, 1910, true), Err(Unfit::NotBegun));
-        assert_eq!(counted(1900, 999, false), Err(Unfit::TooShort));
+        let mut none = Distance::NONE;
+        assert_eq!(none.end(Position::new(0), 5000, 1910, true), Err(Refusal::NotBegun));
+        assert_eq!(counted(1900, 999, false), Err(Refusal::TooShort));
         assert_eq!(counted(24_830, 10_000, false), Ok(2483));
-        assert_eq!(counted(24_840, 10_000, false), Err(Unfit::Differs { counted: 2484, nominal: 1910 }));
-        assert_eq!(counted(13_360, 10_000, false), Err(Unfit::Differs { counted: 1336, nominal: 1910 }));
+        assert_eq!(refused(24_840, 10_000, false), 2484);
+        assert_eq!(refused(13_360, 10_000, false), 1336);
         assert_eq!(counted(24_840, 10_000, true), Ok(2484));
-        assert_eq!(counted(0, 10_000, true), Err(Unfit::Differs { counted: 0, nominal: 1910 }));
-        assert_eq!(counted(i32::MIN, 1000, false), Err(Unfit::Differs { counted: u16::MAX, nominal: 1910 }));
+        assert_eq!(refused(0, 10_000, true), 0);
+        assert_eq!(refused(i32::MIN, 1000, false), u16::MAX);
     }
 
     fn at_ms(milliseconds: u32) -> Instant {

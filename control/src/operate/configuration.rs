@@ -4,7 +4,7 @@ use crate::{
     alarm::Alarm,
     memory::Memory,
     operate::{refusal::Refusal, saved::SavedSettings},
-    settings::{Setting, Settings},
+    settings::{Contradiction, Setting, Settings},
 };
 
 /// The settings in use and those that are saved.
@@ -13,13 +13,15 @@ pub struct Configuration<M> {
     settings: Settings,
     /// Whether what follows from them is yet to be worked out.
     changed: bool,
+    /// The X that margin, leads and top speed would have needed, where it was refused for that last.
+    needed_mm: u16,
     saved: SavedSettings<M>,
 }
 
 impl<M: Memory> Configuration<M> {
     /// A configuration that nobody has loaded.
     pub const fn new(memory: M) -> Self {
-        Self { settings: Settings::NONE, changed: false, saved: SavedSettings::new(memory) }
+        Self { settings: Settings::NONE, changed: false, needed_mm: 0, saved: SavedSettings::new(memory) }
     }
 
     /// Loads what is saved, or the defaults; returns what is wrong with it.
@@ -59,7 +61,7 @@ impl<M: Memory> Configuration<M> {
     /// Sets several settings, or none of them; `is_working` tells whether the machine is.
     ///
     /// # Errors
-    /// [`Refusal::NotInHold`], [`Refusal::OutOfRange`], and [`Refusal::Contradiction`] where there was none before; nothing
+    /// [`Refusal::NotInHold`], [`Refusal::OutOfRange`], and that of a [`Contradiction`] where there was none before; nothing
     /// is changed then.
     #[inline(never)]
     pub fn change(&mut self, changes: &[(Setting, u16)], is_working: bool) -> Result<(), Refusal> {
@@ -78,7 +80,7 @@ impl<M: Memory> Configuration<M> {
         if let Some(contradiction) = settings.contradiction()
             && self.settings.contradiction().is_none()
         {
-            return Err(Refusal::Contradiction(contradiction));
+            return Err(self.refusal(contradiction));
         }
         self.settings = settings;
         self.changed = true;
@@ -106,7 +108,7 @@ impl<M: Memory> Configuration<M> {
     /// Begins to save the settings, which [`carry_on`](Self::carry_on) finishes.
     ///
     /// # Errors
-    /// [`Refusal::Contradiction`].
+    /// That of a [`Contradiction`].
     pub fn save(&mut self) -> Result<(), Refusal> {
         self.expect_no_contradiction()?;
         self.saved.save(&self.settings);
@@ -121,10 +123,26 @@ impl<M: Memory> Configuration<M> {
     /// Nothing, if the settings can be right together.
     ///
     /// # Errors
-    /// [`Refusal::Contradiction`].
+    /// That of a [`Contradiction`].
     #[inline(never)]
-    pub fn expect_no_contradiction(&self) -> Result<(), Refusal> {
-        self.settings.contradiction().map_or(Ok(()), |contradiction| Err(Refusal::Contradiction(contradiction)))
+    pub fn expect_no_contradiction(&mut self) -> Result<(), Refusal> {
+        self.settings.contradiction().map_or(Ok(()), |contradiction| Err(self.refusal(contradiction)))
+    }
+
+    /// The X that [`Refusal::BeamTooNear`] asked for last, in mm.
+    pub fn needed_mm(&self) -> u16 {
+        self.needed_mm
+    }
+
+    fn refusal(&mut self, contradiction: Contradiction) -> Refusal {
+        match contradiction {
+            Contradiction::PulsesEqual => Refusal::PulsesEqual,
+            Contradiction::SecondBeamAstray => Refusal::SecondBeamAstray,
+            Contradiction::BeamTooNear { needed_mm } => {
+                self.needed_mm = needed_mm;
+                Refusal::BeamTooNear
+            }
+        }
     }
 }
 

@@ -27,28 +27,85 @@ impl Judged {
 
 /// The last objects.
 #[derive(Clone, Debug)]
-pub struct Objects(Vec<Judged, CAPACITY, u8>);
+pub struct Objects {
+    objects: Vec<Judged, CAPACITY, u8>,
+    /// The place of the oldest, which the next one takes where there is no room.
+    oldest: u8,
+}
 
 impl Objects {
     /// None.
-    pub const NONE: Self = Self(Vec::new());
+    pub const NONE: Self = Self { objects: Vec::new(), oldest: 0 };
 
     /// Remembers an object, and drops the oldest one where there is no room.
     pub fn remember(&mut self, object: Judged) {
-        if self.0.is_full() {
-            self.0.remove(0);
+        if let Err(object) = self.objects.push(object)
+            && let Some(oldest) = self.objects.get_mut(usize::from(self.oldest))
+        {
+            *oldest = object;
+            self.oldest = (self.oldest + 1) % CAPACITY as u8;
         }
-        // There is room, as was just seen to.
-        let _ = self.0.push(object);
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.objects.is_empty()
+    }
+
+    /// How many there are.
+    pub fn len(&self) -> u8 {
+        self.objects.len() as u8
+    }
+
+    /// One of them, counted from the oldest.
+    pub fn get(&self, number: u8) -> Option<&Judged> {
+        if number < self.len() { self.objects.get(self.place(number)) } else { None }
+    }
+
+    /// The last one.
+    pub fn last(&self) -> Option<&Judged> {
+        self.get(self.len().checked_sub(1)?)
     }
 
     /// The last one, unless it has its label.
     pub fn unlabelled(&mut self) -> Option<&mut Judged> {
-        self.0.last_mut().filter(|object| object.label.is_none())
+        let last = self.place(self.len().checked_sub(1)?);
+        self.objects.get_mut(last).filter(|object| object.label.is_none())
     }
 
-    /// All of them, the oldest first.
-    pub fn all(&self) -> &[Judged] {
-        &self.0
+    /// Where one of them lies.
+    fn place(&self, number: u8) -> usize {
+        usize::from((self.oldest + number) % CAPACITY as u8)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use crate::ground::class::Class;
+    use std::vec::Vec;
+
+    fn judged(width_mm: i16) -> Judged {
+        let vote = Vote { class: Class::Plant, votes: 3 };
+        Judged { speed_class_mm_s: 556, spacing_mm: 300, width_mm, vote, label: None }
+    }
+
+    #[test]
+    fn the_last_objects_are_kept_in_their_order_and_the_last_one_is_labelled() {
+        let mut objects = Objects::NONE;
+        assert!(objects.unlabelled().is_none());
+        for seen in 1..=40_i16 {
+            objects.remember(judged(seen));
+            let oldest = (seen - CAPACITY as i16).max(0) + 1;
+            let widths: Vec<_> =
+                (0..objects.len()).filter_map(|number| objects.get(number)).map(|o| o.width_mm).collect();
+            assert_eq!(widths, (oldest..=seen).collect::<Vec<_>>());
+            assert_eq!(objects.get(objects.len()), None);
+            let last = objects.unlabelled().expect("it has no label");
+            assert_eq!(last.width_mm, seen);
+            last.label = Some(1);
+            assert!(objects.unlabelled().is_none());
+        }
     }
 }

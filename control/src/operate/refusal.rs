@@ -1,22 +1,23 @@
 //! Why the machine may refuse what the operator asks.
-
-use crate::{ground::class::Class, operate::calibration::Unfit, settings::Contradiction};
+//!
+//! A refusal is one byte, as the chip has it handed from function to function: the numbers that belong to one are with whoever refuses.
 
 /// A command that the present state does not allow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
 pub enum Refusal {
     /// An alarm is latched.
     AlarmLatched,
     /// The setting changes where the tool is, or is to be saved, and the machine is at work.
     NotInHold,
-    /// The value lies outside the setting's range.
-    OutOfRange,
-    /// The settings would contradict each other.
-    Contradiction(Contradiction),
+    /// Both of the servo's pulses would be the same.
+    PulsesEqual,
+    /// The beam would stand too near; how far it is to be, [`needed_mm`](crate::operate::configuration::Configuration::needed_mm) says.
+    BeamTooNear,
+    /// The second beam would stand at the first or not ahead of the tool, or X is too long for it.
+    SecondBeamAstray,
     /// There is no object to label yet, or the last one has its label.
     NothingToLabel,
-    /// The built-in examples are sure that the object is of this class, which is not the label's.
-    TakenFor(Class),
     /// An example was to be taught whose features were not told, all and no more.
     NotTold,
     /// All places for examples are taken.
@@ -25,11 +26,19 @@ pub enum Refusal {
     NoSuchExample,
     /// No settings are saved that could be taken back.
     NothingSaved,
-    /// What was rolled tells nothing of the wheel.
-    Unfit(Unfit),
-    /// A row is not played at such a speed.
-    TestSpeed {
-        /// The highest speed at which it is, in mm/s.
-        fastest: u16,
-    },
+    /// Nobody has said where the stretch begins that was rolled.
+    NotBegun,
+    /// It is shorter than [`SHORTEST_MM`](crate::operate::calibration::SHORTEST_MM).
+    TooShort,
+    /// A row is not played at such a speed, but at the settings' top speed at the most.
+    TestSpeed,
+    /// The wheel would differ by more than 30 % from its diameter; what was counted,
+    /// [`counted`](crate::operate::calibration::Distance::counted) says.
+    WheelDiffers,
+    /// The built-in examples are sure that the object is a plant, and it was to be labelled a weed.
+    TakenForPlant,
+    /// The other way round.
+    TakenForWeed,
+    /// The value lies outside the setting's range.
+    OutOfRange,
 }

@@ -116,11 +116,10 @@ impl Answer {
                 if controller.objects().is_empty() { Self::Ok } else { Self::Dump(0) }
             }
             Self::Dump(place) => {
-                let place = usize::from(place);
                 if let Some(object) = controller.objects().get(place) {
                     write_object(object, line);
                 }
-                if place + 1 < controller.objects().len() { Self::Dump(place as u8 + 1) } else { Self::Ok }
+                if place + 1 < controller.objects().len() { Self::Dump(place + 1) } else { Self::Ok }
             }
             Self::Version => {
                 line.say(texts::WEEDER);
@@ -135,7 +134,7 @@ impl Answer {
                 Self::Done
             }
             Self::Refused(refusal, setting) => {
-                write_refusal(refusal, setting, line);
+                write_refusal(refusal, setting, controller, line);
                 Self::Done
             }
         };

@@ -1,14 +1,17 @@
 //! Lines that say what is wrong, and what would be right.
 
-use super::{names::class_name, status::write_allowed};
+use super::status::write_allowed;
 use crate::{
-    operate::{calibration::Unfit, refusal::Refusal},
+    ground::class::Classifier,
+    memory::Memory,
+    operate::refusal::Refusal,
     say::{
-        command::{Mistake, Word},
+        command::{Argument, Mistake, Word},
         line::Line,
         texts,
     },
-    settings::{Contradiction, Setting},
+    settings::Setting,
+    weeder::Controller,
 };
 
 pub(super) fn write_mistake(mistake: Mistake, line: &mut Line) {
@@ -28,7 +31,12 @@ pub(super) fn write_mistake(mistake: Mistake, line: &mut Line) {
     line.say(what);
 }
 
-pub(super) fn write_refusal(refusal: Refusal, setting: Option<Setting>, line: &mut Line) {
+pub(super) fn write_refusal<C: Classifier, M: Memory>(
+    refusal: Refusal,
+    setting: Option<Setting>,
+    controller: &Controller<C, M>,
+    line: &mut Line,
+) {
     line.say(texts::ERROR);
     let what = match (refusal, setting) {
         (Refusal::OutOfRange, Some(setting)) => return write_allowed(setting.text(), setting, line),
@@ -38,36 +46,27 @@ pub(super) fn write_refusal(refusal: Refusal, setting: Option<Setting>, line: &m
             line.say(setting.text());
             texts::HOLD_TO_SET
         }
-        (Refusal::NotInHold, _) => texts::HOLD_FIRST,
-        (Refusal::AlarmLatched, _) => texts::ALARM_LATCHED,
-        (Refusal::Contradiction(Contradiction::PulsesEqual), _) => texts::PULSES_EQUAL,
-        (Refusal::Contradiction(Contradiction::SecondBeamAstray), _) => texts::SECOND_BEAM_ASTRAY,
-        (Refusal::Contradiction(Contradiction::BeamTooNear { needed_mm }), _) => {
-            line.counted(needed_mm);
-            texts::BEAM_TOO_NEAR
-        }
-        (Refusal::NothingToLabel, _) => texts::NOTHING_TO_LABEL,
-        (Refusal::TakenFor(class), _) => {
-            line.say(texts::TAKEN_FOR);
-            line.say(class_name(class));
-            texts::LOOK_AGAIN
-        }
-        (Refusal::NothingSaved, _) => texts::NOTHING_SAVED,
-        (Refusal::Unfit(Unfit::NotBegun), _) => texts::NOT_BEGUN,
-        (Refusal::Unfit(Unfit::TooShort), _) => texts::TOO_SHORT,
-        (Refusal::Unfit(Unfit::Differs { counted, nominal }), _) => {
+        (Refusal::WheelDiffers, _) => {
             line.say(texts::WHEEL_DIFFERS);
-            line.counted(counted);
-            line.counted(nominal);
+            line.counted(controller.distance().counted());
+            line.counted(controller.settings().nominal_ticks_per_m());
             texts::LOOK_AGAIN
         }
-        (Refusal::TestSpeed { fastest }, _) => {
-            line.counted(fastest);
-            texts::TEST_SPEED
+        (Refusal::TakenForPlant | Refusal::TakenForWeed, _) => {
+            let taken_for = if refusal == Refusal::TakenForPlant { Argument::Plant } else { Argument::Weed };
+            line.say(texts::TAKEN_FOR);
+            line.say(taken_for.text());
+            texts::LOOK_AGAIN
         }
-        (Refusal::NotTold, _) => texts::NOT_TOLD,
-        (Refusal::ExamplesFull, _) => texts::EXAMPLES_FULL,
-        (Refusal::NoSuchExample, _) => texts::NO_SUCH_EXAMPLE,
+        (Refusal::BeamTooNear, _) => {
+            line.counted(controller.needed_mm());
+            refusal.text()
+        }
+        (Refusal::TestSpeed, _) => {
+            line.counted(controller.settings().get(Setting::TopSpeedMmS));
+            refusal.text()
+        }
+        _ => refusal.text(),
     };
     line.say(what);
 }

@@ -6,6 +6,7 @@
 use crate::{
     alarm::{Alarm, Warning},
     measure::reset::Cause,
+    operate::refusal::Refusal,
     say::{
         command::{Argument, Word},
         packed::Text,
@@ -17,6 +18,7 @@ use crate::{
 /// All texts of the machine, from which the table in flash is made.
 pub(crate) const GROUPS: &[&[&str]] = &[
     SAID,
+    REFUSALS,
     USAGES,
     HELPS,
     settings::UNITS,
@@ -107,22 +109,48 @@ said! {
     UNKNOWN_SETTING = "no such setting, get lists them all";
     USAGE = "the words do not fit, the command is ";
     HOLD_TO_SET = " changes where the tool is, hold first";
-    HOLD_FIRST = "the machine is at work, hold first";
-    PULSES_EQUAL = "servo_in_us and servo_out_us would be equal, and the tool would not move";
-    SECOND_BEAM_ASTRAY = "second_beam_mm is to be 0, or from 50 to less than beam_to_tool_mm, and that 1000 at most";
-    BEAM_TOO_NEAR = "margin, leads and top speed would need beam_to_tool_mm # or more, change one of them first";
-    NOTHING_TO_LABEL = "there is no object without a label, let the beam see one first";
-    NOTHING_SAVED = "no settings are saved, save does it";
-    NOT_BEGUN = "calibrate start first, then roll";
-    TOO_SHORT = "roll 1000 mm at least, 10000 are better";
     WHEEL_DIFFERS = "that would be ticks_per_m #, the wheel has #";
     TAKEN_FOR = "the built-in examples say ";
     LOOK_AGAIN = ", look again, or add force";
-    TEST_SPEED = "test row takes a speed in mm/s from 100 to #";
-    NOT_TOLD = "tell its 5 features first, as examples lists them";
-    EXAMPLES_FULL = "all 32 places are taken, forget one first";
-    NO_SUCH_EXAMPLE = "no field example has this number, examples lists them";
-    ALARM_LATCHED = "an alarm is latched, see status, then clear it";
+}
+
+/// What is wrong where the machine refuses: one text each, but for those behind the last, which are put together of several.
+macro_rules! refusals {
+    ($($Refusal:ident $text:literal;)*) => {
+        const REFUSALS: &[&str] = &[$($text),*];
+
+        const _: () = {
+            let mut place = 0;
+            $(
+                assert!(Refusal::$Refusal as u8 == place, "the refusals stand here in the order of declaration");
+                place += 1;
+            )*
+            assert!(place == Refusal::WheelDiffers as u8);
+        };
+    };
+}
+
+impl Refusal {
+    /// What is wrong, of those that are one text.
+    pub(crate) fn text(self) -> Text {
+        const { Text::first_of(REFUSALS) }.plus(self as u8)
+    }
+}
+
+refusals! {
+    AlarmLatched "an alarm is latched, see status, then clear it";
+    NotInHold "the machine is at work, hold first";
+    PulsesEqual "servo_in_us and servo_out_us would be equal, and the tool would not move";
+    BeamTooNear "margin, leads and top speed would need beam_to_tool_mm # or more, change one of them first";
+    SecondBeamAstray "second_beam_mm is to be 0, or from 50 to less than beam_to_tool_mm, and that 1000 at most";
+    NothingToLabel "there is no object without a label, let the beam see one first";
+    NotTold "tell its 5 features first, as examples lists them";
+    ExamplesFull "all 32 places are taken, forget one first";
+    NoSuchExample "no field example has this number, examples lists them";
+    NothingSaved "no settings are saved, save does it";
+    NotBegun "calibrate start first, then roll";
+    TooShort "roll 1000 mm at least, 10000 are better";
+    TestSpeed "test row takes a speed in mm/s from 100 to #";
 }
 
 /// The one table of what is said about the commands.

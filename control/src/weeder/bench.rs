@@ -76,24 +76,24 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// Sets the wheel's ticks a metre by a distance that was rolled since [`calibrate_start`](Self::calibrate_start).
     ///
     /// # Errors
-    /// [`Refusal::Unfit`], [`Refusal::NotInHold`], [`Refusal::OutOfRange`] and [`Refusal::Contradiction`]; nothing is changed then.
+    /// Those of [`Distance::end`](crate::operate::calibration::Distance::end) and [`set`](Self::set); nothing is changed then.
     pub fn calibrate(&mut self, distance_mm: u16, force: bool) -> Result<(), Refusal> {
-        let nominal = self.configuration.settings().nominal_wheel().ticks(1000).0 as u16;
-        let ended = self.distance.end(self.sensors.readings.position, distance_mm, nominal, force);
-        self.set(Setting::TicksPerM, ended.map_err(Refusal::Unfit)?)
+        let nominal = self.configuration.settings().nominal_ticks_per_m();
+        let counted = self.distance.end(self.sensors.readings.position, distance_mm, nominal, force)?;
+        self.set(Setting::TicksPerM, counted)
     }
 
     /// Swings the tool as for a row of plants, at a speed in mm/s.
     ///
     /// # Errors
-    /// [`Refusal::NotInHold`], [`Refusal::AlarmLatched`], [`Refusal::Contradiction`], and [`Refusal::TestSpeed`] for what
-    /// the machine would not work at.
+    /// [`Refusal::NotInHold`], [`Refusal::AlarmLatched`], that of a [`Contradiction`](crate::settings::Contradiction), and
+    /// [`Refusal::TestSpeed`] for what the machine would not work at.
     pub fn test_row(&mut self, speed_mm_s: u16) -> Result<(), Refusal> {
         self.expect_hold()?;
         self.configuration.expect_no_contradiction()?;
         let fastest = self.configuration.get(Setting::TopSpeedMmS);
         if !(Setting::TopSpeedMmS.description().least..=fastest).contains(&speed_mm_s) {
-            return Err(Refusal::TestSpeed { fastest });
+            return Err(Refusal::TestSpeed);
         }
         self.bench = Bench::Row(Rehearsal::new(self.sensors.readings.now, speed_mm_s, self.configuration.settings()));
         Ok(())

@@ -20,7 +20,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// Goes to work; with `now`, at once and over ground that the beam has not seen.
     ///
     /// # Errors
-    /// [`Refusal::AlarmLatched`] while an alarm is, and [`Refusal::Contradiction`].
+    /// [`Refusal::AlarmLatched`] while an alarm is, and that of a [`Contradiction`](crate::settings::Contradiction).
     pub fn start(&mut self, now: bool) -> Result<(), Refusal> {
         if let State::Alarm(_) = self.state {
             return Err(Refusal::AlarmLatched);
@@ -53,8 +53,8 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// Sets a setting.
     ///
     /// # Errors
-    /// [`Refusal::NotInHold`], [`Refusal::OutOfRange`], and [`Refusal::Contradiction`] where there was none before; nothing
-    /// is changed then.
+    /// [`Refusal::NotInHold`], [`Refusal::OutOfRange`], and that of a [`Contradiction`](crate::settings::Contradiction) where there
+    /// was none before; nothing is changed then.
     pub fn set(&mut self, setting: Setting, value: u16) -> Result<(), Refusal> {
         self.configuration.change(&[(setting, value)], self.is_working())
     }
@@ -99,7 +99,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// Begins to save the settings, which [`carry_on`](Self::carry_on) finishes.
     ///
     /// # Errors
-    /// [`Refusal::NotInHold`] and [`Refusal::Contradiction`].
+    /// [`Refusal::NotInHold`] and that of a [`Contradiction`](crate::settings::Contradiction).
     pub fn save(&mut self) -> Result<(), Refusal> {
         if self.is_working() {
             return Err(Refusal::NotInHold);
@@ -115,15 +115,16 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// Labels the last object and teaches it to the classifier; if it is `forced`, against the built-in examples too.
     ///
     /// # Errors
-    /// [`Refusal::NothingToLabel`], [`Refusal::TakenFor`] and [`Refusal::ExamplesFull`]; the object has no label then.
+    /// [`Refusal::NothingToLabel`], [`Refusal::TakenForPlant`] or [`Refusal::TakenForWeed`], and [`Refusal::ExamplesFull`]; the object has no label then.
     pub fn label(&mut self, label: u8, forced: bool) -> Result<(), Refusal> {
         let object = self.objects.unlabelled().ok_or(Refusal::NothingToLabel)?;
         let features = object.features();
         // A label that is wrong would turn the class of all that come after it, and nobody would see why.
         if !forced {
-            let taken_for = self.classifier.built_in_class(&features);
-            if taken_for == if label == label::PLANT { Class::Weed } else { Class::Plant } {
-                return Err(Refusal::TakenFor(taken_for));
+            match (self.classifier.built_in_class(&features), label) {
+                (Class::Weed, label::PLANT) => return Err(Refusal::TakenForWeed),
+                (Class::Plant, label::WEED) => return Err(Refusal::TakenForPlant),
+                _ => {}
             }
         }
         self.classifier.teach(&features, label).map_err(|ExamplesFull| Refusal::ExamplesFull)?;
@@ -142,8 +143,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// a file.
     ///
     /// # Errors
-    /// [`Refusal::NotInHold`], as an object that is judged while an example is written waits for its byte; [`Refusal::NotTold`] and
-    /// [`Refusal::ExamplesFull`].
+    /// [`Refusal::NotInHold`], as what is told has not been seen by this machine; [`Refusal::NotTold`] and [`Refusal::ExamplesFull`].
     pub fn teach(&mut self, label: u8) -> Result<(), Refusal> {
         if self.is_working() {
             return Err(Refusal::NotInHold);

@@ -5,7 +5,7 @@ use crate::{
     ground::class::Classifier,
     measure::{quadrature, readings::Readings, reset::Cause},
     memory::Memory,
-    operate::{event::Event, lamp, objects::Judged, plot::Plot, state::State},
+    operate::{calibration::Distance, event::Event, lamp, objects::Objects, plot::Plot, state::State},
     settings::{Setting, Settings},
     units::Ticks,
 };
@@ -105,6 +105,16 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         self.configuration.settings()
     }
 
+    /// The X that was needed where the settings were refused for that last, in mm.
+    pub fn needed_mm(&self) -> u16 {
+        self.configuration.needed_mm()
+    }
+
+    /// The stretch by which the wheel is measured.
+    pub fn distance(&self) -> &Distance {
+        &self.distance
+    }
+
     /// The value of a setting that is saved, if any is.
     pub fn saved(&self, setting: Setting) -> Option<u16> {
         self.configuration.saved(setting)
@@ -115,9 +125,9 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         &self.classifier
     }
 
-    /// The last objects, the oldest first.
-    pub fn objects(&self) -> &[Judged] {
-        self.objects.all()
+    /// The last objects.
+    pub fn objects(&self) -> &Objects {
+        &self.objects
     }
 
     /// Why the machine was reset.

@@ -69,6 +69,15 @@ pub enum BoundsError {
     /// The ELF cannot be read.
     #[error(transparent)]
     Image(#[from] ImageError),
+    /// It is said how often loops turn of functions that the program does not have.
+    #[error(
+        "no function of the firmware is called {}: say how often loops turn by the names of the functions that have them",
+        names.join(" or ")
+    )]
+    NoSuchFunction {
+        /// What they are said to be called.
+        names: Vec<String>,
+    },
     /// A word that is no instruction.
     #[error("{function} comes to {address:#06x}, where there is no instruction of the ATmega328P")]
     NoInstruction {
@@ -341,6 +350,11 @@ impl Bounds {
 /// Where the ELF cannot be read, or its program cannot be followed.
 pub fn prove(elf: &Path, input: Option<&Input>, loops: &LoopBounds) -> Result<Bounds, BoundsError> {
     let image = Image::read(elf)?;
+    let known: BTreeSet<_> = image.functions.keys().map(|name| without_types(name)).collect();
+    let gone: Vec<_> = loops.keys().filter(|name| !known.contains(*name)).cloned().collect();
+    if !gone.is_empty() {
+        return Err(BoundsError::NoSuchFunction { names: gone });
+    }
     // Of two names for one place, always the same.
     let mut functions: Vec<_> = image.functions.iter().collect();
     functions.sort_by_key(|&(name, _)| std::cmp::Reverse(name));

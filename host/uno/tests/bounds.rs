@@ -376,6 +376,14 @@ fn what_is_said_of_a_function_holds_for_each_of_its_loops_and_a_record_at_one_go
 }
 
 #[test]
+fn a_bound_for_the_loops_of_a_function_that_is_gone_is_refused() {
+    let bound = LoopBound { passes: 3, because: "it counted".into() };
+    let loops = LoopBounds::from([("gone".to_owned(), bound)]);
+    let error = try_to_prove_with("start: rjmp start", None, &loops).expect_err("it has no such function").to_string();
+    assert!(error.contains("no function of the firmware is called gone"), "{error}");
+}
+
+#[test]
 fn a_turn_of_the_loop_that_feeds_the_watchdog_has_a_bound_once_every_loop_in_it_has() {
     let program = |record: &str| {
         format!(

@@ -130,13 +130,13 @@ impl Examples<{ features::COUNT }> for OneByOne<'_> {
 
 /// So many random examples: 8, 16, 32, 64 or 128.
 fn random(count: u8) -> InFlash {
-    InFlash(match count {
-        8 => RANDOM_8.as_slice(),
-        16 => RANDOM_16.as_slice(),
-        32 => RANDOM_32.as_slice(),
-        64 => RANDOM_64.as_slice(),
-        _ => RANDOM_128.as_slice(),
-    })
+    match count {
+        8 => InFlash::new(&RANDOM_8),
+        16 => InFlash::new(&RANDOM_16),
+        32 => InFlash::new(&RANDOM_32),
+        64 => InFlash::new(&RANDOM_64),
+        _ => InFlash::new(&RANDOM_128),
+    }
 }
 
 /// Random queries.
