@@ -44,13 +44,17 @@ pub struct Arguments {
 /// Where there is no Uno or no receiver to begin with, or a file cannot be written.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let chosen = arguments.ports.choose()?;
+    let mut gps = arguments.gps.open()?;
+    ensure!(
+        gps.is_none() || !chosen.are_several,
+        "--gps goes with one row: record the others by another `weeder record`"
+    );
     let mut logs = Logs::open(&arguments.out, &chosen)?;
-    let mut gps = None;
-    if let Some((receiver, lines)) = arguments.gps.open()? {
-        ensure!(!chosen.are_several, "--gps goes with one row: record the others by another `weeder record`");
+    if let Some((_, lines)) = &mut gps {
+        let lines = std::mem::take(lines);
         logs.lines_at(0, |_| lines)?;
-        gps = Some(receiver);
     }
+    let mut gps = gps.map(|(receiver, _)| receiver);
     let (rows, _) = open(&chosen)?;
     let stop = Arc::new(AtomicBool::new(false));
     let asked_to_stop = Arc::clone(&stop);

@@ -153,7 +153,9 @@ fn of_six_rows_in_real_time_one_that_is_lost_reset_or_in_alarm_disturbs_no_other
         assert_eq!([0, 3, 5].map(|row| laptop.modes[row]), [Some(Mode::Work); 3]);
         [0, 3, 5].iter().all(|&row| seen[row] >= 3)
     });
-    assert_eq!((laptop.lost.as_slice(), laptop.alarms.as_slice()), (&[0, 1, 0, 0, 1, 0][..], &[0, 0, 1, 0, 0, 0][..]));
+    // The one that was reset may be told of twice: what it was answering is cut.
+    assert_eq!([0, 2, 3, 4, 5].map(|row| laptop.lost[row]), [0, 0, 0, 1, 0]);
+    assert_eq!(laptop.alarms, [0, 0, 1, 0, 0, 0]);
 
     let mut hold = laptop.hold(&[true, true, true, true, false, true]);
     let names: Vec<String> = (1..=6).map(|number| number.to_string()).collect();
