@@ -161,6 +161,26 @@ test("the address with the code pairs by itself, and machines side by side are s
     await inspect(here.page, "desk-served-two");
     await part(page, "right", "hold").click();
     await part(here.page, "right", "state").filter({ hasText: "hold" }).waitFor();
-    await close(here);
-    await close(opened);
+
+    // All of them at once, at a glance.
+    const all = page.getByRole("region", { name: "all rows" });
+    for (const name of ["left", "right"]) await part(page, name, "start").click();
+    await all
+        .getByRole("listitem")
+        .filter({ hasText: /left\s*work/ })
+        .waitFor();
+    await all
+        .getByRole("listitem")
+        .filter({ hasText: /right\s*work/ })
+        .waitFor();
+    await all.getByRole("button", { name: "HOLD all" }).click();
+    await all.getByText(/^HOLD obeyed by 2 of 2, the last after \d+ ms\.$/).waitFor();
+    await all
+        .getByRole("listitem")
+        .filter({ hasText: /right\s*hold/ })
+        .waitFor();
+    assert.equal(await part(page, "left", "state").textContent(), "hold");
+    // What a page was asking as HOLD came was dropped, which the browser itself writes down.
+    for (const { page, errors } of [here, opened])
+        await close({ page, errors: errors.filter((error) => !error.includes("status of 409")) });
 });

@@ -56,6 +56,15 @@ impl CourseArguments {
     /// # Errors
     /// Where the file is wrong, or the numbers make no row.
     pub fn row(&self) -> Result<Row> {
+        self.nth_row(0)
+    }
+
+    /// A row beside that one: grown, it has plants of its own.
+    ///
+    /// # Errors
+    /// As [`CourseArguments::row`].
+    pub fn nth_row(&self, number: u64) -> Result<Row> {
+        let seed = self.seed.wrapping_add(number);
         if let Some(path) = &self.row {
             return Ok(Row::parse_csv(path, csv_table::bytes(path)?)?);
         }
@@ -76,8 +85,8 @@ impl CourseArguments {
             ragged: self.ragged,
         };
         let row = match self.weeds {
-            Some(_) => planting.grow(self.seed),
-            None => planting.grow_with_room(self.seed),
+            Some(_) => planting.grow(seed),
+            None => planting.grow_with_room(seed),
         };
         Ok(row?)
     }

@@ -66,6 +66,12 @@ impl From<&FolderName> for FileName {
     }
 }
 
+impl From<&FileName> for FolderName {
+    fn from(name: &FileName) -> Self {
+        Self(name.0.clone())
+    }
+}
+
 impl OutFile<'_> {
     /// Writes it whole, or leaves what was there.
     ///
@@ -100,6 +106,19 @@ impl FolderName {
         let there = folder.ancestors().find(|part| part.exists()).unwrap_or(Path::new("."));
         whole_file::check(&there.join("report")).with_context(|| cannot_be_written(folder))?;
         Ok(OutFolder(folder))
+    }
+
+    /// The name.
+    pub fn path(&self) -> &Path {
+        &self.0
+    }
+
+    /// Makes it where there is none.
+    ///
+    /// # Errors
+    /// Where it cannot be made.
+    pub fn make(&self) -> Result<()> {
+        fs::create_dir_all(&self.0).with_context(|| format!("the folder {} cannot be made", self.0.display()))
     }
 }
 

@@ -27,9 +27,11 @@ mod numbers;
 mod output;
 mod part;
 mod plan;
+mod ports;
 mod progress;
 mod record;
 mod replay;
+mod rows;
 mod serve;
 mod settings;
 mod sim;
@@ -87,6 +89,8 @@ enum Command {
     Train(train::Arguments),
     /// Say what the firmware's classifier takes recorded objects for.
     Classify(classify::Arguments),
+    /// Say which Uno is which row's, and name the rows of a machine.
+    Rows(rows::Arguments),
     /// Watch the machine, and type into its console.
     Monitor(monitor::Arguments),
     /// Serve the page to a phone: what the machines at this computer do, and HOLD.
@@ -168,6 +172,7 @@ fn main() -> ExitCode {
         Command::Classify(arguments) => classify::run(&arguments),
         Command::Monitor(arguments) => monitor::run(&arguments),
         Command::Serve(arguments) => serve::run(&arguments).map(|()| Finding::Good),
+        Command::Rows(arguments) => rows::run(&arguments).map(|()| Finding::Good),
         Command::Record(arguments) => record::run(&arguments).map(|()| Finding::Good),
         Command::Replay(arguments) => replay::run(&arguments),
         Command::Map(arguments) => map::run(&arguments).map(|()| Finding::Good),

@@ -1,6 +1,6 @@
-//! `weeder monitor`: what the machine does, as it does it, with its console below.
+//! `weeder monitor`: what the machine does, as it does it, with its console below; of several rows all at a glance.
 //!
-//! A [`Session`] talks to the machine, [`model`] keeps what is known of it, [`view`] draws that, and [`terminal`] joins them with
+//! [`Rows`](link::rows::Rows) talk to the machine, [`model`] keeps what is known of it, [`view`] draws that, and [`terminal`] joins them with
 //! the keyboard. [`plain`] does without a screen: lines in, lines out.
 
 mod command_line;
@@ -10,28 +10,30 @@ mod terminal;
 mod view;
 
 use crate::Finding;
-use crate::settings::Port;
+use crate::ports::Ports;
+use crate::record::{self, Logs};
 use anyhow::Result;
 use clap::Args;
-use link::Link;
-use link::log::LogWriter;
-use link::session::Session;
 use std::path::PathBuf;
 
 /// What the user asks of the monitor.
 #[derive(Args)]
-#[command(after_help = "Keys: Tab completes, Up and Down go through the history, Ctrl-C ends.\n\nExamples:\n  \
+#[command(after_help = "\
+Keys: Esc has every row hold, whatever is being typed; Page Up and Page Down choose the row to which commands go, or all; Tab completes, \
+Up and Down go through the history, Ctrl-C ends. It is no emergency stop: that one cuts the power.\n\nExamples:\n  \
     weeder monitor                                     watch the only Uno, and type commands\n  \
     weeder monitor --log row.csv                       and keep a log, for `weeder replay row.csv`\n  \
-    echo status | weeder monitor --plain               one command from a script; status 1 if it is refused")]
+    weeder monitor --all                               every row of a machine at a glance\n  \
+    echo status | weeder monitor --plain               one command from a script; status 1 if it is refused\n  \
+    echo left: status | weeder monitor --plain --all   to one row; without a name and a colon to all")]
 pub struct Arguments {
     #[command(flatten)]
-    port: Port,
+    ports: Ports,
     /// Lines in, lines out, for pipes; ends when the input does and the last answer has come.
     #[arg(long)]
     plain: bool,
-    /// Write all that happens to this log.
-    #[arg(long, value_name = "FILE.csv")]
+    /// Write all that happens to this log; of several rows the folder, in which each has a log by its name.
+    #[arg(long, value_name = "FILE.csv|FOLDER")]
     log: Option<PathBuf>,
 }
 
@@ -40,8 +42,11 @@ pub struct Arguments {
 /// # Errors
 /// Where there is no Uno to begin with, or terminal or log fail.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
-    let log = arguments.log.as_deref().map(LogWriter::open).transpose()?;
-    let port = arguments.port.port.clone();
-    let session = Session::open(move || Link::open(port.as_deref()))?;
-    if arguments.plain { plain::run(session, log) } else { terminal::run(session, log).map(|()| Finding::Good) }
+    let chosen = arguments.ports.choose()?;
+    let logs = arguments.log.as_deref().map(|out| Logs::open(out, &chosen)).transpose()?;
+    let (rows, are_there) = record::open(&chosen)?;
+    match arguments.plain {
+        true => plain::run(&rows, &are_there, &chosen, logs),
+        false => terminal::run(&rows, chosen.names(), logs).map(|()| Finding::Good),
+    }
 }

@@ -1,32 +1,39 @@
-//! `weeder record`: what the machine does, in a file.
+//! `weeder record`: what the machine does, in a file; of several rows a file for each.
 
+use crate::destination::FolderName;
 use crate::gps::GpsArguments;
 use crate::output::tell;
-use crate::settings::Port;
-use anyhow::{Context, Result};
+use crate::ports::{Chosen, Ports};
+use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
-use link::Link;
-use link::log::LogWriter;
-use link::session::{Happening, Session};
+use link::log::{LogError, LogWriter};
+use link::rows::{Rows, What};
+use link::session::Happening;
+use places::recorder::Lines;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
+use std::time::{Duration, Instant};
+
+/// Time after which it looks again at whether to end.
+const LOOK: Duration = Duration::from_millis(20);
 
 /// What the user asks of the recording.
 #[derive(Args)]
 #[command(after_help = "\
 Plants, swings and alarms are written down as they come, and the status ten times a second, until Ctrl-C. A cable that is pulled \
-and plugged in again does not end it. On most Unos opening the port is a reset: begin before you work. With a satellite receiver, \
-`weeder map` draws a map of it; docs/map.md says how the antenna is measured.\n\n\
-Examples:\n  weeder record --out row.csv && weeder replay row.csv
-  weeder record --out field.csv --gps /dev/ttyUSB0 --gps-baud 38400 --beam-ahead 620 --beam-right -40")]
+and plugged in again does not end it, and keeps no other row from being recorded. On most Unos opening the port is a reset: begin \
+before you work. With a satellite receiver, `weeder map` draws a map of one row; docs/map.md says how the antenna is measured.\n\n\
+Examples:\n  \
+    weeder record --out row.csv && weeder replay row.csv\n  \
+    weeder record --out field --all                      every row, a log for each in the folder field\n  \
+    weeder record --out field.csv --gps /dev/ttyUSB0 --gps-baud 38400 --beam-ahead 620 --beam-right -40")]
 pub struct Arguments {
-    /// The log; one that is there is gone on with.
-    #[arg(long, value_name = "FILE.csv")]
+    /// The log; one that is there is gone on with. Of several rows the folder, in which each has a log by its name.
+    #[arg(long, value_name = "FILE.csv|FOLDER")]
     out: PathBuf,
     #[command(flatten)]
-    port: Port,
+    ports: Ports,
     #[command(flatten)]
     gps: GpsArguments,
 }
@@ -34,44 +41,160 @@ pub struct Arguments {
 /// Records until Ctrl-C.
 ///
 /// # Errors
-/// Where there is no Uno or no receiver to begin with, or the file cannot be written.
+/// Where there is no Uno or no receiver to begin with, or a file cannot be written.
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let mut log = LogWriter::open(&arguments.out)?;
-    let mut gps = None;
-    if let Some((receiver, lines)) = arguments.gps.open()? {
-        log.lines_at(log.now_ms(), &lines)?;
-        gps = Some(receiver);
+    let chosen = arguments.ports.choose()?;
+    let mut gps = arguments.gps.open()?;
+    ensure!(
+        gps.is_none() || !chosen.are_several,
+        "--gps goes with one row: record the others by another `weeder record`"
+    );
+    let mut logs = Logs::open(&arguments.out, &chosen)?;
+    if let Some((_, lines)) = &mut gps {
+        let lines = std::mem::take(lines);
+        logs.lines_at(0, |_| lines)?;
     }
-    let port = arguments.port.port.clone();
-    let mut session = Session::open(move || Link::open(port.as_deref()))?;
+    let mut gps = gps.map(|(receiver, _)| receiver);
+    let (rows, _) = open(&chosen)?;
     let stop = Arc::new(AtomicBool::new(false));
     let asked_to_stop = Arc::clone(&stop);
     ctrlc::set_handler(move || asked_to_stop.store(true, Ordering::Relaxed)).context("Ctrl-C cannot be caught")?;
     tell!("Recording into {}, Ctrl-C ends it", arguments.out.display());
     while !stop.load(Ordering::Relaxed) {
-        for happening in session.turn(Instant::now()) {
-            log.write(&happening)?;
-            if let Some(gps) = &mut gps {
-                gps.happened(log.now_ms(), &happening);
-            }
-            match happening {
-                Happening::Connected { version, .. } => tell!("weeder {version} is there"),
-                Happening::Lost(why) => tell!("{why}"),
-                _ => {}
-            }
-        }
         if let Some(gps) = &mut gps {
-            let time_ms = log.now_ms();
-            let lines = gps.turn(time_ms, Instant::now());
-            for (_, line) in lines.iter().filter(|(kind, _)| kind.is_for_the_operator()) {
+            let mut said = Vec::new();
+            logs.lines_at(0, |time_ms| {
+                said = gps.turn(time_ms, Instant::now());
+                said.clone()
+            })?;
+            for (_, line) in said.iter().filter(|(kind, _)| kind.is_for_the_operator()) {
                 tell!("Receiver: {line}");
             }
-            log.lines_at(time_ms, &lines)?;
+        }
+        let Some(heard) = rows.next(LOOK) else { continue };
+        let What::Happened(happening) = heard.what else { continue };
+        if let Err(error) = logs.write(heard.row, &happening) {
+            // The other rows' logs are still written.
+            tell!("error: {}", chosen.told(heard.row, &format!("{:#}", anyhow::Error::from(error))));
+            ensure!(logs.are_any_written(), "no log can be written any more");
+        }
+        if let Some(gps) = &mut gps {
+            gps.happened(logs.now_ms(heard.row), &happening);
+        }
+        match happening {
+            Happening::Connected { version, .. } => {
+                tell!("{}", chosen.told(heard.row, &format!("weeder {version} is there")));
+            }
+            Happening::Lost(why) => tell!("{}", chosen.told(heard.row, &why)),
+            _ => {}
         }
     }
     if let Some(gps) = &gps {
         tell!("{}", gps.summary());
     }
-    tell!("{} lines were added: {} has {} now", log.added(), arguments.out.display(), log.lines());
-    Ok(())
+    logs.end()
+}
+
+/// Opens all rows, and says which of them are there. With several, those that are not are heard of, and waited for.
+///
+/// # Errors
+/// Where none is there.
+pub fn open(chosen: &Chosen) -> Result<(Rows, Vec<bool>)> {
+    let (rows, missing) = Rows::open(chosen.openers());
+    let are_there = missing.iter().map(Option::is_none).collect();
+    let mut missing: Vec<_> = missing.into_iter().enumerate().filter_map(|(row, why)| Some((row, why?))).collect();
+    if missing.len() < rows.count() {
+        return Ok((rows, are_there));
+    }
+    if !chosen.are_several
+        && let Some((_, why)) = missing.pop()
+    {
+        return Err(why.into());
+    }
+    for (row, why) in missing {
+        tell!("{}", chosen.told(row, &format!("{:#}", anyhow::Error::from(why))));
+    }
+    bail!("none of the {} rows is there", rows.count());
+}
+
+/// A log for each row.
+pub struct Logs {
+    logs: Vec<Log>,
+}
+
+struct Log {
+    path: PathBuf,
+    writer: LogWriter,
+    is_written: bool,
+}
+
+impl Logs {
+    /// Opens them all, so that their times begin together.
+    ///
+    /// # Errors
+    /// Where one cannot be written, or is something else.
+    pub fn open(out: &std::path::Path, chosen: &Chosen) -> Result<Self> {
+        if chosen.are_several {
+            let folder = FolderName::from(out.as_os_str().to_owned());
+            folder.check()?;
+            folder.make()?;
+        }
+        let path = |row| if chosen.are_several { Chosen::file_in(out, row, "csv") } else { out.to_owned() };
+        let paths = chosen.rows.iter().map(path);
+        let log = |path: PathBuf| Ok(Log { writer: LogWriter::open(&path)?, path, is_written: true });
+        Ok(Self { logs: paths.map(log).collect::<Result<_, LogError>>()? })
+    }
+
+    /// Writes down what happened to a row. After a log could not be written it is left as it is.
+    ///
+    /// # Errors
+    /// Where it cannot be written for the first time.
+    pub fn write(&mut self, row: usize, happening: &Happening) -> Result<(), LogError> {
+        match self.logs.get_mut(row) {
+            Some(log) if log.is_written => log.writer.write(happening).inspect_err(|_| log.is_written = false),
+            _ => Ok(()),
+        }
+    }
+
+    /// The time that a row's line gets which is written now, in milliseconds.
+    fn now_ms(&self, row: usize) -> u64 {
+        self.logs.get(row).map_or(0, |log| log.writer.now_ms())
+    }
+
+    /// Writes the lines that this gives for the present into a row's log.
+    ///
+    /// # Errors
+    /// Where it cannot be written.
+    fn lines_at(&mut self, row: usize, lines: impl FnOnce(u64) -> Lines) -> Result<(), LogError> {
+        let Some(log) = self.logs.get_mut(row) else { return Ok(()) };
+        let time_ms = log.writer.now_ms();
+        log.writer.lines_at(time_ms, &lines(time_ms))
+    }
+
+    /// Whether any is still written.
+    fn are_any_written(&self) -> bool {
+        self.logs.iter().any(|log| log.is_written)
+    }
+
+    /// Says what is in them.
+    ///
+    /// # Errors
+    /// Where one could not be written.
+    fn end(&self) -> Result<()> {
+        for Log { path, writer, .. } in &self.logs {
+            tell!("{} lines were added: {} has {} now", writer.added(), path.display(), writer.lines());
+        }
+        self.check()
+    }
+
+    /// Says whether all of them are whole.
+    ///
+    /// # Errors
+    /// Where one could not be written.
+    pub fn check(&self) -> Result<()> {
+        match self.logs.iter().find(|log| !log.is_written) {
+            Some(log) => bail!("{} is not whole: it could not be written", log.path.display()),
+            None => Ok(()),
+        }
+    }
 }

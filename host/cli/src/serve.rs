@@ -2,12 +2,11 @@
 
 use crate::numbers::whole_within;
 use crate::output::{say, tell};
-use anyhow::{Context, Result, bail};
+use crate::ports::Ports;
+use anyhow::{Context, Result};
 use clap::Args;
-use link::Link;
 use serve::page::Page;
-use serve::{Opener, Server, Setup};
-use std::collections::HashSet;
+use serve::{Server, Setup};
 use std::env;
 use std::net::Ipv4Addr;
 use std::path::{Path, PathBuf};
@@ -17,9 +16,6 @@ use trial::firmware;
 
 /// The TCP port, unless another is given.
 const HTTP_PORT: u16 = 8866;
-
-/// Characters that a machine's name has at the most: it stands above its panel on a phone.
-const NAME_LENGTH: usize = 24;
 
 /// What the user asks of the server.
 #[derive(Args)]
@@ -34,12 +30,11 @@ Examples:
   weeder serve --lan                                 and for a phone in this computer's network
   weeder serve --lan 192.168.4.1 --allow-start       which may start the machine
   weeder serve --port left=/dev/ttyACM0 --port right=/dev/ttyACM1
+  weeder serve --all                                 every row that `weeder rows` has named, and every other Uno
   weeder serve --port uno --page weeder-release/page --http-port 8080")]
 pub struct Arguments {
-    /// An Uno's serial port, such as /dev/ttyACM0 or COM3, or a name for it to be shown by and the port; once for each machine.
-    /// Found by itself where there is only one Uno.
-    #[arg(long, value_name = "[NAME=]PORT", value_parser = named)]
-    port: Vec<Named>,
+    #[command(flatten)]
+    ports: Ports,
     /// Serve it in the network too, at this address of this computer, or at the only one that it has.
     #[arg(long, value_name = "ADDRESS", num_args = 0..=1)]
     lan: Option<Option<Ipv4Addr>>,
@@ -54,30 +49,6 @@ pub struct Arguments {
     http_port: u16,
 }
 
-/// A machine's port, and the name by which it is shown.
-#[derive(Clone)]
-struct Named {
-    name: String,
-    port: String,
-}
-
-/// Reads `NAME=PORT` or a port alone, which is shown by the end of its path.
-fn named(text: &str) -> Result<Named, String> {
-    let (name, port) = match text.split_once('=') {
-        // A path may have the sign in it.
-        Some((name, port)) if !name.contains(['/', '\\']) => (name.trim().to_owned(), port),
-        _ => (Path::new(text).file_name().unwrap_or_default().to_string_lossy().into_owned(), text),
-    };
-    let is_good = !name.is_empty() && name.chars().count() <= NAME_LENGTH && !name.chars().any(char::is_control);
-    match (is_good, port.is_empty()) {
-        (_, true) => Err("it has to be a port, or a name, = and a port, as left=/dev/ttyACM0".to_owned()),
-        (false, _) => {
-            Err(format!("its name has to have 1 to {NAME_LENGTH} characters: put one before it, as left={port}"))
-        }
-        (true, false) => Ok(Named { name, port: port.to_owned() }),
-    }
-}
-
 /// Serves until Ctrl-C.
 ///
 /// # Errors
@@ -89,8 +60,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         Some(None) => Some(serve::find_lan()?),
         None => None,
     };
+    let chosen = arguments.ports.choose()?;
     let server = Server::open(Setup {
-        machines: machines(&arguments.port)?,
+        machines: chosen.names().into_iter().zip(chosen.openers()).collect(),
         page,
         port: arguments.http_port,
         lan,
@@ -109,22 +81,6 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
-/// The machines, each by a name of its own.
-fn machines(ports: &[Named]) -> Result<Vec<(String, Opener)>> {
-    let mut names = HashSet::new();
-    if let Some(Named { name, .. }) = ports.iter().find(|machine| !names.insert(&machine.name)) {
-        bail!("two machines are called {name}: name them, as in `--port left=/dev/ttyACM0 --port right=/dev/ttyACM1`");
-    }
-    if ports.is_empty() {
-        return Ok(vec![("Uno".to_owned(), Box::new(|| Link::open(None)))]);
-    }
-    let machine = |Named { name, port }: &Named| -> (String, Opener) {
-        let port = port.clone();
-        (name.clone(), Box::new(move || Link::open(Some(&port))))
-    };
-    Ok(ports.iter().map(machine).collect())
-}
-
 /// Where the page is: as it was said, beside this command, as in a release, or where the repository's build puts it.
 fn page_folder(said: Option<&Path>) -> PathBuf {
     if let Some(said) = said {
@@ -134,44 +90,5 @@ fn page_folder(said: Option<&Path>) -> PathBuf {
     match beside {
         Some(beside) if beside.join("index.html").is_file() => beside,
         _ => firmware::workspace_root().join("page/dist"),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn read(text: &str) -> Result<(String, String), String> {
-        named(text).map(|Named { name, port }| (name, port))
-    }
-
-    #[test]
-    fn a_machine_has_the_name_that_is_given_or_the_end_of_its_port_s() {
-        for (text, name, port) in [
-            ("/dev/ttyACM0", "ttyACM0", "/dev/ttyACM0"),
-            ("uno", "uno", "uno"),
-            ("left=/dev/ttyACM0", "left", "/dev/ttyACM0"),
-            ("row 3 = left=COM3", "row 3", " left=COM3"),
-            ("/dev/serial/by-id/a=b", "a=b", "/dev/serial/by-id/a=b"),
-        ] {
-            assert_eq!(read(text), Ok((name.to_owned(), port.to_owned())), "{text}");
-        }
-    }
-
-    #[test]
-    fn a_machine_without_a_name_or_a_port_is_refused_with_what_would_be_right() {
-        for text in ["", "=", "left="] {
-            assert!(read(text).unwrap_err().contains("as left=/dev/ttyACM0"), "{text}");
-        }
-        assert!(
-            read("/dev/serial/by-id/usb-Arduino__www.arduino.cc__0043-if00").unwrap_err().contains("put one before it")
-        );
-    }
-
-    #[test]
-    fn two_machines_of_one_name_have_to_be_told_apart() {
-        let machine = |text| named(text).unwrap();
-        let error = machines(&[machine("a/uno"), machine("b/uno")]).err().unwrap().to_string();
-        assert!(error.starts_with("two machines are called uno: name them"), "{error}");
     }
 }

@@ -1,8 +1,9 @@
 //! `weeder settings`: the machine's settings as a file that can be kept, compared, and given to the next machine.
 
 use crate::Finding;
-use crate::destination::FileName;
+use crate::destination::{FileName, FolderName};
 use crate::output::say;
+use crate::ports::{Chosen, Ports};
 use crate::source;
 use anyhow::{Result, ensure};
 use clap::{Args, Subcommand};
@@ -10,6 +11,7 @@ use comfy_table::{Table, presets};
 use link::settings::{self, Setting, Settings, name, unit};
 use link::{Link, settings_file};
 use serde_json::{Map, Value, json};
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 /// What the user asks of the settings.
@@ -17,7 +19,9 @@ use std::path::{Path, PathBuf};
 #[command(after_help = "Examples:\n  \
     weeder settings pull machine.toml           write the machine's settings into a file\n  \
     weeder settings push machine.toml           set them on a machine, which keeps them for good\n  \
-    weeder settings diff machine.toml           say what differs; ends with status 1 if anything does")]
+    weeder settings diff machine.toml           say what differs; ends with status 1 if anything does\n  \
+    weeder settings pull rows --all             of every row, a file for each in the folder rows\n  \
+    weeder settings push machine.toml --port left --port right")]
 pub struct Arguments {
     #[command(subcommand)]
     action: Action,
@@ -28,22 +32,22 @@ enum Action {
     /// Write the machine's settings into a TOML file; one that is there keeps its comments.
     #[command(after_help = "Example: weeder settings pull --json | jq .wheel_mm")]
     Pull {
-        /// The file.
-        #[arg(value_name = "FILE.toml", required_unless_present = "json")]
+        /// The file; of several rows the folder, in which each gets a file by its name.
+        #[arg(value_name = "FILE.toml|FOLDER", required_unless_present = "json")]
         file: Option<FileName>,
         /// Print them as JSON as well.
         #[arg(long)]
         json: bool,
         #[command(flatten)]
-        port: Port,
+        ports: Ports,
     },
     /// Set a file's settings on the machine and have it keep them for good; nothing is sent unless all of them can be right.
     #[command(after_help = "\
 Opening the port is a reset on most Unos, and so is a loss of power: what is not saved is gone then.\n\n\
 Example: weeder settings push machine.toml --port /dev/ttyACM0")]
     Push {
-        /// The file; - for standard input.
-        #[arg(value_name = "FILE.toml", value_parser = source::file)]
+        /// The file, which is for all rows; - for standard input; or of several rows the folder, in which each has a file by its name.
+        #[arg(value_name = "FILE.toml|FOLDER", value_parser = source::file)]
         file: PathBuf,
         /// Leave out the machine's `save`: its next reset, which on most Unos is the next opening of the port, takes them back.
         #[arg(long)]
@@ -55,19 +59,19 @@ Example: weeder settings push machine.toml --port /dev/ttyACM0")]
         #[arg(long)]
         json: bool,
         #[command(flatten)]
-        port: Port,
+        ports: Ports,
     },
     /// Say which of a file's settings the machine has otherwise; the status is 1 where there is one.
     #[command(after_help = "Example: weeder settings diff machine.toml && echo the same")]
     Diff {
-        /// The file; - for standard input.
-        #[arg(value_name = "FILE.toml", value_parser = source::file)]
+        /// The file, which is for all rows; - for standard input; or of several rows the folder, in which each has a file by its name.
+        #[arg(value_name = "FILE.toml|FOLDER", value_parser = source::file)]
         file: PathBuf,
         /// Print the differences as JSON.
         #[arg(long)]
         json: bool,
         #[command(flatten)]
-        port: Port,
+        ports: Ports,
     },
 }
 
@@ -95,52 +99,128 @@ impl Port {
 /// Where file or machine cannot be used; each says what would be right.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     match &arguments.action {
-        Action::Pull { file, json, port } => {
-            let file = file.as_ref().map(FileName::check).transpose()?;
-            let settings = settings::read(&mut port.open()?)?;
-            let printed = if *json { say!("{:#}", as_json(&settings)) } else { Ok(()) };
-            if let Some(file) = file {
-                settings_file::write(file.path(), &settings)?;
+        Action::Pull { file, json, ports } => pull(file.as_ref(), *json, &ports.choose()?),
+        Action::Push { file, no_save, save: _, json, ports } => push(file, !no_save, *json, &ports.choose()?),
+        Action::Diff { file, json, ports } => diff(file, *json, &ports.choose()?),
+    }
+}
+
+fn pull(file: Option<&FileName>, json: bool, chosen: &Chosen) -> Result<Finding> {
+    let folder = file.filter(|_| chosen.are_several).map(FolderName::from);
+    match (&folder, file) {
+        (Some(folder), _) => folder.check().map(|_| ())?,
+        (None, Some(file)) => file.check().map(|_| ())?,
+        (None, None) => {}
+    }
+    let pulled = chosen.each(|_, link| Ok(settings::read(link)?));
+    let mut written = Vec::new();
+    for (place, (row, pulled)) in chosen.rows.iter().zip(pulled).enumerate() {
+        let path = match (&folder, file) {
+            (Some(folder), _) => Some(Chosen::file_in(folder.path(), row, "toml")),
+            (None, file) => file.map(|file| file.path().to_owned()),
+        };
+        written.push(pulled.and_then(|settings| {
+            if let Some(path) = path {
+                if let Some(folder) = &folder {
+                    folder.make()?;
+                }
+                settings_file::write(&path, &settings)?;
                 if !json {
-                    say!("The machine's settings are in {}", file.path().display())?;
+                    let text = format!("The machine's settings are in {}", path.display());
+                    say!("{}", chosen.told(place, &text))?;
                 }
             }
-            printed?;
-            Ok(Finding::Good)
+            Ok(settings)
+        }));
+    }
+    if json && chosen.has_answer(&written) {
+        say!("{:#}", chosen.in_json(&written, as_json))?;
+    }
+    chosen.check(written)?;
+    Ok(Finding::Good)
+}
+
+fn push(file: &Path, save: bool, json: bool, chosen: &Chosen) -> Result<Finding> {
+    let wanted = chosen.wanted(file)?;
+    let pushed = chosen.each(|row, link| Ok(settings::push(link, &wanted[&row.name], save)?));
+    let pushed: Vec<Result<Vec<String>>> =
+        pushed.into_iter().map(|set| Ok(set?.into_iter().map(name).collect())).collect();
+    if json && chosen.has_answer(&pushed) {
+        say!("{:#}", chosen.in_json(&pushed, |set| json!({ "set": set, "saved": save })))?;
+    }
+    for (place, set) in pushed.iter().enumerate().filter(|_| !json) {
+        let Ok(set) = set else { continue };
+        let text = match set.as_slice() {
+            [] => "The machine has these settings already".to_owned(),
+            set => format!("Set: {}", set.join(", ")),
+        };
+        say!("{}", chosen.told(place, &text))?;
+        let saved = match save {
+            true => "All settings are saved",
+            false => "Not saved: the next reset takes them back, and on most Unos opening the port is one",
+        };
+        say!("{}", chosen.told(place, saved))?;
+    }
+    chosen.check(pushed)?;
+    Ok(Finding::Good)
+}
+
+fn diff(file: &Path, json: bool, chosen: &Chosen) -> Result<Finding> {
+    let wanted = chosen.wanted(file)?;
+    let found = chosen.each(|row, link| Ok(differences(&wanted[&row.name], &settings::read(link)?)));
+    if json && chosen.has_answer(&found) {
+        let differing = |&(setting, file, machine): &(Setting, u16, u16)| json!({ "setting": name(setting), "file": value(setting, file), "machine": value(setting, machine) });
+        say!("{:#}", chosen.in_json(&found, |differences| Value::from_iter(differences.iter().map(differing))))?;
+    }
+    for (place, differences) in found.iter().enumerate().filter(|_| !json) {
+        match differences {
+            Ok(differences) if differences.is_empty() => {
+                let text = format!("The machine has the settings of {}", chosen.file_of(place, file).display());
+                say!("{}", chosen.told(place, &text))?;
+            }
+            Ok(differences) if chosen.are_several => {
+                let file = chosen.file_of(place, file);
+                say!("{}\n{}", chosen.told(place, &format!("not as in {}", file.display())), table(differences))?;
+            }
+            Ok(differences) => say!("{}", table(differences))?,
+            Err(_) => {}
         }
-        Action::Push { file, no_save, save: _, json, port } => {
-            let (wanted, save) = (wanted(file)?, !no_save);
-            let changed = settings::push(&mut port.open()?, &wanted, save)?;
-            let changed: Vec<String> = changed.into_iter().map(name).collect();
-            if *json {
-                say!("{:#}", json!({ "set": changed, "saved": save }))?;
-                return Ok(Finding::Good);
-            }
-            match changed.as_slice() {
-                [] => say!("The machine has these settings already")?,
-                changed => say!("Set: {}", changed.join(", "))?,
-            }
-            match save {
-                true => say!("All settings are saved")?,
-                false => say!("Not saved: the next reset takes them back, and on most Unos opening the port is one")?,
-            }
-            Ok(Finding::Good)
-        }
-        Action::Diff { file, json, port } => {
+    }
+    let differs = found.iter().flatten().any(|differences| !differences.is_empty());
+    chosen.check(found)?;
+    Ok(if differs { Finding::Bad } else { Finding::Good })
+}
+
+impl Chosen {
+    /// The settings that each row is to have, by its name: all of them are read before anything is sent.
+    fn wanted(&self, file: &Path) -> Result<HashMap<String, Vec<(Setting, u16)>>> {
+        if !file.is_dir() {
             let wanted = wanted(file)?;
-            let found = settings::read(&mut port.open()?)?;
-            let differences = differences(&wanted, &found);
-            if *json {
-                let rows = differences.iter().map(|&(setting, file, machine)| {
-                    json!({ "setting": name(setting), "file": value(setting, file), "machine": value(setting, machine) })
-                });
-                say!("{:#}", Value::from_iter(rows))?;
-            } else if differences.is_empty() {
-                say!("The machine has the settings of {}", file.display())?;
-            } else {
-                say!("{}", table(&differences))?;
-            }
-            Ok(if differences.is_empty() { Finding::Good } else { Finding::Bad })
+            return Ok(self.rows.iter().map(|row| (row.name.clone(), wanted.clone())).collect());
+        }
+        ensure!(self.are_several, "{} is a folder, and a file has to be named", file.display());
+        self.rows.iter().map(|row| Ok((row.name.clone(), wanted(&Self::file_in(file, row, "toml"))?))).collect()
+    }
+
+    /// The file of a row's settings.
+    fn file_of(&self, place: usize, file: &Path) -> PathBuf {
+        match self.rows.get(place) {
+            Some(row) if file.is_dir() => Self::file_in(file, row, "toml"),
+            _ => file.to_owned(),
+        }
+    }
+
+    /// Whether there is something to print: where the only row has failed, its error is all.
+    fn has_answer<T>(&self, done: &[Result<T>]) -> bool {
+        self.are_several || done.iter().all(Result::is_ok)
+    }
+
+    /// The only row's value, or each row's by its name; `null` of one with which it went wrong.
+    fn in_json<T>(&self, done: &[Result<T>], value: impl Fn(&T) -> Value) -> Value {
+        let value = |done: &Result<T>| done.as_ref().map_or(Value::Null, &value);
+        match done {
+            [only] if !self.are_several => value(only),
+            _ => Value::Object(Map::from_iter(self.names().into_iter().zip(done.iter().map(value)))),
         }
     }
 }

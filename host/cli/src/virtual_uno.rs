@@ -1,17 +1,18 @@
 //! `weeder virtual-uno`: an Uno without an Uno, at a pseudo terminal that any serial program opens.
 
 use crate::course::CourseArguments;
-use crate::numbers::number_within;
+use crate::numbers::{number_within, whole_within};
 use crate::output::{say, tell};
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, anyhow};
 use clap::Args;
 use field::motion::mm_s;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{SystemTime, UNIX_EPOCH};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use trial::firmware;
-use trial::live::{Course, LiveUno, Setup};
+use trial::live::rows::{LiveRows, Ran};
+use trial::live::{Course, Setup};
 use trial::receiver::{ReceiverSetup, Trouble};
 use uno::hex::{Bootloader, HexError};
 
@@ -39,10 +40,23 @@ Or with the old bootloader, as Debian's arduino-core-avr has it:
   weeder virtual-uno --link /tmp/uno --bootloader ATmegaBOOT_168_atmega328.hex
   weeder flash --port /tmp/uno --old-bootloader
 
+A machine with six rows, an Uno for each, and one wheel whose encoder all of them count, at the ports row1 to row6; and what
+that costs this computer, in their own time:
+
+  weeder virtual-uno --rows 6 --link row
+  weeder virtual-uno --rows 6 --fast --for 10
+
 What avrdude says of TIOCMGET means that a pseudo terminal has no modem lines; it does no harm.")]
 pub struct Arguments {
     #[command(flatten)]
     course: CourseArguments,
+    /// A machine with so many rows, 1 to 64: an Uno and plants for each, one wheel for all. Files and links get the row's number at
+    /// their end.
+    #[arg(long, value_name = "NUMBER", default_value = "1", value_parser = whole_within(1..=64_usize))]
+    rows: usize,
+    /// End after so many seconds of the Unos' own time, 1 to 86400, and say how long that took.
+    #[arg(long = "for", value_name = "SECONDS", value_parser = whole_within(1..=86_400_u64))]
+    seconds: Option<u64>,
     /// Have the machine stand still instead of rolling along the row.
     #[arg(long)]
     stand: bool,
@@ -90,11 +104,9 @@ fn bootloader(name: &Path) -> Result<Bootloader, HexError> {
 /// Where a file is wrong, no pseudo terminal is to be had, or the firmware crashes.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let bootloader = arguments.bootloader.as_deref().map(bootloader).transpose()?;
-    let course = Course {
-        row: arguments.course.row()?,
-        machine: arguments.course.machine(),
-        speed_mm_s: mm_s(arguments.course.speed),
-    };
+    let count = arguments.rows;
+    let rows = (0..count as u64).map(|number| arguments.course.nth_row(number)).collect::<Result<Vec<_>>>()?;
+    let courses = Course::of_rows(rows, arguments.course.machine(), mm_s(arguments.course.speed));
     let elf = match (&arguments.elf, &bootloader) {
         (Some(elf), _) => Some(elf.clone()),
         (None, Some(_)) => None,
@@ -110,17 +122,53 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let asked_to_stop = Arc::clone(&stop);
     ctrlc::set_handler(move || asked_to_stop.store(true, Ordering::Relaxed)).context("Ctrl-C cannot be caught")?;
 
-    let mut uno = LiveUno::start(Setup {
-        elf,
-        bootloader,
-        eeprom: arguments.eeprom.clone(),
-        link: arguments.link.clone(),
-        receiver,
+    let of_row = |path: &Option<PathBuf>, row: usize| path.as_ref().map(|path| of_row(path, row, count));
+    let setup = |(row, course)| Setup {
+        elf: elf.clone(),
+        bootloader: bootloader.clone(),
+        eeprom: of_row(&arguments.eeprom, row),
+        link: of_row(&arguments.link, row),
+        // It stands on the machine, which has one.
+        receiver: receiver.clone().filter(|_| row == 0),
         course: (!arguments.stand).then_some(course),
         fast: arguments.fast,
         keeps_running_when_opened: arguments.no_reset,
+    };
+    let mut unos = LiveRows::start(courses.into_iter().enumerate().map(setup).collect())?;
+    for path in unos.paths() {
+        say!("{}", path.display())?;
+    }
+    let ports = if count == 1 { "Uno's port stands" } else { "Unos' ports stand" };
+    tell!("The virtual {ports} above: open it at 115200 baud. Ctrl-C ends it.");
+    let ran = unos.run(&stop, arguments.seconds.map(Duration::from_secs)).map_err(|(row, error)| match count {
+        1 => anyhow!(error),
+        _ => anyhow!(error).context(format!("row {}", row + 1)),
     })?;
-    say!("{}", uno.path().display())?;
-    tell!("The virtual Uno's port stands above: open it at 115200 baud. Ctrl-C ends it.");
-    Ok(uno.run(&stop)?)
+    if arguments.seconds.is_some() {
+        say!("{}", cost(ran, count))?;
+    }
+    Ok(())
+}
+
+/// A row's own file or link: the number is at its end where there are several.
+fn of_row(path: &Path, row: usize, count: usize) -> PathBuf {
+    if count == 1 {
+        return path.to_owned();
+    }
+    let mut name = path.as_os_str().to_owned();
+    name.push((row + 1).to_string());
+    name.into()
+}
+
+/// What the rows have cost.
+fn cost(ran: Ran, count: usize) -> String {
+    let rows = if count == 1 { "a row".to_owned() } else { format!("{count} rows") };
+    let threads = if ran.threads == 1 { "one thread".to_owned() } else { format!("{} threads", ran.threads) };
+    format!(
+        "{rows} in {threads}: {:.1} s of their own time took {:.1} s, which is {:.2} times real time; in real time a row takes {:.2} of a core",
+        ran.simulated.as_secs_f64(),
+        ran.took.as_secs_f64(),
+        ran.times_real_time(),
+        ran.cores_in_real_time() / count as f64
+    )
 }

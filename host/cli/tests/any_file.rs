@@ -8,6 +8,7 @@ use field::trial::Trial;
 use field::verdict::Timing;
 use field::wiring;
 use files::csv_table;
+use link::row_names::Names;
 use link::{log, replay, settings_file};
 use places::{Job, Wanted, map, picture};
 use proptest::prelude::*;
@@ -26,7 +27,7 @@ type Reader = (&'static str, fn(&Path) -> Result<(), Box<dyn Error>>, fn() -> Ve
 /// Longest row that is also rolled along, in mm: longer ones only take longer.
 const ROLLED_MM: f64 = 20_000.0;
 
-const READERS: [Reader; 10] = [
+const READERS: [Reader; 11] = [
     (
         "row.csv",
         |path| {
@@ -83,6 +84,11 @@ const READERS: [Reader; 10] = [
         "machine-settings.toml",
         |path| Ok(settings_file::read(path).map(drop)?),
         || b"# mine\nwheel_mm = 405\nk = 3 # votes\nend_switch = true\n".to_vec(),
+    ),
+    (
+        "rows.toml",
+        |path| Ok(Names::read(path).map(drop)?),
+        || b"# from the left\nleft = { serial_number = \"85735\" }\n\"row 2\" = { port = \"/dev/pts/7\" }\n".to_vec(),
     ),
     (
         "objects.csv",

@@ -247,7 +247,7 @@ fn raw(address: &str, head: &str) -> u16 {
 }
 
 /// Every path, with its method.
-const PATHS: [(&str, &str); 9] = [
+const PATHS: [(&str, &str); 10] = [
     ("GET", "/"),
     ("GET", "/page.css"),
     ("GET", "/page.js"),
@@ -256,6 +256,7 @@ const PATHS: [(&str, &str); 9] = [
     ("POST", "/pair"),
     ("GET", "/machines"),
     ("GET", "/events"),
+    ("POST", "/machines/hold"),
     ("POST", "/machines/0/command"),
 ];
 
@@ -487,6 +488,21 @@ fn a_port_that_is_pulled_is_told_and_opened_again_and_the_machine_beside_it_work
     let mut events = Events::open(&served.lan, &phone, 0);
     assert_eq!(served.post(&served.lan, "/machines/1/command", &phone, "start"), (200, "ok\n".to_owned()));
 
+    let held = |machines: &[bool]| {
+        let (status, said) = served.post(&served.lan, "/machines/hold", &phone, "");
+        let said: Value = serde_json::from_str(&said).expect("it is JSON");
+        let obeyed: Vec<bool> = said["machines"]
+            .as_array()
+            .expect("it has them")
+            .iter()
+            .map(|machine| machine["error"].is_null())
+            .collect();
+        assert!(status == 200 && obeyed == machines && said["lastMs"].is_u64(), "{status} {said}");
+    };
+    held(&[true, true]);
+    events.wait_for(|message| message["machine"] == 1 && has(message, "line", "state=hold"));
+    assert_eq!(served.post(&served.lan, "/machines/1/command", &phone, "start"), (200, "ok\n".to_owned()));
+
     left.interrupt();
     events.wait_for(|message| {
         message["machine"] == 0 && message["is"] == "lost" && has(message, "why", "the port is gone")
@@ -496,6 +512,9 @@ fn a_port_that_is_pulled_is_told_and_opened_again_and_the_machine_beside_it_work
     assert!(status == 503 && said.starts_with("error: the port is gone"), "{status} {said}");
     let (status, said) = served.post(&served.lan, "/machines/1/command", &phone, "status");
     assert!(status == 200 && said.starts_with("state=work "), "{status} {said}");
+    held(&[false, true]);
+    served.wait_until_told("left has not obeyed HOLD: the port is gone");
+    assert_eq!(served.post(&served.lan, "/machines/1/command", &phone, "start"), (200, "ok\n".to_owned()));
 
     let (_left, _) = uno(&folder, "left", &["--stand"]);
     events.wait_for(|message| message["machine"] == 0 && message["is"] == "there");

@@ -8,8 +8,8 @@
 //! Whatever comes from the port is suspect: noise, lines without an end, a firmware that is not the weeder's. What is kept
 //! of it is bounded, characters that could move a terminal's cursor are taken out, and no wait is endless.
 //!
-//! A link does not reconnect: one whose port is gone says so, and the session opens another. Nothing here knows a row or a
-//! simulator. In a browser there is no serial port, and all but that compiles for it.
+//! A link does not reconnect: one whose port is gone says so, and the session opens another. [`rows`] has several sessions at once, and
+//! [`row_names`] knows which board is which row's. Nothing here knows what stands in a row, or a simulator. In a browser there is no serial port, and all but that compiles for it.
 
 pub mod advice;
 pub mod completion;
@@ -20,6 +20,10 @@ pub mod log;
 #[cfg(not(target_arch = "wasm32"))]
 mod port;
 pub mod replay;
+#[cfg(not(target_arch = "wasm32"))]
+pub mod row_names;
+#[cfg(not(target_arch = "wasm32"))]
+pub mod rows;
 mod said;
 pub mod session;
 pub mod set_up;
@@ -73,6 +77,22 @@ pub enum LinkError {
     /// Several do.
     #[error("there are several Unos: choose one by --port, of {}", .0.join(", "))]
     SeveralUnos(Vec<String>),
+    /// A row's board is not there.
+    #[error(
+        "the board with the serial number {0} is not plugged in: plug it in, or name the row's board anew by `weeder rows name`"
+    )]
+    Unplugged(String),
+    /// Several boards say that they are the row's.
+    #[error(
+        "{} are both of the serial number {number}: name the rows anew by `weeder rows name`, which knows them by their ports then",
+        .ports.join(" and ")
+    )]
+    Twins {
+        /// The serial number.
+        number: String,
+        /// Their ports.
+        ports: Vec<String>,
+    },
     /// There is no such port.
     #[error("there is no port {0}: plug the Uno in, or leave --port out to have it found")]
     Absent(String),
@@ -191,6 +211,8 @@ impl Link {
                 break;
             }
             answer = link.ask("version");
+            // An answer that came too late is not to be the next question's.
+            link.wait_until_quiet()?;
         }
         let answer = answer?;
         match answer.last().map(|line| Said::parse(line)) {

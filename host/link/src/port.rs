@@ -43,15 +43,19 @@ pub fn find_uno() -> Result<String, LinkError> {
 /// # Errors
 /// Where there is none, or several.
 fn only_uno(ports: &[SerialPortInfo]) -> Result<String, LinkError> {
-    let is_uno = |port: &&SerialPortInfo| match &port.port_type {
-        SerialPortType::UsbPort(UsbPortInfo { vid, pid, .. }) => UNOS.contains(&(*vid, *pid)),
-        _ => false,
-    };
-    let unos: Vec<String> = ports.iter().filter(is_uno).map(|port| port.port_name.clone()).collect();
+    let unos: Vec<String> = ports.iter().filter(|port| is_uno(port)).map(|port| port.port_name.clone()).collect();
     match unos.as_slice() {
         [only] => Ok(only.clone()),
         [] => Err(LinkError::NoUno(ports.iter().map(|port| port.port_name.clone()).collect())),
         _ => Err(LinkError::SeveralUnos(unos)),
+    }
+}
+
+/// Whether an Uno is at this port, or a board built like it, by its USB vendor and product.
+pub(super) fn is_uno(port: &SerialPortInfo) -> bool {
+    match &port.port_type {
+        SerialPortType::UsbPort(UsbPortInfo { vid, pid, .. }) => UNOS.contains(&(*vid, *pid)),
+        _ => false,
     }
 }
 

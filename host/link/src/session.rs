@@ -21,7 +21,7 @@ const PATIENCE: Duration = Duration::from_secs(3);
 const RETRY: Duration = Duration::from_secs(1);
 
 /// The command that takes the tool out.
-const HOLD: &str = "hold";
+pub(super) const HOLD: &str = "hold";
 
 /// Most lines that are told of in one turn, so that a machine that says much cannot keep it from turning.
 const LINES: usize = 64;
@@ -96,11 +96,25 @@ impl Session {
     ///
     /// # Errors
     /// Where the first link fails.
-    pub fn open(mut open: impl FnMut() -> Result<Link, LinkError> + 'static) -> Result<Self, SettingsError> {
-        let link = open()?;
+    pub fn open(open: impl FnMut() -> Result<Link, LinkError> + 'static) -> Result<Self, SettingsError> {
         let mut session = Self::waiting_for(open);
-        session.connect(link)?;
+        session.try_now(Instant::now())?;
         Ok(session)
+    }
+
+    /// Opens the link now, where there is none. Why it fails is said here, and not told again; the turns try on.
+    ///
+    /// # Errors
+    /// Where the link fails.
+    pub fn try_now(&mut self, now: Instant) -> Result<(), SettingsError> {
+        if self.link.is_some() {
+            return Ok(());
+        }
+        let opened = (self.open)().map_err(SettingsError::from).and_then(|link| self.connect(link));
+        if opened.is_err() {
+            (self.retry_at, self.is_lost_untold) = (Some(now + RETRY), false);
+        }
+        opened
     }
 
     /// A session without a link: `open` is called by the turns, over and over until there is an Uno. Why there is none at first is told.

@@ -7,8 +7,8 @@ use serde_json::{Value, json};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use tokio::sync::broadcast::{self, Receiver};
 
-/// Messages that a page may be behind by: some ten seconds of two machines at work.
-const BEHIND: usize = 256;
+/// Messages of a machine that a page may be behind by: some ten seconds of it at work.
+const BEHIND: usize = 128;
 
 /// A message to the pages, as JSON.
 pub type Message = Arc<str>;
@@ -31,7 +31,10 @@ impl Hub {
     /// So many machines, none of which has been heard of.
     pub fn new(machines: usize) -> Self {
         let unheard = || State::Lost("its port is being opened".to_owned());
-        Self { machines: Mutex::new((0..machines).map(|_| unheard()).collect()), pages: broadcast::channel(BEHIND).0 }
+        Self {
+            machines: Mutex::new((0..machines).map(|_| unheard()).collect()),
+            pages: broadcast::channel(BEHIND * machines.max(2)).0,
+        }
     }
 
     /// The machine is there.
@@ -149,10 +152,10 @@ mod tests {
     fn a_page_that_does_not_read_keeps_nobody_waiting_and_learns_that_it_has_missed_something() {
         let hub = Hub::new(1);
         let (_, mut page) = hub.listen();
-        for number in 0..10 * BEHIND {
+        for number in 0..20 * BEHIND {
             hub.event(0, &number.to_string());
         }
-        assert!(matches!(page.try_recv(), Err(TryRecvError::Lagged(missed)) if missed as usize == 9 * BEHIND));
-        assert_eq!(heard(&mut page).len(), BEHIND);
+        assert!(matches!(page.try_recv(), Err(TryRecvError::Lagged(missed)) if missed as usize == 18 * BEHIND));
+        assert_eq!(heard(&mut page).len(), 2 * BEHIND);
     }
 }

@@ -28,7 +28,6 @@ use axum::Router;
 use hyper::server::conn::http1;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
-use link::{Link, LinkError};
 use std::io;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -40,8 +39,7 @@ use tokio::runtime::{self, Runtime};
 use tokio::time::sleep;
 use tokio_io_timeout::TimeoutStream;
 
-/// A way to a machine, tried again whenever it is lost.
-pub type Opener = Box<dyn FnMut() -> Result<Link, LinkError> + Send>;
+pub use link::rows::Opener;
 
 /// Says something to the operator at this computer.
 pub type Tell = Arc<dyn Fn(&str) + Send + Sync>;

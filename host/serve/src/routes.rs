@@ -7,6 +7,7 @@
 //! | `POST /pair` | a cookie for the code that is in the body |
 //! | `/machines` | their names, and what may be typed from there, as JSON |
 //! | `/events` | what all machines are and say, as server-sent events |
+//! | `POST /machines/hold` | what came of a HOLD to all machines at once, and after what time the last one had obeyed, as JSON |
 //! | `POST /machines/N/command` | the answer to the line that is in the body, a line each |
 //!
 //! There is no path to any other file, and none that flashes.
@@ -30,6 +31,7 @@ use axum::middleware::{Next, from_fn_with_state};
 use axum::response::sse::{Event, Sse};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
+use futures_util::future::join_all;
 use futures_util::stream::{self, Stream, StreamExt};
 use std::convert::Infallible;
 use std::net::IpAddr;
@@ -101,6 +103,7 @@ pub fn routes(served: Arc<Served>) -> Router {
         .route("/pair.css", get(|| async { ([(CONTENT_TYPE, "text/css; charset=utf-8")], form::CSS) }))
         .route("/pair.js", get(|| async { ([(CONTENT_TYPE, "text/javascript; charset=utf-8")], form::JS) }))
         .route("/machines", get(machines))
+        .route("/machines/hold", post(hold_all))
         .route("/machines/{number}/command", post(command))
         .route("/events", get(events))
         .fallback(|| async { (StatusCode::NOT_FOUND, "there is no such path\n") })
@@ -268,6 +271,38 @@ async fn command(
         Ok(Typed::Lost(why)) => refused(StatusCode::SERVICE_UNAVAILABLE, &why),
         Ok(Typed::Busy) => refused(StatusCode::SERVICE_UNAVAILABLE, "too much waits for the machine: try again"),
         Err(_) => refused(StatusCode::GATEWAY_TIMEOUT, "the machine does not answer"),
+    }
+}
+
+/// Has all machines hold at once, which whoever comes in may: of each why it has not obeyed, or nothing, and the time of the last that has.
+async fn hold_all(State(served): State<Arc<Served>>) -> impl IntoResponse {
+    let since = Instant::now();
+    let holds = served.machines.iter().map(|machine| async move {
+        let typed = timeout(ANSWER_TIME, machine.hold()).await;
+        (why_not_held(typed.ok()), since.elapsed())
+    });
+    let held = join_all(holds).await;
+    let obeyed = held.iter().filter(|(why, _)| why.is_none());
+    let last_ms = obeyed.map(|(_, time)| time.as_millis() as u64).max();
+    let machines: Vec<_> = served.machines.iter().zip(&held).map(|(machine, (why, _))| (&machine.name, why)).collect();
+    for (name, why) in &machines {
+        if let Some(why) = why {
+            (served.tell)(&format!("{name} has not obeyed HOLD: {why}."));
+        }
+    }
+    let machines: Vec<_> =
+        machines.into_iter().map(|(name, why)| serde_json::json!({ "name": name, "error": why })).collect();
+    let said = serde_json::json!({ "machines": machines, "lastMs": last_ms });
+    ([(CONTENT_TYPE, "application/json")], said.to_string())
+}
+
+/// Why a machine has not obeyed a `hold`, of which this came.
+fn why_not_held(typed: Option<Typed>) -> Option<String> {
+    match typed {
+        Some(Typed::Answered(lines)) => lines.last().filter(|line| line.starts_with("error:")).cloned(),
+        Some(Typed::Lost(why)) => Some(why),
+        Some(Typed::Dropped | Typed::Busy) => Some("too much waits for the machine: try again".to_owned()),
+        None => Some("the machine does not answer".to_owned()),
     }
 }
 

@@ -2,7 +2,7 @@
 //! along a row again and again.
 //!
 //! [`LiveUno::start`] powers it up, [`LiveUno::run`] lets it run until it is told to stop, and [`LiveUno::run_in_background`] does so in
-//! a thread. Each millisecond of the chip's time, bytes are taken from and given to the terminal; then the host's clock is
+//! a thread. [`rows`] has several, whose encoder is the same. Each millisecond of the chip's time, bytes are taken from and given to the terminal; then the host's clock is
 //! waited for. A host that is too slow makes the chip slower, never the time between two of its events wrong.
 //!
 //! - **Reset.** A program that opens the port of a real Uno resets it, by the modem line DTR. A pseudo terminal has no such
@@ -23,6 +23,7 @@ use field::wiring;
 use signal::{CYCLES_PER_SECOND, PinChange};
 use std::collections::VecDeque;
 use std::io::{self, ErrorKind};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -33,6 +34,8 @@ use uno::elf::EEPROM_BYTES;
 use uno::hex::Bootloader;
 use uno::pty::{Pty, PtyError};
 use uno::{Uno, UnoError};
+
+pub mod rows;
 
 /// What is on the desk.
 #[derive(Clone, Debug, Default)]
@@ -58,12 +61,11 @@ pub struct Setup {
 /// A row, and the machine that rolls along it.
 #[derive(Clone, Debug)]
 pub struct Course {
-    /// What stands in the row.
-    pub row: Row,
-    /// The machine.
-    pub machine: Machine,
-    /// Its speed.
-    pub speed_mm_s: f64,
+    row: Row,
+    machine: Machine,
+    speed_mm_s: f64,
+    /// The ground on which something stands, in this row or another of the machine.
+    span_mm: Range<f64>,
 }
 
 /// Why a live Uno could not start, or stopped.
@@ -127,9 +129,22 @@ const STANDING_S: u64 = 3;
 const TICKS_IN_A_PERIOD: f64 = 4.0;
 
 impl Course {
+    /// A machine with one row.
+    pub fn new(row: Row, machine: Machine, speed_mm_s: f64) -> Self {
+        Self { span_mm: row.span_mm(), row, machine, speed_mm_s }
+    }
+
+    /// A machine with several rows and one wheel: a course for each row, all of which roll along the same ground at the same time.
+    pub fn of_rows(rows: Vec<Row>, machine: Machine, speed_mm_s: f64) -> Vec<Self> {
+        let spans = || rows.iter().map(Row::span_mm);
+        let start = spans().map(|span| span.start).fold(f64::INFINITY, f64::min);
+        let end = spans().map(|span| span.end).fold(f64::NEG_INFINITY, f64::max);
+        rows.into_iter().map(|row| Self { row, machine, speed_mm_s, span_mm: start..end }).collect()
+    }
+
     /// How the machine rolls along the row once. It ends with the encoder's channels as they were.
     fn motion(&self) -> Motion {
-        let span = self.row.span_mm();
+        let span = &self.span_mm;
         let start_mm = span.start - AHEAD_MM;
         let braking_mm = self.speed_mm_s.powi(2) / (2.0 * ACCELERATION_MM_S2);
         let wanted_mm = span.end + self.machine.beam_to_tool_mm + BEHIND_MM + braking_mm - start_mm;
@@ -203,7 +218,10 @@ fn give(pty: &mut Pty, unread: &mut VecDeque<u8>) -> Result<(), LiveError> {
 /// A virtual Uno at a pseudo terminal.
 pub struct LiveUno {
     uno: Uno,
-    pty: Pty,
+    /// Its terminal; none while its cable is pulled.
+    pty: Option<Pty>,
+    path: PathBuf,
+    link: Option<PathBuf>,
     receiver: Option<Receiver>,
     course: Option<Course>,
     way: Way,
@@ -214,6 +232,8 @@ pub struct LiveUno {
     unread: VecDeque<u8>,
     resets_when_opened: bool,
     fast: bool,
+    /// How long it has run, in slices.
+    slices: u64,
 }
 
 impl LiveUno {
@@ -231,13 +251,12 @@ impl LiveUno {
         };
         uno = uno.wired(&wiring::WIRES);
         uno.follow_baud();
-        let mut pty = Pty::open()?;
-        if let Some(link) = &setup.link {
-            pty.link(link)?;
-        }
+        let pty = terminal(setup.link.as_deref())?;
         Ok(LiveUno {
             uno,
-            pty,
+            path: pty.path().to_owned(),
+            pty: Some(pty),
+            link: setup.link,
             receiver: setup.receiver.map(Receiver::start).transpose()?,
             course: setup.course,
             way: Way { before_mm: 0.0, since: None },
@@ -246,12 +265,13 @@ impl LiveUno {
             unread: VecDeque::new(),
             resets_when_opened: !setup.keeps_running_when_opened,
             fast: setup.fast,
+            slices: 0,
         })
     }
 
     /// The path under which programs open its serial port.
     pub fn path(&self) -> &Path {
-        self.pty.path()
+        &self.path
     }
 
     /// The path under which programs open the receiver's port, where there is one.
@@ -264,30 +284,47 @@ impl LiveUno {
     /// # Errors
     /// Where the firmware crashes or halts, or the terminal or the EEPROM's file fails.
     pub fn run(&mut self, stop: &AtomicBool) -> Result<(), LiveError> {
-        let mut due = Instant::now();
-        let mut slices = 0_u64;
+        let mut pace = (!self.fast).then(Pace::new);
         while !stop.load(Ordering::Relaxed) {
-            self.serve_terminal()?;
-            self.roll();
-            self.uno.run_for_ms(SLICE_MS)?;
-            // Nobody looks at them, and they would pile up.
-            self.uno.take_changes();
-            slices += 1;
-            if slices.is_multiple_of(EEPROM_SLICES) {
-                self.keep_eeprom()?;
-            }
-            if !self.fast {
-                due += Duration::from_millis(SLICE_MS);
-                let now = Instant::now();
-                match due.checked_duration_since(now) {
-                    Some(wait) => thread::sleep(wait),
-                    None if now - due > LATE_BY => due = now,
-                    None => {}
-                }
+            self.slice()?;
+            if let Some(pace) = &mut pace {
+                pace.wait(1);
             }
         }
+        self.end()
+    }
+
+    /// Runs for a slice.
+    fn slice(&mut self) -> Result<(), LiveError> {
         self.serve_terminal()?;
+        self.serve_receiver()?;
+        self.roll();
+        self.slices += 1;
+        // Not so much longer as the last instruction of each slice: several of them share a wheel.
+        self.uno.run_until(self.slices * SLICE_MS * (CYCLES_PER_SECOND / 1000))?;
+        // Nobody looks at them, and they would pile up.
+        self.uno.take_changes();
+        if self.slices.is_multiple_of(EEPROM_SLICES) { self.keep_eeprom() } else { Ok(()) }
+    }
+
+    /// Passes on what is left.
+    fn end(&mut self) -> Result<(), LiveError> {
+        self.serve_terminal()?;
+        self.serve_receiver()?;
         self.keep_eeprom()
+    }
+
+    /// Pulls the cable. The chip runs on: it has power of its own.
+    fn unplug(&mut self) {
+        self.pty = None;
+    }
+
+    /// Plugs the cable in again.
+    fn plug_in(&mut self) -> Result<(), LiveError> {
+        let pty = terminal(self.link.as_deref())?;
+        self.path = pty.path().to_owned();
+        self.pty = Some(pty);
+        Ok(())
     }
 
     /// Runs in a thread until the handle is dropped.
@@ -310,7 +347,12 @@ impl LiveUno {
 
     /// Resets the chip where a program has opened the port, and passes bytes both ways.
     fn serve_terminal(&mut self) -> Result<(), LiveError> {
-        if self.pty.was_opened()? {
+        let Some(pty) = &mut self.pty else {
+            // What it says is heard by nobody.
+            self.uno.received_bytes();
+            return Ok(());
+        };
+        if pty.was_opened()? {
             self.unread.clear();
             if self.resets_when_opened {
                 self.uno.reset();
@@ -319,11 +361,15 @@ impl LiveUno {
 
         let mut buffer = [0; MOST_BYTES_ON_THEIR_WAY];
         let room = MOST_BYTES_ON_THEIR_WAY.saturating_sub(self.uno.bytes_on_their_way());
-        let count = self.pty.read(&mut buffer[..room])?;
+        let count = pty.read(&mut buffer[..room])?;
         self.uno.send(&buffer[..count]);
 
         self.unread.extend(self.uno.received_bytes().iter().map(|received| received.byte));
-        give(&mut self.pty, &mut self.unread)?;
+        give(pty, &mut self.unread)
+    }
+
+    /// Has the satellite receiver say what it has to say by now.
+    fn serve_receiver(&mut self) -> Result<(), LiveError> {
         match &mut self.receiver {
             Some(receiver) => receiver.serve(self.uno.cycle() as f64 / CYCLES_PER_SECOND as f64, &self.way),
             None => Ok(()),
@@ -335,9 +381,10 @@ impl LiveUno {
         if let Some(course) = &self.course
             && self.uno.cycle() >= self.sets_off
         {
-            let (changes, end, motion) = course.roll_along(self.uno.cycle());
+            // At the same cycle for all that share the wheel, wherever their last instruction ended.
+            let (changes, end, motion) = course.roll_along(self.sets_off);
             self.uno.drive(changes);
-            let set_off_s = self.uno.cycle() as f64 / CYCLES_PER_SECOND as f64;
+            let set_off_s = self.sets_off as f64 / CYCLES_PER_SECOND as f64;
             self.way = Way { before_mm: 1000.0 * self.way.rolled_m(set_off_s), since: Some((set_off_s, motion)) };
             self.sets_off = end + STANDING_S * CYCLES_PER_SECOND;
         }
@@ -347,6 +394,37 @@ impl LiveUno {
         match &mut self.eeprom {
             Some(file) => file.keep(self.uno.eeprom()),
             None => Ok(()),
+        }
+    }
+}
+
+/// A pseudo terminal, with a link to it where one is wanted.
+fn terminal(link: Option<&Path>) -> Result<Pty, LiveError> {
+    let mut pty = Pty::open()?;
+    if let Some(link) = link {
+        pty.link(link)?;
+    }
+    Ok(pty)
+}
+
+/// Keeps slices to the host's clock.
+struct Pace {
+    due: Instant,
+}
+
+impl Pace {
+    fn new() -> Self {
+        Self { due: Instant::now() }
+    }
+
+    /// Waits until the time of so many slices is over since the last ones'.
+    fn wait(&mut self, slices: u64) {
+        self.due += Duration::from_millis(slices * SLICE_MS);
+        let now = Instant::now();
+        match self.due.checked_duration_since(now) {
+            Some(wait) => thread::sleep(wait),
+            None if now - self.due > LATE_BY => self.due = now,
+            None => {}
         }
     }
 }

@@ -118,7 +118,7 @@ fn without_firmware_and_bootloader_there_is_nothing_to_run() {
 #[test]
 fn the_machine_rolls_along_its_row_and_stands_between() {
     let row = Row::new(vec![Thing::plant(500.0, 150.0)]).unwrap();
-    let course = Course { row, machine: Machine::default(), speed_mm_s: 2000.0 };
+    let course = Course::new(row, Machine::default(), 2000.0);
     let uno = start(Setup { course: Some(course), fast: true, ..product() });
     let mut link = open(&uno);
     let mut positions = Vec::new();

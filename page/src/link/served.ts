@@ -22,6 +22,14 @@ export interface Allowed {
     readonly mayChange: boolean;
 }
 
+/** What came of a HOLD to all machines. */
+export interface HeldAll {
+    /** Each machine, and why it has not obeyed. */
+    readonly machines: readonly { readonly name: string; readonly error: string | null }[];
+    /** Time until the last of those that have had obeyed, as the computer there took it. */
+    readonly lastMs: number | null;
+}
+
 /** Whether this page comes from `weeder serve`. */
 export function isServed(): boolean {
     return new URLSearchParams(location.search).has("served");
@@ -67,6 +75,15 @@ export class Served {
             this.#take(JSON.parse(data) as Message);
         });
         events.addEventListener("error", () => this.#lose(SILENT));
+    }
+
+    /** Has all machines hold, before all that waits. */
+    async holdAll(): Promise<HeldAll> {
+        const answer = await fetch("/machines/hold", { method: "POST" }).catch(() => {
+            throw new Error(SILENT);
+        });
+        if (!answer.ok) throw new Error(await answer.text());
+        return (await answer.json()) as HeldAll;
     }
 
     /** Looks whether the computer is still there. */

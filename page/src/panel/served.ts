@@ -1,8 +1,9 @@
-// The machines that `weeder serve` has at its ports, side by side: a panel for each, by its name.
+// The machines that `weeder serve` has at its ports, side by side: a panel for each, by its name. Several are at a glance above them.
 
 import { make } from "../dom.ts";
 import { Served } from "../link/served.ts";
 import { sentence } from "./machine.ts";
+import { Overview } from "./overview.ts";
 import { Panel } from "./panel.ts";
 
 /** Time between two turns. */
@@ -11,6 +12,10 @@ const TURN_MS = 20;
 /** Fills an element with the machines' panels, and gives these back. */
 export async function showServed(into: HTMLElement): Promise<Panel[]> {
     const served = await Served.open();
+    const all = make("section", "overview");
+    all.ariaLabel = "all rows";
+    const overview = served.names.length > 1 ? new Overview(all, served.names, () => served.holdAll()) : undefined;
+    if (overview) into.append(all);
     const panels = served.names.map((name, machine) => {
         const element = make("div", "panel");
         const section = make("section", "served", make("h2", "", name), element);
@@ -29,6 +34,7 @@ export async function showServed(into: HTMLElement): Promise<Panel[]> {
     setInterval(() => {
         served.watch();
         for (const panel of panels) panel.turn(performance.now());
+        overview?.show(panels);
     }, TURN_MS);
     served.listen();
     return panels;

@@ -1,7 +1,8 @@
-//! What is known of the machine, and how that changes with what happens.
+//! What is known of each row, and how that changes with what happens.
 
 use super::command_line::CommandLine;
 use link::advice;
+use link::rows::{Heard, Hold, What};
 use link::session::Happening;
 use link::settings::{Setting, Settings};
 use link::{Class, EventLine, Mode, Status};
@@ -35,9 +36,25 @@ pub struct Seen {
     pub spacing: i32,
 }
 
-/// What is known of the machine.
+/// What has become of the last command to a row.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Answer {
+    /// There was none.
+    #[default]
+    None,
+    /// It is not answered yet.
+    Waiting,
+    /// The machine has done it.
+    Done,
+    /// The machine has refused it, or it was not typed.
+    Refused,
+}
+
+/// What is known of a row.
 #[derive(Clone, Debug)]
-pub struct Model {
+pub struct RowModel {
+    /// What the operator calls it.
+    pub name: String,
     /// Whether it is there.
     pub connection: Connection,
     /// Its last status.
@@ -50,6 +67,19 @@ pub struct Model {
     pub windows: VecDeque<Seen>,
     /// What the operator has to see to.
     pub advice: Option<String>,
+    /// What has become of the last command.
+    pub answer: Answer,
+}
+
+/// What is known of the machine.
+#[derive(Clone, Debug)]
+pub struct Model {
+    /// Its rows, at least one.
+    pub rows: Vec<RowModel>,
+    /// The row to which commands go; none: to all.
+    pub target: Option<usize>,
+    /// The last HOLD to all, until something else is asked for.
+    pub hold: Option<Hold>,
     /// What was typed, answered and told, the newest last.
     pub lines: VecDeque<String>,
     /// What is being typed.
@@ -57,39 +87,105 @@ pub struct Model {
 }
 
 impl Model {
-    /// A machine of which nothing is known yet.
-    pub fn new() -> Self {
+    /// Rows of which nothing is known yet.
+    pub fn new(names: Vec<String>) -> Self {
         Self {
-            connection: Connection::Down("looking for it".to_owned()),
-            // As every machine starts.
-            status: Status { tool_out: true, ..Status::default() },
-            settings: Settings::new(),
-            objects: VecDeque::new(),
-            windows: VecDeque::new(),
-            advice: None,
+            rows: names.into_iter().map(RowModel::new).collect(),
+            target: None,
+            hold: None,
             lines: VecDeque::new(),
             line: CommandLine::default(),
         }
     }
 
-    /// Takes what happened.
-    pub fn update(&mut self, happening: Happening) {
-        match happening {
-            Happening::Connected { version, settings, .. } => {
-                self.say(format!("-- connected to weeder {version}"));
-                self.settings = settings;
-                self.connection = Connection::Up(version);
-                self.windows.clear();
+    /// Whether there are several rows.
+    pub fn are_several(&self) -> bool {
+        self.rows.len() > 1
+    }
+
+    /// The rows' names.
+    pub fn names(&self) -> Vec<String> {
+        self.rows.iter().map(|row| row.name.clone()).collect()
+    }
+
+    /// The rows to which commands go.
+    pub fn targets(&self) -> Vec<usize> {
+        self.target.map_or_else(|| (0..self.rows.len()).collect(), |row| vec![row])
+    }
+
+    /// Has commands go to the next row, or the one before; all of them stand before the first.
+    pub fn choose(&mut self, forward: bool) {
+        let places = self.rows.len() + 1;
+        let place = self.target.map_or(0, |row| row + 1);
+        let place = (place + if forward { 1 } else { places - 1 }) % places;
+        self.target = place.checked_sub(1).filter(|_| self.are_several());
+    }
+
+    /// A command was sent to those to whom commands go.
+    pub fn sent(&mut self, command: &str) {
+        self.hold = None;
+        for row in self.targets() {
+            self.rows[row].answer = Answer::Waiting;
+        }
+        if self.are_several() {
+            let to = self.target.map_or("all", |row| self.rows[row].name.as_str());
+            self.say(format!("> {to}: {command}"));
+        }
+    }
+
+    /// HOLD was asked of all.
+    pub fn held(&mut self, hold: Hold) {
+        self.hold = Some(hold);
+        for row in &mut self.rows {
+            row.answer = Answer::Waiting;
+        }
+        if self.are_several() {
+            self.say("> all: hold".to_owned());
+        }
+    }
+
+    /// Takes what was heard of a row.
+    pub fn take(&mut self, heard: Heard) {
+        if let Some(hold) = &mut self.hold {
+            hold.take(&heard);
+        }
+        match heard.what {
+            What::Happened(happening) => self.update(heard.row, happening),
+            What::Answered { refusal, .. } => {
+                let answer = if refusal.is_some() { Answer::Refused } else { Answer::Done };
+                if let Some(row) = self.rows.get_mut(heard.row) {
+                    row.answer = answer;
+                }
             }
-            Happening::Lost(why) => {
-                self.say(format!("-- {why}"));
-                self.connection = Connection::Down(why);
+            What::NotTyped { command, why } => {
+                if let Some(row) = self.rows.get_mut(heard.row) {
+                    row.answer = Answer::Refused;
+                }
+                self.say_of(heard.row, &format!("-- `{command}` was not typed: {why}"));
             }
-            Happening::Status(status, _) => self.take_status(status),
-            Happening::Event(event, line) => self.take_event(event, line),
-            Happening::Command(line) => self.say(format!("> {line}")),
-            Happening::Answer(line) => self.say(line),
-            Happening::Settings(settings) => self.settings = settings,
+        }
+    }
+
+    /// Takes what happened to a row.
+    pub fn update(&mut self, number: usize, happening: Happening) {
+        // What each plant and each swing was is more than anybody reads of several rows.
+        let said = match &happening {
+            Happening::Connected { version, .. } => Some(format!("-- connected to weeder {version}")),
+            Happening::Lost(why) => Some(format!("-- {why}")),
+            Happening::Event(EventLine::Plot, _) => None,
+            Happening::Event(EventLine::Alarm { .. } | EventLine::Warning(_) | EventLine::State(_), line) => {
+                Some(line.clone())
+            }
+            Happening::Event(_, line) => (!self.are_several()).then(|| line.clone()),
+            Happening::Command(line) => (!self.are_several()).then(|| format!("> {line}")),
+            Happening::Answer(line) => Some(line.clone()),
+            Happening::Status(..) | Happening::Settings(_) => None,
+        };
+        if let Some(said) = said {
+            self.say_of(number, &said);
+        }
+        if let Some(row) = self.rows.get_mut(number) {
+            row.update(happening);
         }
     }
 
@@ -99,6 +195,57 @@ impl Model {
             self.lines.pop_front();
         }
         self.lines.push_back(line);
+    }
+
+    /// Adds a line of a row, under its name where there are several.
+    fn say_of(&mut self, number: usize, line: &str) {
+        match self.rows.get(number) {
+            Some(row) if self.are_several() => self.say(format!("{}: {line}", row.name)),
+            _ => self.say(line.to_owned()),
+        }
+    }
+}
+
+impl RowModel {
+    /// A row of which nothing is known yet.
+    fn new(name: String) -> Self {
+        Self {
+            name,
+            connection: Connection::Down("looking for it".to_owned()),
+            // As every machine starts.
+            status: Status { tool_out: true, ..Status::default() },
+            settings: Settings::new(),
+            objects: VecDeque::new(),
+            windows: VecDeque::new(),
+            advice: None,
+            answer: Answer::None,
+        }
+    }
+
+    /// Whether the Uno is there.
+    pub fn is_there(&self) -> bool {
+        matches!(self.connection, Connection::Up(_))
+    }
+
+    fn update(&mut self, happening: Happening) {
+        match happening {
+            Happening::Connected { version, settings, .. } => {
+                self.settings = settings;
+                self.connection = Connection::Up(version);
+                self.windows.clear();
+            }
+            Happening::Lost(why) => {
+                self.connection = Connection::Down(why);
+                // What is not answered by now will not be.
+                if self.answer == Answer::Waiting {
+                    self.answer = Answer::Refused;
+                }
+            }
+            Happening::Status(status, _) => self.take_status(status),
+            Happening::Event(event, _) => self.take_event(event),
+            Happening::Settings(settings) => self.settings = settings,
+            Happening::Command(_) | Happening::Answer(_) => {}
+        }
     }
 
     /// A distance in millimetres, of the machine's own wheel.
@@ -118,7 +265,7 @@ impl Model {
         self.status = status;
     }
 
-    fn take_event(&mut self, event: EventLine, line: String) {
+    fn take_event(&mut self, event: EventLine) {
         match event {
             EventLine::Object { class, position, votes, spacing, hold, .. } => {
                 // The hold is the canopy and both margins.
@@ -135,14 +282,13 @@ impl Model {
                 self.advice =
                     Some(format!("warning {}: {}", name_of(warning.text().bytes()), advice::warning(warning)));
             }
-            EventLine::Plot => return,
-            EventLine::Swing { .. }
+            EventLine::Plot
+            | EventLine::Swing { .. }
             | EventLine::Guarded { .. }
             | EventLine::Slip { .. }
             | EventLine::State(_)
             | EventLine::Calibrated { .. } => {}
         }
-        self.say(line);
     }
 }
 

@@ -1,24 +1,36 @@
 //! The monitor without a screen: each line of the input is a command, each line of the output an answer or an event.
+//!
+//! With several rows a command goes to one of them behind its name and a colon, or to all; what they say stands behind their names. A
+//! `hold` to all goes to them at the same moment, and how long the last one took is said.
 
 use crate::Finding;
 use crate::output::tell;
-use anyhow::{Result, ensure};
-use link::log::LogWriter;
-use link::session::{Happening, Session};
+use crate::ports::Chosen;
+use crate::record::Logs;
+use anyhow::{Result, bail, ensure};
+use link::row_names::ALL;
+use link::rows::{Heard, Hold, Rows, What};
+use link::session::Happening;
 use std::io::{self, BufRead, ErrorKind, Write};
 use std::sync::mpsc::{self, Receiver, TryRecvError};
 use std::thread;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
-/// Goes on until the input has ended and its last command has been answered; bad where one was refused.
+/// Time after which it looks again at whether something was typed.
+const LOOK: Duration = Duration::from_millis(20);
+
+/// Goes on until the input has ended and its last command has been answered; bad where one was refused. `are_there` says which rows were there
+/// when they were opened.
 ///
 /// # Errors
-/// Where a line is no command, the Uno goes away with commands unanswered, or output or log fail.
-pub fn run(session: Session, log: Option<LogWriter>) -> Result<Finding> {
+/// Where a line is no command, an Uno goes away with commands unanswered, or output or log fail.
+pub fn run(rows: &Rows, are_there: &[bool], chosen: &Chosen, logs: Option<Logs>) -> Result<Finding> {
     let (sender, commands) = mpsc::channel();
     // Reading waits for as long as nobody types, so it does so by itself; it ends with the process.
     thread::spawn(move || io::stdin().lock().lines().map_while(Result::ok).try_for_each(|line| sender.send(line)));
-    match talk(session, log, &commands, &mut io::stdout().lock()) {
+    let standing = are_there.iter().map(|&is_there| Standing { is_there, ..Standing::default() }).collect();
+    let talk = Talk { rows, chosen, logs, standing, hold: None, finding: Finding::Good };
+    match talk.run(&commands, &mut io::stdout().lock()) {
         // Whoever read the output has seen enough.
         Err(error) if error.downcast_ref::<io::Error>().is_some_and(|error| error.kind() == ErrorKind::BrokenPipe) => {
             Ok(Finding::Good)
@@ -27,54 +39,155 @@ pub fn run(session: Session, log: Option<LogWriter>) -> Result<Finding> {
     }
 }
 
-fn talk(
-    mut session: Session,
-    mut log: Option<LogWriter>,
-    commands: &Receiver<String>,
-    output: &mut impl Write,
-) -> Result<Finding> {
-    let mut finding = Finding::Good;
-    let mut ended = false;
-    // What the last command brought about is told before the machine has given its status twice.
-    let mut statuses = 0;
-    loop {
-        // One at a time, so that the commands wait in the pipe.
-        if session.is_idle() && !ended {
-            match commands.try_recv() {
-                Ok(command) => ensure!(
-                    session.command(command.trim()),
-                    "{command:?} is no command: it has to be one line of at most {} printable ASCII characters",
-                    link::COMMAND_LENGTH
-                ),
-                Err(TryRecvError::Disconnected) => ended = true,
-                Err(TryRecvError::Empty) => {}
-            }
-        }
-        if ended && session.is_idle() && statuses >= 2 {
-            return Ok(finding);
-        }
-        let was_idle = session.is_idle();
-        for happening in session.turn(Instant::now()) {
-            if let Some(log) = &mut log {
-                log.write(&happening)?;
-            }
-            match happening {
-                Happening::Connected { .. } | Happening::Settings(_) | Happening::Command(_) => {}
-                Happening::Status(..) => statuses += 1,
-                Happening::Lost(why) => {
-                    ensure!(was_idle && !ended, "{why}");
-                    tell!("{why}");
-                }
-                Happening::Event(_, line) => writeln!(output, "{line}")?,
-                Happening::Answer(line) => {
-                    statuses = 0;
-                    if line.starts_with("error:") {
-                        finding = Finding::Bad;
-                    }
-                    writeln!(output, "{line}")?;
+/// How a row stands.
+#[derive(Default)]
+struct Standing {
+    is_there: bool,
+    /// Commands that are not answered.
+    unanswered: usize,
+    /// Statuses since the last answer.
+    statuses: usize,
+    /// Whether it went away with commands unanswered.
+    has_failed: bool,
+}
+
+struct Talk<'a> {
+    rows: &'a Rows,
+    chosen: &'a Chosen,
+    logs: Option<Logs>,
+    standing: Vec<Standing>,
+    /// A `hold` to all of several rows that is under way.
+    hold: Option<Hold>,
+    finding: Finding,
+}
+
+impl Talk<'_> {
+    fn run(mut self, commands: &Receiver<String>, output: &mut impl Write) -> Result<Finding> {
+        let mut ended = false;
+        loop {
+            // One at a time, so that the commands wait in the pipe.
+            if self.is_idle() && !ended {
+                match commands.try_recv() {
+                    Ok(line) => self.command(line.trim(), output)?,
+                    Err(TryRecvError::Disconnected) => ended = true,
+                    Err(TryRecvError::Empty) => {}
                 }
             }
+            // What the last command brought about is told before the machine has given its status twice.
+            let has_told = |row: &Standing| !row.is_there || row.statuses >= 2;
+            if ended && self.is_idle() && self.standing.iter().all(has_told) {
+                return self.end();
+            }
+            let Some(heard) = self.rows.next(LOOK) else { continue };
+            self.take(&heard, ended, output)?;
+            output.flush()?;
         }
-        output.flush()?;
+    }
+
+    fn is_idle(&self) -> bool {
+        self.standing.iter().all(|row| row.unanswered == 0)
+    }
+
+    /// What came of it all.
+    fn end(&self) -> Result<Finding> {
+        let failed = self.chosen.rows.iter().zip(&self.standing).filter(|(_, standing)| standing.has_failed);
+        let failed: Vec<&str> = failed.map(|(row, _)| row.name.as_str()).collect();
+        ensure!(failed.is_empty(), "not all was answered by {}", failed.join(", "));
+        Ok(self.finding)
+    }
+
+    /// Types a line to the rows that it is for.
+    fn command(&mut self, line: &str, output: &mut impl Write) -> Result<()> {
+        let (to, command) = match line.split_once(':') {
+            Some((name, command)) if self.chosen.are_several => (self.named(name.trim())?, command.trim()),
+            _ => (None, line),
+        };
+        ensure!(
+            link::is_command(command),
+            "{command:?} is no command: it has to be one line of at most {} printable ASCII characters",
+            link::COMMAND_LENGTH
+        );
+        // The machine does not answer a line without a word.
+        if command.is_empty() {
+            return Ok(());
+        }
+        let to = to.map_or_else(|| 0..self.rows.count(), |row| row..row + 1);
+        if self.chosen.are_several && to.len() == self.rows.count() && command == "hold" {
+            self.hold = Some(Hold::new(Instant::now(), self.standing.iter().map(|row| row.is_there)));
+        }
+        for row in to {
+            let standing = &mut self.standing[row];
+            if !standing.is_there {
+                standing.has_failed = true;
+                writeln!(output, "{}", self.chosen.told(row, "error: the row is not there"))?;
+                if command == "hold" {
+                    self.rows.hold(row);
+                }
+                continue;
+            }
+            (standing.unanswered, standing.statuses) = (standing.unanswered + 1, 0);
+            match command {
+                "hold" => self.rows.hold(row),
+                _ => self.rows.command(row, command),
+            }
+        }
+        self.tell_of_hold(output)
+    }
+
+    /// The row of this name; none for all.
+    fn named(&self, name: &str) -> Result<Option<usize>> {
+        let found = self.chosen.rows.iter().position(|row| row.name == name);
+        match found {
+            None if name != ALL => bail!("there is no row {name}: there are {}", self.chosen.names().join(", ")),
+            found => Ok(found),
+        }
+    }
+
+    fn take(&mut self, heard: &Heard, ended: bool, output: &mut impl Write) -> Result<()> {
+        let row = heard.row;
+        let standing = &mut self.standing[row];
+        if let (Some(logs), What::Happened(happening)) = (&mut self.logs, &heard.what) {
+            logs.write(row, happening)?;
+        }
+        match &heard.what {
+            What::Happened(Happening::Connected { .. }) => standing.is_there = true,
+            What::Happened(Happening::Settings(_) | Happening::Command(_)) => {}
+            What::Happened(Happening::Status(..)) => standing.statuses += 1,
+            What::Happened(Happening::Lost(why)) => {
+                let was_idle = standing.unanswered == 0;
+                standing.has_failed |= !was_idle;
+                (standing.is_there, standing.unanswered) = (false, 0);
+                ensure!(self.chosen.are_several || was_idle && !ended, "{why}");
+                tell!("{}", self.chosen.told(row, why));
+            }
+            What::Happened(Happening::Event(_, line)) => writeln!(output, "{}", self.chosen.told(row, line))?,
+            What::Happened(Happening::Answer(line)) => {
+                standing.statuses = 0;
+                writeln!(output, "{}", self.chosen.told(row, line))?;
+            }
+            What::Answered { refusal, .. } => {
+                standing.unanswered = standing.unanswered.saturating_sub(1);
+                if refusal.is_some() {
+                    self.finding = Finding::Bad;
+                }
+            }
+            What::NotTyped { command, why } => {
+                standing.unanswered = standing.unanswered.saturating_sub(1);
+                standing.has_failed = true;
+                writeln!(output, "{}", self.chosen.told(row, &format!("error: `{command}` was not typed: {why}")))?;
+            }
+        }
+        if let Some(hold) = &mut self.hold {
+            hold.take(heard);
+        }
+        self.tell_of_hold(output)
+    }
+
+    /// Says what came of a `hold` to all once nobody is waited for any more.
+    fn tell_of_hold(&mut self, output: &mut impl Write) -> Result<()> {
+        if let Some(hold) = self.hold.take_if(|hold| hold.is_over()) {
+            writeln!(output, "{}", hold.summary(&self.chosen.names()))?;
+        }
+        Ok(())
     }
 }

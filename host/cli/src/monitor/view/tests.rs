@@ -1,34 +1,49 @@
 //! Snapshots of the screen, from what happened to a machine.
 
 use super::*;
+use link::rows::{Heard, Hold, What};
 use link::session::Happening;
 use link::settings::Settings;
 use link::{EventLine, Status};
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
 use ratatui::crossterm::event::KeyCode;
+use std::time::{Duration, Instant};
 
 /// The screen after all of this.
 fn screen(model: &Model) -> String {
-    let mut terminal = Terminal::new(TestBackend::new(90, 22)).unwrap();
+    screen_of(model, 90, 22)
+}
+
+/// A screen of so many columns and lines.
+fn screen_of(model: &Model, columns: u16, lines: u16) -> String {
+    let mut terminal = Terminal::new(TestBackend::new(columns, lines)).unwrap();
     terminal.draw(|frame| draw(model, frame)).unwrap();
     terminal.backend().to_string()
 }
 
 /// A machine that told these lines since it was connected.
 fn machine(lines: &[&str]) -> Model {
-    let mut model = Model::new();
+    let mut model = Model::new(vec!["Uno".to_owned()]);
+    tell(&mut model, 0, lines);
+    model
+}
+
+/// A row connects, and tells these lines.
+fn tell(model: &mut Model, row: usize, lines: &[&str]) {
     let version = "0.1.0".to_owned();
-    model.update(Happening::Connected { version, settings: Settings::new(), examples: Vec::new() });
+    model.update(row, Happening::Connected { version, settings: Settings::new(), examples: Vec::new() });
     for line in lines {
         let line = (*line).to_owned();
-        model.update(match (Status::parse(&line), EventLine::parse(&line)) {
-            (Some(status), _) => Happening::Status(status, line),
-            (None, Some(event)) => Happening::Event(event, line),
-            (None, None) => Happening::Answer(line),
-        });
+        model.update(
+            row,
+            match (Status::parse(&line), EventLine::parse(&line)) {
+                (Some(status), _) => Happening::Status(status, line),
+                (None, Some(event)) => Happening::Event(event, line),
+                (None, None) => Happening::Answer(line),
+            },
+        );
     }
-    model
 }
 
 /// A plant 150 mm wide that began 250 mm ahead of the tool, a weed, and the plant before them.
@@ -57,7 +72,7 @@ fn an_alarm_is_shown_with_what_to_do_until_it_is_cleared() {
     lines.push("state=alarm alarm=beam_blocked tool=out pos=2700 speed_mm_s=0 windows=0 unseen_mm=400");
     insta::assert_snapshot!(screen(&machine(&lines)));
     lines.push("state=hold tool=out pos=2700 speed_mm_s=0 windows=0 unseen_mm=400");
-    assert_eq!(machine(&lines).advice, None);
+    assert_eq!(machine(&lines).rows[0].advice, None);
 }
 
 #[test]
@@ -73,7 +88,7 @@ fn completions_are_offered_below_the_line() {
 #[test]
 fn a_machine_that_is_gone_is_said_to_be() {
     let mut model = machine(&ROW);
-    model.update(Happening::Lost("the port is gone: plug the Uno in again".to_owned()));
+    model.update(0, Happening::Lost("the port is gone: plug the Uno in again".to_owned()));
     insta::assert_snapshot!(screen(&model));
 }
 
@@ -107,8 +122,106 @@ fn what_is_drawn_follows_the_machine_s_settings() {
     let mut settings = Settings::new();
     settings.set(Setting::BeamToToolMm, 800).unwrap();
     let before = screen(&model);
-    model.update(Happening::Settings(settings));
+    model.update(0, Happening::Settings(settings));
     assert_ne!(screen(&model), before);
-    model.update(Happening::Settings(Settings::new()));
+    model.update(0, Happening::Settings(Settings::new()));
     assert_eq!(screen(&model), before);
+}
+
+/// A status of a row at work with these windows, and one of a row in alarm.
+const AT_WORK: &str = "state=work tool=in pos=2196 speed_mm_s=556 windows=1 unseen_mm=0";
+const IN_ALARM: &str = "state=alarm alarm=encoder_channel_dead tool=out pos=2700 speed_mm_s=0 windows=0 unseen_mm=400";
+
+/// A machine of so many rows, the third of which is in alarm and the last of which is lost.
+fn rows(count: usize) -> Model {
+    let mut model = Model::new((1..=count).map(|number| format!("row {number}")).collect());
+    for row in 0..count {
+        let mut lines = ROW.to_vec();
+        lines.push(if row == 2 { IN_ALARM } else { AT_WORK });
+        tell(&mut model, row, &lines);
+    }
+    if count > 1 {
+        model.update(count - 1, Happening::Lost("the port is gone: plug the Uno in again".to_owned()));
+    }
+    model
+}
+
+/// A HOLD to all that every row but the last, which is lost, has obeyed.
+fn held(model: &mut Model) {
+    let since = Instant::now();
+    let count = model.rows.len();
+    model.held(Hold::new(since, model.rows.iter().map(RowModel::is_there)));
+    for row in 0..count - 1 {
+        let what = What::Answered { command: "hold".to_owned(), refusal: None };
+        model.take(Heard { row, at: since + Duration::from_millis(20 + row as u64), what });
+    }
+}
+
+#[test]
+fn six_and_twelve_rows_are_seen_at_a_glance_on_screens_of_both_sizes() {
+    for count in [6, 12] {
+        for (columns, lines) in [(40, 10), (80, 24)] {
+            let mut model = rows(count);
+            insta::assert_snapshot!(format!("{count}_rows_{columns}x{lines}"), screen_of(&model, columns, lines));
+            held(&mut model);
+            insta::assert_snapshot!(format!("{count}_rows_held_{columns}x{lines}"), screen_of(&model, columns, lines));
+        }
+    }
+}
+
+#[test]
+fn one_row_in_a_small_terminal_keeps_its_state_its_alarm_and_the_key_for_hold() {
+    let mut lines = ROW.to_vec();
+    lines.push(AT_WORK);
+    insta::assert_snapshot!(screen_of(&machine(&lines), 40, 10));
+    insta::assert_snapshot!(screen_of(&machine(&lines), 80, 24));
+    lines.push(IN_ALARM);
+    let mut model = machine(&lines);
+    insta::assert_snapshot!(screen_of(&model, 40, 10));
+    model.update(0, Happening::Lost("the port is gone: plug the Uno in again".to_owned()));
+    insta::assert_snapshot!(screen_of(&model, 40, 10));
+}
+
+#[test]
+fn on_no_screen_of_40_columns_and_10_lines_or_more_the_key_or_an_alarmed_or_lost_row_is_missing() {
+    for count in 1..=24 {
+        for (columns, lines) in [(40, 10), (40, 30), (57, 11), (80, 15), (80, 16), (80, 24), (200, 10), (120, 50)] {
+            let mut model = rows(count);
+            for _ in 0..=count {
+                let drawn = screen_of(&model, columns, lines);
+                assert!(drawn.contains("Esc HOLD"), "{count}: {drawn}");
+                if count > 3 {
+                    assert!(
+                        drawn.contains("row 3") && drawn.contains("ALARM") && drawn.contains("encoder_chan"),
+                        "{drawn}"
+                    );
+                    assert!(drawn.contains(&format!("row {count}")) && drawn.contains("LOST"), "{drawn}");
+                }
+                model.choose(true);
+            }
+        }
+    }
+}
+
+#[test]
+fn the_row_that_commands_go_to_is_chosen_and_its_answer_is_marked() {
+    let mut model = rows(3);
+    assert_eq!(model.targets(), [0, 1, 2]);
+    model.choose(true);
+    model.choose(true);
+    assert_eq!(model.targets(), [1]);
+    model.sent("start");
+    assert!(screen_of(&model, 80, 24).contains("row 2 work  ? in"), "{}", screen_of(&model, 80, 24));
+    let refusal = Some("error: alarm latched".to_owned());
+    model.take(Heard { row: 1, at: Instant::now(), what: What::Answered { command: "start".to_owned(), refusal } });
+    let drawn = screen_of(&model, 80, 24);
+    assert!(
+        drawn.contains("row 2 work  ! in") && drawn.contains("row 2> ") && drawn.contains("> row 2: start"),
+        "{drawn}"
+    );
+    model.choose(false);
+    model.choose(false);
+    assert_eq!(model.targets(), [0, 1, 2]);
+    model.choose(false);
+    assert_eq!(model.targets(), [2]);
 }

@@ -1,0 +1,161 @@
+//! One row on the screen: its machine, the ground between beam and tool, its objects, and its console. Where there is no room for all that,
+//! the state and the ground in a few lines.
+
+use super::{HOLD_KEY, colour, draw_line, draw_said, draw_top, ground, hold_style, tool_column};
+use crate::monitor::model::{Connection, Model, RowModel, Seen};
+use link::Class;
+use ratatui::Frame;
+use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::style::{Color, Style, Stylize};
+use ratatui::text::{Line, Span, Text};
+use ratatui::widgets::{Block, Paragraph, Row, Table, Wrap};
+
+/// Columns and lines below which there is no room for all.
+const COLUMNS: u16 = 70;
+const LINES: u16 = 18;
+
+/// Draws the row.
+pub fn draw(model: &Model, row: &RowModel, frame: &mut Frame) {
+    let area = frame.area();
+    if area.width < COLUMNS || area.height < LINES {
+        draw_small(model, row, frame)
+    } else {
+        draw_all(model, row, frame)
+    }
+}
+
+/// The state, with the tool and why it is out.
+fn state(row: &RowModel) -> Line<'static> {
+    let status = &row.status;
+    let reason = status.reason.as_deref().map_or_else(String::new, |reason| format!(" for {reason}"));
+    Line::from(vec![
+        Span::raw("state "),
+        Span::styled(format!("{:<8}", status.mode.name()), Style::new().fg(colour(status.mode)).bold()),
+        Span::raw(format!("tool {}{reason}", if status.tool_out { "out" } else { "in" })),
+    ])
+}
+
+fn speed_and_place(row: &RowModel) -> String {
+    let km_h = f64::from(row.status.speed_mm_s) * 0.0036;
+    format!("speed {km_h:5.2} km/h   place {:8.2} m", row.millimetres(row.status.position) / 1000.0)
+}
+
+fn draw_small(model: &Model, row: &RowModel, frame: &mut Frame) {
+    let area = frame.area();
+    // Two lines are enough for every advice, three for why there is no machine.
+    let urgent = match (&row.connection, &row.advice) {
+        (Connection::Down(why), _) => Some(why.clone()),
+        (Connection::Up(_), advice) => advice.clone(),
+    };
+    let wrapped = urgent.as_ref().map_or(0, |text| text.chars().count().div_ceil(usize::from(area.width.max(10)) - 5));
+    // What comes first here is there where there is not room for all.
+    let mut left = area.height;
+    let mut take = |wanted: usize| {
+        let got = left.min(wanted as u16);
+        left -= got;
+        Constraint::Length(got)
+    };
+    let (top, advice, line, hint) = (take(1), take(wrapped.min(4)), take(1), take(1));
+    let (ground, speed) = (take(2), take(1));
+    let [top, advice, ground, speed, said, line, hint] =
+        Layout::vertical([top, advice, ground, speed, Constraint::Length(left), line, hint]).areas(area);
+    match row.connection {
+        Connection::Up(_) => draw_top(state(row), frame, top),
+        Connection::Down(_) => {
+            draw_top(Line::styled("NO WEEDER", Style::new().fg(Color::Red).bold()), frame, top);
+        }
+    }
+    let style = Style::new().fg(Color::Red).bold();
+    frame.render_widget(Paragraph::new(urgent.unwrap_or_default()).style(style).wrap(Wrap { trim: true }), advice);
+    let columns = usize::from(ground.width);
+    frame
+        .render_widget(Text::from(vec![self::ground(row, columns).green().into(), marks(row, columns).into()]), ground);
+    frame.render_widget(Line::raw(speed_and_place(row)), speed);
+    let lines = model.lines.iter().skip(model.lines.len().saturating_sub(usize::from(said.height)));
+    frame.render_widget(Paragraph::new(lines.map(|line| Line::raw(line.as_str())).collect::<Vec<_>>()), said);
+    draw_line(model, "", frame, line, hint);
+}
+
+fn draw_all(model: &Model, row: &RowModel, frame: &mut Frame) {
+    let [machine, ground, advice, middle, line, hint] = Layout::vertical([
+        Constraint::Length(4),
+        Constraint::Length(5),
+        Constraint::Length(1),
+        Constraint::Min(4),
+        Constraint::Length(1),
+        Constraint::Length(1),
+    ])
+    .areas(frame.area());
+    let [objects, said] = Layout::horizontal([Constraint::Length(40), Constraint::Min(10)]).areas(middle);
+    draw_machine(row, frame, machine);
+    draw_ground(row, frame, ground);
+    if let Some(text) = &row.advice {
+        frame.render_widget(Line::styled(text.as_str(), Style::new().fg(Color::Red).bold()), advice);
+    }
+    draw_objects(row, frame, objects);
+    draw_said(model, frame, said);
+    draw_line(model, "", frame, line, hint);
+}
+
+fn draw_machine(row: &RowModel, frame: &mut Frame, area: Rect) {
+    let title = match &row.connection {
+        Connection::Up(version) => format!(" weeder {version} "),
+        Connection::Down(why) => format!(" no weeder: {why} "),
+    };
+    let status = &row.status;
+    let slip = status.slip_permille.map_or_else(String::new, |slip| format!("   slip {:.1} %", f64::from(slip) / 10.0));
+    let second =
+        format!("{}   windows {}   unseen {} mm{slip}", speed_and_place(row), status.windows, status.unseen_mm);
+    let key = Line::styled(format!(" {HOLD_KEY} "), hold_style()).right_aligned();
+    let block = Block::bordered().title(title).title(key);
+    frame.render_widget(Paragraph::new(vec![state(row), second.into()]).block(block), area);
+}
+
+/// Where the tool and the beam are.
+fn marks(row: &RowModel, columns: usize) -> String {
+    let tool_at = tool_column(row, columns);
+    let tool = format!("{:tool_at$}{}", "", if row.status.tool_out { "△ tool out" } else { "▲ tool in" });
+    let mut marks: Vec<char> = tool.chars().take(columns).collect();
+    marks.resize(columns, ' ');
+    let beam = "beam |";
+    let start = columns.saturating_sub(beam.len());
+    if start > tool_at + 12 {
+        marks.splice(start.., beam.chars());
+    }
+    marks.into_iter().collect()
+}
+
+/// The row from a little behind the tool to the beam, as the machine rolls to the right.
+fn draw_ground(row: &RowModel, frame: &mut Frame, area: Rect) {
+    let block = Block::bordered().title(" row ");
+    let inner = block.inner(area);
+    frame.render_widget(block, area);
+    let columns = usize::from(inner.width);
+    let text = Text::from(vec![
+        Line::raw(ground(row, columns)).green(),
+        Line::raw(marks(row, columns)),
+        Line::raw("█ canopy  ░ margin  ' weed").dim(),
+    ]);
+    frame.render_widget(text, inner);
+}
+
+fn draw_objects(machine: &RowModel, frame: &mut Frame, area: Rect) {
+    let row = |seen: &Seen| {
+        let class = match seen.class {
+            Class::Plant => "plant",
+            Class::Weed => "weed",
+            Class::Unknown => "unknown",
+        };
+        Row::new([
+            class.to_owned(),
+            seen.votes.to_string(),
+            format!("{:.0} mm", machine.millimetres(seen.width)),
+            format!("{:.0} mm", machine.millimetres(seen.spacing)),
+        ])
+    };
+    let widths = [Constraint::Length(8), Constraint::Length(5), Constraint::Length(9), Constraint::Length(9)];
+    let table = Table::new(machine.objects.iter().map(row), widths)
+        .header(Row::new(["class", "votes", "width", "spacing"]).dim())
+        .block(Block::bordered().title(" objects, the newest first "));
+    frame.render_widget(table, area);
+}

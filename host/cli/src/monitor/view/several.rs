@@ -1,0 +1,150 @@
+//! Several rows at a glance: a line for each, with its name, its state, its alarm or the ground before its tool, and what has become of the
+//! last command. Where there is not room for all of them, those that are lost or in alarm come first, and how the rest is is counted.
+
+use super::{colour, draw_line, draw_said, draw_top, ground};
+use crate::monitor::model::{Answer, Connection, Model, RowModel};
+use link::Mode;
+use ratatui::Frame;
+use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::style::{Color, Style, Stylize};
+use ratatui::text::{Line, Span};
+use ratatui::widgets::Paragraph;
+
+/// Lines from which on the console has a frame, and what there is to do about an alarm a line.
+const ROOMY: u16 = 16;
+
+/// Columns of a name where the screen is narrow, and columns from which on it is not.
+const NAME: usize = 8;
+const WIDE: u16 = 60;
+
+/// Draws the rows.
+pub fn draw(model: &Model, rows: &[RowModel], frame: &mut Frame) {
+    let area = frame.area();
+    let is_roomy = area.height >= ROOMY;
+    // The top, a line of the console, what is typed, and the line below it; the console's frame and the advice where there is room.
+    let others = if is_roomy { 3 + 3 + 1 } else { 3 };
+    let room = usize::from(area.height.saturating_sub(others)).min(rows.len());
+    let [top, list, advice, said, line, hint] = Layout::vertical([
+        Constraint::Length(1),
+        Constraint::Length(room as u16),
+        Constraint::Length(u16::from(is_roomy)),
+        Constraint::Min(0),
+        Constraint::Length(1),
+        Constraint::Length(1),
+    ])
+    .areas(area);
+    draw_top(counted(rows), frame, top);
+    draw_list(model, rows, frame, list);
+    if let Some((row, text)) = rows.iter().find_map(|row| Some((row, row.advice.as_ref()?))) {
+        let style = Style::new().fg(Color::Red).bold();
+        frame.render_widget(Line::styled(format!("{}: {text}", row.name), style), advice);
+    }
+    if is_roomy {
+        draw_said(model, frame, said);
+    } else {
+        let lines = model.lines.iter().skip(model.lines.len().saturating_sub(usize::from(said.height)));
+        frame.render_widget(Paragraph::new(lines.map(|line| Line::raw(line.as_str())).collect::<Vec<_>>()), said);
+    }
+    let to = model.target.map_or("all", |row| rows[row].name.as_str());
+    draw_line(model, to, frame, line, hint);
+}
+
+/// How a row is, the worst first.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Is {
+    Lost,
+    Alarm,
+    Work,
+    Hold,
+}
+
+impl Is {
+    const ALL: [Self; 4] = [Self::Lost, Self::Alarm, Self::Work, Self::Hold];
+
+    fn of(row: &RowModel) -> Self {
+        match (row.is_there(), row.status.mode) {
+            (false, _) => Self::Lost,
+            (true, Mode::Alarm) => Self::Alarm,
+            (true, Mode::Work) => Self::Work,
+            (true, Mode::Hold) => Self::Hold,
+        }
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Lost => "LOST",
+            Self::Alarm => "ALARM",
+            Self::Work => "work",
+            Self::Hold => "hold",
+        }
+    }
+
+    fn style(self) -> Style {
+        let colour = match self {
+            Self::Lost | Self::Alarm => Color::Red,
+            Self::Work => colour(Mode::Work),
+            Self::Hold => colour(Mode::Hold),
+        };
+        Style::new().fg(colour).bold()
+    }
+}
+
+/// How many rows are how.
+fn counts<'a>(rows: impl Iterator<Item = &'a RowModel> + Clone) -> Vec<Span<'static>> {
+    let count = |is: Is| rows.clone().filter(|row| Is::of(row) == is).count();
+    let counts = Is::ALL.map(|is| (is, count(is)));
+    let counts = counts.into_iter().filter(|&(_, count)| count > 0);
+    counts.map(|(is, count)| Span::styled(format!("{count} {} ", is.name()), is.style())).collect()
+}
+
+fn counted(rows: &[RowModel]) -> Line<'static> {
+    Line::from([vec![Span::raw(format!("{} rows: ", rows.len()))], counts(rows.iter())].concat())
+}
+
+fn draw_list(model: &Model, rows: &[RowModel], frame: &mut Frame, area: Rect) {
+    let room = usize::from(area.height);
+    let mut order: Vec<usize> = (0..rows.len()).collect();
+    if room < rows.len() {
+        // Where all fit they keep their places, for the eye.
+        let is_urgent = |row: usize| matches!(Is::of(&rows[row]), Is::Lost | Is::Alarm);
+        order.sort_by_key(|&row| (!is_urgent(row), model.target != Some(row)));
+    }
+    let shown = if room < rows.len() { room.saturating_sub(1) } else { room };
+    let longest = rows.iter().map(|row| row.name.chars().count()).max().unwrap_or_default();
+    let name = if area.width < WIDE { longest.min(NAME) } else { longest };
+    let mut lines: Vec<Line> =
+        order.iter().take(shown).map(|&row| line(&rows[row], name, area.width, model.target == Some(row))).collect();
+    if shown < rows.len() {
+        let rest = order[shown..].iter().map(|&row| &rows[row]);
+        let more = Span::raw(format!("and {} more: ", order.len() - shown));
+        lines.push(Line::from([vec![more], counts(rest)].concat()));
+    }
+    frame.render_widget(Paragraph::new(lines), area);
+}
+
+/// A row's line.
+fn line(row: &RowModel, name: usize, columns: u16, is_target: bool) -> Line<'static> {
+    let is = Is::of(row);
+    let mark = match row.answer {
+        Answer::None => ' ',
+        Answer::Waiting => '?',
+        Answer::Done => '+',
+        Answer::Refused => '!',
+    };
+    let shown: String = row.name.chars().take(name).collect();
+    let shown = Span::raw(format!("{shown:<name$} "));
+    let shown = if is_target { shown.reversed() } else { shown };
+    let state = Span::styled(format!("{:<5} ", is.name()), is.style());
+    let room = usize::from(columns).saturating_sub(name + 13);
+    let (tool, rest) = match (&row.connection, row.status.alarm) {
+        (Connection::Down(why), _) => ("   ", Span::styled(why.clone(), Is::Lost.style())),
+        (Connection::Up(_), Some(alarm)) => {
+            let name: String = alarm.text().bytes().map(char::from).collect();
+            ("out", Span::styled(name, Is::Alarm.style()))
+        }
+        (Connection::Up(_), None) => {
+            (if row.status.tool_out { "out" } else { "in " }, Span::raw(ground(row, room)).green())
+        }
+    };
+    Line::from(vec![shown, state, Span::raw(format!("{mark} {tool} ")), rest])
+}

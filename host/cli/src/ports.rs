@@ -1,0 +1,286 @@
+//! Which rows a command talks to: those at the ports that are named, the only Uno, or all.
+//!
+//! A port is a path, such as /dev/ttyACM0, or the name that `weeder rows` has given to a board, wherever that is plugged in now. What has
+//! a name is told under it.
+
+use crate::output::tell;
+use anyhow::{Context, Result, bail, ensure};
+use clap::Args;
+use etcetera::BaseStrategy;
+use link::Link;
+use link::row_names::{Board, Names, Row, plugged, wrong_with};
+use link::rows::Opener;
+use std::collections::HashSet;
+use std::panic::resume_unwind;
+use std::path::{Path, PathBuf};
+use std::thread;
+
+/// The file of the rows' names in the user's folder.
+const FILE: &str = "weeder/rows.toml";
+
+/// The file in which the rows' names are.
+#[derive(Args)]
+pub struct NamesFile {
+    /// The file with the rows' names; `weeder/rows.toml` in the user's folder for settings where none is named.
+    #[arg(long, value_name = "FILE.toml")]
+    rows_file: Option<PathBuf>,
+}
+
+impl NamesFile {
+    /// Its path.
+    ///
+    /// # Errors
+    /// Where the user has no folder.
+    pub fn path(&self) -> Result<PathBuf> {
+        match &self.rows_file {
+            Some(path) => Ok(path.clone()),
+            None => {
+                let strategy = etcetera::choose_base_strategy()
+                    .context("there is no folder for the user's settings: name a file by --rows-file")?;
+                Ok(strategy.config_dir().join(FILE))
+            }
+        }
+    }
+
+    /// The names in it.
+    ///
+    /// # Errors
+    /// Where it cannot be read; one that was named has to be there.
+    pub fn read(&self) -> Result<Names> {
+        let path = self.path()?;
+        ensure!(
+            self.rows_file.is_none() || path.exists(),
+            "there is no {}: `weeder rows name` makes it",
+            path.display()
+        );
+        Ok(Names::read(&path)?)
+    }
+}
+
+/// Where the Unos of one row or several are.
+#[derive(Args)]
+pub struct Ports {
+    /// An Uno's serial port, such as /dev/ttyACM0 or COM3, or a row's name, or a name to call it by and its port; once for each row.
+    /// Found by itself where there is only one Uno.
+    #[arg(long, value_name = "[NAME=]PORT", value_parser = named)]
+    port: Vec<Named>,
+    /// Take every row that `weeder rows` has named, and every other Uno at a USB port.
+    #[arg(long, conflicts_with = "port")]
+    all: bool,
+    #[command(flatten)]
+    names: NamesFile,
+}
+
+/// A row's port, and the name by which it is shown.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Named {
+    /// Where one was given.
+    name: Option<String>,
+    port: String,
+}
+
+/// Reads `NAME=PORT`, or a port or a row's name alone.
+fn named(text: &str) -> Result<Named, String> {
+    let (name, port) = match text.split_once('=') {
+        // A path may have the sign in it.
+        Some((name, port)) if !name.contains(['/', '\\']) => (Some(name.trim().to_owned()), port),
+        _ => (None, text),
+    };
+    if port.is_empty() || name.as_ref().is_some_and(String::is_empty) {
+        return Err("it has to be a port, or a name, = and a port, as left=/dev/ttyACM0".to_owned());
+    }
+    match name.as_deref().and_then(wrong_with) {
+        Some(problem) => Err(format!("{text:?} begins with no row's name: {problem}")),
+        None => Ok(Named { name, port: port.to_owned() }),
+    }
+}
+
+/// The rows that a command talks to.
+pub struct Chosen {
+    /// The rows, at least one.
+    pub rows: Vec<Row>,
+    /// Whether there may be several: what is told names the row then.
+    pub are_several: bool,
+}
+
+impl Ports {
+    /// The rows that are meant.
+    ///
+    /// # Errors
+    /// Where there is none, two have a name, or the file of the names cannot be read.
+    pub fn choose(&self) -> Result<Chosen> {
+        // A path is no name, and needs no file.
+        let may_be_name = |machine: &Named| !machine.port.contains(['/', '\\']);
+        let rows = if self.all {
+            every_row(&self.names.read()?)?
+        } else if self.port.is_empty() {
+            vec![Row { name: "Uno".to_owned(), board: Board::Only }]
+        } else {
+            let names = if self.port.iter().any(may_be_name) { Some(self.names.read()?) } else { None };
+            self.port.iter().map(|machine| row(machine, names.as_ref())).collect::<Result<_>>()?
+        };
+        let mut seen = HashSet::new();
+        if let Some(row) = rows.iter().find(|row| !seen.insert(row.name.to_lowercase())) {
+            bail!(
+                "two machines are called {}: name them, as in `--port left=/dev/ttyACM0 --port right=/dev/ttyACM1`",
+                row.name
+            );
+        }
+        Ok(Chosen { are_several: self.all || rows.len() > 1, rows })
+    }
+}
+
+/// What `--port` means.
+fn row(machine: &Named, names: Option<&Names>) -> Result<Row> {
+    let known = names.and_then(|names| names.find(&machine.port));
+    let board = known.map_or_else(|| Board::Port(machine.port.clone()), |row| row.board.clone());
+    let name = match &machine.name {
+        Some(name) => name.clone(),
+        None => Path::new(&machine.port).file_name().unwrap_or_default().to_string_lossy().into_owned(),
+    };
+    if let Some(problem) = wrong_with(&name) {
+        bail!("{name:?} cannot be a row's name: {problem}: put one before it, as left={}", machine.port);
+    }
+    Ok(Row { name, board })
+}
+
+/// Every row with a name, and every other Uno.
+fn every_row(names: &Names) -> Result<Vec<Row>> {
+    let mut rows = names.rows().to_vec();
+    let have_ports: Vec<Option<String>> = rows.iter().map(|row| row.board.port().ok()).collect();
+    for uno in plugged()? {
+        let is_named = rows.iter().any(|row| row.board == uno.board) || have_ports.contains(&Some(uno.port.clone()));
+        if !is_named {
+            let name = Path::new(&uno.port).file_name().unwrap_or_default().to_string_lossy().into_owned();
+            rows.push(Row { name, board: uno.board });
+        }
+    }
+    ensure!(
+        !rows.is_empty(),
+        "there is no Uno at any USB port, and {} names no row: plug them in, or name their ports by --port",
+        names.path().display()
+    );
+    Ok(rows)
+}
+
+impl Chosen {
+    /// The rows' names, in their order.
+    pub fn names(&self) -> Vec<String> {
+        self.rows.iter().map(|row| row.name.clone()).collect()
+    }
+
+    /// A way to each.
+    pub fn openers(&self) -> Vec<Opener> {
+        let opener = |row: &Row| -> Opener {
+            let board = row.board.clone();
+            Box::new(move || board.open())
+        };
+        self.rows.iter().map(opener).collect()
+    }
+
+    /// Does this with each row, with all at the same time: what came of it, in the rows' order.
+    pub fn each<T: Send>(&self, work: impl Fn(&Row, &mut Link) -> Result<T> + Sync) -> Vec<Result<T>> {
+        let of_row = |row: &Row| -> Result<T> { work(row, &mut row.board.open()?) };
+        thread::scope(|scope| {
+            let threads: Vec<_> = self.rows.iter().map(|row| scope.spawn(|| of_row(row))).collect();
+            threads.into_iter().map(|thread| thread.join().unwrap_or_else(|panic| resume_unwind(panic))).collect()
+        })
+    }
+
+    /// What came of a work with each row, told of those with which it went wrong, under their names.
+    ///
+    /// # Errors
+    /// Where it went wrong with one: the only one's own error, or which rows those were.
+    pub fn check<T>(&self, mut done: Vec<Result<T>>) -> Result<()> {
+        if let (false, [_]) = (self.are_several, done.as_slice()) {
+            return done.remove(0).map(drop);
+        }
+        let mut failed = Vec::new();
+        for (row, done) in self.rows.iter().zip(&done) {
+            if let Err(error) = done {
+                tell!("error: {}: {error:#}", row.name);
+                failed.push(row.name.as_str());
+            }
+        }
+        ensure!(failed.is_empty(), "{} of {} rows failed: {}", failed.len(), self.rows.len(), failed.join(", "));
+        Ok(())
+    }
+
+    /// A row's own file, where there may be several: in a folder, by the row's name.
+    pub fn file_in(folder: &Path, row: &Row, ending: &str) -> PathBuf {
+        folder.join(format!("{}.{ending}", row.name))
+    }
+
+    /// What is told of a row, under its name where there may be several.
+    pub fn told(&self, row: usize, text: &str) -> String {
+        match self.rows.get(row) {
+            Some(row) if self.are_several => format!("{}: {text}", row.name),
+            _ => text.to_owned(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<(Option<String>, String), String> {
+        named(text).map(|Named { name, port }| (name, port))
+    }
+
+    #[test]
+    fn a_row_has_the_name_that_is_given_or_the_end_of_its_port_s() {
+        for (text, name, port) in [
+            ("/dev/ttyACM0", "ttyACM0", "/dev/ttyACM0"),
+            ("uno", "uno", "uno"),
+            ("left=/dev/ttyACM0", "left", "/dev/ttyACM0"),
+            ("row 3 = left=COM3", "row 3", " left=COM3"),
+        ] {
+            let row = row(&named(text).unwrap(), None).unwrap();
+            assert_eq!((row.name.as_str(), row.board), (name, Board::Port(port.to_owned())), "{text}");
+        }
+        assert_eq!(read("/dev/serial/by-id/a=b").unwrap().1, "/dev/serial/by-id/a=b");
+    }
+
+    #[test]
+    fn a_row_without_a_name_or_a_port_is_refused_with_what_would_be_right() {
+        for text in ["", "=", "left="] {
+            assert!(read(text).unwrap_err().contains("as left=/dev/ttyACM0"), "{text}");
+        }
+        assert!(read("all=COM3").unwrap_err().contains("`all` means every row"));
+        let long = named("/dev/serial/by-id/usb-Arduino__www.arduino.cc__0043-if00").unwrap();
+        assert!(row(&long, None).unwrap_err().to_string().contains("put one before it, as left=/dev/"));
+    }
+
+    #[test]
+    fn a_name_of_the_file_is_its_board_and_a_path_stays_a_path() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("rows.toml");
+        let mut names = Names::read(&file).unwrap();
+        names.name("left", Board::SerialNumber("A1".to_owned())).unwrap();
+        names.write().unwrap();
+        let ports = |words: &[&str]| Ports {
+            port: words.iter().map(|text| named(text).unwrap()).collect(),
+            all: false,
+            names: NamesFile { rows_file: Some(file.clone()) },
+        };
+        let chosen = ports(&["left", "./left2", "hedge=right"]).choose().unwrap();
+        let boards: Vec<(&str, &Board)> = chosen.rows.iter().map(|row| (row.name.as_str(), &row.board)).collect();
+        let port = |text: &str| Board::Port(text.to_owned());
+        assert_eq!(
+            boards,
+            [("left", &Board::SerialNumber("A1".to_owned())), ("left2", &port("./left2")), ("hedge", &port("right"))]
+        );
+        assert_eq!(chosen.told(0, "lost"), "left: lost");
+        let one = ports(&["./left"]).choose().unwrap();
+        assert_eq!((one.rows[0].board.clone(), one.told(0, "lost")), (port("./left"), "lost".to_owned()));
+    }
+
+    #[test]
+    fn two_rows_of_one_name_have_to_be_told_apart() {
+        let port = ["a/uno", "b/uno"].map(|text| named(text).unwrap()).to_vec();
+        let ports = Ports { port, all: false, names: NamesFile { rows_file: None } };
+        let error = ports.choose().err().unwrap().to_string();
+        assert!(error.starts_with("two machines are called uno: name them"), "{error}");
+    }
+}

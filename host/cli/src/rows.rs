@@ -1,0 +1,169 @@
+//! `weeder rows`: which Uno is which row's, told apart after they were plugged in anew.
+
+use crate::output::say;
+use crate::ports::NamesFile;
+use anyhow::Result;
+use clap::{Args, Subcommand};
+use comfy_table::{Table, presets};
+use link::row_names::{Board, Names, Plugged, plugged};
+use serde_json::{Value, json};
+
+/// What the user asks of the rows.
+#[derive(Args)]
+#[command(
+    args_conflicts_with_subcommands = true,
+    after_help = "\
+A row is known by its board's USB serial number, at whichever port the board is; a board without one, by the place where it is \
+plugged in. `weeder monitor`, `record`, `serve` and `settings` take its name as --port, and all rows by --all.\n\n\
+Examples:\n  \
+    weeder rows                                  the rows with a name, and the other Unos that are plugged in\n  \
+    weeder rows name left /dev/ttyACM0           call the board at this port so\n  \
+    weeder rows forget left                      and no more"
+)]
+pub struct Arguments {
+    #[command(subcommand)]
+    action: Option<Action>,
+    /// Print them as JSON.
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    file: NamesFile,
+}
+
+#[derive(Subcommand)]
+enum Action {
+    /// Call the board at a port so; the rows stand in the order in which they were named.
+    #[command(after_help = "Example: weeder rows name left /dev/ttyACM0")]
+    Name {
+        /// The row's name: 1 to 24 characters that can be a file's name.
+        #[arg(value_name = "NAME")]
+        name: String,
+        /// The port at which its board is now.
+        #[arg(value_name = "PORT")]
+        port: String,
+        #[command(flatten)]
+        file: NamesFile,
+    },
+    /// Forget a row's name.
+    #[command(after_help = "Example: weeder rows forget left")]
+    Forget {
+        /// The row's name.
+        #[arg(value_name = "NAME")]
+        name: String,
+        #[command(flatten)]
+        file: NamesFile,
+    },
+}
+
+/// Lists, names or forgets.
+///
+/// # Errors
+/// Where the file, a name or a port is wrong.
+pub fn run(arguments: &Arguments) -> Result<()> {
+    match &arguments.action {
+        None => list(&arguments.file.read()?, arguments.json),
+        Some(Action::Name { name, port, file }) => {
+            let board = Board::at(port)?;
+            let mut names = Names::read(&file.path()?)?;
+            names.name(name, board.clone())?;
+            names.write()?;
+            say!("{name} is {}, in {}", described(&board), names.path().display())
+        }
+        Some(Action::Forget { name, file }) => {
+            let mut names = file.read()?;
+            names.forget(name)?;
+            names.write()?;
+            say!("{name} is forgotten, in {}", names.path().display())
+        }
+    }
+}
+
+/// A row or an Uno, for the list.
+struct Line {
+    name: Option<String>,
+    board: Board,
+    /// Where it is now.
+    port: Option<String>,
+}
+
+fn list(names: &Names, json: bool) -> Result<()> {
+    let unos = plugged()?;
+    let lines = lines(names, &unos, |port| std::fs::exists(port).unwrap_or(false));
+    if json {
+        let value = |line: &Line| {
+            let (serial_number, known_port) = match &line.board {
+                Board::SerialNumber(number) => (Some(number), None),
+                Board::Port(port) => (None, Some(port)),
+                Board::Only => (None, None),
+            };
+            json!({ "name": line.name, "serial_number": serial_number, "known_port": known_port, "port": line.port })
+        };
+        return say!("{:#}", Value::from_iter(lines.iter().map(value)));
+    }
+    if lines.is_empty() {
+        return say!("There is no Uno at any USB port, and {} names no row", names.path().display());
+    }
+    let mut table = Table::new();
+    table.load_style(presets::UTF8_BORDERS_ONLY).set_header(["row", "port now", "known by"]);
+    for line in &lines {
+        let name = line.name.as_deref().unwrap_or("without a name");
+        table.add_row([name, line.port.as_deref().unwrap_or("not there"), &described(&line.board)]);
+    }
+    say!("{table}")?;
+    say!("The names are in {}", names.path().display())
+}
+
+/// The rows, then the Unos that are none.
+fn lines(names: &Names, unos: &[Plugged], exists: impl Fn(&str) -> bool) -> Vec<Line> {
+    let now = |board: &Board| match board {
+        Board::Port(port) if exists(port) => Some(port.clone()),
+        _ => unos.iter().find(|uno| uno.board == *board).map(|uno| uno.port.clone()),
+    };
+    let rows = names.rows().iter();
+    let rows = rows.map(|row| Line { name: Some(row.name.clone()), port: now(&row.board), board: row.board.clone() });
+    let is_row = |uno: &&Plugged| {
+        names.rows().iter().any(|row| row.board == uno.board || row.board == Board::Port(uno.port.clone()))
+    };
+    let others = unos.iter().filter(|uno| !is_row(uno));
+    rows.chain(others.map(|uno| Line { name: None, port: Some(uno.port.clone()), board: uno.board.clone() })).collect()
+}
+
+/// How a board is known, in words.
+fn described(board: &Board) -> String {
+    match board {
+        Board::Only => "the only Uno".to_owned(),
+        Board::SerialNumber(number) => format!("the board with the serial number {number}"),
+        Board::Port(port) => format!("the board at {port}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_are_listed_in_their_order_and_unos_without_a_name_behind_them() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut names = Names::read(&folder.path().join("rows.toml")).unwrap();
+        let number = |text: &str| Board::SerialNumber(text.to_owned());
+        let port = |text: &str| Board::Port(text.to_owned());
+        for (name, board) in [("right", number("B2")), ("left", number("A1")), ("third", port("/tmp/uno"))] {
+            names.name(name, board).unwrap();
+        }
+        let uno = |port: &str, board| Plugged { port: port.to_owned(), board };
+        let unos = [uno("ttyACM3", number("A1")), uno("ttyACM4", number("C3")), uno("ttyUSB0", port("ttyUSB0"))];
+        let listed: Vec<(Option<String>, Option<String>)> =
+            lines(&names, &unos, |port| port == "/tmp/uno").into_iter().map(|line| (line.name, line.port)).collect();
+        let text = |text: &str| Some(text.to_owned());
+        assert_eq!(
+            listed,
+            [
+                (text("right"), None),
+                (text("left"), text("ttyACM3")),
+                (text("third"), text("/tmp/uno")),
+                (None, text("ttyACM4")),
+                (None, text("ttyUSB0"))
+            ]
+        );
+    }
+}

@@ -1,0 +1,209 @@
+//! The host's tools with several rows, as a user runs them, with virtual Unos at their ports.
+
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::thread::sleep;
+use std::time::Duration;
+use tempfile::TempDir;
+use trial::firmware;
+use trial::live::Setup;
+use trial::live::rows::{Background, LiveRows, Mishap};
+
+/// Rows that stand, their ports linked in a folder as `row0` and so on.
+fn rows(folder: &TempDir, count: usize) -> Background {
+    let elf = firmware::build().expect("the firmware builds");
+    let setup =
+        |number| Setup { elf: Some(elf.clone()), link: Some(port(folder, number)), fast: true, ..Setup::default() };
+    LiveRows::start((0..count).map(setup).collect()).expect("they start").run_in_background()
+}
+
+fn port(folder: &TempDir, number: usize) -> PathBuf {
+    folder.path().join(format!("row{number}"))
+}
+
+/// A file with the names of so many rows.
+fn named(folder: &TempDir, count: usize) -> String {
+    let file = folder.path().join("rows.toml");
+    let file = file.to_str().expect("it is text").to_owned();
+    for number in 0..count {
+        let path = port(folder, number);
+        let name = ["left", "middle", "right"][number];
+        let said =
+            printed(&weeder(&["rows", "name", name, path.to_str().expect("it is text"), "--rows-file", &file], ""), 0);
+        assert!(said.starts_with(&format!("{name} is the board at {}", path.display())), "{said}");
+    }
+    file
+}
+
+fn command(words: &[&str]) -> Command {
+    let mut weeder = Command::new(env!("CARGO_BIN_EXE_weeder"));
+    weeder.args(words).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    weeder
+}
+
+/// A process that is ended with its test.
+struct Running(Child);
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        // It may have ended.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// Runs `weeder` with these words and this input.
+fn weeder(words: &[&str], input: &str) -> Output {
+    let mut weeder = command(words).spawn().expect("cargo has built the command");
+    // One that fails at once reads nothing.
+    let _ = weeder.stdin.take().expect("it is piped").write_all(input.as_bytes());
+    weeder.wait_with_output().expect("it ends")
+}
+
+/// What it printed, where it ended with this status.
+#[track_caller]
+fn printed(output: &Output, status: i32) -> String {
+    let [out, error] = [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes).into_owned());
+    assert_eq!(output.status.code(), Some(status), "{out}{error}");
+    out + &error
+}
+
+#[test]
+fn rows_are_named_listed_renamed_and_forgotten() {
+    let folder = TempDir::new().expect("there is room for a folder");
+    let _rows = rows(&folder, 2);
+    let file = named(&folder, 2);
+    let list = printed(&weeder(&["rows", "--rows-file", &file], ""), 0);
+    assert!(list.contains("left") && list.contains("middle") && list.contains("row1"), "{list}");
+    printed(&weeder(&["rows", "name", "hedge", port(&folder, 1).to_str().unwrap(), "--rows-file", &file], ""), 0);
+    let json = printed(&weeder(&["rows", "--json", "--rows-file", &file], ""), 0);
+    let json: serde_json::Value = serde_json::from_str(&json).expect("it is JSON");
+    let names: Vec<&str> = json.as_array().unwrap().iter().filter_map(|row| row["name"].as_str()).collect();
+    assert_eq!(names, ["left", "hedge"]);
+    printed(&weeder(&["rows", "forget", "left", "--rows-file", &file], ""), 0);
+    let error = printed(&weeder(&["rows", "forget", "left", "--rows-file", &file], ""), 2);
+    assert!(error.contains("has no row left: it has hedge"), "{error}");
+    let error = printed(&weeder(&["rows", "name", "left", "/dev/no-such-port", "--rows-file", &file], ""), 2);
+    assert!(error.contains("there is no port /dev/no-such-port"), "{error}");
+    let error = printed(&weeder(&["settings", "pull", "x", "--all", "--rows-file", "no-such.toml"], ""), 2);
+    assert!(error.contains("there is no no-such.toml: `weeder rows name` makes it"), "{error}");
+}
+
+#[test]
+fn settings_of_several_rows_are_pulled_pushed_and_compared_and_the_row_that_fails_is_named() {
+    let folder = TempDir::new().expect("there is room for a folder");
+    let machine = rows(&folder, 3);
+    let file = named(&folder, 3);
+    let all = ["--all", "--rows-file", &file];
+    let kept = folder.path().join("kept");
+    let kept = kept.to_str().expect("it is text");
+    let with = |words: &[&str]| weeder(&[words, &all].concat(), "");
+    printed(&weeder(&[&["monitor", "--plain"], &all[..]].concat(), "clear\n"), 0);
+
+    let pulled = printed(&with(&["settings", "pull", kept]), 0);
+    assert!(pulled.contains("left: The machine's settings are in ") && pulled.contains("right.toml"), "{pulled}");
+    let right = Path::new(kept).join("right.toml");
+    let text = fs::read_to_string(&right).expect("each has a file");
+    fs::write(&right, text.replace("wheel_mm = 400", "wheel_mm = 405")).expect("it can be written");
+    let differs = printed(&with(&["settings", "diff", kept]), 1);
+    assert!(
+        differs.contains("left: The machine has the settings of ") && differs.contains("right: not as in"),
+        "{differs}"
+    );
+    let pushed = printed(&with(&["settings", "push", kept]), 0);
+    assert!(
+        pushed.contains("middle: The machine has these settings already\nmiddle: All settings are saved\n"),
+        "{pushed}"
+    );
+    assert!(pushed.contains("right: Set: wheel_mm\n"), "{pushed}");
+    let json = printed(&with(&["settings", "pull", "--json"]), 0);
+    let json: serde_json::Value = serde_json::from_str(&json).expect("it is JSON");
+    assert_eq!([&json["left"]["wheel_mm"], &json["right"]["wheel_mm"]], [400, 405]);
+
+    // One is not there: the others have it done, and it is named.
+    machine.happen(1, Mishap::Unplugged);
+    while port(&folder, 1).exists() {
+        sleep(Duration::from_millis(10));
+    }
+    let one = folder.path().join("one.toml");
+    fs::write(&one, "k = 5\n").expect("it can be written");
+    let pushed = printed(&with(&["settings", "push", one.to_str().unwrap()]), 2);
+    assert!(pushed.contains("left: Set: k\n") && pushed.contains("right: Set: k\n"), "{pushed}");
+    assert!(
+        pushed.contains("error: middle: there is no port ") && pushed.contains("1 of 3 rows failed: middle"),
+        "{pushed}"
+    );
+    let differs = printed(&with(&["settings", "diff", one.to_str().unwrap()]), 2);
+    assert!(differs.contains("left: The machine has the settings of "), "{differs}");
+}
+
+#[test]
+fn the_plain_monitor_types_to_one_row_or_to_all_and_tells_of_each_answer() {
+    let folder = TempDir::new().expect("there is room for a folder");
+    let _rows = rows(&folder, 2);
+    let [left, right] = [0, 1].map(|number| port(&folder, number).display().to_string());
+    let ports = ["--port", &format!("left={left}"), "--port", &format!("right={right}")].map(str::to_owned);
+    let words: Vec<&str> = ["monitor", "--plain"].into_iter().chain(ports.iter().map(String::as_str)).collect();
+    let said = printed(&weeder(&words, "save\nclear\nleft: start\nall: version\nhold\n"), 0);
+    assert!(said.contains("left: ok\n") && said.contains("right: weeder "), "{said}");
+    assert!(said.contains("left: state is=work\n") && !said.contains("right: state is=work"), "{said}");
+    assert!(said.contains("HOLD 2 of 2 in ") && said.contains(" last\n"), "{said}");
+    let refused = printed(&weeder(&words, "right: launch\n"), 1);
+    assert!(refused.contains("right: error:") && !refused.contains("left: error:"), "{refused}");
+    let unknown = printed(&weeder(&words, "hedge: hold\n"), 2);
+    assert!(unknown.contains("there is no row hedge: there are left, right"), "{unknown}");
+    let twice = printed(&weeder(&["monitor", "--plain", "--port", &left, "--port", &left], ""), 2);
+    assert!(twice.contains("two machines are called row0: name them"), "{twice}");
+    let none = printed(&weeder(&["monitor", "--plain", "--port", "/no/a", "--port", "/no/b"], ""), 2);
+    assert!(none.contains("a: there is no port /no/a") && none.contains("none of the 2 rows is there"), "{none}");
+}
+
+#[test]
+fn of_several_rows_each_has_a_log_and_one_that_is_unplugged_and_back_is_told_in_its_own_alone() {
+    let folder = TempDir::new().expect("there is room for a folder");
+    let machine = rows(&folder, 3);
+    let file = named(&folder, 3);
+    let logs = folder.path().join("field");
+    let out = logs.to_str().expect("it is text");
+    machine.happen(2, Mishap::Unplugged);
+    while port(&folder, 2).exists() {
+        sleep(Duration::from_millis(10));
+    }
+    let weeder = command(&["record", "--out", out, "--all", "--rows-file", &file]).spawn().expect("it is built");
+    let mut weeder = Running(weeder);
+    let text = |name: &str| fs::read_to_string(logs.join(format!("{name}.csv"))).unwrap_or_default();
+    // Waits for what a log shows; the test's own time limit is the test program's.
+    let wait_for = |name: &str, what: &str, count: usize| {
+        for _ in 0..2400 {
+            if text(name).matches(what).count() >= count {
+                return;
+            }
+            sleep(Duration::from_millis(50));
+        }
+        panic!("the log of {name} does not show {what} {count} times: {:?}", text(name));
+    };
+    for name in ["left", "middle"] {
+        wait_for(name, ",status,", 3);
+    }
+    wait_for("right", ",lost,\"there is no port ", 1);
+    machine.happen(2, Mishap::PluggedIn);
+    wait_for("right", ",status,", 3);
+    machine.happen(0, Mishap::Unplugged);
+    wait_for("left", ",lost,the port is gone", 1);
+    machine.happen(0, Mishap::PluggedIn);
+    wait_for("left", ",connected,", 2);
+    Command::new("kill").args(["-INT", &weeder.0.id().to_string()]).status().expect("there is a kill");
+    let mut told = String::new();
+    std::io::Read::read_to_string(&mut weeder.0.stderr.take().expect("it is piped"), &mut told).expect("it is text");
+    assert_eq!(weeder.0.wait().expect("it ends").code(), Some(0), "{told}");
+    assert!(told.contains("left: the port is gone") && !told.contains("middle: the port"), "{told}");
+    assert!(!text("middle").contains(",lost,") && text("middle").matches(",connected,").count() == 1);
+    for name in ["left", "middle", "right"] {
+        assert!(told.contains(&format!("{name}.csv has ")), "{told}");
+        let log = logs.join(format!("{name}.csv"));
+        let replayed = Command::new(env!("CARGO_BIN_EXE_weeder")).arg("replay").arg(&log).output().expect("it ends");
+        assert!(matches!(replayed.status.code(), Some(0 | 1)), "{}", String::from_utf8_lossy(&replayed.stderr));
+    }
+}

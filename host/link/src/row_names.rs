@@ -1,0 +1,463 @@
+//! The names of a machine's rows, and which board each of them has: a small TOML file with a line a row.
+//!
+//! A board is known by its USB serial number, at whichever port the system puts it after it was plugged in anew. Boards without one, and
+//! boards of which several have the same, are known by their port: on Linux by udev's link for the place where they are plugged in,
+//! where there is one. A virtual Uno is known by its path. The file keeps its comments and its order, which is that of the rows.
+//!
+//! Nothing here opens a port but [`Board::open`], and nothing but [`Names::write`] changes the file.
+
+use super::port::{is_uno, open};
+use super::{Link, LinkError, find_uno};
+use files::whole_file;
+use serialport::{SerialPortInfo, SerialPortType};
+use std::fs;
+use std::io::{self, ErrorKind};
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+use toml_edit::{DocumentMut, InlineTable, Item, TomlError, Value};
+
+/// Characters that a row's name has at the most: it stands before its machine on a phone.
+pub const NAME_LENGTH: usize = 24;
+
+/// What addresses every row, and is no row's name.
+pub const ALL: &str = "all";
+
+/// Where Linux keeps links to ports by the place where they are plugged in.
+const BY_PLACE: &str = "/dev/serial/by-path";
+
+/// The keys of the file.
+const SERIAL_NUMBER: &str = "serial_number";
+const PORT: &str = "port";
+
+/// What stands at the head of a new file.
+const HEAD: &str = "\
+# The rows of a machine, in their order: `weeder rows` lists and names them.
+# A row is known by its board's USB serial number, or by the port at which the board is.
+";
+
+/// Which board a row has.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Board {
+    /// The only Uno at this computer.
+    Only,
+    /// The one of this USB serial number.
+    SerialNumber(String),
+    /// The one at this port.
+    Port(String),
+}
+
+/// A row.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Row {
+    /// What the operator calls it.
+    pub name: String,
+    /// Its board.
+    pub board: Board,
+}
+
+/// An Uno that is plugged in.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Plugged {
+    /// The port at which it is now.
+    pub port: String,
+    /// How it is known.
+    pub board: Board,
+}
+
+/// Why the rows' names cannot be had.
+#[derive(Debug, Error)]
+pub enum NamesError {
+    /// The file itself.
+    #[error("{path} cannot be {done}")]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// `read` or `written`.
+        done: &'static str,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// Something in it.
+    #[error("{path}, line {line}: {problem}")]
+    Line {
+        /// The file.
+        path: PathBuf,
+        /// The line, counted from 1.
+        line: usize,
+        /// What is wrong with it, and what would be right.
+        problem: String,
+    },
+    /// A name that no row can have.
+    #[error("{name:?} cannot be a row's name: {problem}")]
+    Name {
+        /// The name.
+        name: String,
+        /// What is wrong with it, and what would be right.
+        problem: String,
+    },
+    /// There is no such row.
+    #[error("{path} has no row {name}: it has {known}")]
+    NoRow {
+        /// The file.
+        path: PathBuf,
+        /// The name.
+        name: String,
+        /// The names that are there.
+        known: String,
+    },
+    /// The port.
+    #[error(transparent)]
+    Port(#[from] LinkError),
+}
+
+impl Board {
+    /// The board at a port: whether it has a serial number of its own, the system's list tells.
+    ///
+    /// # Errors
+    /// Where there is no such port.
+    pub fn at(port: &str) -> Result<Self, LinkError> {
+        let path = Path::new(port);
+        // What a link leads to now is what the list has.
+        let now = fs::canonicalize(path).map_or(port.to_owned(), |path| path.to_string_lossy().into_owned());
+        let ports = serialport::available_ports().map_err(LinkError::NoList)?;
+        let listed = ports.iter().find(|listed| listed.port_name == port || listed.port_name == now);
+        match listed {
+            Some(listed) if serial_number(listed).is_some() => Ok(of(listed, &ports, Path::new(BY_PLACE))),
+            // A link of the user's own is meant to lead elsewhere some day.
+            Some(listed) if listed.port_name == port => Ok(of(listed, &ports, Path::new(BY_PLACE))),
+            None if !path.exists() => Err(LinkError::Absent(port.to_owned())),
+            // From wherever the next command is typed.
+            _ => Ok(Self::Port(std::path::absolute(path).map_or(port.to_owned(), |path| path.display().to_string()))),
+        }
+    }
+
+    /// Opens a link to it, at whichever port it is now.
+    ///
+    /// # Errors
+    /// Where it is not plugged in, or as [`Link::open`].
+    pub fn open(&self) -> Result<Link, LinkError> {
+        let (port, resets) = open(&self.port()?)?;
+        Link::over(port, resets)
+    }
+
+    /// The port at which it is now.
+    ///
+    /// # Errors
+    /// Where it is not plugged in, or cannot be told from another.
+    pub fn port(&self) -> Result<String, LinkError> {
+        match self {
+            Self::Only => find_uno(),
+            Self::Port(port) => Ok(port.clone()),
+            Self::SerialNumber(number) => numbered(number, &serialport::available_ports().map_err(LinkError::NoList)?),
+        }
+    }
+}
+
+/// The port of the board with this serial number.
+fn numbered(number: &str, ports: &[SerialPortInfo]) -> Result<String, LinkError> {
+    let has_it = |port: &&SerialPortInfo| serial_number(port).is_some_and(|found| found == number);
+    let found: Vec<String> = ports.iter().filter(has_it).map(|port| port.port_name.clone()).collect();
+    match found.as_slice() {
+        [only] => Ok(only.clone()),
+        [] => Err(LinkError::Unplugged(number.to_owned())),
+        _ => Err(LinkError::Twins { number: number.to_owned(), ports: found }),
+    }
+}
+
+/// The serial number of the board at a port, where it has one.
+fn serial_number(port: &SerialPortInfo) -> Option<&str> {
+    match &port.port_type {
+        SerialPortType::UsbPort(usb) => usb.serial_number.as_deref().map(str::trim).filter(|number| !number.is_empty()),
+        _ => None,
+    }
+}
+
+/// How the board at a port is known: links by place are looked for in this folder.
+fn of(port: &SerialPortInfo, ports: &[SerialPortInfo], by_place: &Path) -> Board {
+    if let Some(number) = serial_number(port)
+        && numbered(number, ports).is_ok()
+    {
+        return Board::SerialNumber(number.to_owned());
+    }
+    let links = fs::read_dir(by_place).into_iter().flatten().flatten().map(|entry| entry.path());
+    let leads_there =
+        |link: &PathBuf| fs::canonicalize(link).is_ok_and(|path| path.to_str() == Some(port.port_name.as_str()));
+    // udev makes two of a place, of which the shorter one has been there for longer.
+    let place = links.filter(leads_there).min_by_key(|link| link.as_os_str().len());
+    Board::Port(place.map_or_else(|| port.port_name.clone(), |link| link.display().to_string()))
+}
+
+/// The Unos at this computer's USB ports.
+///
+/// # Errors
+/// Where the system has no list of its ports.
+pub fn plugged() -> Result<Vec<Plugged>, LinkError> {
+    let ports = serialport::available_ports().map_err(LinkError::NoList)?;
+    let board = |port: &SerialPortInfo| of(port, &ports, Path::new(BY_PLACE));
+    let unos = ports.iter().filter(|port| is_uno(port));
+    Ok(unos.map(|port| Plugged { port: port.port_name.clone(), board: board(port) }).collect())
+}
+
+/// What keeps a word from being a row's name, with what would be right: it becomes a file's name, and stands before a colon.
+pub fn wrong_with(name: &str) -> Option<String> {
+    let length = name.chars().count();
+    if length == 0 || length > NAME_LENGTH {
+        return Some(format!("it has to have 1 to {NAME_LENGTH} characters"));
+    }
+    if name.trim() != name || name.starts_with('.') {
+        return Some("it has to begin and end with neither a blank nor a dot".to_owned());
+    }
+    if name.chars().any(|character| character.is_control() || r#"/\:*?"<>|="#.contains(character)) {
+        return Some(
+            r#"it becomes a file's name, and may have no control character and none of / \ : * ? " < > | ="#.into(),
+        );
+    }
+    (name == ALL).then(|| format!("`{ALL}` means every row"))
+}
+
+/// The rows' names, as they stand in their file.
+#[derive(Clone, Debug)]
+pub struct Names {
+    path: PathBuf,
+    /// What a new file begins with.
+    head: &'static str,
+    document: DocumentMut,
+    rows: Vec<Row>,
+}
+
+impl Names {
+    /// Reads a file; where there is none, no row is named yet.
+    ///
+    /// # Errors
+    /// Names the file, the line, and what would be right.
+    pub fn read(path: &Path) -> Result<Self, NamesError> {
+        let (head, text) = match fs::read_to_string(path) {
+            Ok(text) => ("", text),
+            Err(error) if error.kind() == ErrorKind::NotFound => (HEAD, String::new()),
+            Err(source) => return Err(NamesError::File { path: path.into(), done: "read", source }),
+        };
+        let (document, rows) = parse(path, &text)?;
+        Ok(Self { path: path.into(), head, document, rows })
+    }
+
+    /// The file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The rows, in the file's order.
+    pub fn rows(&self) -> &[Row] {
+        &self.rows
+    }
+
+    /// The row of this name.
+    pub fn find(&self, name: &str) -> Option<&Row> {
+        self.rows.iter().find(|row| row.name == name)
+    }
+
+    /// Calls a board so. Another name that it had is dropped, and so is another board that had the name; the row keeps its place.
+    ///
+    /// # Errors
+    /// Where it cannot be a row's name.
+    pub fn name(&mut self, name: &str, board: Board) -> Result<(), NamesError> {
+        let refused = |problem| NamesError::Name { name: name.to_owned(), problem };
+        if let Some(problem) = wrong_with(name) {
+            return Err(refused(problem));
+        }
+        // Some systems' files are the same then.
+        let twin = self.rows.iter().find(|row| row.name != name && row.name.to_lowercase() == name.to_lowercase());
+        if let Some(twin) = twin {
+            return Err(refused(format!("there is a row {} already", twin.name)));
+        }
+        let (key, known) = match &board {
+            Board::SerialNumber(number) => (SERIAL_NUMBER, number.clone()),
+            Board::Port(port) => (PORT, port.clone()),
+            Board::Only => return Err(refused("a row is a board's that is known by more than being alone".to_owned())),
+        };
+        for row in self.rows.iter().filter(|row| row.board == board && row.name != name) {
+            self.document.remove(&row.name);
+        }
+        self.rows.retain(|row| row.board != board || row.name == name);
+        let line = InlineTable::from_iter([(key, Value::from(known))]);
+        self.document[name] = Item::Value(Value::InlineTable(line));
+        match self.rows.iter_mut().find(|row| row.name == name) {
+            Some(row) => row.board = board,
+            None => self.rows.push(Row { name: name.to_owned(), board }),
+        }
+        Ok(())
+    }
+
+    /// Forgets a row.
+    ///
+    /// # Errors
+    /// Where there is none of this name.
+    pub fn forget(&mut self, name: &str) -> Result<(), NamesError> {
+        if self.document.remove(name).is_none() {
+            let known: Vec<&str> = self.rows.iter().map(|row| row.name.as_str()).collect();
+            let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
+            return Err(NamesError::NoRow { path: self.path.clone(), name: name.to_owned(), known });
+        }
+        self.rows.retain(|row| row.name != name);
+        Ok(())
+    }
+
+    /// Writes the file, and makes its folder where there is none.
+    ///
+    /// # Errors
+    /// Where it cannot be written.
+    pub fn write(&self) -> Result<(), NamesError> {
+        let text = format!("{}{}", self.head, self.document);
+        let folder = self.path.parent().filter(|folder| !folder.as_os_str().is_empty());
+        let written = folder
+            .map_or(Ok(()), fs::create_dir_all)
+            .and_then(|()| whole_file::write(&self.path, |to| to.write_all(text.as_bytes())));
+        written.map_err(|source| NamesError::File { path: self.path.clone(), done: "written", source })
+    }
+}
+
+fn parse(path: &Path, text: &str) -> Result<(DocumentMut, Vec<Row>), NamesError> {
+    let at = |start: usize, problem: String| {
+        let line = 1 + text.bytes().take(start).filter(|&byte| byte == b'\n').count();
+        NamesError::Line { path: path.into(), line, problem }
+    };
+    let broken = |error: TomlError| at(error.span().map_or(0, |span| span.start), error.message().replace('\n', ", "));
+    let read = toml_edit::Document::parse(text).map_err(broken)?;
+    let mut rows: Vec<Row> = Vec::new();
+    for (name, item) in read.as_table().iter() {
+        let start = read.as_table().key(name).and_then(|key| key.span()).or_else(|| item.span());
+        let wrong = |problem| at(start.map_or(0, |span| span.start), problem);
+        if let Some(problem) = wrong_with(name) {
+            return Err(wrong(format!("{name:?} cannot be a row's name: {problem}")));
+        }
+        let text_of =
+            |key: &str| item.get(key).and_then(Item::as_str).map(str::to_owned).filter(|text| !text.is_empty());
+        let keys = item.as_table_like().map_or(0, |table| table.len());
+        let board = match (keys, text_of(SERIAL_NUMBER), text_of(PORT)) {
+            (1, Some(number), None) => Board::SerialNumber(number),
+            (1, None, Some(port)) => Board::Port(port),
+            _ => {
+                let right = format!("{{ {SERIAL_NUMBER} = \"...\" }} or {{ {PORT} = \"...\" }}");
+                let found = item.to_string().replace(['\n', '\r'], " ");
+                return Err(wrong(format!("{name} is `{}`: it has to be {right}", found.trim())));
+            }
+        };
+        if let Some(other) = rows.iter().find(|row| row.board == board) {
+            return Err(wrong(format!("{name} has the board of {}: each row has one of its own", other.name)));
+        }
+        rows.push(Row { name: name.to_owned(), board });
+    }
+    Ok((read.into_mut(), rows))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serialport::UsbPortInfo;
+
+    fn usb(port: &str, serial_number: Option<&str>) -> SerialPortInfo {
+        let serial_number = serial_number.map(str::to_owned);
+        let (manufacturer, product) = (None, None);
+        let usb = UsbPortInfo { vid: 0x2341, pid: 0x0043, serial_number, manufacturer, product };
+        SerialPortInfo { port_name: port.to_owned(), port_type: SerialPortType::UsbPort(usb) }
+    }
+
+    fn number(text: &str) -> Board {
+        Board::SerialNumber(text.to_owned())
+    }
+
+    #[test]
+    fn a_board_with_a_number_is_found_at_whichever_port_it_comes_back() {
+        let before = [usb("/dev/ttyACM0", Some("A1")), usb("/dev/ttyACM1", Some("B2"))];
+        let after = [usb("/dev/ttyACM1", Some("A1")), usb("/dev/ttyACM4", Some("B2"))];
+        assert_eq!(of(&before[0], &before, Path::new("/no-such")), number("A1"));
+        assert_eq!([&before, &after].map(|ports| numbered("A1", ports).unwrap()), ["/dev/ttyACM0", "/dev/ttyACM1"]);
+        let error = numbered("C3", &after).unwrap_err().to_string();
+        assert!(error.starts_with("the board with the serial number C3 is not plugged in"), "{error}");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn boards_without_a_number_of_their_own_are_known_by_the_place_where_they_are_plugged_in() {
+        let folder = tempfile::tempdir().unwrap();
+        let folder = fs::canonicalize(folder.path()).unwrap();
+        let [first, second] = ["ttyUSB0", "ttyUSB1"].map(|name| {
+            fs::write(folder.join(name), "").unwrap();
+            folder.join(name).display().to_string()
+        });
+        let places = folder.join("by-path");
+        fs::create_dir(&places).unwrap();
+        std::os::unix::fs::symlink(&first, places.join("usb-0:2:1.0")).unwrap();
+        std::os::unix::fs::symlink(&first, places.join("usbv2-0:2:1.0")).unwrap();
+        let by_place = Board::Port(places.join("usb-0:2:1.0").display().to_string());
+        for number in [None, Some("0001"), Some(" ")] {
+            let ports = [usb(&first, number), usb(&second, number)];
+            assert_eq!(of(&ports[0], &ports, &places), by_place);
+            assert_eq!(of(&ports[1], &ports, &places), Board::Port(second.clone()), "nobody knows its place");
+        }
+        let twins = [usb(&first, Some("0001")), usb(&second, Some("0001"))];
+        let error = numbered("0001", &twins).unwrap_err().to_string();
+        assert!(error.contains("are both of the serial number 0001") && error.contains("weeder rows name"), "{error}");
+    }
+
+    #[test]
+    fn names_are_kept_in_their_order_with_the_user_s_comments() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("new/rows.toml");
+        let mut names = Names::read(&path).unwrap();
+        assert!(names.rows().is_empty());
+        names.name("left", number("A1")).unwrap();
+        names.name("right", Board::Port("/dev/pts/7".to_owned())).unwrap();
+        names.write().unwrap();
+        let text = fs::read_to_string(&path).unwrap();
+        assert!(text.ends_with("left = { serial_number = \"A1\" }\nright = { port = \"/dev/pts/7\" }\n"), "{text}");
+        fs::write(&path, text.replace("right =", "# by the hedge\nright =")).unwrap();
+
+        let mut names = Names::read(&path).unwrap();
+        names.name("left", number("C3")).unwrap();
+        names.name("middle", Board::Port("/dev/pts/7".to_owned())).unwrap();
+        let rows: Vec<(&str, &Board)> = names.rows().iter().map(|row| (row.name.as_str(), &row.board)).collect();
+        assert_eq!(rows, [("left", &number("C3")), ("middle", &Board::Port("/dev/pts/7".to_owned()))]);
+        names.write().unwrap();
+        assert_eq!(Names::read(&path).unwrap().rows(), names.rows());
+        names.forget("middle").unwrap();
+        let error = names.forget("middle").unwrap_err().to_string();
+        assert!(error.ends_with("has no row middle: it has left"), "{error}");
+    }
+
+    #[test]
+    fn a_name_that_could_be_no_file_s_or_another_row_s_is_refused_with_what_would_be_right() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut names = Names::read(&folder.path().join("rows.toml")).unwrap();
+        names.name("Left", number("A1")).unwrap();
+        for (name, problem) in [
+            ("", "1 to 24 characters"),
+            ("a row with a very long name", "1 to 24 characters"),
+            ("a/b", "none of /"),
+            ("1: x", "none of /"),
+            (".hidden", "neither a blank nor a dot"),
+            (" 1", "neither a blank nor a dot"),
+            ("all", "`all` means every row"),
+            ("left", "there is a row Left already"),
+        ] {
+            let error = names.name(name, number("B2")).unwrap_err().to_string();
+            assert!(error.contains(problem), "{name:?}: {error}");
+        }
+        assert_eq!(names.rows().len(), 1);
+    }
+
+    #[test]
+    fn what_is_wrong_in_a_file_is_said_with_its_line() {
+        let path = Path::new("rows.toml");
+        for (text, problem) in [
+            ("\nleft = 3\n", "rows.toml, line 2: left is `3`: it has to be { serial_number"),
+            ("left = { port = \"\" }\n", "line 1: left is"),
+            ("left = { port = \"a\", serial_number = \"b\" }\n", "line 1: left is"),
+            ("a = { port = \"x\" }\nb = { port = \"x\" }\n", "line 2: b has the board of a"),
+            ("\"a/b\" = { port = \"x\" }\n", "line 1: \"a/b\" cannot be a row's name"),
+            ("left = \n", "line 1: "),
+        ] {
+            let error = parse(path, text).unwrap_err().to_string();
+            assert!(error.contains(problem), "{error}");
+        }
+    }
+}

@@ -1,0 +1,311 @@
+//! Several rows at once: a [`Session`] for each, in a thread of its own, so that none waits for another.
+//!
+//! [`Rows::open`] opens them all at the same time. [`Rows::command`] and [`Rows::hold`] ask something of one of them, [`Rows::next`] tells
+//! what any of them says. A row that is lost is tried again by itself, and what was to be typed to it is told as not typed. Only a `hold`
+//! waits for it: it is the first thing that is typed to a row that is back.
+//!
+//! [`Hold`] follows a HOLD to all of them: who has obeyed, and how long the last one took. It knows no clock but what it is told.
+
+use super::session::{Happening, Session};
+use super::settings::SettingsError;
+use super::{Link, LinkError, Said};
+use std::collections::VecDeque;
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender, TryRecvError};
+use std::thread;
+use std::time::{Duration, Instant};
+
+/// A way to a link, tried again whenever it is lost.
+pub type Opener = Box<dyn FnMut() -> Result<Link, LinkError> + Send>;
+
+/// What one row says.
+#[derive(Debug)]
+pub struct Heard {
+    /// Which row, by its place among those that were opened.
+    pub row: usize,
+    /// When.
+    pub at: Instant,
+    /// What.
+    pub what: What,
+}
+
+/// Something of one row.
+#[derive(Debug)]
+pub enum What {
+    /// It happened in its session.
+    Happened(Happening),
+    /// A command of ours is answered to its end.
+    Answered {
+        /// The command.
+        command: String,
+        /// The line that begins with `error:`, where the firmware refused.
+        refusal: Option<String>,
+    },
+    /// A command of ours is not typed, and why.
+    NotTyped {
+        /// The command.
+        command: String,
+        /// Why.
+        why: String,
+    },
+}
+
+/// What is asked of a row's thread.
+enum Order {
+    Type(String),
+    Hold,
+}
+
+/// Several rows.
+pub struct Rows {
+    orders: Vec<Sender<Order>>,
+    heard: Receiver<Heard>,
+}
+
+impl Rows {
+    /// Opens all of them at the same time, and waits until each was tried once: why those are not there that are not. They are tried
+    /// again, and heard of as lost.
+    pub fn open(openers: Vec<Opener>) -> (Self, Vec<Option<SettingsError>>) {
+        let (sender, heard) = mpsc::channel();
+        let (orders, firsts): (Vec<_>, Vec<_>) = openers
+            .into_iter()
+            .enumerate()
+            .map(|(row, open)| {
+                let (orders, ordered) = mpsc::channel();
+                let (tried, first) = mpsc::channel();
+                let talk = Talk { row, heard: sender.clone(), typed: VecDeque::new(), hold: Owed::Nothing };
+                thread::spawn(move || {
+                    let mut session = Session::waiting_for(open);
+                    let missing = session.try_now(Instant::now()).err();
+                    if let Some(why) = &missing {
+                        talk.tell(What::Happened(Happening::Lost(why.to_string())));
+                    }
+                    // Nobody waits any more where nobody hears.
+                    let _ = tried.send(missing);
+                    talk.run(session, &ordered);
+                });
+                (orders, first)
+            })
+            .unzip();
+        // A thread that died has told why itself.
+        let missing = firsts.into_iter().map(|first| first.recv().ok().flatten()).collect();
+        (Self { orders, heard }, missing)
+    }
+
+    /// How many there are.
+    pub fn count(&self) -> usize {
+        self.orders.len()
+    }
+
+    /// Types a command to a row as soon as those before it have been answered.
+    pub fn command(&self, row: usize, command: &str) {
+        self.order(row, Order::Type(command.to_owned()));
+    }
+
+    /// Has a row hold, before all that waits, which is dropped.
+    pub fn hold(&self, row: usize) {
+        self.order(row, Order::Hold);
+    }
+
+    fn order(&self, row: usize, order: Order) {
+        if let Some(orders) = self.orders.get(row) {
+            // A thread that died has told why itself.
+            let _ = orders.send(order);
+        }
+    }
+
+    /// What is heard next, if it comes within this time.
+    pub fn next(&self, patience: Duration) -> Option<Heard> {
+        match self.heard.recv_timeout(patience) {
+            Ok(heard) => Some(heard),
+            Err(RecvTimeoutError::Timeout) => None,
+            Err(RecvTimeoutError::Disconnected) => {
+                thread::sleep(patience);
+                None
+            }
+        }
+    }
+}
+
+/// What has become of a `hold` that was ordered.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Owed {
+    /// It was answered, or there was none.
+    Nothing,
+    /// The session has it.
+    Answer,
+    /// It is to be typed once the row is there.
+    Typing,
+}
+
+/// A row's thread.
+struct Talk {
+    row: usize,
+    heard: Sender<Heard>,
+    /// What was typed and is not answered.
+    typed: VecDeque<String>,
+    hold: Owed,
+}
+
+impl Talk {
+    /// Goes on until nobody orders or hears any more.
+    fn run(mut self, mut session: Session, orders: &Receiver<Order>) {
+        loop {
+            loop {
+                match orders.try_recv() {
+                    Ok(Order::Hold) => self.hold = Owed::Typing,
+                    Ok(Order::Type(command)) => {
+                        // In the order in which they came: what comes behind a `hold` is not dropped by it.
+                        self.hold_where_owed(&mut session);
+                        self.type_or_tell(&mut session, command);
+                    }
+                    Err(TryRecvError::Empty) => break,
+                    Err(TryRecvError::Disconnected) => return,
+                }
+            }
+            self.hold_where_owed(&mut session);
+            for happening in session.turn(Instant::now()) {
+                if !self.take(happening) {
+                    return;
+                }
+            }
+        }
+    }
+
+    fn hold_where_owed(&mut self, session: &mut Session) {
+        if self.hold == Owed::Typing && session.is_connected() {
+            let dropped = session.hold();
+            if dropped > 0 {
+                let command = if dropped == 1 { "a command".to_owned() } else { format!("{dropped} commands") };
+                self.tell(What::NotTyped { command, why: "hold came first".to_owned() });
+            }
+            self.hold = Owed::Answer;
+        }
+    }
+
+    fn type_or_tell(&mut self, session: &mut Session, command: String) {
+        if !session.is_connected() {
+            self.tell(What::NotTyped { command, why: "the row is not there".to_owned() });
+        } else if !session.command(&command) {
+            self.tell(What::NotTyped { command, why: "it is no command, or too many wait".to_owned() });
+        }
+    }
+
+    /// Passes on what happened; whether anybody hears it.
+    fn take(&mut self, happening: Happening) -> bool {
+        let mut answered = None;
+        match &happening {
+            Happening::Command(line) => self.typed.push_back(line.clone()),
+            Happening::Lost(_) => {
+                self.typed.clear();
+                if self.hold == Owed::Answer {
+                    self.hold = Owed::Typing;
+                }
+            }
+            Happening::Answer(line) => {
+                let said = Said::parse(line);
+                if matches!(said, Said::Done | Said::Refused(_))
+                    && let Some(command) = self.typed.pop_front()
+                {
+                    let is_hold = command == super::session::HOLD;
+                    if is_hold && self.hold == Owed::Answer {
+                        self.hold = Owed::Nothing;
+                    }
+                    let refusal = (said != Said::Done).then(|| line.clone());
+                    answered = Some(What::Answered { command, refusal });
+                }
+            }
+            _ => {}
+        }
+        self.tell(What::Happened(happening)) && answered.is_none_or(|answered| self.tell(answered))
+    }
+
+    fn tell(&self, what: What) -> bool {
+        self.heard.send(Heard { row: self.row, at: Instant::now(), what }).is_ok()
+    }
+}
+
+/// How far a row has come with a HOLD to all.
+#[derive(Clone, Debug, PartialEq, Eq)]
+enum Held {
+    Waiting,
+    Obeyed(Duration),
+    Refused(String),
+    NotThere,
+}
+
+/// A HOLD to all rows. A row obeys when its firmware has answered `ok`: its servo has its order then.
+#[derive(Clone, Debug)]
+pub struct Hold {
+    since: Instant,
+    rows: Vec<Held>,
+}
+
+impl Hold {
+    /// One that is asked for now, of rows of which these are there.
+    pub fn new(since: Instant, are_there: impl IntoIterator<Item = bool>) -> Self {
+        let held = |is_there| if is_there { Held::Waiting } else { Held::NotThere };
+        Self { since, rows: are_there.into_iter().map(held).collect() }
+    }
+
+    /// Takes what a row says.
+    pub fn take(&mut self, heard: &Heard) {
+        let Some(held) = self.rows.get_mut(heard.row) else { return };
+        match &heard.what {
+            What::Answered { command, refusal } if command == super::session::HOLD => {
+                *held = match (refusal, &*held) {
+                    (_, Held::Obeyed(_)) => return,
+                    (None, _) => Held::Obeyed(heard.at.saturating_duration_since(self.since)),
+                    (Some(refusal), _) => Held::Refused(refusal.clone()),
+                };
+            }
+            What::Happened(Happening::Lost(_)) if *held == Held::Waiting => *held = Held::NotThere,
+            _ => {}
+        }
+    }
+
+    /// Whether nobody is waited for any more.
+    pub fn is_over(&self) -> bool {
+        !self.rows.contains(&Held::Waiting)
+    }
+
+    /// Whether every row has obeyed.
+    pub fn is_obeyed(&self) -> bool {
+        self.rows.iter().all(|held| matches!(held, Held::Obeyed(_)))
+    }
+
+    /// The time until the last of those that have obeyed did.
+    pub fn time(&self) -> Option<Duration> {
+        self.rows.iter().filter_map(|held| if let Held::Obeyed(time) = held { Some(*time) } else { None }).max()
+    }
+
+    /// How it stands, in a line: how many have obeyed and after what time, then who has not.
+    pub fn summary(&self, names: &[String]) -> String {
+        let of = |is_so: fn(&Held) -> bool| -> Vec<&str> {
+            let rows = self.rows.iter().zip(names).filter(|(held, _)| is_so(held));
+            rows.map(|(_, name)| name.as_str()).collect()
+        };
+        let obeyed = of(|held| matches!(held, Held::Obeyed(_))).len();
+        let mut parts = vec![match self.time() {
+            Some(time) => format!("HOLD {obeyed} of {} in {} ms", self.rows.len(), time.as_millis()),
+            None => format!("HOLD {obeyed} of {}", self.rows.len()),
+        }];
+        for (what, rows) in [
+            ("NOT THERE", of(|held| *held == Held::NotThere)),
+            ("REFUSED", of(|held| matches!(held, Held::Refused(_)))),
+            ("no answer yet", of(|held| *held == Held::Waiting)),
+        ] {
+            if !rows.is_empty() {
+                parts.push(format!("{what}: {}", rows.join(", ")));
+            }
+        }
+        let last = self.time().map(Held::Obeyed);
+        let last = self.rows.iter().zip(names).find(|(held, _)| Some(*held) == last.as_ref());
+        if let (Some((_, name)), 2..) = (last, obeyed) {
+            parts.push(format!("{name} last"));
+        }
+        parts.join("; ")
+    }
+}
+
+#[cfg(test)]
+mod tests;

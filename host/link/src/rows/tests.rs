@@ -1,0 +1,201 @@
+//! Rows with firmwares that answer by a script, fall silent, and may be unplugged.
+
+use super::*;
+use crate::settings::{Setting, name};
+use std::io::{self, Read, Write};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+
+/// A row's board: whether its cable is plugged in, whether it is silent, and what was typed to it.
+#[derive(Clone, Default)]
+struct Desk {
+    is_there: Arc<AtomicBool>,
+    is_silent: Arc<AtomicBool>,
+    typed: Arc<Mutex<Vec<String>>>,
+}
+
+impl Desk {
+    fn plugged_in() -> Self {
+        let desk = Self::default();
+        desk.is_there.store(true, Ordering::Relaxed);
+        desk
+    }
+
+    fn typed(&self) -> Vec<String> {
+        self.typed.lock().unwrap().clone()
+    }
+
+    fn opener(&self) -> Opener {
+        let desk = self.clone();
+        Box::new(move || {
+            if !desk.is_there.load(Ordering::Relaxed) {
+                return Err(LinkError::Absent("it".to_owned()));
+            }
+            Link::over(Firmware { desk: desk.clone(), line: Vec::new(), to_read: VecDeque::new() }, false)
+        })
+    }
+}
+
+struct Firmware {
+    desk: Desk,
+    line: Vec<u8>,
+    to_read: VecDeque<u8>,
+}
+
+impl Read for Firmware {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        if !self.desk.is_there.load(Ordering::Relaxed) {
+            return Ok(0);
+        }
+        if self.to_read.is_empty() || self.desk.is_silent.load(Ordering::Relaxed) {
+            thread::sleep(Duration::from_millis(1));
+            return Err(io::ErrorKind::TimedOut.into());
+        }
+        self.to_read.read(buffer)
+    }
+}
+
+impl Write for Firmware {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        for &byte in bytes {
+            if byte != b'\n' {
+                self.line.push(byte);
+                continue;
+            }
+            let line = String::from_utf8(std::mem::take(&mut self.line)).unwrap();
+            let setting = |setting: Setting| format!("{}={}\n", name(setting), setting.description().default);
+            let answer = match line.as_str() {
+                "" => continue,
+                "version" => "weeder 0.1.0\nok\n".to_owned(),
+                "get" => Setting::all().map(setting).collect::<String>() + "ok\n",
+                "status" => "state=hold tool=out pos=7 speed_mm_s=0 windows=0 unseen_mm=400\nok\n".to_owned(),
+                "examples" | "events on" => "ok\n".to_owned(),
+                _ => {
+                    self.desk.typed.lock().unwrap().push(line.clone());
+                    if line == "start" { "error: alarm latched\n".to_owned() } else { "ok\n".to_owned() }
+                }
+            };
+            self.to_read.extend(answer.bytes());
+        }
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+/// Hears the rows until this is so.
+fn until(rows: &Rows, mut is_so: impl FnMut(&Heard) -> bool) {
+    for _ in 0..60_000 {
+        if rows.next(Duration::from_millis(1)).is_some_and(|heard| is_so(&heard)) {
+            return;
+        }
+    }
+    panic!("it does not come to be so");
+}
+
+/// Whether this is the end of the answer to a command.
+fn answers(heard: &Heard, row: usize, line: &str) -> bool {
+    matches!(&heard.what, What::Answered { command, .. } if heard.row == row && command == line)
+}
+
+fn open(desks: &[Desk]) -> (Rows, Vec<Option<SettingsError>>) {
+    Rows::open(desks.iter().map(Desk::opener).collect())
+}
+
+#[test]
+fn rows_that_are_not_there_are_told_and_the_others_are_talked_to() {
+    let desks = [Desk::plugged_in(), Desk::default(), Desk::plugged_in()];
+    let (rows, missing) = open(&desks);
+    let missing: Vec<Option<String>> = missing.into_iter().map(|why| why.map(|why| why.to_string())).collect();
+    assert!(missing[0].is_none() && missing[2].is_none(), "{missing:?}");
+    assert!(missing[1].as_ref().is_some_and(|why| why.contains("there is no port it")), "{missing:?}");
+    rows.command(1, "clear");
+    until(&rows, |heard| matches!(&heard.what, What::NotTyped { .. } if heard.row == 1));
+    rows.command(2, "start");
+    until(
+        &rows,
+        |heard| matches!(&heard.what, What::Answered { refusal: Some(refusal), .. } if heard.row == 2 && refusal.contains("alarm")),
+    );
+    desks[1].is_there.store(true, Ordering::Relaxed);
+    until(&rows, |heard| matches!(&heard.what, What::Happened(Happening::Connected { .. }) if heard.row == 1));
+    assert_eq!(desks.each_ref().map(Desk::typed), [vec![], vec![], vec!["start".to_owned()]]);
+}
+
+#[test]
+fn a_row_that_is_silent_or_lost_keeps_no_other_from_holding() {
+    let desks = [Desk::plugged_in(), Desk::plugged_in(), Desk::plugged_in()];
+    let (rows, _) = open(&desks);
+    desks[0].is_silent.store(true, Ordering::Relaxed);
+    desks[1].is_there.store(false, Ordering::Relaxed);
+    until(&rows, |heard| matches!(&heard.what, What::Happened(Happening::Lost(_)) if heard.row == 1));
+    for row in 0..3 {
+        rows.command(row, "label plant");
+        rows.hold(row);
+    }
+    let mut hold = Hold::new(Instant::now(), [true, false, true]);
+    until(&rows, |heard| {
+        hold.take(heard);
+        answers(heard, 2, "hold")
+    });
+    let names = ["left", "middle", "right"].map(str::to_owned);
+    assert!(!hold.is_over());
+    let summary = hold.summary(&names);
+    assert!(
+        summary.starts_with("HOLD 1 of 3 in ") && summary.ends_with(" ms; NOT THERE: middle; no answer yet: left"),
+        "{summary}"
+    );
+    assert!(desks[2].typed().contains(&"hold".to_owned()));
+}
+
+#[test]
+fn a_row_that_was_lost_with_a_hold_unanswered_holds_first_when_it_is_back_and_types_nothing_else() {
+    let desk = Desk::plugged_in();
+    let (rows, _) = open(std::slice::from_ref(&desk));
+    desk.is_silent.store(true, Ordering::Relaxed);
+    // It goes before the answer to the question for the status, which does not come.
+    rows.hold(0);
+    until(&rows, |heard| matches!(&heard.what, What::Happened(Happening::Command(line)) if line == "hold"));
+    rows.command(0, "label plant");
+    desk.is_there.store(false, Ordering::Relaxed);
+    until(&rows, |heard| matches!(&heard.what, What::Happened(Happening::Lost(_))));
+    rows.hold(0);
+    rows.command(0, "clear");
+    until(&rows, |heard| matches!(&heard.what, What::NotTyped { command, .. } if command == "clear"));
+    desk.typed.lock().unwrap().clear();
+    desk.is_silent.store(false, Ordering::Relaxed);
+    desk.is_there.store(true, Ordering::Relaxed);
+    until(&rows, |heard| answers(heard, 0, "hold"));
+    assert_eq!(desk.typed(), ["hold"]);
+}
+
+#[test]
+fn a_hold_to_all_is_told_with_the_time_of_the_last_row_and_who_has_not_obeyed() {
+    let names = ["1", "2", "3"].map(str::to_owned);
+    let since = Instant::now();
+    let obeyed = |row, ms| Heard {
+        row,
+        at: since + Duration::from_millis(ms),
+        what: What::Answered { command: "hold".to_owned(), refusal: None },
+    };
+    let mut hold = Hold::new(since, [true; 3]);
+    assert_eq!(hold.summary(&names), "HOLD 0 of 3; no answer yet: 1, 2, 3");
+    hold.take(&obeyed(1, 12));
+    hold.take(&obeyed(0, 31));
+    assert_eq!((hold.is_over(), hold.is_obeyed()), (false, false));
+    assert_eq!(hold.summary(&names), "HOLD 2 of 3 in 31 ms; no answer yet: 3; 1 last");
+    let mut lost = hold.clone();
+    lost.take(&Heard { row: 2, at: since, what: What::Happened(Happening::Lost("pulled".to_owned())) });
+    assert_eq!((lost.is_over(), lost.is_obeyed()), (true, false));
+    assert_eq!(lost.summary(&names), "HOLD 2 of 3 in 31 ms; NOT THERE: 3; 1 last");
+    // It is back, and holds.
+    lost.take(&obeyed(2, 4000));
+    assert_eq!((lost.is_obeyed(), lost.time()), (true, Some(Duration::from_secs(4))));
+    hold.take(&obeyed(2, 30));
+    assert_eq!(hold.summary(&names), "HOLD 3 of 3 in 31 ms; 1 last");
+    let refusal = What::Answered { command: "hold".to_owned(), refusal: Some("error: no".to_owned()) };
+    let mut refused = Hold::new(since, [true]);
+    refused.take(&Heard { row: 0, at: since, what: refusal });
+    assert_eq!((refused.is_over(), refused.summary(&names)), (true, "HOLD 0 of 1; REFUSED: 1".to_owned()));
+}

@@ -1,0 +1,290 @@
+//! Several virtual Unos before one wheel: a machine with several rows, each with an Uno, a pseudo terminal and plants of its own.
+//!
+//! The encoder's edges come to all of them at the same cycle, as over one cable. They run in step, some milliseconds at a time, in
+//! up to as many threads as there are cores; a host that is too slow makes all of them slower together. One that stops, because its firmware
+//! crashes, keeps none of the others from running.
+//!
+//! The cable itself is not simulated: no edge is lost on it, and none comes late.
+
+use super::{LiveError, LiveUno, Pace, SLICE_MS, Setup};
+use rustix::time::{ClockId, clock_gettime};
+use std::collections::VecDeque;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Barrier, Mutex, PoisonError};
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
+use uno::Uno;
+
+/// Rows that one thread has at least: it runs so many in real time by itself, and has nobody to wait for.
+const ROWS_OF_A_THREAD: usize = 3;
+
+/// Slices after which the threads wait for each other: seldom enough not to matter on a busy host, and less than a person notices.
+const SLICES_IN_STEP: u64 = 5;
+
+/// What may happen to one row.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mishap {
+    /// Its USB cable is pulled. The board has power of its own and works on.
+    Unplugged,
+    /// The cable is plugged in again.
+    PluggedIn,
+    /// The board is reset.
+    Reset,
+}
+
+/// The rows of a machine.
+pub struct LiveRows {
+    unos: Vec<LiveUno>,
+    mishaps: Arc<Mutex<VecDeque<(usize, Mishap)>>>,
+    fast: bool,
+}
+
+/// How long they have run.
+#[derive(Clone, Copy, Debug)]
+pub struct Ran {
+    /// By their own clock.
+    pub simulated: Duration,
+    /// By the host's.
+    pub took: Duration,
+    /// The host's cores were at work for so long, all together.
+    pub cores: Duration,
+    /// In so many threads.
+    pub threads: usize,
+}
+
+impl Ran {
+    /// How much of their own time passed in a second of the host's.
+    pub fn times_real_time(&self) -> f64 {
+        self.simulated.as_secs_f64() / self.took.as_secs_f64().max(f64::EPSILON)
+    }
+
+    /// How many cores it takes in real time.
+    pub fn cores_in_real_time(&self) -> f64 {
+        self.cores.as_secs_f64() / self.simulated.as_secs_f64().max(f64::EPSILON)
+    }
+}
+
+impl LiveRows {
+    /// Powers all of them up. Their courses have to be those of one machine; the first says whether they run in real time.
+    ///
+    /// # Errors
+    /// As [`LiveUno::start`].
+    pub fn start(setups: Vec<Setup>) -> Result<Self, LiveError> {
+        let fast = setups.first().is_some_and(|setup| setup.fast);
+        let unos = setups.into_iter().map(LiveUno::start).collect::<Result<_, _>>()?;
+        Ok(Self { unos, mishaps: Arc::default(), fast })
+    }
+
+    /// The paths under which programs open the rows' serial ports.
+    pub fn paths(&self) -> Vec<&Path> {
+        self.unos.iter().map(LiveUno::path).collect()
+    }
+
+    /// Runs until `stop` is set, or for so long by their own clock.
+    ///
+    /// # Errors
+    /// What has ended one of them, and which, once the others have ended as well.
+    pub fn run(&mut self, stop: &AtomicBool, time: Option<Duration>) -> Result<Ran, (usize, LiveError)> {
+        let cores = thread::available_parallelism().map_or(1, usize::from);
+        let threads = cores.min(self.unos.len() / ROWS_OF_A_THREAD).max(1);
+        let each = self.unos.len().div_ceil(threads).max(1);
+        let threads = self.unos.len().div_ceil(each).max(1);
+        let most_slices = time.map_or(u64::MAX, |time| time.as_millis() as u64 / SLICE_MS);
+        let (began, worked) = (Instant::now(), worked());
+        let (barrier, ends) = (Barrier::new(threads), AtomicBool::new(false));
+        let mishaps = &self.mishaps;
+        let fast = self.fast;
+        let mut slices = 0;
+        let failed = thread::scope(|scope| {
+            let mut parts = self.unos.chunks_mut(each).enumerate();
+            // This thread leads: it looks at the clock and at whether to stop.
+            let own = parts.next();
+            let others: Vec<_> = parts
+                .map(|(part, unos)| {
+                    let (barrier, ends) = (&barrier, &ends);
+                    scope.spawn(move || {
+                        let mut part = Part::new(part * each, unos);
+                        while !ends.load(Ordering::Relaxed) {
+                            part.step(mishaps);
+                            barrier.wait();
+                            // The leader decides in between.
+                            barrier.wait();
+                        }
+                        part.end()
+                    })
+                })
+                .collect();
+            let mut part = Part::new(0, own.map_or(&mut [], |(_, unos)| unos));
+            let mut pace = (!fast).then(Pace::new);
+            while !ends.load(Ordering::Relaxed) {
+                part.step(mishaps);
+                slices += SLICES_IN_STEP;
+                barrier.wait();
+                if let Some(pace) = &mut pace {
+                    pace.wait(SLICES_IN_STEP);
+                }
+                ends.store(stop.load(Ordering::Relaxed) || slices >= most_slices, Ordering::Relaxed);
+                barrier.wait();
+            }
+            let own = part.end();
+            let others = others
+                .into_iter()
+                .filter_map(|thread| thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
+            others.fold(own, |first, next| first.or(Some(next)))
+        });
+        match failed {
+            Some(failed) => Err(failed),
+            None => Ok(Ran {
+                simulated: Duration::from_millis(slices * SLICE_MS),
+                took: began.elapsed(),
+                cores: self::worked().saturating_sub(worked),
+                threads,
+            }),
+        }
+    }
+
+    /// Runs in a thread until the handle is dropped.
+    pub fn run_in_background(mut self) -> Background {
+        let stop = Arc::new(AtomicBool::new(false));
+        let stop_there = Arc::clone(&stop);
+        let paths = self.paths().into_iter().map(Path::to_owned).collect();
+        let mishaps = Arc::clone(&self.mishaps);
+        let thread = thread::spawn(move || {
+            self.run(&stop_there, None)?;
+            Ok(self)
+        });
+        Background { paths, stop, mishaps, thread: Some(thread) }
+    }
+
+    /// The rows' Unos, without their terminals.
+    pub fn into_unos(self) -> Vec<Uno> {
+        self.unos.into_iter().map(|live| live.uno).collect()
+    }
+}
+
+/// For how long this process has had cores at work.
+fn worked() -> Duration {
+    let time = clock_gettime(ClockId::ProcessCPUTime);
+    Duration::try_from(time).unwrap_or_default()
+}
+
+/// The rows of one thread.
+struct Part<'a> {
+    first: usize,
+    unos: Vec<(&'a mut LiveUno, bool)>,
+    failed: Option<(usize, LiveError)>,
+}
+
+impl<'a> Part<'a> {
+    fn new(first: usize, unos: &'a mut [LiveUno]) -> Self {
+        Self { first, unos: unos.iter_mut().map(|uno| (uno, true)).collect(), failed: None }
+    }
+
+    /// Runs each until the threads wait for each other.
+    fn step(&mut self, mishaps: &Mutex<VecDeque<(usize, Mishap)>>) {
+        self.suffer(mishaps);
+        for _ in 0..SLICES_IN_STEP {
+            for place in 0..self.unos.len() {
+                let (uno, runs) = &mut self.unos[place];
+                if *runs && let Err(error) = uno.slice() {
+                    self.stop(place, error);
+                }
+            }
+        }
+    }
+
+    /// One has stopped: to those at its port it is as if its cable were pulled.
+    fn stop(&mut self, place: usize, error: LiveError) {
+        let (uno, runs) = &mut self.unos[place];
+        uno.unplug();
+        *runs = false;
+        self.failed.get_or_insert((self.first + place, error));
+    }
+
+    /// Has happen to these rows what is to happen.
+    fn suffer(&mut self, mishaps: &Mutex<VecDeque<(usize, Mishap)>>) {
+        let own = self.first..self.first + self.unos.len();
+        let mine: Vec<(usize, Mishap)> = {
+            let mut mishaps = mishaps.lock().unwrap_or_else(PoisonError::into_inner);
+            if mishaps.is_empty() {
+                return;
+            }
+            let (mine, others): (VecDeque<_>, _) = mishaps.drain(..).partition(|(row, _)| own.contains(row));
+            *mishaps = others;
+            Vec::from(mine)
+        };
+        for (row, mishap) in mine {
+            let place = row - self.first;
+            let uno = &mut self.unos[place].0;
+            let suffered = match mishap {
+                Mishap::Unplugged => {
+                    uno.unplug();
+                    Ok(())
+                }
+                Mishap::PluggedIn => uno.plug_in(),
+                Mishap::Reset => {
+                    uno.uno.reset();
+                    Ok(())
+                }
+            };
+            if let Err(error) = suffered {
+                self.stop(place, error);
+            }
+        }
+    }
+
+    /// Ends them, and says what has stopped one before.
+    fn end(mut self) -> Option<(usize, LiveError)> {
+        for place in 0..self.unos.len() {
+            let (uno, runs) = &mut self.unos[place];
+            if *runs && let Err(error) = uno.end() {
+                self.stop(place, error);
+            }
+        }
+        self.failed
+    }
+}
+
+/// Rows that run in a thread. Dropped, they end, their terminals and links with them.
+pub struct Background {
+    paths: Vec<PathBuf>,
+    stop: Arc<AtomicBool>,
+    mishaps: Arc<Mutex<VecDeque<(usize, Mishap)>>>,
+    thread: Option<JoinHandle<Result<LiveRows, (usize, LiveError)>>>,
+}
+
+impl Background {
+    /// The paths under which programs open the rows' serial ports.
+    pub fn paths(&self) -> &[PathBuf] {
+        &self.paths
+    }
+
+    /// Has something happen to a row, within some milliseconds.
+    pub fn happen(&self, row: usize, mishap: Mishap) {
+        self.mishaps.lock().unwrap_or_else(PoisonError::into_inner).push_back((row, mishap));
+    }
+
+    /// Stops them, and gives them back.
+    ///
+    /// # Errors
+    /// What has ended one of them before, and which.
+    ///
+    /// # Panics
+    /// Where their thread did.
+    pub fn stop(mut self) -> Result<LiveRows, (usize, LiveError)> {
+        self.stop.store(true, Ordering::Relaxed);
+        let thread = self.thread.take().expect("it is taken here and by drop alone");
+        thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+    }
+}
+
+impl Drop for Background {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            // Its user did not ask what became of them.
+            let _ = thread.join();
+        }
+    }
+}

@@ -1,0 +1,206 @@
+//! Virtual Unos before one wheel, as the laptop at their ports finds them: what happens to one of them disturbs no other, and all of them hold.
+
+use field::machine::Machine;
+use field::planting::Planting;
+use field::row::{Row, Thing};
+use link::rows::{Heard, Hold, Opener, Rows, What};
+use link::session::Happening;
+use link::{EventLine, Link, Mode};
+use std::path::PathBuf;
+use std::sync::atomic::AtomicBool;
+use std::time::{Duration, Instant};
+use trial::console::ask;
+use trial::firmware;
+use trial::live::rows::{Background, LiveRows, Mishap};
+use trial::live::{Course, Setup};
+
+/// Walking pace.
+const SPEED_MM_S: f64 = 700.0;
+
+/// A row of plants of its own.
+fn row(seed: u64) -> Row {
+    let planting = Planting {
+        plants: 40,
+        spacing_mm: 500.0,
+        spacing_scatter_mm: 40.0,
+        canopy_mm: 150.0,
+        canopy_scatter_mm: 20.0,
+        weeds: 5,
+        ragged: false,
+    };
+    planting.grow_with_room(seed).expect("it is a row")
+}
+
+/// Setups of a machine with these rows.
+fn setups(rows: Vec<Row>, setup: &Setup) -> Vec<Setup> {
+    let courses = Course::of_rows(rows, Machine::default(), SPEED_MM_S).into_iter();
+    courses.map(|course| Setup { course: Some(course), ..setup.clone() }).collect()
+}
+
+fn product() -> Setup {
+    Setup { elf: Some(firmware::build().expect("the firmware builds")), ..Setup::default() }
+}
+
+/// What the laptop knows of the rows.
+struct Laptop {
+    rows: Rows,
+    modes: Vec<Option<Mode>>,
+    /// What befell each: lost, connected, and in alarm.
+    lost: Vec<usize>,
+    alarms: Vec<usize>,
+}
+
+impl Laptop {
+    #[track_caller]
+    fn open(machine: &Background) -> Self {
+        let opener = |path: &PathBuf| -> Opener {
+            let path = path.to_str().expect("it is text").to_owned();
+            Box::new(move || Link::open(Some(&path)))
+        };
+        let (rows, missing) = Rows::open(machine.paths().iter().map(opener).collect());
+        assert!(missing.iter().all(Option::is_none), "{missing:?}");
+        let count = rows.count();
+        Self { rows, modes: vec![None; count], lost: vec![0; count], alarms: vec![0; count] }
+    }
+
+    fn all(&self) -> std::ops::Range<usize> {
+        0..self.rows.count()
+    }
+
+    /// Listens until this is so.
+    #[track_caller]
+    fn until(&mut self, what: &str, mut is_so: impl FnMut(&Self, &Heard) -> bool) {
+        for _ in 0..600_000 {
+            let Some(heard) = self.rows.next(Duration::from_millis(1)) else { continue };
+            match &heard.what {
+                What::Happened(Happening::Status(status, _)) => self.modes[heard.row] = Some(status.mode),
+                What::Happened(Happening::Lost(_)) => self.lost[heard.row] += 1,
+                What::Happened(Happening::Event(EventLine::Alarm { .. }, _)) => self.alarms[heard.row] += 1,
+                _ => {}
+            }
+            if is_so(self, &heard) {
+                return;
+            }
+        }
+        panic!("{what} does not come: {:?}, lost {:?}, alarms {:?}", self.modes, self.lost, self.alarms);
+    }
+
+    /// Types a command to all, each of which does it.
+    #[track_caller]
+    fn command(&mut self, command: &str) {
+        for row in self.all() {
+            self.rows.command(row, command);
+        }
+        let mut left = self.rows.count();
+        self.until(command, |_, heard| {
+            if let What::Answered { refusal, .. } = &heard.what {
+                assert_eq!(refusal, &None, "row {} refuses {command}", heard.row);
+                left -= 1;
+            }
+            left == 0
+        });
+    }
+
+    /// Has all of them at work: settings saved, the alarm of a new board cleared.
+    #[track_caller]
+    fn set_to_work(&mut self) {
+        for command in ["save", "clear", "start"] {
+            self.command(command);
+        }
+        self.until("work", |laptop, _| laptop.modes.iter().all(|mode| *mode == Some(Mode::Work)));
+    }
+
+    /// HOLD to all, until nobody is waited for any more.
+    #[track_caller]
+    fn hold(&mut self, are_there: &[bool]) -> Hold {
+        let mut hold = Hold::new(Instant::now(), are_there.iter().copied());
+        for row in self.all() {
+            self.rows.hold(row);
+        }
+        self.until("hold", |_, heard| {
+            hold.take(heard);
+            hold.is_over()
+        });
+        hold
+    }
+}
+
+#[test]
+fn of_six_rows_in_real_time_one_that_is_lost_reset_or_in_alarm_disturbs_no_other_and_all_hold() {
+    let folder = tempfile::tempdir().expect("there is room for links");
+    let mut rows: Vec<Row> = (1..=6).map(row).collect();
+    // The beam of the third is broken over more ground than a plant has.
+    rows[2] = Row::new(vec![Thing::plant(3000.0, 150.0), Thing::plant(4500.0, 900.0)]).expect("it is a row");
+    let link = |number| Some(folder.path().join(format!("row{number}")));
+    let setups = setups(rows, &product()).into_iter().enumerate();
+    let setups = setups.map(|(number, setup)| Setup { link: link(number), ..setup }).collect();
+    let machine = LiveRows::start(setups).expect("they start").run_in_background();
+    let mut laptop = Laptop::open(&machine);
+    laptop.set_to_work();
+
+    machine.happen(1, Mishap::Reset);
+    laptop.until("a reset that is told", |laptop, _| laptop.lost[1] == 1);
+    laptop.until("hold after it", |laptop, _| laptop.modes[1] == Some(Mode::Hold));
+    machine.happen(4, Mishap::Unplugged);
+    laptop.until("a loss that is told", |laptop, _| laptop.lost[4] == 1);
+    laptop.until("an alarm", |laptop, _| laptop.modes[2] == Some(Mode::Alarm));
+    // The others have not noticed, and still do not: each tells of its plants.
+    let mut seen = [0; 6];
+    laptop.until("plants of the others", |laptop, heard| {
+        if let What::Happened(Happening::Event(EventLine::Object { .. }, _)) = heard.what {
+            seen[heard.row] += 1;
+        }
+        assert_eq!([0, 3, 5].map(|row| laptop.modes[row]), [Some(Mode::Work); 3]);
+        [0, 3, 5].iter().all(|&row| seen[row] >= 3)
+    });
+    // The one that was reset may be told of twice: what it was answering is cut.
+    assert_eq!([0, 2, 3, 4, 5].map(|row| laptop.lost[row]), [0, 0, 0, 1, 0]);
+    assert_eq!(laptop.alarms, [0, 0, 1, 0, 0, 0]);
+
+    let mut hold = laptop.hold(&[true, true, true, true, false, true]);
+    let names: Vec<String> = (1..=6).map(|number| number.to_string()).collect();
+    let summary = hold.summary(&names);
+    assert!(summary.starts_with("HOLD 5 of 6 in ") && summary.contains("; NOT THERE: 5; "), "{summary}");
+    println!("{summary}");
+    // The one that was lost has worked on. It holds as soon as its cable is in again.
+    machine.happen(4, Mishap::PluggedIn);
+    laptop.until("the last one's hold", |_, heard| {
+        hold.take(heard);
+        hold.is_obeyed()
+    });
+    machine.stop().map_err(|(row, error)| format!("row {row}: {error}")).expect("none has stopped");
+}
+
+#[test]
+fn twelve_rows_hold_at_once_however_slow_the_computer_is() {
+    let setup = Setup { fast: true, ..product() };
+    let machine = LiveRows::start(setups((1..=12).map(row).collect(), &setup)).expect("they start");
+    let machine = machine.run_in_background();
+    let mut laptop = Laptop::open(&machine);
+    laptop.set_to_work();
+    let hold = laptop.hold(&[true; 12]);
+    assert!(hold.is_obeyed() && hold.time().is_some());
+    let names: Vec<String> = (1..=12).map(|number| number.to_string()).collect();
+    println!("{}", hold.summary(&names));
+    laptop.until("hold everywhere", |laptop, _| laptop.modes.iter().all(|mode| *mode == Some(Mode::Hold)));
+    assert_eq!(laptop.lost, [0; 12]);
+}
+
+#[test]
+fn all_rows_count_the_same_ticks_of_the_wheel_that_they_share_and_each_sees_its_own_plants() {
+    let setup = Setup { fast: true, ..product() };
+    let mut machine = LiveRows::start(setups(vec![row(1), row(2), row(3)], &setup)).expect("they start");
+    let ran = machine.run(&AtomicBool::new(false), Some(Duration::from_secs(12)));
+    let ran = ran.map_err(|(row, error)| format!("row {row}: {error}")).expect("they run");
+    assert_eq!(ran.simulated, Duration::from_secs(12));
+    let mut unos = machine.into_unos();
+    let mut told = |command: &str| -> Vec<Vec<String>> {
+        unos.iter_mut().map(|uno| ask(uno, command).expect("it answers")).collect()
+    };
+    let position = |status: &Vec<String>| status[0].split(' ').find(|word| word.starts_with("pos=")).map(str::to_owned);
+    let positions: Vec<Option<String>> = told("status").iter().map(position).collect();
+    assert!(positions[0].is_some() && positions.iter().all(|position| *position == positions[0]), "{positions:?}");
+    assert_ne!(positions[0].as_deref(), Some("pos=0"));
+    let objects = told("dump");
+    assert!(objects[0] != objects[1] && objects[1] != objects[2], "{objects:?}");
+}
