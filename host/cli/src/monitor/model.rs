@@ -4,6 +4,7 @@ use super::command_line::CommandLine;
 use link::advice;
 use link::rows::{Heard, Hold, What};
 use link::session::Happening;
+use link::set_up::{SetUp, Step};
 use link::settings::{Setting, Settings};
 use link::{Class, EventLine, Mode, Status};
 use std::collections::VecDeque;
@@ -69,6 +70,9 @@ pub struct RowModel {
     pub advice: Option<String>,
     /// What has become of the last command.
     pub answer: Answer,
+    /// What was measured of it since it has been watched, and what was said to be done next.
+    set_up: SetUp,
+    step: Option<Step>,
 }
 
 /// What is known of the machine.
@@ -184,8 +188,10 @@ impl Model {
         if let Some(said) = said {
             self.say_of(number, &said);
         }
-        if let Some(row) = self.rows.get_mut(number) {
-            row.update(happening);
+        let Some(row) = self.rows.get_mut(number) else { return };
+        row.update(happening);
+        if let Some(step) = row.take_step() {
+            self.say_of(number, &format!("-- next, {step}"));
         }
     }
 
@@ -219,7 +225,18 @@ impl RowModel {
             windows: VecDeque::new(),
             advice: None,
             answer: Answer::None,
+            set_up: SetUp::default(),
+            step: None,
         }
+    }
+
+    /// The next step of setting it up, if it is another one now.
+    fn take_step(&mut self) -> Option<Step> {
+        let step = self.set_up.next(&self.settings);
+        let before = std::mem::replace(&mut self.step, step.clone());
+        // Each plant counts, and not each is worth a line.
+        let goes_on = matches!((&before, &step), (Some(Step::PassPlants(_)), Some(Step::PassPlants(_))));
+        step.filter(|_| before != self.step && !goes_on)
     }
 
     /// Whether the Uno is there.
@@ -228,6 +245,7 @@ impl RowModel {
     }
 
     fn update(&mut self, happening: Happening) {
+        self.set_up.take(&happening);
         match happening {
             Happening::Connected { version, settings, .. } => {
                 self.settings = settings;

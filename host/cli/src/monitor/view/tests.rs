@@ -65,6 +65,24 @@ fn windows_move_toward_the_tool() {
 }
 
 #[test]
+fn what_is_to_be_measured_next_is_said_once_calibrating_has_begun() {
+    let timed = "calibrated lead_out_ms=158 lead_in_ms=52 set=yes";
+    let told = |model: &Model| model.lines.iter().filter(|line| line.starts_with("-- next, ")).cloned().collect();
+    let mut model = machine(&["state is=hold"]);
+    let none: Vec<String> = told(&model);
+    assert_eq!(none, [""; 0]);
+    tell(&mut model, 0, &[timed, timed]);
+    let lines: Vec<String> = told(&model);
+    assert_eq!(
+        lines,
+        [
+            "-- next, time the servo: `calibrate servo` (1 of 2 done)",
+            "-- next, measure 10 m: `calibrate start`, roll, `calibrate 10000` (0 of 3 done)",
+        ]
+    );
+}
+
+#[test]
 fn an_alarm_is_shown_with_what_to_do_until_it_is_cleared() {
     let mut lines = ROW.to_vec();
     lines.push("alarm name=beam_blocked code=11 pos=2700");
