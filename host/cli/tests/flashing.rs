@@ -69,16 +69,16 @@ impl Drop for VirtualUno {
     }
 }
 
-/// Reads until this text has come, and returns all of it.
+/// Reads until one of these texts has come, and returns all of it.
 #[track_caller]
-fn read_until(port: &mut dyn serialport::SerialPort, text: &str) -> String {
+fn read_until(port: &mut dyn serialport::SerialPort, texts: &[&str]) -> String {
     let mut heard = Vec::new();
     let mut byte = [0];
-    while !heard.ends_with(text.as_bytes()) {
+    while !texts.iter().any(|text| heard.ends_with(text.as_bytes())) {
         match port.read(&mut byte) {
             Ok(count) => heard.extend(&byte[..count]),
             Err(error) if error.kind() == ErrorKind::Interrupted => {}
-            Err(error) => panic!("{text:?} has not come ({error}), but {:?}", String::from_utf8_lossy(&heard)),
+            Err(error) => panic!("{texts:?} has not come ({error}), but {:?}", String::from_utf8_lossy(&heard)),
         }
     }
     String::from_utf8_lossy(&heard).into_owned()
@@ -112,16 +112,24 @@ fn flash(port: &Path, arguments: &[&str]) {
     assert!(flashed, "avrdude's own words stand above");
 }
 
-/// Asserts that the firmware greets who opens the port, once the bootloader has waited, and answers.
+/// Asserts that the firmware greets who opens the port, once the bootloader has waited, and answers. On a busy host the greeting of the run
+/// before may be read before the opening is noticed; what is typed then is lost in the reset, and typed again at the next greeting, as
+/// `weeder` does.
 #[track_caller]
 fn assert_talks(link: &Path) {
+    const GREETING_ENDS: &str = "help lists the commands\r\n";
     let mut port = serialport::new(link.to_string_lossy(), 115_200).timeout(PATIENCE).open().unwrap();
-    let greeting = read_until(&mut *port, "help lists the commands\r\n");
-    assert!(greeting.contains("weeder"), "{greeting}");
-    port.write_all(b"version\n").unwrap();
-    assert!(read_until(&mut *port, "ok\r\n").contains(env!("CARGO_PKG_VERSION")));
+    let mut heard = read_until(&mut *port, &[GREETING_ENDS]);
+    assert!(heard.contains("weeder"), "{heard}");
+    for _ in 0..2 {
+        if heard.ends_with(GREETING_ENDS) {
+            port.write_all(b"version\n").unwrap();
+            heard = read_until(&mut *port, &["ok\r\n", GREETING_ENDS]);
+        }
+    }
+    assert!(heard.ends_with("ok\r\n") && heard.contains(env!("CARGO_PKG_VERSION")), "{heard}");
     port.write_all(b"status\n").unwrap();
-    assert!(read_until(&mut *port, "ok\r\n").contains("tool=out"));
+    assert!(read_until(&mut *port, &["ok\r\n"]).contains("tool=out"));
 }
 
 /// An ELF for the chip that takes so many bytes of flash.
