@@ -143,7 +143,8 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// a file.
     ///
     /// # Errors
-    /// [`Refusal::NotInHold`], as what is told has not been seen by this machine; [`Refusal::NotTold`] and [`Refusal::ExamplesFull`].
+    /// [`Refusal::NotInHold`], as what stands between beam and tool would be judged by other examples than what came before it;
+    /// [`Refusal::NotTold`] and [`Refusal::ExamplesFull`].
     pub fn teach(&mut self, label: u8) -> Result<(), Refusal> {
         if self.is_working() {
             return Err(Refusal::NotInHold);

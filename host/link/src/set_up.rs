@@ -156,7 +156,8 @@ impl SetUp {
             if self.slip_permille.len() < PLANTS {
                 return Some(Step::PassPlants(self.slip_permille.len()));
             }
-            f64::from(range(self.slip_permille.iter().copied())) / 2.0 / 1000.0 * (beam_to_tool_mm - second_beam_mm)
+            // What is told is the median of three plants: the slip of one may be as far off it as the medians are from each other.
+            f64::from(range(self.slip_permille.iter().copied())) / 1000.0 * (beam_to_tool_mm - second_beam_mm)
         } else {
             let &[.., in_use] = &self.ticks_per_m[..] else { return Some(Step::MeasureWheel(0)) };
             if self.ticks_per_m.len() < STRETCHES {
@@ -266,7 +267,7 @@ mod tests {
         lines.extend(["slip permille=50", "slip permille=70"].repeat(PLANTS / 2));
         let step = after(&lines).next(&settings(&leads));
         let Some(Step::SetMargin(margin)) = step else { panic!("{step:?}") };
-        assert!((margin.slip_mm - 2.0).abs() < 1e-9, "a hundredth of 200 mm: {margin:?}");
+        assert!((margin.slip_mm - 4.0).abs() < 1e-9, "a fiftieth of 200 mm: {margin:?}");
     }
 
     #[test]
