@@ -8,10 +8,13 @@
 //! # How near it is
 //!
 //! - An object's edges are right to [`OBJECT_TICKS`]. A swing leads by the speed, and the log has that only now and then: it may
-//!   differ by [`SWING_TICKS`], and by [`SWING_MS`] of the machine's way, which at 2.5 km/h is another 17 mm.
+//!   differ by [`SWING_TICKS`], and by [`SWING_MS`] of the machine's way, which at 2.5 km/h is another 17 mm. Whether the ground between
+//!   two windows is long enough to come into the row rests on the speed too. So all is replayed at three paces, as even, as slow and
+//!   as fast as the log allows, and a swing differs where none of them has it like the log.
 //! - An object's vote rests on the speed class, which the line does not tell: it is the same where one of the classes that the machine
 //!   may have been in gives it. What was seen before the log began is believed.
-//! - Where the state changed is not in the log. The swing that follows says it, and is not judged by its place.
+//! - Where the state changed is not in the log. The swing that follows says it, and is not judged by its place. Without one the tool was
+//!   out already, and the statuses around it say enough. The time at which a command was typed does not: a busy host is late.
 //! - An alarm that encoder, beam, end switch or stack gave rests on what the log does not hold. It is raised where the log has it.
 //! - Where a log begins with ground already seen, what the tool did there is not judged.
 //! - A command that the firmware refused is left out, as it did nothing there.
@@ -23,12 +26,13 @@ mod judge;
 mod player;
 
 use self::compare::{Bounds, Heard, compare};
-use self::player::Player;
+use self::player::{Pace, Player};
 use super::log::{Entry, Kind};
 use super::settings::{Setting, Settings, shown};
-use super::{EventLine, Said, Status};
+use super::{EventLine, Mode, Said, Status};
 use control::ground::class::label;
 use control::ground::features;
+use control::say::command::{self, Command};
 use knn::Example;
 use std::collections::VecDeque;
 use std::fmt;
@@ -132,6 +136,16 @@ enum Happened<'a> {
     },
 }
 
+/// What came of a stretch at one pace.
+struct Played {
+    logged: Vec<Heard>,
+    replayed: Vec<Heard>,
+    /// What was left out, and why.
+    notes: Vec<String>,
+    /// The last place.
+    end: i32,
+}
+
 /// A log from one start of the link to its end.
 struct Stretch<'a> {
     settings: Settings,
@@ -209,9 +223,27 @@ impl<'a> Stretch<'a> {
             ));
         }
 
-        let mut player = Player::new(&self);
+        let mut played = Vec::new();
+        for pace in Pace::ALL {
+            played.push(self.play(pace)?);
+        }
+        let heard: Vec<&[Heard]> = played.iter().map(|played| played.replayed.as_slice()).collect();
+        // What the log says is the same at every pace.
+        let Played { logged, notes, end, .. } = &played[0];
+        let bounds = Bounds { first: self.first.position, judged_from, end: *end };
+        compare(logged, &heard, &bounds, replayed);
+        replayed.notes.extend_from_slice(notes);
+        Ok(())
+    }
+
+    /// Has the decisions made anew at a pace.
+    fn play(&self, pace: Pace) -> Result<Played, ReplayError> {
+        let mut player = Player::new(self, pace);
         let mut logged: Vec<Heard> = Vec::new();
         let mut last = (self.first.clone(), self.happened.first().map_or(0, |(entry, _)| entry.time_ms));
+        let mut notes = Vec::new();
+        // Whether the start that is carried out next takes unseen ground for bare.
+        let mut starts_now = false;
         for (place, (entry, happened)) in self.happened.iter().enumerate() {
             match happened {
                 Happened::Status(status) => {
@@ -223,24 +255,32 @@ impl<'a> Stretch<'a> {
                 }
                 Happened::Event(event) => {
                     let mut is_given = false;
-                    // Both places of a change of state are known once its swing is.
-                    if let EventLine::State(_) | EventLine::Alarm { .. } = event
-                        && let Some(at) = self.place_of_change(place)
-                    {
+                    if let Some(at) = self.place_of_change(place) {
                         player.roll_to(at, &last.0, self.next_status(place));
-                        last.0.position = at;
+                        last.0.position = player.position();
                         last.0.speed_mm_s = player.speed_mm_s;
                     }
                     match event {
-                        EventLine::State(mode) => player.enter(*mode),
+                        EventLine::State(mode) => player.enter(*mode, std::mem::take(&mut starts_now)),
                         EventLine::Alarm { .. } => is_given = player.raise(),
                         EventLine::Swing { .. } => is_given = self.follows_change(place),
                         _ => {}
                     }
-                    logged.push(Heard { line: entry.number, event: *event, speed: player.speed().0, is_given });
+                    logged.push(Heard {
+                        line: entry.number,
+                        steps: 0,
+                        event: *event,
+                        speed: player.speed().0,
+                        is_given,
+                    });
                 }
                 Happened::Command { is_refused: true, .. } => {}
                 Happened::Command { line, .. } => {
+                    // The line that tells of the new state comes nearer to where it was taken.
+                    if self.is_told_by_state(place) {
+                        starts_now = matches!(command::parse(line.as_bytes()), Ok(Command::Start { now: true }));
+                        continue;
+                    }
                     if let Some(at) = self.place_of_command(entry.time_ms, &last, place) {
                         player.roll_to(at, &last.0, self.next_status(place));
                         last.0.position = player.position();
@@ -248,15 +288,13 @@ impl<'a> Stretch<'a> {
                         last.1 = entry.time_ms;
                     }
                     if !player.command(line) {
-                        replayed.notes.push(format!("line {}: not replayed from `{line}` on", entry.number));
+                        notes.push(format!("line {}: not replayed from `{line}` on", entry.number));
                         break;
                     }
                 }
             }
         }
-        let bounds = Bounds { first: self.first.position, judged_from, end: last.0.position };
-        compare(&logged, &player.heard, &bounds, replayed);
-        Ok(())
+        Ok(Played { logged, replayed: player.heard, notes, end: last.0.position })
     }
 
     /// Where watching began, as far as the log tells. Where all ground up to the tool had been seen, the log does not: then it is
@@ -295,8 +333,15 @@ impl<'a> Stretch<'a> {
         first.saturating_add(self.settings.ticks(Setting::BeamToToolMm).0).saturating_add(behind)
     }
 
-    /// Where the machine was when a command was typed: on its way to the next status, by the host's clock.
+    /// Where the machine was when a command was typed that changes no state: on its way to the next status, by the host's clock. `start
+    /// now` at work lets the tool into the row where it swings in next.
     fn place_of_command(&self, time_ms: u64, last: &(Status, u64), place: usize) -> Option<i32> {
+        if let Happened::Command { line, .. } = self.happened[place].1
+            && matches!(command::parse(line.as_bytes()), Ok(Command::Start { now: true }))
+            && let Some((position, true)) = self.happened[place..].iter().find_map(swing_or_status)
+        {
+            return Some(position);
+        }
         let (entry, next) = self.happened[place..].iter().find_map(|(entry, happened)| match happened {
             Happened::Status(status) => Some((entry, status)),
             _ => None,
@@ -307,16 +352,39 @@ impl<'a> Stretch<'a> {
         Some(last.0.position.wrapping_add(way as i32))
     }
 
-    /// Where the state changed that a line tells of: at an alarm's own place, or that of the swing that follows.
+    /// Where the state changed that an event tells of: an alarm has its own place, and the swing that follows has it. Where no swing
+    /// follows, the tool was out already: work began as late, and was left as early as the log allows.
     fn place_of_change(&self, place: usize) -> Option<i32> {
-        if let Happened::Event(EventLine::Alarm { position, .. }) = &self.happened[place].1 {
-            return Some(*position);
+        let mode = match &self.happened[place].1 {
+            Happened::Event(EventLine::Alarm { position, .. }) => return Some(*position),
+            Happened::Event(EventLine::State(mode)) => mode,
+            _ => return None,
+        };
+        match (self.happened[place + 1..].iter().find_map(swing_or_status), mode) {
+            (Some((position, true)), _) | (Some((position, false)), Mode::Work) => Some(position),
+            _ => self.happened[..place].iter().rev().find_map(swing_or_status).map(|(position, _)| position),
         }
-        self.happened[place + 1..].iter().find_map(|(_, happened)| match happened {
-            Happened::Event(EventLine::Swing { position, .. }) => Some(Some(*position)),
-            Happened::Status(_) => Some(None),
+    }
+
+    /// Whether an event tells of the change of state that a command brought: it comes behind the answer, and no more than the status
+    /// that was asked for before comes between.
+    fn is_told_by_state(&self, place: usize) -> bool {
+        let Happened::Command { line, .. } = self.happened[place].1 else { return false };
+        let brings = match command::parse(line.as_bytes()) {
+            Ok(Command::Start { .. }) => Mode::Work,
+            Ok(Command::Hold | Command::Clear) => Mode::Hold,
+            _ => return false,
+        };
+        let mut statuses = 0;
+        let soon = self.happened[place + 1..].iter().take_while(|(_, happened)| {
+            statuses += u8::from(matches!(happened, Happened::Status(_)));
+            statuses < 2
+        });
+        let told = soon.into_iter().find_map(|(_, happened)| match happened {
+            Happened::Event(EventLine::State(mode)) => Some(*mode),
             _ => None,
-        })?
+        });
+        told == Some(brings)
     }
 
     /// Whether a swing belongs to a change of state that was told just before it.
@@ -332,6 +400,15 @@ impl<'a> Stretch<'a> {
             Happened::Status(status) => Some(status),
             _ => None,
         })
+    }
+}
+
+/// The place that a swing or a status tells, and whether it is a swing.
+fn swing_or_status((_, happened): &(&Entry, Happened<'_>)) -> Option<(i32, bool)> {
+    match happened {
+        Happened::Event(EventLine::Swing { position, .. }) => Some((*position, true)),
+        Happened::Status(status) => Some((status.position, false)),
+        _ => None,
     }
 }
 

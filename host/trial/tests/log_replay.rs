@@ -10,8 +10,13 @@ use link::session::{Happening, Session};
 use link::{Link, LinkError, Status};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use signal::CYCLES_PER_SECOND;
+use std::io::{self, Read, Write};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 use trial::{UnoPort, firmware};
+use uno::Uno;
 
 /// Plants and a tall weed.
 fn row() -> Row {
@@ -39,9 +44,15 @@ fn logged_from(row: &Row, motion: &Motion, commands: &[&str], sets_off: u64) -> 
         .expect("the firmware wakes up");
     let changes = machine.pin_changes(row, motion, uno.cycle() + sets_off);
     uno.drive(changes);
-    let mut uno = Some(uno);
-    let open = move || match uno.take() {
-        Some(uno) => Link::over(UnoPort::new(uno), false),
+    logged_at(HostPort::new(uno), None, commands, ticks - 10)
+}
+
+/// The log of a session over a port, until the machine has stood for a second behind a place in ticks. Someone may type more by chance.
+fn logged_at(port: HostPort, mut typed: Option<ChaCha8Rng>, commands: &[&str], end: i64) -> Vec<Entry> {
+    let ms = Arc::clone(&port.ms);
+    let mut port = Some(port);
+    let open = move || match port.take() {
+        Some(port) => Link::over(port, false),
         None => Err(LinkError::Absent("it is gone".to_owned())),
     };
     let mut session = Session::open(open).expect("the firmware answers");
@@ -51,21 +62,79 @@ fn logged_from(row: &Row, motion: &Motion, commands: &[&str], sets_off: u64) -> 
     let folder = tempfile::tempdir().expect("there is room for a log");
     let path = folder.path().join("log.csv");
     let mut log = LogWriter::open(&path).expect("the log can be written");
-    let mut now = Instant::now();
+    let began = Instant::now();
     let mut standing = 0;
-    // A second after the machine has come to the end of its way, by the status ten times a second.
     while standing < 10 {
+        if let Some(typed) = &mut typed
+            && typed.random_ratio(1, 100)
+        {
+            match typed.random_range(0..5) {
+                place @ 0..3 => assert!(session.command(["start", "start now", "clear"][place])),
+                _ => _ = session.hold(),
+            }
+        }
+        let now = began + Duration::from_millis(ms.load(Ordering::Relaxed));
         for happening in session.turn(now) {
             assert!(!matches!(happening, Happening::Lost(_)), "{happening:?}");
             if let Happening::Status(status, _) = &happening {
-                let is_there = i64::from(status.position) > ticks - 10;
+                let is_there = i64::from(status.position) > end;
                 standing = if is_there { standing + 1 } else { 0 };
             }
-            log.write(&happening).expect("the log can be written");
+            log.write_at(ms.load(Ordering::Relaxed), &happening).expect("the log can be written");
         }
-        now += Duration::from_millis(20);
     }
     log::read(&path).expect("the log is one")
+}
+
+/// A virtual Uno as a port, with the time that a host at its other end has. That host may be busy by chance: the machine rolls on
+/// before what it has told is read, or what was typed leaves.
+struct HostPort {
+    port: UnoPort,
+    /// Time by the Uno's clock.
+    ms: Arc<AtomicU64>,
+    busy: Option<ChaCha8Rng>,
+}
+
+impl HostPort {
+    fn new(uno: Uno) -> Self {
+        Self { port: UnoPort::new(uno), ms: Arc::default(), busy: None }
+    }
+
+    /// Has the host do something else in one of so many cases.
+    fn pause(&mut self, one_in: u32) -> io::Result<()> {
+        if let Some(busy) = &mut self.busy
+            && busy.random_ratio(1, one_in)
+        {
+            let ms = busy.random_range(1..=400);
+            self.port.uno().run_for_ms(ms).map_err(io::Error::other)?;
+        }
+        Ok(())
+    }
+
+    fn look_at_clock(&mut self) {
+        self.ms.store(self.port.uno().cycle() * 1000 / CYCLES_PER_SECOND, Ordering::Relaxed);
+    }
+}
+
+impl Read for HostPort {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        self.pause(20)?;
+        let read = self.port.read(buffer);
+        self.look_at_clock();
+        read
+    }
+}
+
+impl Write for HostPort {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.look_at_clock();
+        self.pause(10)?;
+        self.port.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
 }
 
 #[track_caller]
@@ -121,15 +190,17 @@ fn a_row_with_changes_of_speed_and_a_stop_is_decided_the_same_on_the_host() {
     assert_same(&logged(&row(), &motion, &["start"]), 9);
 }
 
-/// Rows by chance, at speeds of which half lie where one speed class ends and the next begins, and sessions that begin before the
-/// machine sets off, while it gains its speed, and while it rolls past plants.
+/// Rows by chance, at speeds of which half lie where one speed class ends and the next begins. The session begins before the machine
+/// sets off, while it gains its speed, or while it rolls past plants; whoever sits there types at any moment, and every other host is
+/// busy with something else now and then.
 #[test]
-fn rows_by_chance_are_decided_the_same_on_the_host_whenever_the_session_begins() {
-    let mut objects = 0;
+fn rows_by_chance_are_decided_the_same_on_the_host_whatever_is_typed_and_whenever_it_is_read() {
+    let elf = firmware::build().expect("the firmware builds");
+    let (mut objects, mut swings) = (0, 0);
     for seed in 0..ROWS {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let planting = Planting {
-            plants: 5,
+            plants: 6,
             spacing_mm: rng.random_range(300.0..600.0),
             canopy_mm: rng.random_range(80.0..160.0),
             weeds: rng.random_range(0..4),
@@ -143,16 +214,25 @@ fn rows_by_chance_are_decided_the_same_on_the_host_whenever_the_session_begins()
         let end_mm = row.span_mm().end + 900.0;
         let motion = Motion::steady(start_mm, 800.0, speed_mm_s, end_mm).change_speed(0.0, 1500.0);
         let commands: &[&str] = [&["start"][..], &["start now"], &["clear", "start now"]][rng.random_range(0..3)];
-        let log = logged_from(&row, &motion, commands, rng.random_range(0..24_000_000));
+
+        let machine = Machine::default();
+        let mut uno = trial::boot(&elf, &[machine.beam_before(&row, &motion)]).expect("the firmware wakes up");
+        let changes = machine.pin_changes(&row, &motion, uno.cycle() + rng.random_range(0..24_000_000));
+        uno.drive(changes);
+        let mut port = HostPort::new(uno);
+        port.busy = (seed % 2 == 0).then(|| ChaCha8Rng::from_rng(&mut rng));
+        let typed = (seed % 4 < 3).then(|| ChaCha8Rng::from_rng(&mut rng));
+        let end = machine.ticks(&motion, motion.duration_s()) - 10;
+        let log = logged_at(port, typed, commands, end);
         let replayed = replay(&log).expect("the log can be replayed");
         assert_eq!(replayed.difference, None, "seed {seed}, {commands:?}: {replayed:#?}\n{log:#?}");
-        objects += replayed.objects;
+        (objects, swings) = (objects + replayed.objects, swings + replayed.swings);
     }
-    assert!(objects as u64 > 3 * ROWS, "{objects}");
+    assert!(objects as u64 > 4 * ROWS && swings as u64 > 4 * ROWS, "{objects}, {swings}");
 }
 
 /// How many rows by chance are rolled along.
-const ROWS: u64 = 24;
+const ROWS: u64 = 20;
 
 #[test]
 fn start_now_over_unseen_ground_is_known_from_start() {

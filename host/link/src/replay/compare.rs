@@ -11,6 +11,8 @@ const FAR_TICKS: i32 = 10_000;
 pub(super) struct Heard {
     /// The log's line; 0 for the replay.
     pub(super) line: u64,
+    /// Steps of the replay until it was told; 0 for the log.
+    pub(super) steps: u64,
     /// What.
     pub(super) event: EventLine,
     /// The machine's speed then, in ticks a second.
@@ -29,8 +31,9 @@ pub(super) struct Bounds {
     pub(super) end: i32,
 }
 
-/// Compares what both tell, each kind in its order, and notes the first difference.
-pub(super) fn compare(logged: &[Heard], replayed: &[Heard], bounds: &Bounds, result: &mut Replayed) {
+/// Compares what the log tells with what its replays tell, each kind in its order, and notes the first difference: something on
+/// which none of the replays agrees with the log. Each is at another pace, the likeliest first.
+pub(super) fn compare(logged: &[Heard], replays: &[&[Heard]], bounds: &Bounds, result: &mut Replayed) {
     let kinds: [fn(&EventLine) -> bool; 3] = [
         |event| matches!(event, EventLine::Object { .. }),
         |event| matches!(event, EventLine::Swing { .. }),
@@ -63,37 +66,68 @@ pub(super) fn compare(logged: &[Heard], replayed: &[Heard], bounds: &Bounds, res
             let is_heard = |heard_there: &[Heard]| heard_there.iter().any(|other| agree(heard, other));
             position.wrapping_sub(bounds.first).saturating_abs() <= OBJECT_TICKS
                 && is_heard(logged)
-                && is_heard(replayed)
+                && replays.iter().any(|replayed| is_heard(replayed))
         }
         _ => false,
     };
     let mut differences = Vec::new();
     for is_kind in kinds {
-        let mut ours = replayed.iter().filter(|heard| is_kind(&heard.event)).filter(is_judged).peekable();
-        let mut theirs = logged.iter().filter(|heard| is_kind(&heard.event)).filter(is_judged).peekable();
-        let is_one_sided = match (theirs.peek(), ours.peek()) {
-            (Some(logged), Some(replayed)) => !agree(logged, replayed),
-            (logged, replayed) => logged.is_some() != replayed.is_some(),
+        let judged = |heard: &'_ [Heard]| -> Vec<Heard> {
+            heard.iter().filter(|heard| is_kind(&heard.event)).filter(is_judged).copied().collect()
         };
-        if is_one_sided && theirs.next_if(|heard| is_at_beginning(heard)).is_none() {
-            ours.next_if(|heard| is_at_beginning(heard));
+        let (logged, replays) = (judged(logged), replays.iter().map(|replayed| judged(replayed)).collect::<Vec<_>>());
+        let mut theirs = logged.as_slice();
+        let mut ours: Vec<&[Heard]> = replays.iter().map(Vec::as_slice).collect();
+        let is_agreed = |logged: &Heard| ours.iter().any(|ours| ours.first().is_some_and(|first| agree(logged, first)));
+        if !theirs.first().is_some_and(is_agreed) {
+            match theirs {
+                [first, rest @ ..] if is_at_beginning(first) => theirs = rest,
+                _ => ours
+                    .iter_mut()
+                    .for_each(|ours| *ours = &ours[usize::from(ours.first().is_some_and(is_at_beginning))..]),
+            }
         }
         loop {
-            match (theirs.next(), ours.next()) {
-                (None, None) => break,
-                (Some(logged), Some(replayed)) if agree(logged, replayed) => result.count(logged, replayed),
-                (Some(only), None) | (None, Some(only)) if is_at_end(only) => break,
-                (logged, replayed) => {
-                    let line = logged.map(|heard| heard.line);
-                    differences.push(Difference { line, logged: describe(logged), replayed: describe(replayed) });
-                    break;
+            let nexts: Vec<Option<&Heard>> = ours.iter().map(|ours| ours.first()).collect();
+            let Some((logged, rest)) = theirs.split_first() else {
+                if !nexts.iter().any(|next| next.is_none_or(is_at_end)) {
+                    differences.push(Difference { line: None, logged: describe(None), replayed: describe(nexts[0]) });
                 }
+                break;
+            };
+            if let Some(replayed) = nexts.iter().flatten().find(|replayed| agree(logged, replayed)) {
+                result.count(logged, replayed);
+                theirs = rest;
+                ours.iter_mut().for_each(|ours| *ours = behind(ours, replayed));
+            } else {
+                if !(is_at_end(logged) && nexts.contains(&None)) {
+                    let (line, replayed) = (Some(logged.line), describe(nexts[0]));
+                    differences.push(Difference { line, logged: describe(Some(logged)), replayed });
+                }
+                break;
             }
         }
     }
     if result.difference.is_none() {
         result.difference = differences.into_iter().min_by_key(|difference| difference.line.unwrap_or(u64::MAX));
     }
+}
+
+/// What a replay tells behind something that it tells too, or that another tells at another pace and it does not.
+fn behind<'a>(heard: &'a [Heard], this: &Heard) -> &'a [Heard] {
+    let reach = u64::from(swing_ticks(this, this).unsigned_abs());
+    let near = heard.iter().take_while(|heard| heard.steps <= this.steps + reach);
+    let is_the_same = |heard: &Heard| match (heard.event, this.event) {
+        (EventLine::Swing { out, .. }, EventLine::Swing { out: this_out, .. }) => out == this_out,
+        _ => true,
+    };
+    let apart = |heard: &Heard| heard.steps.abs_diff(this.steps);
+    let same = near.clone().enumerate().filter(|(_, heard)| is_the_same(heard) && apart(heard) <= reach);
+    let behind = match same.min_by_key(|(_, heard)| apart(heard)) {
+        Some((place, _)) => place + 1,
+        None => near.take_while(|heard| heard.steps < this.steps).count(),
+    };
+    &heard[behind..]
 }
 
 impl Replayed {

@@ -27,20 +27,60 @@ const LONGEST_REST_MS: u64 = 2_000;
 /// The speed at which a machine comes to a stop without surprise.
 const SLOWLY_MM_S: i32 = 20;
 
+/// A speed that the machine keeps for long enough to be believed between two lines of a log.
+const SURE_MM_S: f64 = 50.0;
+
+/// How fast it rolls at the most where neither its speed nor the host's clock says how fast.
+const MOST_MM_S: f64 = 200.0;
+
+/// By what share the machine's own measure of a steady speed may be off.
+const UNSURE: f64 = 0.02;
+
 /// Longest way between two lines of a log. A machine at 10 km/h rolls it in some minutes.
 const LONGEST_WAY: i32 = 1_000_000;
 
 /// Faster than any machine, and as far as [`control::units::Wheel::ticks`] goes with every encoder.
 const FASTEST_MM_S: u16 = 3_800;
 
+/// How fast the machine is taken to be between two lines of a log, which tell its speed there alone, and in whole mm/s.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Pace {
+    /// As fast as it is with an even acceleration.
+    Even,
+    /// As slow as it may have been: nearly the slower of the two speeds, and a little less.
+    Slow,
+    /// As fast as it may have been: nearly the faster of the two, and a little more.
+    Fast,
+}
+
+impl Pace {
+    /// All of them, the likeliest first.
+    pub(super) const ALL: [Self; 3] = [Self::Even, Self::Slow, Self::Fast];
+
+    /// The speed where a share of the way between two lines is rolled, in mm/s; never negative.
+    fn speed(self, from: f64, to: f64, share: f64) -> f64 {
+        // The square of the speed goes evenly with the way.
+        let even = (from * from + share * (to * to - from * from)).max(0.0).sqrt();
+        let (one, other) = (from.abs(), to.abs());
+        match self {
+            Self::Even => even,
+            Self::Slow => (even + 7.0 * one.min(other)) / 8.0 * (1.0 - UNSURE),
+            Self::Fast => (even + 7.0 * one.max(other)) / 8.0 * (1.0 + UNSURE),
+        }
+    }
+}
+
 /// The decisions, driven along the log.
 pub(super) struct Player<'a> {
+    pace: Pace,
     controller: Controller<Judge<'a>, Volatile>,
     witness: Rc<Witness>,
     /// The ground over which the beam was broken.
     canopies: Vec<Canopy>,
     broken: bool,
     now: Instant,
+    /// Steps until here, which are the same at every pace.
+    steps: u64,
     position: i32,
     /// The machine's speed over the ground.
     pub(super) speed_mm_s: i32,
@@ -53,7 +93,7 @@ pub(super) struct Player<'a> {
 impl<'a> Player<'a> {
     /// A machine as it was when the stretch began. It has rolled there from where watching began, as far as the log tells where
     /// that was.
-    pub(super) fn new(stretch: &'a Stretch<'a>) -> Self {
+    pub(super) fn new(stretch: &'a Stretch<'a>, pace: Pace) -> Self {
         let canopies = canopies(stretch);
         // A little before, so that what stands at that place is seen in full and the log says what it was taken for.
         let began = stretch.began();
@@ -71,6 +111,8 @@ impl<'a> Player<'a> {
             let _ = controller.set(setting, value);
         }
         let mut player = Self {
+            pace,
+            steps: 0,
             controller,
             witness,
             canopies,
@@ -120,7 +162,10 @@ impl<'a> Player<'a> {
         }
         if way == 0 {
             self.speed_mm_s = to.speed_mm_s;
-            self.rest(host_ms.min(LONGEST_REST_MS));
+            // It may have rolled here on account of a line between the two.
+            if f64::from(to.speed_mm_s.saturating_abs()) < SURE_MM_S {
+                self.rest(host_ms.min(LONGEST_REST_MS));
+            }
             return Ok(());
         }
         self.roll_by(way, from.speed_mm_s, to.speed_mm_s, host_ms);
@@ -139,36 +184,29 @@ impl<'a> Player<'a> {
             return;
         }
         let share = f64::from(way) / f64::from(whole);
-        let speed = f64::from(from.speed_mm_s) + share * (f64::from(next.speed_mm_s) - f64::from(from.speed_mm_s));
-        self.roll_by(way, from.speed_mm_s, speed.round() as i32, 0);
+        let speed = self.pace.speed(from.speed_mm_s.into(), next.speed_mm_s.into(), share);
+        self.roll_by(way, from.speed_mm_s, way.signum() * speed.round() as i32, 0);
     }
 
-    /// Rolls a way, tick by tick. The speeds say how long it takes; where they cannot, the host's clock does.
+    /// Rolls a way, tick by tick. The speeds say how long it takes. Where they are next to nothing, the host's clock does: a host that
+    /// was busy reads late, and two lines that came far apart at once.
     fn roll_by(&mut self, way: i32, from_mm_s: i32, to_mm_s: i32, host_ms: u64) {
         let tick_mm = 100.0 / f64::from(self.controller.settings().wheel().ticks(100).0.max(1));
-        let (from, to) = (f64::from(from_mm_s) / tick_mm, f64::from(to_mm_s) / tick_mm);
-        let ways = f64::from(way);
+        let way_mm = f64::from(way) * tick_mm;
+        let (from, to) = (f64::from(from_mm_s), f64::from(to_mm_s));
         let mean = (from + to) / 2.0;
-        let by_speed = ways / mean;
+        let by_speed_s = way_mm / mean;
         self.witness.speeds_mm_s.set((from_mm_s.min(to_mm_s), from_mm_s.max(to_mm_s)));
-        let host_s = host_ms.max(1) as f64 / 1000.0;
-        let duration_s = if by_speed > 0.0 && by_speed < 3.0 * host_s.max(0.1) { by_speed } else { host_s };
+        let host_s = (host_ms as f64 / 1000.0).max(way_mm.abs() / MOST_MM_S);
+        let is_known = by_speed_s > 0.0 && (by_speed_s < 3.0 * host_s.max(0.1) || mean.abs() > SURE_MM_S);
         let steps = way.unsigned_abs();
         let start = self.position;
-        let mut elapsed_s = 0.0;
+        let mut speed = from.abs();
         for step in 1..=steps {
-            let share = f64::from(step) / f64::from(steps);
-            // Even acceleration: the square of the speed goes evenly with the way.
-            let speed = (from * from + share * (to * to - from * from)).max(0.0).sqrt();
-            let even = duration_s * share;
-            let due_s = if by_speed == duration_s && from.abs() + speed > 0.0 {
-                2.0 * ways.abs() * share / (from.abs() + speed)
-            } else {
-                even
-            };
-            let interval_s = (due_s - elapsed_s).max(0.0);
-            elapsed_s = due_s;
-            self.speed_mm_s = (from_mm_s.signum() | to_mm_s.signum()) * (speed * tick_mm).round() as i32;
+            let before = speed;
+            speed = self.pace.speed(from, to, f64::from(step) / f64::from(steps));
+            let interval_s = if is_known { 2.0 * tick_mm / (before + speed) } else { host_s / f64::from(steps) };
+            self.speed_mm_s = (from_mm_s.signum() | to_mm_s.signum()) * speed.round() as i32;
             self.now = self.now + Interval::from_steps((interval_s * f64::from(Interval::STEPS_PER_SECOND)) as u32);
             self.position = start.wrapping_add(way.signum() * step as i32);
             self.step();
@@ -190,6 +228,7 @@ impl<'a> Player<'a> {
 
     /// Has the decisions take what came from the beam before, and the place where the machine now is.
     fn step_behind(&mut self, before: Option<Edge>) {
+        self.steps += 1;
         let response = self.speed().distance_in_ms(self.controller.settings().get(Setting::BeamResponseMs));
         let ground = (Position::new(self.position) - response).count();
         let broken = is_in(&self.canopies, ground);
@@ -237,15 +276,15 @@ impl<'a> Player<'a> {
                 | Event::Guarded(_)
                 | Event::Slip { .. } => continue,
             };
-            self.heard.push(Heard { line: 0, event, speed, is_given: false });
+            self.heard.push(Heard { line: 0, steps: self.steps, event, speed, is_given: false });
         }
     }
 
-    /// Goes to a state, unless it is there already.
-    pub(super) fn enter(&mut self, mode: Mode) {
+    /// Goes to a state, unless it is there already; to work `now`, over ground that was not seen too.
+    pub(super) fn enter(&mut self, mode: Mode, now: bool) {
         match (mode, self.controller.state()) {
             (Mode::Work, State::Hold) => {
-                let _ = self.controller.start(false);
+                let _ = self.controller.start(now);
             }
             (Mode::Hold, State::Work | State::Alarm(_)) => {
                 self.controller.hold();
@@ -323,7 +362,7 @@ fn canopies(stretch: &Stretch) -> Vec<Canopy> {
         let wheel = settings.wheel();
         match happened {
             Happened::Event(EventLine::Object { class, position, votes, spacing, hold, .. }) => {
-                let width = hold.wrapping_sub(wheel.ticks(2 * settings.get(Setting::MarginMm)).0);
+                let width = hold.wrapping_sub(2 * wheel.ticks(settings.get(Setting::MarginMm)).0);
                 let seen = Seen {
                     vote: Vote { class: *class, votes: *votes },
                     spacing_mm: wheel.millimetres(Ticks(*spacing)),
