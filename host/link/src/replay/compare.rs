@@ -61,7 +61,7 @@ pub(super) fn compare(logged: &[Heard], replays: &[&[Heard]], bounds: &Bounds, r
             bounds.judged_from > i32::MIN
                 && position.wrapping_sub(bounds.judged_from).saturating_abs() <= swing_ticks(heard, heard)
         }
-        // EventLine by both it is, and only by one of them as judged.
+        // Both have it, and only one of them where it is judged.
         EventLine::Object { position, .. } => {
             let is_heard = |heard_there: &[Heard]| heard_there.iter().any(|other| agree(heard, other));
             position.wrapping_sub(bounds.first).saturating_abs() <= OBJECT_TICKS
