@@ -9,8 +9,8 @@ use trial::bench::encoder::{self, Counted, Direction, JITTER, Load, Turning};
 
 /// Counts in a second that the firmware follows while its status streams at 115200 baud and the beam flickers, whatever the
 /// moments at which the edges come: evenly, and early and late by 30 % of the time between two.
-const EVEN_PER_S: f64 = 225_000.0;
-const JITTERED_PER_S: f64 = 215_000.0;
+const EVEN_PER_S: f64 = 255_000.0;
+const JITTERED_PER_S: f64 = 235_000.0;
 
 /// Turns the encoder forward and backward beside all the rest, by chance and at the worst moments.
 #[track_caller]

@@ -15,8 +15,8 @@ const BUDGETS: [(u8, &str, u64); 6] = [
     (16, "TIMER0_OVF, clock and heartbeat", 42),
     (18, "USART_RX", 51),
     (19, "USART_UDRE", 44),
-    (1, "INT0, the encoder", 87),
-    (2, "INT1, the encoder", 87),
+    (1, "INT0, the encoder", 83),
+    (2, "INT1, the encoder", 83),
 ];
 
 /// Budget of a stretch with interrupts off outside the handlers, in cycles.
