@@ -13,6 +13,7 @@
 use crate::{
     encoder,
     handler::handler,
+    passes,
     ring::Ring,
     shared::{Byte, Shared},
 };
@@ -72,6 +73,8 @@ impl<'a> Beam<'a> {
         // No more edges than can wait: those that keep coming must not keep the loop from turning.
         let mut left = SLOTS as u8;
         core::iter::from_fn(move || {
+            // The edges, that some were lost, and the end.
+            passes::at_most::<{ SLOTS as u8 + 2 }>();
             if left > 0 {
                 left -= 1;
                 if let Some(edge) = next_edge() {

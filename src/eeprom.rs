@@ -1,7 +1,7 @@
 //! The EEPROM, in two halves: one for the settings, one for the examples taught in the field.
 //!
-//! A byte takes 3.4 ms to write (data sheet, 8.4.2). Whoever writes does not wait for it; whoever reads does, as nothing can be
-//! read while a byte is written. What the bytes mean is not known here.
+//! A byte takes 3.4 ms to write (data sheet, 8.4.2), in which nothing can be read. Nobody waits for that but [`finish`], once and
+//! before the loop turns. What the bytes mean is not known here.
 
 use avr_device::{
     atmega328p::{EEPROM, eeprom},
@@ -18,6 +18,11 @@ pub type Lower = Half<0>;
 
 /// The half with the examples taught in the field.
 pub type Upper = Half<{ SIZE as u16 }>;
+
+/// Waits, 3.4 ms at the most, for the byte whose write a reset has come into: the chip finishes it (data sheet, 8.4.3).
+pub fn finish(eeprom: &EEPROM) {
+    while eeprom.eecr().read().eepe().bit_is_set() {}
+}
 
 impl<const BASE: u16> Half<BASE> {
     /// The half.
@@ -40,8 +45,6 @@ impl<const BASE: u16> Half<BASE> {
 
 impl<const BASE: u16> Memory for Half<BASE> {
     fn read(&self, address: u16) -> u8 {
-        // It is there in 3.4 ms at the most.
-        while !self.is_ready() {}
         self.choose(address);
         self.registers().eecr().modify(|_, w| w.eere().set_bit());
         self.registers().eedr().read().bits()

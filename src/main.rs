@@ -17,6 +17,7 @@ mod encoder;
 mod examples;
 mod handler;
 mod heartbeat;
+mod passes;
 mod reset;
 mod ring;
 mod serial;
@@ -77,6 +78,7 @@ fn run(typed: &mut LineBuffer) -> ! {
     };
     static CONSOLE: ConstStaticCell<Console> = ConstStaticCell::new(Console::new());
     let console = CONSOLE.take();
+    eeprom::finish(&peripherals.EEPROM);
     let controller = wake_up(WakeUp { readings: read(), beam_broken: beam.is_broken(), cause });
     // The settings say which pulse has the tool out, so there is none before they are loaded.
     let mut servo = servo::Servo::new(peripherals.TC1, &peripherals.PORTB, controller.orders().pulse);
@@ -95,6 +97,7 @@ fn run(typed: &mut LineBuffer) -> ! {
         // has done enough has none.
         let bytes = if orders.is_enough { 0 } else { CONSOLE_BYTES };
         for _ in 0..bytes {
+            passes::at_most::<CONSOLE_BYTES>();
             if serial.room() > 0
                 && let Some(byte) = console.next_byte()
             {

@@ -25,10 +25,10 @@ pub(crate) const fn checksum(mut bytes: &[u8]) -> u16 {
 
 /// Memory that keeps bytes without power.
 pub trait Memory {
-    /// The byte at an address, which may have to wait for a byte under way.
+    /// The byte at an address; only when [`is_ready`](Self::is_ready), as nothing can be read while a byte is being written.
     fn read(&self, address: u16) -> u8;
 
-    /// Whether a byte can be written now.
+    /// Whether bytes can be read and one be written now.
     fn is_ready(&self) -> bool;
 
     /// Begins to write a byte; only when [`is_ready`](Self::is_ready).

@@ -132,6 +132,10 @@ fn loops_are_said_to_turn_as_often_as_the_constants_behind_them_have_it() {
     for function in ["say::packed::Text::find", "say::command::split_word", "say::command::number"] {
         assert_eq!(passes(&format!("control::{function}")), LINE_LENGTH + 1, "{function}");
     }
+    // A save writes each byte, and the first twice.
+    assert_eq!(passes("weeder_firmware::run"), saved::COPY + 1 + 1);
+    assert!(passes("weeder_firmware::run") > usize::from(field_examples::CAPACITY));
+    assert_eq!(passes("control::ground::nearest::Nearest::keep"), usize::from(field_examples::CAPACITY) + 1);
     for function in ["answer::Answer::write_line", "execute::execute"] {
         assert_eq!(
             passes(&format!("control::say::{function}")),

@@ -40,6 +40,13 @@ pub struct FieldExamples<M> {
     left: u8,
 }
 
+impl Slot {
+    /// Whether it holds an example, written or not.
+    const fn has_example(self) -> bool {
+        matches!(self, Self::Held | Self::New)
+    }
+}
+
 /// What a slot is known to be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Slot {
@@ -47,6 +54,8 @@ enum Slot {
     Free,
     /// It holds an example.
     Held,
+    /// It holds an example that is yet to be written.
+    New,
     /// Its example is forgotten and yet to be erased.
     Forgotten,
 }
@@ -84,30 +93,27 @@ impl<M: Memory> FieldExamples<M> {
     /// The example in a slot.
     pub fn slot(&self, number: u8) -> Option<Taught> {
         match self.slots.get(usize::from(number)) {
-            Some(Slot::Held) => self.examples.get(usize::from(number)).copied(),
+            Some(slot) if slot.has_example() => self.examples.get(usize::from(number)).copied(),
             _ => None,
         }
     }
 
-    /// Adds an example; returns its slot. What is still being written is finished first, which may take time: ask
-    /// [`carry_on`](Self::carry_on) before.
+    /// Adds an example, which [`carry_on`](Self::carry_on) will write; returns its slot.
     ///
     /// # Errors
     /// The example, when all slots are taken.
     pub fn add(&mut self, example: Taught) -> Result<u8, Taught> {
-        let Some(number) = self.slots.iter().position(|&slot| slot != Slot::Held) else {
+        let Some(number) = self.slots.iter().position(|slot| !slot.has_example()) else {
             return Err(example);
         };
-        while !self.write_next_byte() {}
-        (self.slots[number], self.examples[number]) = (Slot::Held, example);
-        self.begin(number as u8, encode(example));
+        (self.slots[number], self.examples[number]) = (Slot::New, example);
         Ok(number as u8)
     }
 
     /// Forgets the example in a slot, which [`carry_on`](Self::carry_on) will erase; whether there was one.
     pub fn forget(&mut self, number: u8) -> bool {
         match self.slots.get_mut(usize::from(number)) {
-            Some(slot @ Slot::Held) => {
+            Some(slot) if slot.has_example() => {
                 *slot = Slot::Forgotten;
                 true
             }
@@ -120,14 +126,16 @@ impl<M: Memory> FieldExamples<M> {
         if !self.write_next_byte() {
             return false;
         }
-        match self.slots.iter().position(|&slot| slot == Slot::Forgotten) {
-            Some(number) => {
-                self.slots[number] = Slot::Free;
-                self.begin(number as u8, [ERASED; SLOT]);
-                false
-            }
-            None => true,
-        }
+        let Some(number) = self.slots.iter().position(|slot| matches!(slot, Slot::New | Slot::Forgotten)) else {
+            return true;
+        };
+        let bytes;
+        (self.slots[number], bytes) = match self.slots[number] {
+            Slot::New => (Slot::Held, encode(self.examples[number])),
+            _ => (Slot::Free, [ERASED; SLOT]),
+        };
+        self.begin(number as u8, bytes);
+        false
     }
 
     /// The memory, to be looked at or put into another machine.
@@ -164,7 +172,7 @@ const fn address(number: u8) -> u16 {
 
 impl<M: Memory> Examples<{ features::COUNT }> for FieldExamples<M> {
     fn len(&self) -> usize {
-        self.slots.iter().filter(|&&slot| slot == Slot::Held).count()
+        self.slots.iter().filter(|slot| slot.has_example()).count()
     }
 
     fn example(&self, index: usize) -> Option<Taught> {
@@ -173,7 +181,7 @@ impl<M: Memory> Examples<{ features::COUNT }> for FieldExamples<M> {
 
     fn keep_nearest<const CLASSES: usize>(&self, query: &[u8; features::COUNT], nearest: &mut Nearest<CLASSES>) {
         for (&slot, example) in self.slots.iter().zip(&self.examples) {
-            if slot == Slot::Held {
+            if slot.has_example() {
                 nearest.join(example.neighbour_of(query));
             }
         }
