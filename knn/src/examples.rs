@@ -6,8 +6,14 @@
 
 use crate::{Nearest, Neighbour, squared_distance};
 
+/// The label of a place that holds no example.
+pub const VACANT: u8 = u8::MAX;
+
 /// A labelled example: what was measured, and what it was.
+///
+/// It lies in memory as its features and then its label, for a search in assembly.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[repr(C)]
 pub struct Example<const FEATURES: usize> {
     /// The features, each scaled to a byte (see [`Scale::quantise`](crate::Scale::quantise)).
     pub features: [u8; FEATURES],
@@ -59,6 +65,20 @@ pub trait Examples<const FEATURES: usize> {
     #[inline]
     fn keep_nearest<const CLASSES: usize>(&self, query: &[u8; FEATURES], nearest: &mut Nearest<CLASSES>) {
         for example in (0..self.len()).filter_map(|index| self.example(index)) {
+            nearest.join(example.neighbour_of(query));
+        }
+    }
+
+    /// Does for examples in memory that somebody else holds what [`keep_nearest`](Self::keep_nearest) does for its own: for a store
+    /// that has a faster way for them too. Those labelled [`VACANT`] are none.
+    #[inline]
+    fn keep_nearest_of<const CLASSES: usize>(
+        &self,
+        others: &[Example<FEATURES>],
+        query: &[u8; FEATURES],
+        nearest: &mut Nearest<CLASSES>,
+    ) {
+        for example in others.iter().filter(|example| example.label != VACANT) {
             nearest.join(example.neighbour_of(query));
         }
     }
@@ -118,6 +138,16 @@ impl<const FEATURES: usize, Store: Examples<FEATURES> + ?Sized> Examples<FEATURE
     #[inline]
     fn keep_nearest<const CLASSES: usize>(&self, query: &[u8; FEATURES], nearest: &mut Nearest<CLASSES>) {
         (**self).keep_nearest(query, nearest)
+    }
+
+    #[inline]
+    fn keep_nearest_of<const CLASSES: usize>(
+        &self,
+        others: &[Example<FEATURES>],
+        query: &[u8; FEATURES],
+        nearest: &mut Nearest<CLASSES>,
+    ) {
+        (**self).keep_nearest_of(others, query, nearest)
     }
 }
 

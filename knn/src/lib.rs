@@ -81,7 +81,7 @@ mod table;
 
 pub use classify::{Answer, ClassifyError, Kind, MAX_K, classify};
 pub use distance::{MAX_FEATURES, squared_distance};
-pub use examples::{Example, Examples};
+pub use examples::{Example, Examples, VACANT};
 pub use nearest::Nearest;
 pub use neighbour::Neighbour;
 pub use scale::{Range, Scale};

@@ -8,10 +8,10 @@
 //! slot go to the memory one at a time, whenever it can take one.
 
 use crate::{
-    ground::{examples, features},
+    ground::{class::label, examples, features},
     memory::{ERASED, Memory, checksum},
 };
-use knn::{Example, Examples, Nearest};
+use knn::{Example, Examples, VACANT};
 
 /// Examples that can be taught.
 pub const CAPACITY: u8 = 32;
@@ -29,9 +29,12 @@ const SCALE_MARK: [u8; 2] = checksum(&examples::SCALE_BYTES).to_le_bytes();
 #[derive(Clone, Debug)]
 pub struct FieldExamples<M> {
     memory: M,
-    slots: [Slot; CAPACITY as usize],
-    /// The examples of the slots that hold one.
+    /// The examples of the slots; labelled [`VACANT`] those that hold none.
     examples: [Taught; CAPACITY as usize],
+    /// Slots from the first on, behind which no slot holds an example.
+    used: u8,
+    /// Slots that are yet to be written, or erased where they hold none any more.
+    pending: [bool; CAPACITY as usize],
     spoiled: u8,
     /// The slot that is being written.
     writing: u8,
@@ -40,47 +43,37 @@ pub struct FieldExamples<M> {
     left: u8,
 }
 
-impl Slot {
-    /// Whether it holds an example, written or not.
-    const fn has_example(self) -> bool {
-        matches!(self, Self::Held | Self::New)
-    }
-}
-
-/// What a slot is known to be.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Slot {
-    /// Free.
-    Free,
-    /// It holds an example.
-    Held,
-    /// It holds an example that is yet to be written.
-    New,
-    /// Its example is forgotten and yet to be erased.
-    Forgotten,
-}
-
 impl<M: Memory> FieldExamples<M> {
     /// The store in a memory that nobody has looked through.
     pub const fn asleep(memory: M) -> Self {
-        let slots = [Slot::Free; CAPACITY as usize];
+        // Zeros take no flash. There is no example until the memory has been looked through.
         let examples = [Example::new([0; features::COUNT], 0); CAPACITY as usize];
-        Self { memory, slots, examples, spoiled: 0, writing: 0, bytes: [0; SLOT], left: 0 }
+        Self {
+            memory,
+            examples,
+            used: 0,
+            pending: [false; CAPACITY as usize],
+            spoiled: 0,
+            writing: 0,
+            bytes: [0; SLOT],
+            left: 0,
+        }
     }
 
     /// Looks through the memory for the examples that it holds.
     pub fn wake_up(&mut self) {
         self.spoiled = 0;
-        for (number, (slot, example)) in (0..).zip(self.slots.iter_mut().zip(&mut self.examples)) {
+        for (number, example) in (0..).zip(&mut self.examples) {
             let mut bytes = [0; SLOT];
             for (address, byte) in (address(number)..).zip(&mut bytes) {
                 *byte = self.memory.read(address);
             }
             *example = example_in(bytes);
-            if bytes == encode(*example) {
-                *slot = Slot::Held;
-            } else if bytes != [ERASED; SLOT] {
-                self.spoiled += 1;
+            if bytes != encode(*example) || usize::from(example.label) >= label::COUNT {
+                example.label = VACANT;
+                self.spoiled += u8::from(bytes != [ERASED; SLOT]);
+            } else {
+                self.used = number + 1;
             }
         }
     }
@@ -92,10 +85,7 @@ impl<M: Memory> FieldExamples<M> {
 
     /// The example in a slot.
     pub fn slot(&self, number: u8) -> Option<Taught> {
-        match self.slots.get(usize::from(number)) {
-            Some(slot) if slot.has_example() => self.examples.get(usize::from(number)).copied(),
-            _ => None,
-        }
+        self.examples.get(usize::from(number)).copied().filter(is_held)
     }
 
     /// Adds an example, which [`carry_on`](Self::carry_on) will write; returns its slot.
@@ -103,22 +93,22 @@ impl<M: Memory> FieldExamples<M> {
     /// # Errors
     /// The example, when all slots are taken.
     pub fn add(&mut self, example: Taught) -> Result<u8, Taught> {
-        let Some(number) = self.slots.iter().position(|slot| !slot.has_example()) else {
+        let Some(number) = self.examples.iter().position(|example| !is_held(example)) else {
             return Err(example);
         };
-        (self.slots[number], self.examples[number]) = (Slot::New, example);
+        (self.examples[number], self.pending[number]) = (example, true);
+        self.used = self.used.max(number as u8 + 1);
         Ok(number as u8)
     }
 
     /// Forgets the example in a slot, which [`carry_on`](Self::carry_on) will erase; whether there was one.
     pub fn forget(&mut self, number: u8) -> bool {
-        match self.slots.get_mut(usize::from(number)) {
-            Some(slot) if slot.has_example() => {
-                *slot = Slot::Forgotten;
-                true
-            }
-            _ => false,
-        }
+        let Some(example) = self.examples.get_mut(usize::from(number)).filter(|example| is_held(example)) else {
+            return false;
+        };
+        example.label = VACANT;
+        self.pending[usize::from(number)] = true;
+        true
     }
 
     /// Carries on with what is to be written, without waiting; whether all has been.
@@ -126,16 +116,19 @@ impl<M: Memory> FieldExamples<M> {
         if !self.write_next_byte() {
             return false;
         }
-        let Some(number) = self.slots.iter().position(|slot| matches!(slot, Slot::New | Slot::Forgotten)) else {
+        let Some(number) = self.pending.iter().position(|&is_pending| is_pending) else {
             return true;
         };
-        let bytes;
-        (self.slots[number], bytes) = match self.slots[number] {
-            Slot::New => (Slot::Held, encode(self.examples[number])),
-            _ => (Slot::Free, [ERASED; SLOT]),
-        };
+        self.pending[number] = false;
+        let example = &self.examples[number];
+        let bytes = if is_held(example) { encode(*example) } else { [ERASED; SLOT] };
         self.begin(number as u8, bytes);
         false
+    }
+
+    /// The slots that hold examples, and some between them that are [`VACANT`].
+    pub fn places(&self) -> &[Taught] {
+        self.examples.get(..self.used.into()).unwrap_or(&self.examples)
     }
 
     /// The memory, to be looked at or put into another machine.
@@ -172,20 +165,17 @@ const fn address(number: u8) -> u16 {
 
 impl<M: Memory> Examples<{ features::COUNT }> for FieldExamples<M> {
     fn len(&self) -> usize {
-        self.slots.iter().filter(|slot| slot.has_example()).count()
+        self.examples.iter().filter(|example| is_held(example)).count()
     }
 
     fn example(&self, index: usize) -> Option<Taught> {
         (0..CAPACITY).filter_map(|slot| self.slot(slot)).nth(index)
     }
+}
 
-    fn keep_nearest<const CLASSES: usize>(&self, query: &[u8; features::COUNT], nearest: &mut Nearest<CLASSES>) {
-        for (&slot, example) in self.slots.iter().zip(&self.examples) {
-            if slot.has_example() {
-                nearest.join(example.neighbour_of(query));
-            }
-        }
-    }
+/// Whether a slot holds an example.
+const fn is_held(example: &Taught) -> bool {
+    example.label != VACANT
 }
 
 fn encode(example: Taught) -> [u8; SLOT] {
@@ -301,6 +291,29 @@ mod tests {
         store.memory.bytes[6..SLOT].copy_from_slice(&[low, high]);
         let store = restart(store);
         assert_eq!((store.slot(0), store.spoiled()), (None, 1));
+    }
+
+    #[test]
+    fn an_example_of_a_class_that_there_is_not_is_spoiled() {
+        for label in [label::COUNT as u8, VACANT] {
+            let mut memory = Volatile::new();
+            memory.bytes[..SLOT].copy_from_slice(&encode(Example::new([1, 2, 3, 4, 5], label)));
+            let store = wake_up(memory);
+            assert_eq!((store.slot(0), store.len(), store.spoiled()), (None, 0, 1), "{label}");
+        }
+    }
+
+    #[test]
+    fn what_is_forgotten_before_it_is_written_is_erased() {
+        let mut store = store();
+        store.add(example(1)).unwrap();
+        store.add(example(2)).unwrap();
+        assert!(!store.carry_on(), "the first is being written");
+        assert!(store.forget(0) && store.forget(1));
+        assert_eq!(store.add(example(3)), Ok(0), "its slot is free, whatever is still to be written there");
+        while !store.carry_on() {}
+        let store = restart(store);
+        assert_eq!((store.slot(0), store.slot(1), store.spoiled()), (Some(example(3)), None, 0));
     }
 
     #[test]

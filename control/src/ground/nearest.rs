@@ -39,7 +39,7 @@ impl<B: Examples<{ features::COUNT }>, M: Memory> Nearest<B, M> {
     #[inline(never)]
     fn vote(&self, features: &Features, k: u8, with_field: bool) -> Vote {
         let query = scaled(features);
-        let all = (&self.built_in, FromField { examples: &self.field, vote: with_field });
+        let all = (&self.built_in, FromField { examples: &self.field, vote: with_field, search: &self.built_in });
         let answer = knn::classify::<{ features::COUNT }, { label::COUNT }>(&all, &query, k, examples::RADIUS);
         let Ok(Answer { label, votes, kind, .. }) = answer else {
             return Vote { class: Class::Unknown, votes: 0 };
@@ -60,13 +60,14 @@ fn scaled(features: &Features) -> [u8; features::COUNT] {
     examples::scale().quantise(&features.values())
 }
 
-/// The examples from the field, which may have no vote.
-struct FromField<'a, M> {
+/// The examples from the field, which may have no vote, and who searches them.
+struct FromField<'a, B, M> {
     examples: &'a FieldExamples<M>,
     vote: bool,
+    search: &'a B,
 }
 
-impl<M: Memory> Examples<{ features::COUNT }> for FromField<'_, M> {
+impl<B: Examples<{ features::COUNT }>, M: Memory> Examples<{ features::COUNT }> for FromField<'_, B, M> {
     fn len(&self) -> usize {
         if self.vote { self.examples.len() } else { 0 }
     }
@@ -77,7 +78,7 @@ impl<M: Memory> Examples<{ features::COUNT }> for FromField<'_, M> {
 
     fn keep_nearest<const CLASSES: usize>(&self, query: &[u8; features::COUNT], nearest: &mut knn::Nearest<CLASSES>) {
         if self.vote {
-            self.examples.keep_nearest(query, nearest);
+            self.search.keep_nearest_of(self.examples.places(), query, nearest);
         }
     }
 }
@@ -167,12 +168,13 @@ mod tests {
     #[test]
     fn examples_from_the_field_that_have_no_vote_are_not_there() {
         let mut examples = FieldExamples::asleep(Volatile::new());
+        examples.wake_up();
         let taught = Example::new([7; features::COUNT], label::PLANT);
         for _ in 0..3 {
             examples.add(taught).expect("there is room");
         }
         let seen = |vote| {
-            let field = FromField { examples: &examples, vote };
+            let field = FromField { examples: &examples, vote, search: &[taught; 0] };
             (field.len(), field.example(2), field.example(3))
         };
         assert_eq!(seen(true), (3, Some(taught), None));

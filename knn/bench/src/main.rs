@@ -1,7 +1,8 @@
 //! The bench on the chip: runs the tasks of `Task::ALL` and shows each call on D13.
 //!
 //! It runs the firmware's own search of examples in flash, compiled by the firmware's own profile. When all is measured
-//! it classifies the same queries again, now by the plain search of the crate `knn`, and counts the answers that differ.
+//! it classifies the same queries again, now by the plain search of the crate `knn`, and counts the answers that differ, those
+//! of a search of examples in SRAM too.
 //! It prints nothing: `cargo bench-uno` reads the pin and the variables.
 
 #![no_std]
@@ -18,7 +19,7 @@ use control::ground::{
 };
 use core::{arch::asm, hint::black_box};
 use examples::{BuiltIn, InFlash, Row, rows};
-use knn::{Answer, ClassifyError, Example, Examples, classify};
+use knn::{Answer, ClassifyError, Example, Examples, MAX_K, Nearest, VACANT, classify};
 use knn_bench::{CLASSES, K, QUERIES, Random, Task};
 
 progmem! {
@@ -83,6 +84,22 @@ fn main() -> ! {
             }
         }
     }
+    let mut taught = InMemory { places: [Example::new([0; features::COUNT], VACANT); TAUGHT], is_plain: false };
+    for (number, place) in taught.places.iter_mut().enumerate() {
+        // Some places stay vacant.
+        if let Some(example) = random(TAUGHT as u8).example(number).filter(|_| number % 5 > 0) {
+            *place = example;
+        }
+    }
+    for query in queries() {
+        for k in [K, MAX_K] {
+            let [fast, plain] = [false, true].map(|is_plain| {
+                taught.is_plain = is_plain;
+                search_taught(&taught, &query, k)
+            });
+            different += u16::from(fast != plain);
+        }
+    }
     // SAFETY: as above.
     unsafe { (&raw mut DIFFERENT_ANSWERS).write_volatile(different) };
     loop {
@@ -126,6 +143,45 @@ impl Examples<{ features::COUNT }> for OneByOne<'_> {
     fn example(&self, index: usize) -> Option<Example<{ features::COUNT }>> {
         self.0.example(index)
     }
+}
+
+/// Examples in SRAM.
+const TAUGHT: usize = 32;
+
+/// They, and whether the crate's plain search goes over them.
+struct InMemory {
+    places: [Example<{ features::COUNT }>; TAUGHT],
+    is_plain: bool,
+}
+
+impl InMemory {
+    fn held(&self) -> impl Iterator<Item = &Example<{ features::COUNT }>> {
+        self.places.iter().filter(|example| example.label != VACANT)
+    }
+}
+
+impl Examples<{ features::COUNT }> for InMemory {
+    fn len(&self) -> usize {
+        self.held().count()
+    }
+
+    fn example(&self, index: usize) -> Option<Example<{ features::COUNT }>> {
+        self.held().nth(index).copied()
+    }
+
+    #[inline(never)]
+    fn keep_nearest<const CLASSES: usize>(&self, query: &Query, nearest: &mut Nearest<CLASSES>) {
+        if self.is_plain {
+            self.held().for_each(|example| nearest.join(example.neighbour_of(query)));
+        } else {
+            BuiltIn.keep_nearest_of(&self.places, query, nearest);
+        }
+    }
+}
+
+#[inline(never)]
+fn search_taught(examples: &InMemory, query: &Query, k: u8) -> Result {
+    classify(examples, query, black_box(k), RADIUS)
 }
 
 /// So many random examples: 8, 16, 32, 64 or 128.
