@@ -7,7 +7,7 @@ use std::process::{Command, Output, Stdio};
 use std::thread;
 use std::time::Duration;
 use trial::firmware;
-use trial::live::{Background, LiveUno, Setup};
+use trial::live::{Background, Live, LiveUno, Setup};
 use uno::pty::Pty;
 
 /// How many lines of a kind a log has by now.
@@ -74,7 +74,7 @@ fn a_receiver_that_is_unplugged_and_plugged_in_again_goes_on_in_the_record() {
 }
 
 /// A virtual Uno at rest that runs as fast as it can.
-fn uno() -> Background {
+fn uno() -> Background<LiveUno> {
     let setup = Setup {
         elf: Some(firmware::build().expect("the firmware builds")),
         bootloader: None,

@@ -18,7 +18,7 @@ use std::path::Path;
 use std::str::FromStr;
 use thiserror::Error;
 
-pub use files::TableError;
+pub use files::FileError;
 
 /// Widest thing that a row takes. Wider than any crop plant that is weeded between.
 pub const MAX_WIDTH_MM: f64 = 1000.0;
@@ -271,7 +271,7 @@ impl Row {
     ///
     /// # Errors
     /// Names the file, the line and what would be right.
-    pub fn parse_csv(path: &Path, text: Vec<u8>) -> Result<Self, TableError> {
+    pub fn parse_csv(path: &Path, text: Vec<u8>) -> Result<Self, FileError> {
         let table = CsvTable::parse(path, text, &COLUMNS)?;
         let mut lines = Vec::new();
         for line in table.lines() {

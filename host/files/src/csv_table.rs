@@ -3,35 +3,11 @@
 //! The columns may come in any order, with others among them; lines that begin with `#` are comments. Lines may end as
 //! any system or serial monitor ends them. What the values mean is for the reader of each table to say.
 
+use super::FileError;
 use csv::StringRecord;
 use std::fs;
-use std::io;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
-use thiserror::Error;
-
-/// A table could not be read, and what would be right.
-#[derive(Debug, Error)]
-pub enum TableError {
-    /// The file itself.
-    #[error("{path} cannot be read")]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// What the system says.
-        source: io::Error,
-    },
-    /// A line of it.
-    #[error("{path}, line {line}: {problem}")]
-    Line {
-        /// The file.
-        path: PathBuf,
-        /// The line, counted from 1.
-        line: u64,
-        /// What is wrong with it.
-        problem: String,
-    },
-}
 
 /// A table: some lines of text in columns.
 pub struct CsvTable {
@@ -45,7 +21,7 @@ impl CsvTable {
     ///
     /// # Errors
     /// As [`parse`](Self::parse), and where the file cannot be read.
-    pub fn read(path: &Path, columns: &[&str]) -> Result<Self, TableError> {
+    pub fn read(path: &Path, columns: &[&str]) -> Result<Self, FileError> {
         Self::parse(path, bytes(path)?, columns)
     }
 
@@ -55,8 +31,8 @@ impl CsvTable {
     ///
     /// # Errors
     /// Names the file, the line and what would be right.
-    pub fn parse(path: &Path, text: Vec<u8>, columns: &[&str]) -> Result<Self, TableError> {
-        let at = |line: u64, problem: String| TableError::Line { path: path.into(), line, problem };
+    pub fn parse(path: &Path, text: Vec<u8>, columns: &[&str]) -> Result<Self, FileError> {
+        let at = |line: u64, problem: String| FileError::Line { path: path.into(), line, problem };
         let text = String::from_utf8(text)
             .map_err(|_| at(1, "this is not text: a table is a CSV file in UTF-8".to_owned()))?;
         // The reader counts line feeds, so that each line has to have just one.
@@ -109,8 +85,8 @@ impl CsvTable {
 ///
 /// # Errors
 /// Where it cannot be read.
-pub fn bytes(path: &Path) -> Result<Vec<u8>, TableError> {
-    fs::read(path).map_err(|source| TableError::File { path: path.into(), source })
+pub fn bytes(path: &Path) -> Result<Vec<u8>, FileError> {
+    fs::read(path).map_err(|source| FileError::unread(path, source))
 }
 
 /// A line of a table.
@@ -137,14 +113,14 @@ impl Line<'_> {
     ///
     /// # Errors
     /// Where the text is none.
-    pub fn value<T: FromStr>(&self, column: &str, right: &str) -> Result<T, TableError> {
+    pub fn value<T: FromStr>(&self, column: &str, right: &str) -> Result<T, FileError> {
         let text = self.text(column);
         text.parse().map_err(|_| self.error(format!("{column} is `{text}`: it has to be {right}")))
     }
 
     /// The error that this line has a problem.
-    pub fn error(&self, problem: impl Into<String>) -> TableError {
-        TableError::Line { path: self.table.path.clone(), line: self.number, problem: problem.into() }
+    pub fn error(&self, problem: impl Into<String>) -> FileError {
+        FileError::Line { path: self.table.path.clone(), line: self.number, problem: problem.into() }
     }
 }
 
@@ -171,7 +147,7 @@ mod tests {
         let values = CsvTable::read(&path, &["place_mm"]).and_then(|table| {
             table.lines().map(|line| Ok((line.number, line.value("place_mm", "a whole number")?))).collect()
         });
-        values.map_err(|error: TableError| error.to_string().replace(&format!("{}/", folder.path().display()), ""))
+        values.map_err(|error: FileError| error.to_string().replace(&format!("{}/", folder.path().display()), ""))
     }
 
     #[test]
@@ -228,7 +204,7 @@ mod tests {
     #[test]
     fn a_file_that_is_no_text_is_refused() {
         let mut file = tempfile::NamedTempFile::new().unwrap();
-        io::Write::write_all(&mut file, b"place_mm\n\xFF\n").unwrap();
+        std::io::Write::write_all(&mut file, b"place_mm\n\xFF\n").unwrap();
         let error = CsvTable::read(file.path(), &["place_mm"]).err().unwrap().to_string();
         assert!(error.ends_with("this is not text: a table is a CSV file in UTF-8"), "{error}");
     }

@@ -1,9 +1,12 @@
 //! What several of the host's crates need of files: CSV tables that people made, and files that are written whole.
 //!
 //! [`csv_table`] reads a table and names file, line and column where something is wrong; what the values mean is for the reader
-//! of each table to say. [`whole_file`] writes a file whole or not at all. It knows nothing of weeding.
+//! of each table to say. [`FileError`] is how any file that people write is refused. [`whole_file`] writes a file whole or not at
+//! all. It knows nothing of weeding.
 
 pub mod csv_table;
+mod file_error;
 pub mod whole_file;
 
-pub use csv_table::{CsvTable, Line, TableError};
+pub use csv_table::{CsvTable, Line};
+pub use file_error::FileError;

@@ -8,7 +8,7 @@
 
 use super::session::Happening;
 use super::settings::{Setting, name};
-use files::csv_table::{CsvTable, TableError};
+use files::{CsvTable, FileError};
 use std::fs::{File, OpenOptions};
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
@@ -235,7 +235,7 @@ pub struct Entry {
 ///
 /// # Errors
 /// Names the file, the line and what would be right.
-pub fn read(path: &Path) -> Result<Vec<Entry>, TableError> {
+pub fn read(path: &Path) -> Result<Vec<Entry>, FileError> {
     let table = CsvTable::read(path, &HEADER.split(',').collect::<Vec<_>>())?;
     table
         .lines()

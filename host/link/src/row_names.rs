@@ -8,10 +8,10 @@
 
 use super::port::{is_uno, open};
 use super::{Link, LinkError, find_uno};
-use files::whole_file;
+use files::{FileError, whole_file};
 use serialport::{SerialPortInfo, SerialPortType};
 use std::fs;
-use std::io::{self, ErrorKind};
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 use toml_edit::{DocumentMut, InlineTable, Item, TomlError, Value};
@@ -67,26 +67,9 @@ pub struct Plugged {
 /// Why the rows' names cannot be had.
 #[derive(Debug, Error)]
 pub enum NamesError {
-    /// The file itself.
-    #[error("{path} cannot be {done}")]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// `read` or `written`.
-        done: &'static str,
-        /// What the system says.
-        source: io::Error,
-    },
-    /// Something in it.
-    #[error("{path}, line {line}: {problem}")]
-    Line {
-        /// The file.
-        path: PathBuf,
-        /// The line, counted from 1.
-        line: usize,
-        /// What is wrong with it, and what would be right.
-        problem: String,
-    },
+    /// The file itself, or a line of it.
+    #[error(transparent)]
+    File(#[from] FileError),
     /// A name that no row can have.
     #[error("{name:?} cannot be a row's name: {problem}")]
     Name {
@@ -234,7 +217,7 @@ impl Names {
         let (head, text) = match fs::read_to_string(path) {
             Ok(text) => ("", text),
             Err(error) if error.kind() == ErrorKind::NotFound => (HEAD, String::new()),
-            Err(source) => return Err(NamesError::File { path: path.into(), done: "read", source }),
+            Err(source) => return Err(FileError::unread(path, source).into()),
         };
         let (document, rows) = parse(path, &text)?;
         Ok(Self { path: path.into(), head, document, rows })
@@ -311,15 +294,12 @@ impl Names {
         let written = folder
             .map_or(Ok(()), fs::create_dir_all)
             .and_then(|()| whole_file::write(&self.path, |to| to.write_all(text.as_bytes())));
-        written.map_err(|source| NamesError::File { path: self.path.clone(), done: "written", source })
+        written.map_err(|source| FileError::unwritten(&self.path, source).into())
     }
 }
 
-fn parse(path: &Path, text: &str) -> Result<(DocumentMut, Vec<Row>), NamesError> {
-    let at = |start: usize, problem: String| {
-        let line = 1 + text.bytes().take(start).filter(|&byte| byte == b'\n').count();
-        NamesError::Line { path: path.into(), line, problem }
-    };
+fn parse(path: &Path, text: &str) -> Result<(DocumentMut, Vec<Row>), FileError> {
+    let at = |start: usize, problem: String| FileError::at_byte(path, text, start, problem);
     let broken = |error: TomlError| at(error.span().map_or(0, |span| span.start), error.message().replace('\n', ", "));
     let read = toml_edit::Document::parse(text).map_err(broken)?;
     let mut rows: Vec<Row> = Vec::new();

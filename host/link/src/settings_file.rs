@@ -5,36 +5,10 @@
 //! the table, and the first thing that is wrong is said with its line and what would be right.
 
 use super::settings::{Setting, Settings, help, name, range};
-use files::whole_file;
-use std::path::{Path, PathBuf};
-use std::{fs, io};
-use thiserror::Error;
+use files::{FileError, whole_file};
+use std::fs;
+use std::path::Path;
 use toml_edit::{Decor, Document, DocumentMut, Item, Key, TomlError, Value};
-
-/// Why a settings file cannot be used.
-#[derive(Debug, Error)]
-pub enum SettingsFileError {
-    /// The file itself.
-    #[error("{path} cannot be {done}")]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// `read` or `written`.
-        done: &'static str,
-        /// What the system says.
-        source: io::Error,
-    },
-    /// Something in it.
-    #[error("{path}, line {line}: {problem}")]
-    Line {
-        /// The file.
-        path: PathBuf,
-        /// The line, counted from 1.
-        line: usize,
-        /// What is wrong with it, and what would be right.
-        problem: String,
-    },
-}
 
 /// What stands at the head of a new file.
 const HEAD: &str = "\
@@ -49,7 +23,7 @@ const OLD_MERGE_GAP: &str = "merge_gap_ticks";
 ///
 /// # Errors
 /// Names the file, the line, and what would be right.
-pub fn read(path: &Path) -> Result<Vec<(Setting, u16)>, SettingsFileError> {
+pub fn read(path: &Path) -> Result<Vec<(Setting, u16)>, FileError> {
     parse(path, &text(path)?)
 }
 
@@ -57,11 +31,11 @@ pub fn read(path: &Path) -> Result<Vec<(Setting, u16)>, SettingsFileError> {
 ///
 /// # Errors
 /// As [`read`], and where the file cannot be written.
-pub fn write(path: &Path, settings: &Settings) -> Result<(), SettingsFileError> {
+pub fn write(path: &Path, settings: &Settings) -> Result<(), FileError> {
     let old = if path.exists() { text(path)? } else { HEAD.to_owned() };
     let new = updated(path, &old, settings)?;
     let written = whole_file::write(path, |to| to.write_all(new.as_bytes()));
-    written.map_err(|source| SettingsFileError::File { path: path.into(), done: "written", source })
+    written.map_err(|source| FileError::unwritten(path, source))
 }
 
 /// A setting's value as it stands in TOML and JSON: a switched one is true or false.
@@ -69,20 +43,14 @@ pub fn is_true(setting: Setting, value: u16) -> Option<bool> {
     setting.is_switched().then_some(value != 0)
 }
 
-fn text(path: &Path) -> Result<String, SettingsFileError> {
-    let bytes = fs::read(path).map_err(|source| SettingsFileError::File { path: path.into(), done: "read", source })?;
-    String::from_utf8(bytes).map_err(|_| SettingsFileError::Line {
-        path: path.into(),
-        line: 1,
-        problem: "this is no text: a settings file is TOML in UTF-8".to_owned(),
-    })
+fn text(path: &Path) -> Result<String, FileError> {
+    let bytes = fs::read(path).map_err(|source| FileError::unread(path, source))?;
+    String::from_utf8(bytes)
+        .map_err(|_| FileError::at_byte(path, "", 0, "this is no text: a settings file is TOML in UTF-8"))
 }
 
-fn parse(path: &Path, text: &str) -> Result<Vec<(Setting, u16)>, SettingsFileError> {
-    let at = |start: usize, problem: String| {
-        let line = 1 + text.bytes().take(start).filter(|&byte| byte == b'\n').count();
-        SettingsFileError::Line { path: path.into(), line, problem }
-    };
+fn parse(path: &Path, text: &str) -> Result<Vec<(Setting, u16)>, FileError> {
+    let at = |start: usize, problem: String| FileError::at_byte(path, text, start, problem);
     let broken = |error: TomlError| at(error.span().map_or(0, |span| span.start), error.message().replace('\n', ", "));
     let document = Document::parse(text).map_err(broken)?;
     let mut settings = Vec::new();
@@ -136,13 +104,10 @@ fn right(setting: Setting) -> String {
     format!("{whole}{}", range(setting))
 }
 
-fn updated(path: &Path, old: &str, settings: &Settings) -> Result<String, SettingsFileError> {
+fn updated(path: &Path, old: &str, settings: &Settings) -> Result<String, FileError> {
     parse(path, old)?;
-    let mut document: DocumentMut = old.parse().map_err(|error: TomlError| SettingsFileError::Line {
-        path: path.into(),
-        line: 1,
-        problem: error.message().to_owned(),
-    })?;
+    let mut document: DocumentMut =
+        old.parse().map_err(|error: TomlError| FileError::at_byte(path, old, 0, error.message()))?;
     // The comments of a file without a value are its end: new values would go before them.
     let head = if document.is_empty() {
         document = DocumentMut::new();

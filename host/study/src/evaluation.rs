@@ -13,7 +13,7 @@ pub mod table;
 use crate::statistics::{AnalysisOfVariance, BinomialModel, Checks, Design, LinearModel, Mean, NoModel, Share};
 use published::Published;
 use serde::{Deserialize, Serialize};
-pub use table::{TableError, read_csv, write_csv};
+pub use table::{FileError, read_csv, write_csv};
 use thiserror::Error;
 
 /// Square metres in a hectare.

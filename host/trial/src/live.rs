@@ -1,7 +1,7 @@
 //! The virtual Uno, live: in real time, at a pseudo terminal that any serial program opens, with a machine around it that rolls
 //! along a row again and again.
 //!
-//! [`LiveUno::start`] powers it up, [`LiveUno::run`] lets it run until it is told to stop, and [`LiveUno::run_in_background`] does so in
+//! [`LiveUno::start`] powers it up, [`LiveUno::run`] lets it run until it is told to stop, and [`Live::run_in_background`] does so in
 //! a thread. [`rows`] has several, whose encoder is the same. Each millisecond of the chip's time, bytes are taken from and given to the terminal; then the host's clock is
 //! waited for. A host that is too slow makes the chip slower, never the time between two of its events wrong.
 //!
@@ -25,9 +25,8 @@ use std::collections::VecDeque;
 use std::io::{self, ErrorKind};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread::{self, JoinHandle};
+use std::thread;
 use std::time::{Duration, Instant};
 use thiserror::Error;
 use uno::elf::EEPROM_BYTES;
@@ -35,7 +34,10 @@ use uno::hex::Bootloader;
 use uno::pty::{Pty, PtyError};
 use uno::{Uno, UnoError};
 
+mod background;
 pub mod rows;
+
+pub use background::{Background, Live};
 
 /// What is on the desk.
 #[derive(Clone, Debug, Default)]
@@ -327,19 +329,6 @@ impl LiveUno {
         Ok(())
     }
 
-    /// Runs in a thread until the handle is dropped.
-    pub fn run_in_background(mut self) -> Background {
-        let path = self.path().to_owned();
-        let receiver_path = self.receiver_path().map(Path::to_owned);
-        let stop = Arc::new(AtomicBool::new(false));
-        let stop_there = Arc::clone(&stop);
-        let thread = thread::spawn(move || {
-            self.run(&stop_there)?;
-            Ok(self)
-        });
-        Background { path, receiver_path, stop, thread: Some(thread) }
-    }
-
     /// The Uno itself.
     pub fn uno(&self) -> &Uno {
         &self.uno
@@ -429,15 +418,13 @@ impl Pace {
     }
 }
 
-/// A live Uno that runs in a thread. Dropped, it ends, its terminal and link with it.
-pub struct Background {
+/// The ports of an Uno that runs in a thread.
+pub struct Ports {
     path: PathBuf,
     receiver_path: Option<PathBuf>,
-    stop: Arc<AtomicBool>,
-    thread: Option<JoinHandle<Result<LiveUno, LiveError>>>,
 }
 
-impl Background {
+impl Ports {
     /// The path under which programs open its serial port.
     pub fn path(&self) -> &Path {
         &self.path
@@ -447,28 +434,18 @@ impl Background {
     pub fn receiver_path(&self) -> Option<&Path> {
         self.receiver_path.as_deref()
     }
-
-    /// Stops it, and gives it back.
-    ///
-    /// # Errors
-    /// What ended it before.
-    ///
-    /// # Panics
-    /// Where its thread did.
-    pub fn stop(mut self) -> Result<LiveUno, LiveError> {
-        self.stop.store(true, Ordering::Relaxed);
-        let thread = self.thread.take().expect("it is taken here and by drop alone");
-        thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
-    }
 }
 
-impl Drop for Background {
-    fn drop(&mut self) {
-        self.stop.store(true, Ordering::Relaxed);
-        if let Some(thread) = self.thread.take() {
-            // Its user did not ask what became of it.
-            let _ = thread.join();
-        }
+impl Live for LiveUno {
+    type Outside = Ports;
+    type Failure = LiveError;
+
+    fn outside(&self) -> Ports {
+        Ports { path: self.path().to_owned(), receiver_path: self.receiver_path().map(Path::to_owned) }
+    }
+
+    fn run_until(&mut self, stop: &AtomicBool) -> Result<(), LiveError> {
+        self.run(stop)
     }
 }
 

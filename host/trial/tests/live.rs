@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use std::path::Path;
 use std::process::Command;
 use trial::firmware;
-use trial::live::{Background, Course, LiveUno, Setup};
+use trial::live::{Background, Course, Live, LiveUno, Setup};
 use uno::Uno;
 use uno::hex::Bootloader;
 use uno::pty::Pty;
@@ -22,13 +22,13 @@ fn product() -> Setup {
 }
 
 #[track_caller]
-fn start(setup: Setup) -> Background {
+fn start(setup: Setup) -> Background<LiveUno> {
     LiveUno::start(setup).expect("it starts").run_in_background()
 }
 
 /// Opens the port, and waits until the firmware, which is reset by that, answers.
 #[track_caller]
-fn open(uno: &Background) -> Link {
+fn open(uno: &Background<LiveUno>) -> Link {
     Link::open(uno.path().to_str()).expect("the firmware answers")
 }
 

@@ -11,8 +11,8 @@ use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 use trial::console::ask;
 use trial::firmware;
-use trial::live::rows::{Background, LiveRows, Mishap};
-use trial::live::{Course, Setup};
+use trial::live::rows::{LiveRows, Mishap};
+use trial::live::{Background, Course, Live, Setup};
 
 /// Walking pace.
 const SPEED_MM_S: f64 = 700.0;
@@ -52,7 +52,7 @@ struct Laptop {
 
 impl Laptop {
     #[track_caller]
-    fn open(machine: &Background) -> Self {
+    fn open(machine: &Background<LiveRows>) -> Self {
         let opener = |path: &PathBuf| -> Opener {
             let path = path.to_str().expect("it is text").to_owned();
             Box::new(move || Link::open(Some(&path)))

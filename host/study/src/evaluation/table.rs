@@ -4,7 +4,7 @@
 //! with `#` are comments. Every line is checked before anything follows from one.
 
 use super::PlotRecord;
-pub use files::csv_table::TableError;
+pub use files::FileError;
 use files::csv_table::{CsvTable, Line};
 use std::io;
 use std::path::Path;
@@ -30,7 +30,7 @@ pub const COLUMNS: [&str; 11] = [
 /// # Errors
 /// Names the file, the line and the column, and what would be right: a missing column, text in a number, a value out of
 /// its range, more weeds after than before, more damaged plants than plants, or a replication of a speed and spacing that stood there before.
-pub fn read_csv(path: &Path) -> Result<Vec<PlotRecord>, TableError> {
+pub fn read_csv(path: &Path) -> Result<Vec<PlotRecord>, FileError> {
     let table = CsvTable::read(path, &COLUMNS)?;
     let mut plots: Vec<(u64, PlotRecord)> = Vec::new();
     for line in table.lines() {
@@ -51,7 +51,7 @@ pub fn read_csv(path: &Path) -> Result<Vec<PlotRecord>, TableError> {
 }
 
 /// One line of the table.
-fn record(line: Line) -> Result<PlotRecord, TableError> {
+fn record(line: Line) -> Result<PlotRecord, FileError> {
     let plot = PlotRecord {
         replication: count(line, "replication")?,
         speed_km_h: number(line, "speed_km_h")?,
@@ -69,11 +69,11 @@ fn record(line: Line) -> Result<PlotRecord, TableError> {
     Ok(plot)
 }
 
-fn count(line: Line, column: &str) -> Result<u32, TableError> {
+fn count(line: Line, column: &str) -> Result<u32, FileError> {
     line.value(column, "a whole number, 0 or more")
 }
 
-fn number(line: Line, column: &str) -> Result<f64, TableError> {
+fn number(line: Line, column: &str) -> Result<f64, FileError> {
     let Number(value) = line.value(column, "a number, like 1.5")?;
     Ok(value)
 }

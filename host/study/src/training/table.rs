@@ -10,7 +10,7 @@ use field::row::Kind;
 use files::csv_table::{CsvTable, Line};
 use std::path::{Path, PathBuf};
 
-pub use files::csv_table::TableError;
+pub use files::FileError;
 
 /// The columns of the features, in the order of [`Features::values`].
 pub const COLUMNS: [&str; 5] = ["speed_mm_s", "spacing_mm", "delay_mm", "hold_mm", "actuation_mm"];
@@ -31,7 +31,7 @@ pub struct Recorded {
 ///
 /// # Errors
 /// Names the file, the line and what would be right.
-pub fn read(path: &Path) -> Result<Vec<Recorded>, TableError> {
+pub fn read(path: &Path) -> Result<Vec<Recorded>, FileError> {
     CsvTable::read(path, &COLUMNS)?.lines().map(object).collect()
 }
 
@@ -48,7 +48,7 @@ pub struct Lesson {
 ///
 /// # Errors
 /// Names the file, the line and what would be right.
-pub fn read_labelled(paths: &[PathBuf]) -> Result<Lesson, TableError> {
+pub fn read_labelled(paths: &[PathBuf]) -> Result<Lesson, FileError> {
     let columns: Vec<&str> = COLUMNS.into_iter().chain([LABEL]).collect();
     let tables = paths.iter().map(|path| CsvTable::read(path, &columns)).collect::<Result<Vec<_>, _>>()?;
     let mut lesson = Lesson { objects: Vec::new(), unlabelled: 0 };
@@ -72,7 +72,7 @@ pub fn read_labelled(paths: &[PathBuf]) -> Result<Lesson, TableError> {
 }
 
 /// The object in a line.
-fn object(line: Line) -> Result<Recorded, TableError> {
+fn object(line: Line) -> Result<Recorded, FileError> {
     let mut values = [0; COLUMNS.len()];
     for (value, column) in values.iter_mut().zip(COLUMNS) {
         *value = line.value(column, "a whole number from -32768 to 32767")?;

@@ -6,13 +6,13 @@
 //!
 //! The cable itself is not simulated: no edge is lost on it, and none comes late.
 
-use super::{LiveError, LiveUno, Pace, SLICE_MS, Setup};
+use super::{Live, LiveError, LiveUno, Pace, SLICE_MS, Setup};
 use rustix::time::{ClockId, clock_gettime};
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Barrier, Mutex, PoisonError};
-use std::thread::{self, JoinHandle};
+use std::thread;
 use std::time::{Duration, Instant};
 use uno::Uno;
 
@@ -144,19 +144,6 @@ impl LiveRows {
         }
     }
 
-    /// Runs in a thread until the handle is dropped.
-    pub fn run_in_background(mut self) -> Background {
-        let stop = Arc::new(AtomicBool::new(false));
-        let stop_there = Arc::clone(&stop);
-        let paths = self.paths().into_iter().map(Path::to_owned).collect();
-        let mishaps = Arc::clone(&self.mishaps);
-        let thread = thread::spawn(move || {
-            self.run(&stop_there, None)?;
-            Ok(self)
-        });
-        Background { paths, stop, mishaps, thread: Some(thread) }
-    }
-
     /// The rows' Unos, without their terminals.
     pub fn into_unos(self) -> Vec<Uno> {
         self.unos.into_iter().map(|live| live.uno).collect()
@@ -246,15 +233,13 @@ impl<'a> Part<'a> {
     }
 }
 
-/// Rows that run in a thread. Dropped, they end, their terminals and links with them.
-pub struct Background {
+/// What is reached of rows that run in a thread: their ports, and what may happen to them.
+pub struct Reached {
     paths: Vec<PathBuf>,
-    stop: Arc<AtomicBool>,
     mishaps: Arc<Mutex<VecDeque<(usize, Mishap)>>>,
-    thread: Option<JoinHandle<Result<LiveRows, (usize, LiveError)>>>,
 }
 
-impl Background {
+impl Reached {
     /// The paths under which programs open the rows' serial ports.
     pub fn paths(&self) -> &[PathBuf] {
         &self.paths
@@ -264,27 +249,19 @@ impl Background {
     pub fn happen(&self, row: usize, mishap: Mishap) {
         self.mishaps.lock().unwrap_or_else(PoisonError::into_inner).push_back((row, mishap));
     }
-
-    /// Stops them, and gives them back.
-    ///
-    /// # Errors
-    /// What has ended one of them before, and which.
-    ///
-    /// # Panics
-    /// Where their thread did.
-    pub fn stop(mut self) -> Result<LiveRows, (usize, LiveError)> {
-        self.stop.store(true, Ordering::Relaxed);
-        let thread = self.thread.take().expect("it is taken here and by drop alone");
-        thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
-    }
 }
 
-impl Drop for Background {
-    fn drop(&mut self) {
-        self.stop.store(true, Ordering::Relaxed);
-        if let Some(thread) = self.thread.take() {
-            // Its user did not ask what became of them.
-            let _ = thread.join();
-        }
+impl Live for LiveRows {
+    type Outside = Reached;
+    /// Which row has ended, and why.
+    type Failure = (usize, LiveError);
+
+    fn outside(&self) -> Reached {
+        let paths = self.paths().into_iter().map(Path::to_owned).collect();
+        Reached { paths, mishaps: Arc::clone(&self.mishaps) }
+    }
+
+    fn run_until(&mut self, stop: &AtomicBool) -> Result<(), Self::Failure> {
+        self.run(stop, None).map(|_| ())
     }
 }

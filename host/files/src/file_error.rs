@@ -1,0 +1,64 @@
+//! Why a file that people wrote cannot be used: the file itself, or a line of it, with what would be right.
+//!
+//! Each reader says what is wrong with a line in words of its own. This only says where.
+
+use std::io;
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// A file cannot be used.
+#[derive(Debug, Error)]
+pub enum FileError {
+    /// The file itself.
+    #[error("{path} cannot be {done}")]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// `read` or `written`.
+        done: &'static str,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// A line of it.
+    #[error("{path}, line {line}: {problem}")]
+    Line {
+        /// The file.
+        path: PathBuf,
+        /// The line, counted from 1.
+        line: u64,
+        /// What is wrong with it, and what would be right.
+        problem: String,
+    },
+}
+
+impl FileError {
+    /// The system cannot read it.
+    pub fn unread(path: &Path, source: io::Error) -> Self {
+        Self::File { path: path.into(), done: "read", source }
+    }
+
+    /// The system cannot write it.
+    pub fn unwritten(path: &Path, source: io::Error) -> Self {
+        Self::File { path: path.into(), done: "written", source }
+    }
+
+    /// Something is wrong in the line in which this byte of the file's text stands.
+    pub fn at_byte(path: &Path, text: &str, byte: usize, problem: impl Into<String>) -> Self {
+        let ends = text.bytes().take(byte).filter(|&byte| byte == b'\n').count();
+        Self::Line { path: path.into(), line: 1 + ends as u64, problem: problem.into() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_byte_stands_in_the_line_that_its_own_end_closes() {
+        let text = "k = 3\n\nmargin_mm = far\n";
+        for (byte, line) in [(0, 1), (5, 1), (6, 2), (7, 3), (text.len(), 4)] {
+            let error = FileError::at_byte(Path::new("machine.toml"), text, byte, "it has to be a number").to_string();
+            assert_eq!(error, format!("machine.toml, line {line}: it has to be a number"));
+        }
+    }
+}
