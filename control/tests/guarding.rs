@@ -1,88 +1,39 @@
 //! Plants that the beam has not seen, in a crop at even distances: the ground where they are due is kept as if they had been.
 
 mod common;
+#[path = "common/rolling.rs"]
+mod rolling;
 
-use common::{Machine, machine, readings};
-use control::{
-    alarm::Alarm,
-    measure::readings::Edge,
-    operate::{event::Event, state::State},
-    settings::Setting,
-    units::Position,
-};
+use control::{alarm::Alarm, operate::event::Event, operate::state::State, settings::Setting};
 use proptest::prelude::*;
-
-/// Ticks a millimetre of the default wheel.
-const TICKS_A_MM: f64 = 1.90986;
-
-/// A turn of the main loop.
-const TURN_US: u64 = 500;
+use rolling::{BEAM_TO_TOOL_MM, MARGIN_MM, Rolling, TICKS_A_MM};
 
 const SPACING_MM: f64 = 500.0;
 const CANOPY_MM: f64 = 150.0;
-const BEAM_TO_TOOL_MM: f64 = 400.0;
-const MARGIN_MM: f64 = 50.0;
 
 /// What a place may be off by: two ticks, and what is rolled in a turn and a lead that wavers.
 const TOLERANCE_MM: f64 = 8.0;
 
-/// A machine at work along a row, with its guard set for this spacing and this scatter.
-struct Rolling {
-    machine: Machine,
-    time_us: u64,
-    place_mm: f64,
-    /// Canopies that the beam sees, from and to.
-    seen_mm: Vec<(f64, f64)>,
-    broken: bool,
-    /// Where the machine said that it guards a plant, and the ground over which the tool was in the row.
-    guarded_mm: Vec<f64>,
-    weeded_mm: Vec<f64>,
-    swings: usize,
+/// A machine at work along canopies, from and to, with its guard set for this spacing and this scatter.
+fn guarding(seen_mm: Vec<(f64, f64)>, settings: &[(Setting, u16)]) -> Rolling {
+    let guard = [(Setting::GuardSpacingMm, SPACING_MM as u16), (Setting::GuardScatterMm, 30), (Setting::LeadInMs, 0)];
+    Rolling::along(seen_mm, Vec::new(), &[&guard, settings].concat())
+}
+
+/// Plants that stand at their places, in the middle, of which the beam sees these.
+fn with_plants(seen: &[bool]) -> Rolling {
+    let places = (1..).map(|place| f64::from(place) * SPACING_MM);
+    let seen_mm = places.zip(seen).filter(|(_, seen)| **seen).map(|(place, _)| canopy(place)).collect();
+    guarding(seen_mm, &[])
 }
 
 impl Rolling {
-    fn along(seen_mm: Vec<(f64, f64)>, settings: &[(Setting, u16)]) -> Self {
-        let mut machine = machine();
-        let guard = [(Setting::GuardSpacingMm, SPACING_MM as u16), (Setting::GuardScatterMm, 30)];
-        let exact = [(Setting::BeamResponseMs, 0), (Setting::LeadInMs, 0)];
-        for (setting, value) in guard.iter().chain(&exact).chain(settings) {
-            machine.set(*setting, *value).unwrap();
-        }
-        machine.tell_events(true);
-        machine.start(true).unwrap();
-        let (guarded_mm, weeded_mm) = (Vec::new(), Vec::new());
-        Self { machine, time_us: 0, place_mm: 0.0, seen_mm, broken: false, guarded_mm, weeded_mm, swings: 0 }
-    }
-
-    /// Plants that stand at their places, in the middle, of which the beam sees these.
-    fn with_plants(seen: &[bool]) -> Self {
-        let places = (1..).map(|place| f64::from(place) * SPACING_MM);
-        let seen_mm = places.zip(seen).filter(|(_, seen)| **seen).map(|(place, _)| canopy(place)).collect();
-        Self::along(seen_mm, &[])
-    }
-
-    /// Rolls to a place of the beam.
-    fn roll_to(&mut self, to_mm: f64, speed_mm_s: f64) {
-        let step = (to_mm - self.place_mm).signum() * speed_mm_s * TURN_US as f64 / 1e6;
-        while (to_mm - self.place_mm) * step > 0.0 {
-            self.place_mm += step;
-            self.time_us += TURN_US;
-            let position = (self.place_mm * TICKS_A_MM).floor() as i32;
-            let broken = self.seen_mm.iter().any(|&(from, to)| (from..to).contains(&self.place_mm));
-            let edge = Edge::Seen { position: Position::new(position), broken, second_broken: false };
-            let edges = (broken != std::mem::replace(&mut self.broken, broken)).then_some(edge);
-            self.machine.turn(readings(self.time_us, position), edges);
-            if !self.machine.tool_out() {
-                self.weeded_mm.push(self.place_mm - BEAM_TO_TOOL_MM);
-            }
-            while let Some(event) = self.machine.next_event() {
-                match event {
-                    Event::Guarded(place) => self.guarded_mm.push(f64::from(place.count()) / TICKS_A_MM),
-                    Event::Swing { out: true, .. } => self.swings += 1,
-                    _ => {}
-                }
-            }
-        }
+    /// Where the machine said that it guards a plant.
+    fn guarded_mm(&self) -> Vec<f64> {
+        self.told_of(|event| match event {
+            Event::Guarded(place) => Some(f64::from(place.count()) / TICKS_A_MM),
+            _ => None,
+        })
     }
 
     /// Whether the tool was in the row somewhere from one place to another.
@@ -99,8 +50,9 @@ impl Rolling {
     #[track_caller]
     fn assert_guarded(&self, middles_mm: &[f64]) {
         let is_near = |(one, other): (&f64, &f64)| (one - other).abs() < 4.0;
-        let are_same = self.guarded_mm.len() == middles_mm.len();
-        assert!(are_same && self.guarded_mm.iter().zip(middles_mm).all(is_near), "{:?}", self.guarded_mm);
+        let guarded_mm = self.guarded_mm();
+        let are_same = guarded_mm.len() == middles_mm.len();
+        assert!(are_same && guarded_mm.iter().zip(middles_mm).all(is_near), "{guarded_mm:?}");
     }
 }
 
@@ -110,13 +62,14 @@ fn canopy(middle_mm: f64) -> (f64, f64) {
 
 #[test]
 fn a_plant_that_was_not_seen_is_kept_with_a_swing_of_its_own() {
-    let mut rolling = Rolling::with_plants(&[true, true, false, true, false, false, true]);
+    let mut rolling = with_plants(&[true, true, false, true, false, false, true]);
     rolling.roll_to(3600.0, 400.0);
     rolling.assert_guarded(&[1500.0, 2500.0, 3000.0]);
     rolling.roll_to(3950.0, 400.0);
     assert!([1500.0, 2500.0, 3000.0].iter().all(|&middle_mm| rolling.has_kept(middle_mm)));
     assert!((1..7).all(|gap| rolling.has_weeded(f64::from(gap) * 500.0 + 200.0, f64::from(gap) * 500.0 + 300.0)));
-    assert_eq!(rolling.swings, 7);
+    let out = rolling.told_of(|event| matches!(event, Event::Swing { out: true, .. }).then_some(()));
+    assert_eq!(out.len(), 7);
 }
 
 #[test]
@@ -124,7 +77,7 @@ fn behind_three_unseen_plants_the_row_is_at_its_end_until_a_plant_is_seen() {
     let mut seen = vec![true, true];
     seen.extend([false; 8]);
     seen.extend([true, false, true]);
-    let mut rolling = Rolling::with_plants(&seen);
+    let mut rolling = with_plants(&seen);
     rolling.roll_to(8500.0, 500.0);
     rolling.assert_guarded(&[1500.0, 2000.0, 2500.0, 6000.0, 7000.0, 7500.0, 8000.0]);
     assert!(rolling.has_weeded(3000.0, 3001.0) && rolling.has_weeded(5000.0, 5001.0));
@@ -132,11 +85,11 @@ fn behind_three_unseen_plants_the_row_is_at_its_end_until_a_plant_is_seen() {
 
 #[test]
 fn nothing_is_guarded_before_a_plant_was_seen_and_nothing_where_no_spacing_is_set() {
-    let mut rolling = Rolling::with_plants(&[]);
+    let mut rolling = with_plants(&[]);
     rolling.roll_to(6000.0, 500.0);
     rolling.assert_guarded(&[]);
     let plants = || [1.0, 3.0, 4.0].map(|place| canopy(place * SPACING_MM)).to_vec();
-    let mut off = Rolling::along(plants(), &[(Setting::GuardSpacingMm, 0)]);
+    let mut off = guarding(plants(), &[(Setting::GuardSpacingMm, 0)]);
     off.roll_to(4000.0, 500.0);
     off.assert_guarded(&[]);
     assert!(off.has_weeded(1000.0, 1001.0));
@@ -146,7 +99,7 @@ fn nothing_is_guarded_before_a_plant_was_seen_and_nothing_where_no_spacing_is_se
 fn a_plant_early_or_late_by_the_scatter_is_no_unseen_one_and_the_next_is_counted_from_it() {
     for off_mm in [-90.0, -30.0, 30.0, 90.0] {
         let middles_mm = [500.0, 1000.0, 1500.0 + off_mm];
-        let mut rolling = Rolling::along(middles_mm.map(canopy).to_vec(), &[]);
+        let mut rolling = guarding(middles_mm.map(canopy).to_vec(), &[]);
         rolling.roll_to(2200.0, 400.0);
         rolling.assert_guarded(&[2000.0 + off_mm]);
     }
@@ -157,7 +110,7 @@ fn a_double_or_a_weed_like_a_plant_between_two_places_changes_nothing() {
     let between_mm = [(620.0, 700.0), (1700.0, 1790.0)];
     let mut seen_mm = [500.0, 1000.0, 1500.0].map(canopy).to_vec();
     seen_mm.extend(between_mm);
-    let mut rolling = Rolling::along(seen_mm, &[]);
+    let mut rolling = guarding(seen_mm, &[]);
     rolling.roll_to(2300.0, 400.0);
     rolling.assert_guarded(&[2000.0]);
 }
@@ -166,7 +119,7 @@ fn a_double_or_a_weed_like_a_plant_between_two_places_changes_nothing() {
 fn a_weed_where_a_plant_is_due_does_not_stand_for_it() {
     let mut seen_mm = [500.0, 1000.0].map(canopy).to_vec();
     seen_mm.push((1495.0, 1510.0));
-    let mut rolling = Rolling::along(seen_mm, &[]);
+    let mut rolling = guarding(seen_mm, &[]);
     rolling.roll_to(1950.0, 400.0);
     rolling.assert_guarded(&[1500.0]);
     assert!(rolling.has_kept(1500.0));
@@ -174,7 +127,7 @@ fn a_weed_where_a_plant_is_due_does_not_stand_for_it() {
 
 #[test]
 fn ground_that_is_guarded_is_told_once_and_kept_however_often_it_is_rolled_over() {
-    let mut rolling = Rolling::with_plants(&[true, false, true]);
+    let mut rolling = with_plants(&[true, false, true]);
     for (there_mm, back_mm) in [(1040.0, 900.0), (1100.0, 600.0), (2000.0, 400.0), (1990.0, 1000.0)] {
         rolling.roll_to(there_mm, 300.0);
         rolling.roll_to(back_mm, 300.0);
@@ -186,9 +139,9 @@ fn ground_that_is_guarded_is_told_once_and_kept_however_often_it_is_rolled_over(
 
 #[test]
 fn an_alarm_ends_what_is_due_until_a_plant_is_seen() {
-    let mut rolling = Rolling::with_plants(&[true, true, false, false, true, false]);
+    let mut rolling = with_plants(&[true, true, false, false, true, false]);
     rolling.roll_to(1200.0, 400.0);
-    rolling.machine.turn(readings(rolling.time_us, (1200.0 * TICKS_A_MM) as i32), [Edge::Lost { broken: false }]);
+    rolling.lose_edges();
     assert_eq!(rolling.machine.state(), State::Alarm(Alarm::BeamEdgesLost));
     rolling.machine.clear();
     rolling.machine.start(false).unwrap();
@@ -205,7 +158,7 @@ fn a_plant_that_is_due_keeps_the_tool_out_before_it_is_clear_whether_it_is_seen(
         (Setting::BeamToToolMm, 100),
         (Setting::GuardScatterMm, 60),
     ];
-    let mut rolling = Rolling::along(vec![canopy(500.0)], &settings);
+    let mut rolling = guarding(vec![canopy(500.0)], &settings);
     rolling.roll_to(1200.0, 80.0);
     let nearer_mm = BEAM_TO_TOOL_MM - 100.0;
     let weeded = |place_mm: f64| rolling.has_weeded(place_mm - nearer_mm - 1.0, place_mm - nearer_mm + 1.0);
@@ -226,7 +179,7 @@ proptest! {
             (f64::from(place) * SPACING_MM + off_mm, seen || place == 1)
         }).collect();
         let seen_mm = middles.iter().filter(|(_, seen)| *seen).map(|&(middle_mm, _)| canopy(middle_mm)).collect();
-        let mut rolling = Rolling::along(seen_mm, &[]);
+        let mut rolling = guarding(seen_mm, &[]);
         let end_mm = (middles.len() as f64 + 0.8) * SPACING_MM;
         rolling.roll_to(0.6 * end_mm, speed_mm_s);
         rolling.roll_to(0.6 * end_mm - back_mm, speed_mm_s);
@@ -236,7 +189,7 @@ proptest! {
             unseen = if seen { 0 } else { unseen + 1 };
             let half_mm = MARGIN_MM - TOLERANCE_MM - speed_mm_s / 100.0;
             let is_weeded = rolling.has_weeded(middle_mm - half_mm, middle_mm + half_mm);
-            prop_assert!(!is_weeded || unseen > 3, "the plant at {middle_mm}, {:?}", rolling.guarded_mm);
+            prop_assert!(!is_weeded || unseen > 3, "the plant at {middle_mm}, {:?}", rolling.guarded_mm());
         }
     }
 }

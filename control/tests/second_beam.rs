@@ -1,102 +1,45 @@
 //! A second beam: a wheel that slips, a wire that is torn, and what only one of the beams has seen.
 
 mod common;
+#[path = "common/rolling.rs"]
+mod rolling;
 
-use common::{Machine, machine, readings};
-use control::{
-    alarm::Alarm,
-    measure::readings::Edge,
-    operate::{event::Event, state::State},
-    settings::Setting,
-    units::Position,
-};
+use common::machine;
+use control::{alarm::Alarm, operate::event::Event, operate::state::State, settings::Setting};
 use proptest::prelude::*;
+use rolling::{MARGIN_MM, Rolling, SECOND_BEAM_MM};
 
-/// Ticks a millimetre of the default wheel, where it does not slip.
-const TICKS_A_MM: f64 = 1.90986;
+/// A machine at work along plants, from and to, that both beams see.
+fn along(plants_mm: &[(f64, f64)]) -> Rolling {
+    with_beams(plants_mm.to_vec(), plants_mm.to_vec())
+}
 
-/// A turn of the main loop.
-const TURN_US: u64 = 500;
-
-const BEAM_TO_TOOL_MM: f64 = 400.0;
-const SECOND_BEAM_MM: f64 = 200.0;
-const MARGIN_MM: f64 = 50.0;
-
-/// A machine at work along a row.
-struct Rolling {
-    machine: Machine,
-    time_us: u64,
-    /// The ground below the first beam, and what the wheel has turned.
-    place_mm: f64,
-    wheel_mm: f64,
-    /// What the wheel turns for a millimetre of ground.
-    turns: f64,
-    /// What each of the beams sees, from and to.
-    first_mm: Vec<(f64, f64)>,
-    second_mm: Vec<(f64, f64)>,
-    levels: (bool, bool),
-    /// Places where the tool was in the row.
-    weeded_mm: Vec<f64>,
-    alarms: Vec<(Alarm, f64)>,
-    slips: Vec<i16>,
+fn with_beams(first_mm: Vec<(f64, f64)>, second_mm: Vec<(f64, f64)>) -> Rolling {
+    Rolling::along(first_mm, second_mm, &[(Setting::SecondBeamMm, SECOND_BEAM_MM as u16)])
 }
 
 impl Rolling {
-    fn along(plants_mm: &[(f64, f64)]) -> Self {
-        Self::with_beams(plants_mm.to_vec(), plants_mm.to_vec())
-    }
-
-    fn with_beams(first_mm: Vec<(f64, f64)>, second_mm: Vec<(f64, f64)>) -> Self {
-        let mut machine = machine();
-        machine.set(Setting::SecondBeamMm, SECOND_BEAM_MM as u16).unwrap();
-        machine.set(Setting::BeamResponseMs, 0).unwrap();
-        machine.tell_events(true);
-        machine.start(true).unwrap();
-        Self {
-            machine,
-            time_us: 0,
-            place_mm: 0.0,
-            wheel_mm: 0.0,
-            turns: 1.0,
-            first_mm,
-            second_mm,
-            levels: (false, false),
-            weeded_mm: Vec::new(),
-            alarms: Vec::new(),
-            slips: Vec::new(),
-        }
-    }
-
     /// Rolls on with a wheel that slips by so many percent.
     fn slipping(mut self, percent: f64) -> Self {
         self.turns = 1.0 / (1.0 - percent / 100.0);
         self
     }
 
-    fn roll_to(&mut self, to_mm: f64, speed_mm_s: f64) {
-        let step_mm = (to_mm - self.place_mm).signum() * speed_mm_s * TURN_US as f64 / 1e6;
-        while (to_mm - self.place_mm) * step_mm > 0.0 {
-            self.place_mm += step_mm;
-            self.wheel_mm += step_mm * self.turns;
-            self.time_us += TURN_US;
-            let position = (self.wheel_mm * TICKS_A_MM).floor() as i32;
-            let is_in = |seen: &[(f64, f64)], place| seen.iter().any(|&(from, to)| (from..to).contains(&place));
-            let levels = (is_in(&self.first_mm, self.place_mm), is_in(&self.second_mm, self.place_mm - SECOND_BEAM_MM));
-            let (broken, second_broken) = levels;
-            let edge = Edge::Seen { position: Position::new(position), broken, second_broken };
-            let edges = (levels != std::mem::replace(&mut self.levels, levels)).then_some(edge);
-            self.machine.turn(readings(self.time_us, position), edges);
-            if !self.machine.tool_out() {
-                self.weeded_mm.push(self.place_mm - BEAM_TO_TOOL_MM);
-            }
-            while let Some(event) = self.machine.next_event() {
-                match event {
-                    Event::Alarm { alarm, .. } => self.alarms.push((alarm, self.place_mm)),
-                    Event::Slip { permille } => self.slips.push(permille),
-                    _ => {}
-                }
-            }
-        }
+    /// The alarms, and the ground below the first beam when each came.
+    fn alarms(&self) -> Vec<(Alarm, f64)> {
+        let alarm = |&(event, place_mm): &(Event, f64)| match event {
+            Event::Alarm { alarm, .. } => Some((alarm, place_mm)),
+            _ => None,
+        };
+        self.told.iter().filter_map(alarm).collect()
+    }
+
+    /// The slips that were told, in thousandths.
+    fn slips(&self) -> Vec<i16> {
+        self.told_of(|event| match event {
+            Event::Slip { permille } => Some(permille),
+            _ => None,
+        })
     }
 
     /// By how much of its margin each of these plants was left alone, on both sides.
@@ -115,9 +58,9 @@ fn plants(count: usize) -> Vec<(f64, f64)> {
 fn a_wheel_that_slips_costs_no_margin_behind_the_second_plant() {
     for percent in [-30.0, -10.0, 5.0, 10.0, 30.0] {
         let plants = plants(12);
-        let mut rolling = Rolling::along(&plants).slipping(percent);
+        let mut rolling = along(&plants).slipping(percent);
         rolling.roll_to(7000.0, 500.0);
-        assert_eq!((&rolling.alarms[..], rolling.machine.state()), (&[][..], State::Work), "{percent} %");
+        assert_eq!((&rolling.alarms()[..], rolling.machine.state()), (&[][..], State::Work), "{percent} %");
         let slip = rolling.machine.slip_permille().expect("plants have told it");
         assert!((f64::from(slip) - 10.0 * percent).abs() < 6.0, "{slip} for {percent} %");
         let before = plants[3..].iter().map(|&(from, _)| {
@@ -135,21 +78,21 @@ fn a_wheel_that_slips_costs_no_margin_behind_the_second_plant() {
 
 #[test]
 fn without_a_second_beam_nothing_is_measured() {
-    let mut rolling = Rolling::along(&plants(6)).slipping(10.0);
+    let mut rolling = along(&plants(6)).slipping(10.0);
     rolling.machine.hold();
     rolling.machine.set(Setting::SecondBeamMm, 0).unwrap();
     rolling.machine.start(true).unwrap();
     rolling.roll_to(4000.0, 500.0);
-    assert_eq!((rolling.slips.len(), rolling.machine.slip_permille(), rolling.alarms.len()), (0, None, 0));
+    assert_eq!((rolling.slips().len(), rolling.machine.slip_permille(), rolling.alarms().len()), (0, None, 0));
     assert!(!rolling.machine.has_second_beam());
 }
 
 #[test]
 fn a_torn_wire_of_the_second_beam_is_an_alarm_within_three_plants() {
     let plants = plants(12);
-    let mut rolling = Rolling::with_beams(plants.clone(), plants[..5].to_vec());
+    let mut rolling = with_beams(plants.clone(), plants[..5].to_vec());
     rolling.roll_to(6000.0, 500.0);
-    let &[(Alarm::SecondBeamBlind, place_mm)] = &rolling.alarms[..] else { panic!("{:?}", rolling.alarms) };
+    let &[(Alarm::SecondBeamBlind, place_mm)] = &rolling.alarms()[..] else { panic!("{:?}", rolling.told) };
     // The third plant that it missed has passed it, and the next one has not come to the first.
     assert!(plants[7].1 + SECOND_BEAM_MM < place_mm && place_mm < plants[8].0 + SECOND_BEAM_MM, "{place_mm}");
 }
@@ -157,9 +100,9 @@ fn a_torn_wire_of_the_second_beam_is_an_alarm_within_three_plants() {
 #[test]
 fn a_torn_wire_of_the_first_beam_is_an_alarm_within_three_plants_and_costs_none() {
     let plants = plants(12);
-    let mut rolling = Rolling::with_beams(plants[..5].to_vec(), plants.clone());
+    let mut rolling = with_beams(plants[..5].to_vec(), plants.clone());
     rolling.roll_to(6000.0, 500.0);
-    let &[(Alarm::BeamBlind, place_mm)] = &rolling.alarms[..] else { panic!("{:?}", rolling.alarms) };
+    let &[(Alarm::BeamBlind, place_mm)] = &rolling.alarms()[..] else { panic!("{:?}", rolling.told) };
     assert!(plants[7].1 + SECOND_BEAM_MM < place_mm && place_mm < plants[8].0 + SECOND_BEAM_MM, "{place_mm}");
     assert!(rolling.least_margin_mm(&plants[..8]) > 0.0, "the second beam's sight keeps them");
     assert!(rolling.weeded_mm.iter().any(|&place| place > plants[6].1), "and the tool works in between");
@@ -172,31 +115,30 @@ fn an_insect_in_one_beam_is_no_alarm_and_half_a_plant_moves_nothing() {
     let mut second: Vec<(f64, f64)> = plants.iter().copied().chain(insects(150.0)).collect();
     second[6].0 += 100.0;
     let first = plants.iter().copied().chain(insects(100.0)).collect();
-    let mut rolling = Rolling::with_beams(first, second).slipping(10.0);
+    let mut rolling = with_beams(first, second).slipping(10.0);
     rolling.roll_to(5500.0, 500.0);
-    assert_eq!(rolling.alarms, []);
-    assert!(rolling.slips.iter().all(|slip| (94..=106).contains(slip)), "{:?}", rolling.slips);
+    assert_eq!(rolling.alarms(), []);
+    assert!(rolling.slips().iter().all(|slip| (94..=106).contains(slip)), "{:?}", rolling.slips());
 }
 
 #[test]
 fn an_alarm_drops_what_was_measured_and_two_plants_tell_it_again() {
-    let mut rolling = Rolling::along(&plants(12)).slipping(10.0);
+    let mut rolling = along(&plants(12)).slipping(10.0);
     rolling.roll_to(2500.0, 500.0);
     assert!(rolling.machine.slip_permille().is_some());
-    let lost = Edge::Lost { broken: rolling.levels.0 };
-    rolling.machine.turn(readings(rolling.time_us, (rolling.wheel_mm * TICKS_A_MM) as i32), [lost]);
+    rolling.lose_edges();
     assert_eq!(rolling.machine.slip_permille(), None);
     rolling.machine.clear();
     rolling.machine.start(false).unwrap();
     rolling.roll_to(4500.0, 500.0);
     assert!(rolling.machine.slip_permille().is_some_and(|slip| (94..=106).contains(&slip)));
-    assert_eq!(rolling.alarms.iter().map(|&(alarm, _)| alarm).collect::<Vec<_>>(), [Alarm::BeamEdgesLost]);
+    assert_eq!(rolling.alarms().iter().map(|&(alarm, _)| alarm).collect::<Vec<_>>(), [Alarm::BeamEdgesLost]);
 }
 
 #[test]
 fn another_wheel_or_another_place_of_a_beam_drops_what_was_measured_while_the_machine_holds() {
     for (setting, value) in [(Setting::TicksPerM, 2100), (Setting::SecondBeamMm, 180), (Setting::BeamToToolMm, 420)] {
-        let mut rolling = Rolling::along(&plants(12)).slipping(10.0);
+        let mut rolling = along(&plants(12)).slipping(10.0);
         rolling.roll_to(2500.0, 500.0);
         rolling.machine.hold();
         rolling.machine.set(setting, value).unwrap();
@@ -207,17 +149,17 @@ fn another_wheel_or_another_place_of_a_beam_drops_what_was_measured_while_the_ma
 
 #[test]
 fn rolling_back_over_plants_measures_nothing_twice_and_is_no_alarm() {
-    let mut rolling = Rolling::along(&plants(8));
+    let mut rolling = along(&plants(8));
     rolling.roll_to(2600.0, 500.0);
-    let told = rolling.slips.len();
+    let told = rolling.slips().len();
     for _ in 0..3 {
         rolling.roll_to(900.0, 400.0);
         rolling.roll_to(2590.0, 400.0);
     }
-    assert_eq!((rolling.slips.len(), &rolling.alarms[..]), (told, &[][..]));
+    assert_eq!((rolling.slips().len(), &rolling.alarms()[..]), (told, &[][..]));
     rolling.roll_to(4500.0, 500.0);
-    assert_eq!(rolling.alarms, []);
-    assert!(rolling.slips.len() > told);
+    assert_eq!(rolling.alarms(), []);
+    assert!(rolling.slips().len() > told);
 }
 
 #[test]
@@ -252,12 +194,12 @@ proptest! {
             place_mm = from_mm + width_mm;
             (from_mm, place_mm)
         }).collect();
-        let mut rolling = Rolling::along(&plants);
+        let mut rolling = along(&plants);
         for (change, leg_mm) in changes {
             rolling = rolling.slipping(mean + change);
             rolling.roll_to(rolling.place_mm + leg_mm, speed_mm_s);
         }
-        prop_assert_eq!(&rolling.alarms, &[]);
+        prop_assert_eq!(&rolling.alarms(), &[]);
         prop_assert!(rolling.least_margin_mm(&plants[3..]) > 0.0, "{}", rolling.least_margin_mm(&plants[3..]));
     }
 }

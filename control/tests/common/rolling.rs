@@ -1,0 +1,103 @@
+//! A machine at work along a row: what each beam sees is given, and where the tool was in the row and what was told is kept.
+//!
+//! The wheel may slip. The tool is told apart in the row and out of it only: it swings in no time.
+
+use crate::common::{Machine, machine, readings};
+use control::{
+    measure::readings::{Edge, Readings},
+    operate::event::Event,
+    settings::Setting,
+};
+
+/// Ticks a millimetre of the default wheel, where it does not slip.
+pub const TICKS_A_MM: f64 = 1.90986;
+
+/// Where the tool is behind the first beam, and the second beam behind it.
+pub const BEAM_TO_TOOL_MM: f64 = 400.0;
+pub const SECOND_BEAM_MM: f64 = 200.0;
+
+/// What stays free on each side of a plant.
+pub const MARGIN_MM: f64 = 50.0;
+
+/// A turn of the main loop.
+const TURN_US: u64 = 500;
+
+/// A machine on its way.
+pub struct Rolling {
+    pub machine: Machine,
+    /// The ground below the first beam.
+    pub place_mm: f64,
+    /// What the wheel turns for a millimetre of ground.
+    pub turns: f64,
+    /// Places where the tool was in the row.
+    pub weeded_mm: Vec<f64>,
+    /// What the machine told, and the ground below the first beam then.
+    pub told: Vec<(Event, f64)>,
+    time_us: u64,
+    wheel_mm: f64,
+    /// What each of the beams sees, from and to.
+    first_mm: Vec<(f64, f64)>,
+    second_mm: Vec<(f64, f64)>,
+    levels: (bool, bool),
+}
+
+impl Rolling {
+    /// At work, with these settings, a beam that answers at once, and nothing known of the ground.
+    pub fn along(first_mm: Vec<(f64, f64)>, second_mm: Vec<(f64, f64)>, settings: &[(Setting, u16)]) -> Self {
+        let mut machine = machine();
+        for &(setting, value) in [(Setting::BeamResponseMs, 0)].iter().chain(settings) {
+            machine.set(setting, value).unwrap();
+        }
+        machine.tell_events(true);
+        machine.start(true).unwrap();
+        Self {
+            machine,
+            place_mm: 0.0,
+            turns: 1.0,
+            weeded_mm: Vec::new(),
+            told: Vec::new(),
+            time_us: 0,
+            wheel_mm: 0.0,
+            first_mm,
+            second_mm,
+            levels: (false, false),
+        }
+    }
+
+    /// Rolls to a place of the first beam.
+    pub fn roll_to(&mut self, to_mm: f64, speed_mm_s: f64) {
+        let step_mm = (to_mm - self.place_mm).signum() * speed_mm_s * TURN_US as f64 / 1e6;
+        while (to_mm - self.place_mm) * step_mm > 0.0 {
+            self.place_mm += step_mm;
+            self.wheel_mm += step_mm * self.turns;
+            self.time_us += TURN_US;
+            let sees = |seen: &[(f64, f64)], place| seen.iter().any(|&(from, to)| (from..to).contains(&place));
+            let levels = (sees(&self.first_mm, self.place_mm), sees(&self.second_mm, self.place_mm - SECOND_BEAM_MM));
+            let (broken, second_broken) = levels;
+            let now = self.readings();
+            let edge = Edge::Seen { position: now.position, broken, second_broken };
+            let edges = (levels != std::mem::replace(&mut self.levels, levels)).then_some(edge);
+            self.machine.turn(now, edges);
+            if !self.machine.tool_out() {
+                self.weeded_mm.push(self.place_mm - BEAM_TO_TOOL_MM);
+            }
+            while let Some(event) = self.machine.next_event() {
+                self.told.push((event, self.place_mm));
+            }
+        }
+    }
+
+    /// Some edges of the first beam are lost, which is an alarm.
+    pub fn lose_edges(&mut self) {
+        self.machine.turn(self.readings(), [Edge::Lost { broken: self.levels.0 }]);
+    }
+
+    /// What was told of a kind.
+    pub fn told_of<T>(&self, of: impl Fn(Event) -> Option<T>) -> Vec<T> {
+        self.told.iter().filter_map(|&(event, _)| of(event)).collect()
+    }
+
+    fn readings(&self) -> Readings {
+        readings(self.time_us, (self.wheel_mm * TICKS_A_MM).floor() as i32)
+    }
+}
