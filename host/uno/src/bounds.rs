@@ -29,12 +29,14 @@ mod effects;
 mod flow;
 mod loops;
 mod registers;
+mod values;
 
 pub use self::budget::{Budgets, BudgetsError, BudgetsProblem, Held};
 use self::cycles::{Stretch, Time, Timer, Turns};
 use self::decode::{Instruction, Operation};
-use self::flow::{Entry, Interrupts, Kind, Node, Program, Routine, bytes};
+use self::flow::{Entry, Kind, Node, Program, Routine, bytes};
 pub use self::loops::{LoopBound, LoopBounds};
+use self::values::Interrupts;
 use crate::elf::{Image, ImageError};
 use serde::{Deserialize, Serialize};
 use signal::CYCLES_PER_SECOND;

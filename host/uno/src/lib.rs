@@ -56,100 +56,30 @@ pub mod capture;
 mod core;
 mod eeprom;
 pub mod elf;
+mod error;
 pub mod hex;
 mod interrupts;
 pub mod pty;
 mod recorder;
+mod terminal;
 mod timer;
 mod turns;
 pub mod waveform;
 
+pub use self::error::UnoError;
 pub use self::interrupts::{HandlerCycles, InterruptStatistics, Place};
+pub use self::terminal::{BAUD, SENT_BYTE_CYCLES};
 pub use self::turns::Turns;
 pub use signal::{CYCLES_PER_SECOND, Pin, PinChange, Pulse, Wire};
 
 use self::core::{Core, Stop};
-use self::elf::{EEPROM_BYTES, Image, ImageError, Size, Variable};
-use self::hex::{Bootloader, HexError};
+use self::elf::{EEPROM_BYTES, Image, Size, Variable};
+use self::hex::Bootloader;
+use self::terminal::Terminal;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::collections::VecDeque;
 use std::path::Path;
-
-/// Bits in a second at which a terminal sends, until it is told to follow the chip.
-pub const BAUD: u64 = 115_200;
-
-/// Cycles of a byte that a terminal sends: a start bit, eight data bits and a stop bit.
-pub const SENT_BYTE_CYCLES: u64 = (10 * CYCLES_PER_SECOND + BAUD / 2) / BAUD;
-
-/// Why a virtual Uno could not start, or stopped.
-#[derive(Debug, thiserror::Error)]
-pub enum UnoError {
-    /// The ELF cannot be run.
-    #[error(transparent)]
-    Image(#[from] ImageError),
-    /// The firmware reaches into the bootloader.
-    #[error(transparent)]
-    Hex(#[from] HexError),
-    /// The EEPROM content does not fit.
-    #[error("{0} bytes of EEPROM content were given: the ATmega328P holds {EEPROM_BYTES}")]
-    EepromTooLarge(usize),
-    /// The firmware met an instruction that does not exist, or ran past the end of its flash.
-    #[error("the firmware crashed at cycle {cycle}, address {program_counter:#06x} of flash")]
-    Crashed {
-        /// When.
-        cycle: u64,
-        /// Where, in bytes.
-        program_counter: u32,
-    },
-    /// The firmware sleeps with interrupts off, so that nothing but a reset can wake it.
-    #[error(
-        "the firmware halted at cycle {cycle}, address {program_counter:#06x} of flash: it sleeps with interrupts off"
-    )]
-    Halted {
-        /// When.
-        cycle: u64,
-        /// Where, in bytes.
-        program_counter: u32,
-    },
-    /// The ELF has no such symbol, or the bytes do not fit into it.
-    #[error("the firmware has no variable `{symbol}` of at least {length} bytes: give its path from the crate on")]
-    NoVariable {
-        /// The symbol asked for.
-        symbol: String,
-        /// Bytes that were to be put into it.
-        length: usize,
-    },
-    /// The bytes do not fit into SRAM.
-    #[error("{length} bytes from {address:#06x} do not fit into SRAM, which is from 0x0100 to 0x08ff")]
-    NotInSram {
-        /// Where the first was to go.
-        address: u16,
-        /// How many there were.
-        length: usize,
-    },
-    /// The ELF has no such function.
-    #[error("the firmware has no function `{0}`: give its path from the crate on")]
-    NoFunction(String),
-    /// The firmware did not come to a function.
-    #[error("the firmware did not come to `{symbol}` within {timeout_cycles} cycles")]
-    NotReached {
-        /// The function.
-        symbol: String,
-        /// How long it was waited for.
-        timeout_cycles: u64,
-    },
-    /// A text that was waited for did not come.
-    #[error("the firmware did not send {text:?} within {timeout_cycles} cycles; it sent {received:?}")]
-    NoAnswer {
-        /// What was waited for.
-        text: String,
-        /// How long.
-        timeout_cycles: u64,
-        /// What came instead; it can still be taken by [`Uno::received`].
-        received: String,
-    },
-}
 
 /// Why the chip started anew.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -190,12 +120,7 @@ pub struct Uno {
     reset_address: u16,
     /// Levels to come, by cycle.
     to_drive: VecDeque<PinChange>,
-    /// Bytes to come, and when the first one's stop bit ends.
-    to_send: VecDeque<u8>,
-    next_byte_ends: u64,
-    /// Whether bytes come at the chip's own baud rate, not at [`BAUD`].
-    follows_baud: bool,
-    lost_bytes: u64,
+    terminal: Terminal,
 }
 
 impl Uno {
@@ -245,10 +170,7 @@ impl Uno {
             image,
             reset_address,
             to_drive: VecDeque::new(),
-            to_send: VecDeque::new(),
-            next_byte_ends: 0,
-            follows_baud: false,
-            lost_bytes: 0,
+            terminal: Terminal::default(),
         }
     }
 
@@ -446,17 +368,9 @@ impl Uno {
         while let Some(change) = self.to_drive.pop_front_if(|change| change.cycle <= self.core.cycle()) {
             self.core.set_input(change.pin, change.high);
         }
-        while !self.to_send.is_empty() && self.next_byte_ends <= self.cycle() {
-            if let Some(byte) = self.to_send.pop_front()
-                && !self.core.receive(byte)
-            {
-                self.lost_bytes += 1;
-            }
-            self.next_byte_ends += self.sent_byte_cycles();
-        }
+        self.terminal.send_what_is_due(&mut self.core);
         let next_level = self.to_drive.front().map(|change| change.cycle);
-        let next_byte = (!self.to_send.is_empty()).then_some(self.next_byte_ends);
-        let until = [next_level, next_byte].into_iter().flatten().fold(until, u64::min);
+        let until = [next_level, self.terminal.next_byte_ends()].into_iter().flatten().fold(until, u64::min);
         self.core.step(until).map_err(|stop| {
             let (cycle, program_counter) = (self.core.cycle(), self.core.program_counter());
             match stop {
@@ -468,25 +382,18 @@ impl Uno {
 
     /// Types bytes into the serial line, at the pace of the line and behind those that are still on their way.
     pub fn send(&mut self, bytes: &[u8]) {
-        if self.to_send.is_empty() {
-            self.next_byte_ends = self.next_byte_ends.max(self.cycle() + self.sent_byte_cycles());
-        }
-        self.to_send.extend(bytes);
+        self.terminal.send(bytes, &self.core);
     }
 
     /// From now on sent bytes come at the rate that the chip's UART is set to, whichever that is, and not at [`BAUD`]: a
     /// bootloader has a rate of its own.
     pub fn follow_baud(&mut self) {
-        self.follows_baud = true;
-    }
-
-    fn sent_byte_cycles(&self) -> u64 {
-        if self.follows_baud { self.core.byte_cycles() } else { SENT_BYTE_CYCLES }
+        self.terminal.follow_baud();
     }
 
     /// Sent bytes that are still on their way to the receiver.
     pub fn bytes_on_their_way(&self) -> usize {
-        self.to_send.len()
+        self.terminal.bytes_on_their_way()
     }
 
     /// Pushes up to 63 bytes into the receiver at once, faster than any line could: simavr keeps them and hands them out one
@@ -499,7 +406,7 @@ impl Uno {
 
     /// Sent bytes that the receiver had no room for, because the firmware did not read in time.
     pub fn lost_bytes(&self) -> u64 {
-        self.lost_bytes
+        self.terminal.lost_bytes()
     }
 
     /// Takes the bytes that have come from the firmware, with their cycles.

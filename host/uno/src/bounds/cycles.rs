@@ -7,7 +7,8 @@
 //!
 //! Paths that never come to an end are left out: a loop that waits for the watchdog's reset is not the longest time of anything.
 
-use super::flow::{Interrupts, Node, Routine, Way};
+use super::flow::{Node, Routine, Way};
+use super::values::Interrupts;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The longest time of something.

@@ -4,8 +4,7 @@
 //! reset. From its entry every path is followed to its ends. A place on a path is an address together with the bytes that lie on
 //! the stack there and the state of the interrupts; so a stack that differs between two paths to one address is two places,
 //! and one that grows in a loop never ends, which is found. For every place it is known what the registers hold, as far as it
-//! matters: bytes of a stack pointer, a saved status register, or what the caller left there. What a call leaves of them is
-//! worked out from the function that is called, not from a convention.
+//! matters (`values`). What a call leaves of them is worked out from the function that is called, not from a convention.
 //!
 //! A jump into another function, as compilers make of a call at the end, is followed like any jump. The reset vector's address
 //! is where a program starts anew, so a path ends there.
@@ -15,42 +14,18 @@
 
 use super::decode::Instruction;
 use super::decode::Operation::*;
+use super::values::{DEEPEST, Doubt, INTERRUPT_FLAG, Interrupts, Known, Value};
 use super::{BoundsError, Frame};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::rc::Rc;
 
-/// The last address of SRAM, where the stack pointer stands after a reset (data sheet, stack pointer).
-const SRAM_LAST: u16 = 0x08FF;
-
-/// More than there is SRAM for: a stack so deep grows without an end.
-const DEEPEST: usize = 2048;
-
-// Registers by their address in the data space (data sheet, register summary).
-const GPIOR: [u16; 3] = [0x3E, 0x4A, 0x4B];
+/// EECR by its address in the data space, its bits that start to read and to write (data sheet, section 8.6.3), and for how many cycles the
+/// core then stands still.
 const EECR: u16 = 0x3F;
-const SPL: u16 = 0x5D;
-const SPH: u16 = 0x5E;
-const SREG: u16 = 0x5F;
-
-/// SREG's bit of the interrupts.
-const INTERRUPT_FLAG: u16 = 7;
-
-/// EECR: start to read, and to write (data sheet, section 8.6.3), and for how many cycles the core then stands still.
 const EERE: u16 = 0;
 const EEPE: u16 = 1;
 const READ_HALT_CYCLES: u32 = 4;
 const WRITE_HALT_CYCLES: u32 = 2;
-
-/// Whether an interrupt can come in before an instruction.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub(super) enum Interrupts {
-    /// The flag is clear.
-    Off,
-    /// The flag has just been set: the instruction that follows is still carried out (data sheet, section 7.7).
-    Soon,
-    /// The flag is set.
-    On,
-}
 
 /// How a routine is entered, and so how it has to end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -69,66 +44,6 @@ pub(super) struct Entry {
     pub(super) address: u32,
     pub(super) interrupts: Interrupts,
     pub(super) kind: Kind,
-}
-
-/// What a register holds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Value {
-    Unknown,
-    Constant(u8),
-    /// What this register held at the routine's entry.
-    AtEntry(usize),
-    /// The lower byte of the stack pointer at the entry less so many, modulo 256.
-    StackLow(u8),
-    /// The upper byte of the stack pointer at the entry less so many.
-    StackHigh(i32),
-    /// The status register, with interrupts on or off.
-    Status(bool),
-}
-
-/// What is known at a place.
-#[derive(Clone, Debug, PartialEq)]
-struct Known {
-    registers: [Value; 32],
-    /// The general purpose I/O registers, which some handlers keep the status register in.
-    kept: [Value; 3],
-    /// What lies on the stack, from the entry on.
-    stack: Vec<Value>,
-    /// A constant has just been subtracted from the lower byte of a stack pointer that had so many subtracted already, and the carry
-    /// is still that subtraction's.
-    borrow: Option<(u8, u8)>,
-    /// The stack pointer's upper byte has been written, and the lower one not yet.
-    upper_half: Option<Value>,
-}
-
-impl Known {
-    fn at_entry() -> Known {
-        Known {
-            registers: std::array::from_fn(Value::AtEntry),
-            kept: [Value::Unknown; 3],
-            stack: Vec::new(),
-            borrow: None,
-            upper_half: None,
-        }
-    }
-
-    /// Leaves what both know; whether that is less than before.
-    fn meet(&mut self, other: &Known) -> bool {
-        let before = self.clone();
-        let pairs = (self.registers.iter_mut().zip(&other.registers))
-            .chain(self.kept.iter_mut().zip(&other.kept))
-            .chain(self.stack.iter_mut().zip(&other.stack));
-        for (mine, _) in pairs.filter(|(mine, theirs)| mine != theirs) {
-            *mine = Value::Unknown;
-        }
-        if self.borrow != other.borrow {
-            self.borrow = None;
-        }
-        if self.upper_half != other.upper_half {
-            self.upper_half = Some(Value::Unknown);
-        }
-        *self != before
-    }
 }
 
 /// A place on a path.
@@ -463,7 +378,14 @@ impl<'p, 'a> Follower<'p, 'a> {
             }
             _ => {
                 let before = interrupts;
-                self.carry_out(&instruction, place, &mut known, &mut interrupts)?;
+                let is_start_up = self.entry.kind == Kind::Reset;
+                known.carry_out(&instruction, place.interrupts, &mut interrupts, is_start_up).map_err(|doubt| {
+                    match doubt {
+                        Doubt::TakesTooMuch => BoundsError::TakesTooMuch { address: at, function: function() },
+                        Doubt::Stack => BoundsError::UnknownStack { address: at, function: function() },
+                        Doubt::Status => BoundsError::UnknownStatus { address: at, function: function() },
+                    }
+                })?;
                 if before == Interrupts::Off
                     && interrupts != Interrupts::Off
                     && self.entry.interrupts == Interrupts::Off
@@ -475,131 +397,6 @@ impl<'p, 'a> Follower<'p, 'a> {
         }
         Ok(step)
     }
-
-    /// Carries an instruction out that leads to the one behind it.
-    fn carry_out(
-        &self,
-        instruction: &Instruction,
-        place: Place,
-        known: &mut Known,
-        interrupts: &mut Interrupts,
-    ) -> Result<(), BoundsError> {
-        use Value::{Constant, StackHigh, StackLow, Status, Unknown};
-
-        let address = place.address;
-        let function = || self.program.name(address);
-        let (d, r) = (instruction.destination(), instruction.source());
-        match instruction.operation {
-            Bset if instruction.operand('s') == INTERRUPT_FLAG => turn(interrupts, true),
-            Bclr if instruction.operand('s') == INTERRUPT_FLAG => turn(interrupts, false),
-            Push => known.stack.push(known.registers[r]),
-            Pop => {
-                let unknown_stack = || BoundsError::TakesTooMuch { address, function: function() };
-                known.registers[d] = known.stack.pop().ok_or_else(unknown_stack)?;
-            }
-            Mov => known.registers[d] = known.registers[r],
-            Movw => {
-                known.registers[d] = known.registers[r];
-                known.registers[d + 1] = known.registers[r + 1];
-            }
-            Ldi => known.registers[d] = Constant(instruction.constant()),
-            Eor | Sub if d == r => known.registers[d] = Constant(0),
-            Adiw | Sbiw => {
-                let constant = i32::from(instruction.constant());
-                let constant = if instruction.operation == Sbiw { constant } else { -constant };
-                let (low, high) = match (known.registers[d], known.registers[d + 1]) {
-                    (StackLow(low), StackHigh(high)) if low == high as u8 => {
-                        (StackLow((high + constant) as u8), StackHigh(high + constant))
-                    }
-                    _ => (Unknown, Unknown),
-                };
-                (known.registers[d], known.registers[d + 1]) = (low, high);
-            }
-            Subi => {
-                let constant = instruction.constant();
-                (known.registers[d], known.borrow) = match known.registers[d] {
-                    StackLow(low) => (StackLow(low.wrapping_add(constant)), Some((low, constant))),
-                    _ => (Unknown, None),
-                };
-            }
-            Sbci => {
-                known.registers[d] = match (known.registers[d], known.borrow.take()) {
-                    (StackHigh(high), Some((low, subtracted))) if low == high as u8 => {
-                        let constant = u16::from_be_bytes([instruction.constant(), subtracted]) as i16;
-                        StackHigh(high + i32::from(constant))
-                    }
-                    _ => Unknown,
-                };
-            }
-            In | Lds => {
-                let depth = place.depth as i32;
-                known.registers[d] = match instruction.data_address() {
-                    Some(SPL) => StackLow(depth as u8),
-                    Some(SPH) => StackHigh(depth),
-                    Some(SREG) => Status(place.interrupts != Interrupts::Off),
-                    from => {
-                        GPIOR.iter().position(|gpior| Some(*gpior) == from).map_or(Unknown, |kept| known.kept[kept])
-                    }
-                };
-            }
-            Out | Sts => {
-                let value = known.registers[r];
-                match instruction.data_address() {
-                    Some(SREG) => match value {
-                        Status(on) => turn(interrupts, on),
-                        Constant(status) => turn(interrupts, status >> INTERRUPT_FLAG & 1 == 1),
-                        _ => return Err(BoundsError::UnknownStatus { address, function: function() }),
-                    },
-                    Some(SPH) => known.upper_half = Some(value),
-                    Some(SPL) => {
-                        let depth = match (known.upper_half.take(), value) {
-                            (Some(StackHigh(high)), StackLow(low)) if low == high as u8 => usize::try_from(high).ok(),
-                            // The start-up code says what the reset has done already.
-                            (Some(Constant(high)), Constant(low)) if self.entry.kind == Kind::Reset => {
-                                SRAM_LAST.checked_sub(u16::from_be_bytes([high, low])).map(usize::from)
-                            }
-                            _ => None,
-                        };
-                        let depth = depth.ok_or_else(|| BoundsError::UnknownStack { address, function: function() })?;
-                        known.stack.resize(depth.min(DEEPEST + 1), Unknown);
-                    }
-                    to => {
-                        if let Some(kept) = GPIOR.iter().position(|gpior| Some(*gpior) == to) {
-                            known.kept[kept] = value;
-                        }
-                    }
-                }
-            }
-            Sbi | Cbi => {
-                let to = instruction.data_address();
-                if let Some(kept) = GPIOR.iter().position(|gpior| Some(*gpior) == to) {
-                    known.kept[kept] = Unknown;
-                }
-            }
-            Mul | Muls | Mulsu | Fmul | Fmuls | Fmulsu => known.registers[..2].fill(Unknown),
-            Ld | Ldd | Lpm | St | Std => {
-                if matches!(instruction.operation, Ld | Ldd | Lpm) {
-                    known.registers[d] = Unknown;
-                }
-                // The pointer goes on, or back: whichever of them it is.
-                if let Some(pointer) = instruction.moved_pointer() {
-                    known.registers[pointer..pointer + 2].fill(Unknown);
-                }
-            }
-            Cp | Cpc | Cpi | Bst | Nop | Wdr | Bset | Bclr => {}
-            _ => known.registers[d] = Unknown,
-        }
-        Ok(())
-    }
-}
-
-/// Sets the interrupt flag, or clears it.
-fn turn(interrupts: &mut Interrupts, on: bool) {
-    *interrupts = match (on, *interrupts) {
-        (false, _) => Interrupts::Off,
-        (true, Interrupts::Off) => Interrupts::Soon,
-        (true, already) => already,
-    };
 }
 
 /// Cycles for which the core stands still behind an instruction, because of the EEPROM (data sheet, section 8.6.3). A write of the whole register may

@@ -40,7 +40,8 @@
 use super::decode::Instruction;
 use super::decode::Operation::*;
 use super::effects::Registers;
-use super::flow::{Interrupts, Kind, Node, Place, Program, Routine};
+use super::flow::{Kind, Node, Place, Program, Routine};
+use super::values::Interrupts;
 use super::{BoundsError, Lasting, Spoilt};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::RangeInclusive;

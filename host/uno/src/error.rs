@@ -1,0 +1,73 @@
+//! Why a virtual Uno could not start, stopped, or did not come to what was waited for.
+
+use crate::elf::{EEPROM_BYTES, ImageError};
+use crate::hex::HexError;
+
+/// Why a virtual Uno could not start, or stopped.
+#[derive(Debug, thiserror::Error)]
+pub enum UnoError {
+    /// The ELF cannot be run.
+    #[error(transparent)]
+    Image(#[from] ImageError),
+    /// The firmware reaches into the bootloader.
+    #[error(transparent)]
+    Hex(#[from] HexError),
+    /// The EEPROM content does not fit.
+    #[error("{0} bytes of EEPROM content were given: the ATmega328P holds {EEPROM_BYTES}")]
+    EepromTooLarge(usize),
+    /// The firmware met an instruction that does not exist, or ran past the end of its flash.
+    #[error("the firmware crashed at cycle {cycle}, address {program_counter:#06x} of flash")]
+    Crashed {
+        /// When.
+        cycle: u64,
+        /// Where, in bytes.
+        program_counter: u32,
+    },
+    /// The firmware sleeps with interrupts off, so that nothing but a reset can wake it.
+    #[error(
+        "the firmware halted at cycle {cycle}, address {program_counter:#06x} of flash: it sleeps with interrupts off"
+    )]
+    Halted {
+        /// When.
+        cycle: u64,
+        /// Where, in bytes.
+        program_counter: u32,
+    },
+    /// The ELF has no such symbol, or the bytes do not fit into it.
+    #[error("the firmware has no variable `{symbol}` of at least {length} bytes: give its path from the crate on")]
+    NoVariable {
+        /// The symbol asked for.
+        symbol: String,
+        /// Bytes that were to be put into it.
+        length: usize,
+    },
+    /// The bytes do not fit into SRAM.
+    #[error("{length} bytes from {address:#06x} do not fit into SRAM, which is from 0x0100 to 0x08ff")]
+    NotInSram {
+        /// Where the first was to go.
+        address: u16,
+        /// How many there were.
+        length: usize,
+    },
+    /// The ELF has no such function.
+    #[error("the firmware has no function `{0}`: give its path from the crate on")]
+    NoFunction(String),
+    /// The firmware did not come to a function.
+    #[error("the firmware did not come to `{symbol}` within {timeout_cycles} cycles")]
+    NotReached {
+        /// The function.
+        symbol: String,
+        /// How long it was waited for.
+        timeout_cycles: u64,
+    },
+    /// A text that was waited for did not come.
+    #[error("the firmware did not send {text:?} within {timeout_cycles} cycles; it sent {received:?}")]
+    NoAnswer {
+        /// What was waited for.
+        text: String,
+        /// How long.
+        timeout_cycles: u64,
+        /// What came instead; it can still be taken by [`Uno::received`](crate::Uno::received).
+        received: String,
+    },
+}
