@@ -1,14 +1,21 @@
 //! A machine on a row that never ends, with the model beside it; every turn is checked.
 //!
 //! The ground is counted in ticks of the encoder. What the machine is, the decisions alone or the firmware in an Uno, is behind the
-//! trait [`Machine`]. What can be seen only in the decisions is checked only there.
+//! trait [`Machine`]. What can be seen only in the decisions is checked only there. This file has things happen and rolls the machine;
+//! `checks` holds what the tool does against the model, `console` types lines and follows what they change.
+
+mod checks;
+mod console;
+
+pub use console::is_end;
 
 use crate::{
-    machine::{Attended, Checked, Machine, World},
+    machine::{Checked, Machine, World},
     model::{Model, Run},
     speeds::Speeds,
     walk::{Beginning, Happening, TICKS_A_MM, Walk},
 };
+use checks::Place;
 use control::{
     alarm::Alarm,
     ground::class::Listed,
@@ -16,16 +23,11 @@ use control::{
     operate::state::State,
     settings::{Setting, Settings},
     units::Grain,
-    weeder::Reason,
 };
 use proptest::prelude::*;
 
 /// The grain of the measured speed: that of a tick in 10 ms, twice.
 const GRAIN_OF_SPEED: f64 = 200.0;
-
-/// At a steady speed, the measured one is right after this time, if it is no slower than this.
-const STEADY_US: u64 = 1_200_000;
-const STEADY_SPEED: f64 = 60.0;
 
 /// The end switch follows the tool by this.
 const SWITCH_DELAY_US: u64 = 60_000;
@@ -33,25 +35,11 @@ const SWITCH_DELAY_US: u64 = 60_000;
 /// So many ticks behind the row, no monitor counts what stood there.
 const BEHIND_THE_ROW: i64 = 500;
 
-/// Turns in which every line is answered, whatever is still to be written to the EEPROM.
-const PATIENCE: u32 = 20_000;
-
 /// As a machine that is not open is asked for its state on the way back to work.
 const ASKED_EVERY_US: u64 = 300_000;
 
-/// A short line is carried out and answered within this.
-const ANSWERED_S: f64 = 0.05;
-
 /// Edges of dust that are more than the machine can take at once.
 const TOO_MANY: u32 = 40;
-
-/// Where the tool is while the machine rolls between two speeds, in ticks a second.
-#[derive(Clone, Copy, Debug)]
-struct Place {
-    tool: i64,
-    slowest: f64,
-    fastest: f64,
-}
 
 /// The machine on its way, see the module's words.
 #[derive(Debug)]
@@ -338,35 +326,6 @@ impl<M: Machine> Drive<M> {
         self.machine.settings().ticks(setting).0.into()
     }
 
-    /// Types a line, or several, and waits until each of them has been answered: once.
-    fn say(&mut self, text: &str) -> Checked {
-        if !M::IS_OPEN && text.contains("start now") {
-            // How much the operator is to vouch for.
-            self.say("status")?;
-        }
-        let lines = self.type_in(text);
-        let mut ends = 0;
-        for _ in 0..PATIENCE {
-            if self.machine.is_done() {
-                prop_assert_eq!(ends, lines.len(), "ends of answers to {:?}", lines);
-                return Ok(());
-            }
-            self.turn()?;
-            ends += self.written.iter().filter(|line| is_end(line)).count();
-        }
-        prop_assert!(false, "{text:?} is not answered");
-        Ok(())
-    }
-
-    /// Types a line, or several; those that are to be answered.
-    fn type_in(&mut self, text: &str) -> Vec<String> {
-        self.disturb();
-        let lines = text.split(['\r', '\n']).map(str::trim).filter(|line| !line.is_empty());
-        let lines: Vec<String> = lines.map(str::to_owned).collect();
-        self.machine.put(text, &lines);
-        lines
-    }
-
     /// Something came in between.
     fn disturb(&mut self) {
         (self.calm_since_us, self.left_for) = (self.world.time_us, None);
@@ -526,192 +485,6 @@ impl<M: Machine> Drive<M> {
         Ok(())
     }
 
-    /// The tool is in the row, and may be. One that goes over a canopy may be on its way out; and where it does not go, what was known
-    /// of the ground may have changed at that moment.
-    fn check(&mut self, place: Place) -> Checked {
-        let held = self.check_place(place);
-        match self.suspect {
-            Some((since_us, first)) if since_us + M::LATENESS_US <= self.world.time_us => {
-                self.suspect = None;
-                self.check_place(first)
-            }
-            None if held.is_err() && M::LATENESS_US > 0 => {
-                self.suspect = Some((self.world.time_us, place));
-                Ok(())
-            }
-            None => held,
-            Some(_) => Ok(()),
-        }
-    }
-
-    /// The tool may be in the row.
-    fn check_place(&self, Place { tool, slowest, fastest }: Place) -> Checked {
-        let settings = self.machine.settings();
-        // The machine adds a millisecond to each lead, for the command's way to the pin.
-        let lead = |milliseconds: u16| f64::from(milliseconds + u16::from(milliseconds > 0)) / 1000.0;
-        let lead_out = lead(settings.get(Setting::LeadOutMs));
-        let lead_in = (1.25 * lead(settings.get(Setting::LeadInMs))).min(lead_out);
-        let ticks = |speed: f64, seconds: f64| (speed * seconds) as i64;
-        // Coming back is led, in the direction of rolling; so is leaving, by as much as the slowest speed makes it.
-        let near = tool + ticks(fastest.max(0.0), lead_in) + 1;
-        let far = tool + ticks(slowest.min(0.0), lead_in) - 1;
-        let margin = self.ticks(Setting::MarginMm);
-        let (from, to) = if slowest > 0.0 {
-            prop_assert!(!self.model.is_unseen(near), "the tool is in the row at {tool}, where nothing has been seen");
-            (near, tool + ticks(slowest, lead_out))
-        } else if fastest < 0.0 {
-            (tool + ticks(fastest, lead_out), far)
-        } else {
-            (near, far)
-        };
-        let canopy = if from <= to {
-            self.model.canopy_between(from, to, margin)
-        } else {
-            // At speeds as different as these, or rolling forward and back in the same second, it may be either way: what is
-            // closed all over is closed.
-            self.model.canopies_all_over(to, from, margin)
-        };
-        prop_assert!(
-            canopy.is_none(),
-            "the tool is in the row at {tool}, rolling {slowest:.0} to {fastest:.0} ticks/s, margin {margin}, leads \
-             {lead_out} s and {lead_in} s: {canopy:?}"
-        );
-        Ok(())
-    }
-
-    /// The tool has left the row: at a steady speed, not for the canopy for which it left before.
-    fn check_swing(&mut self, tool: i64) -> Checked {
-        let is_calm = self.speed == self.target
-            && self.speed.abs() > STEADY_SPEED
-            && self.calm_since_us + STEADY_US < self.world.time_us
-            && self.machine.reason().is_none_or(|reason| reason == Reason::Plant)
-            && !self.model.is_unseen(tool)
-            // What is guarded may not have been told.
-            && self.guard_spacings.is_empty()
-            && !self.had_second_beam
-            && !self.model.is_in_doubt();
-        if !is_calm {
-            self.left_for = None;
-            return Ok(());
-        }
-        // A window is left, and over, by the lead before its end, the less as the measured speed wavers.
-        let settings = self.machine.settings();
-        let lead_in_ms = settings.get(Setting::LeadInMs).min(settings.get(Setting::LeadOutMs));
-        let ahead = tool + (0.8 * self.speed * f64::from(lead_in_ms) / 1000.0) as i64;
-        let window = self.model.next_window(ahead, self.speed > 0.0, self.ticks(Setting::MarginMm));
-        let again = window.is_some() && window.map(|run| run.leading) == self.left_for.map(|run| run.leading);
-        prop_assert!(!again, "at {tool} the tool leaves again for {window:?}, at {:.0} ticks/s", self.speed);
-        self.left_for = window;
-        self.steady_swings += 1;
-        Ok(())
-    }
-
-    /// What the machine has just taken for a weed was one, as the model saw it.
-    fn check_weed(&mut self) -> Checked {
-        let Some(width_mm) = self.machine.take_weed() else { return Ok(()) };
-        let wheel = self.machine.settings().wheel();
-        // A millimetre, and what lies between it and the next.
-        let millimetre = i64::from(wheel.ticks(1).0) + 1;
-        let told = self.model.weed(self.here(), wheel.ticks(width_mm as u16).0.into(), millimetre);
-        // One that only the second beam has seen opens nothing.
-        let is_right = told.is_ok() || self.model.is_in_doubt() || self.had_second_beam;
-        prop_assert!(is_right, "{}", told.unwrap_err());
-        Ok(())
-    }
-
-    /// The console's part of a turn.
-    fn attend_to_the_console(&mut self) -> Checked {
-        let (before, unseen_mm) = (self.machine.state(), self.machine.unseen_mm());
-        let Attended { begun, written } = self.machine.attend()?;
-        if let Some(line) = begun {
-            self.begin(&line, before);
-            if M::IS_OPEN {
-                self.check_begun(&line, before)?;
-                if self.machine.state() == State::Work {
-                    self.trust(&line, unseen_mm);
-                }
-            }
-            self.current = line;
-        }
-        if self.grain != grain(self.machine.settings()) {
-            self.grain = grain(self.machine.settings());
-            self.model.begin_anew(self.here());
-        }
-        for end in written.iter().filter(|line| is_end(line)) {
-            self.end(end, unseen_mm);
-        }
-        written.iter().try_for_each(|line| self.check_guarded(line))?;
-        self.written = written;
-        Ok(())
-    }
-
-    /// What the machine says that it guards is where a plant was due.
-    fn check_guarded(&mut self, line: &str) -> Checked {
-        let Some(told) = line.strip_prefix("guarded pos=").and_then(|place| place.parse::<i32>().ok()) else {
-            return Ok(());
-        };
-        let here = self.here();
-        let due = here + i64::from(told.wrapping_sub(self.machine.own_count(here)));
-        // It was decided a moment ago, and the settings may have changed since.
-        let guarded: Vec<_> =
-            self.guard_spacings.iter().map(|&spacing| self.model.guard(due, spacing, self.guard_scatter)).collect();
-        let is_right = guarded.iter().any(Result::is_ok) || self.model.is_in_doubt() || self.had_second_beam;
-        prop_assert!(is_right, "{guarded:?}");
-        Ok(())
-    }
-
-    /// A line is carried out, now or soon.
-    fn begin(&mut self, line: &str, before: State) {
-        let words = words(line);
-        self.is_tried |= matches!(words[0], "servo" | "calibrate" | "test");
-        if M::IS_OPEN {
-            self.is_tried &= self.machine.state() == State::Hold && !matches!(words[..], ["hold"] | ["servo", "out"]);
-        }
-        self.saving = (words == ["save"]).then(|| self.machine.settings().clone());
-        if self.saving.is_some() {
-            self.leads_in_doubt = self.machine.settings_are_in_doubt();
-        }
-        if self.machine.state() != before {
-            self.disturb();
-        }
-    }
-
-    fn check_begun(&self, line: &str, before: State) -> Checked {
-        let (words, after) = (words(line), self.machine.state());
-        prop_assert!(after == before || after != State::Work || words[0] == "start", "{line:?} had it work");
-        prop_assert!(after == before || !is_alarm(before) || words == ["clear"], "{line:?} cleared an alarm");
-        Ok(())
-    }
-
-    /// The line that was begun has been answered.
-    fn end(&mut self, end: &str, unseen_mm: i16) {
-        let (line, is_ok) = (std::mem::take(&mut self.current), end == "ok");
-        if let Some(saving) = self.saving.take()
-            && is_ok
-        {
-            self.saved = Some(saving);
-        }
-        let words = words(&line);
-        if matches!(words.first(), Some(&("label" | "teach" | "forget"))) {
-            self.taught = self.machine.examples();
-        }
-        if !M::IS_OPEN && is_ok {
-            self.is_tried &= !matches!(words[..], ["hold"] | ["servo", "out"] | ["start", ..]);
-            self.trust(&line, unseen_mm);
-        }
-    }
-
-    /// The operator's word, if the line is it, for the ground that the machine has not seen by so much.
-    fn trust(&mut self, line: &str, unseen_mm: i16) {
-        if words(line) == ["start", "now"] && unseen_mm > 0 {
-            let tool = self.here() - self.ticks(Setting::BeamToToolMm);
-            let unseen = f64::from(unseen_mm + 1) * f64::from(self.machine.settings().wheel().ticks(1000).0) / 1000.0;
-            // What the machine has rolled on since it was told.
-            let late = if M::IS_OPEN { 0 } else { (self.speed.abs() * ANSWERED_S) as i64 };
-            self.model.trust(tool - self.ticks(Setting::MarginMm) - late, tool + unseen as i64);
-        }
-    }
-
     /// What was kept, with the leads that were found, if they are in doubt.
     fn with_leads_of(&self, kept: &Option<Settings>, found: &Option<Settings>) -> Option<Settings> {
         let (Some(kept), Some(found)) = (kept, found) else { return kept.clone() };
@@ -766,15 +539,6 @@ fn grain(settings: &Settings) -> Grain {
     Grain::of(settings.wheel().ticks(1000))
 }
 
-fn words(line: &str) -> Vec<&str> {
-    line.split([' ', '\t']).filter(|word| !word.is_empty()).collect()
-}
-
 fn is_alarm(state: State) -> bool {
     matches!(state, State::Alarm(_))
-}
-
-/// Whether a line is the last one of an answer.
-pub fn is_end(line: &str) -> bool {
-    line == "ok" || line.starts_with("error: ")
 }
