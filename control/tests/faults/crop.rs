@@ -1,0 +1,119 @@
+//! A beam or a crop that cannot be right: too many weeds, no plant for long, a beam that flickers; and dust, which is neither.
+
+use crate::drive::Drive;
+use control::{
+    alarm::{Alarm, Warning},
+    measure::readings::Edge,
+    operate::{event::Event, state::State},
+    settings::Setting,
+};
+
+#[test]
+fn a_row_of_stalks_that_are_taken_for_weeds_is_an_alarm_at_the_fifth() {
+    let mut drive = Drive::at_work();
+    assert_eq!((drive.pass_stalks(20), drive.alarm()), (5, Some(Alarm::CropUnknown)));
+    drive.machine.clear();
+    drive.machine.start(false).unwrap();
+    assert_eq!((drive.pass_stalks(20), drive.alarm()), (5, Some(Alarm::CropUnknown)), "it is counted anew");
+}
+
+#[test]
+fn so_many_stalks_as_are_set_are_an_alarm_and_none_where_that_is_zero() {
+    for (misfit_after, stalks) in [(1, 1), (2, 2), (100, 100), (0, 300)] {
+        let mut drive = Drive::at_work();
+        drive.machine.set(Setting::MisfitAfter, misfit_after).unwrap();
+        assert_eq!(drive.pass_stalks(300), stalks);
+        assert_eq!(drive.alarm().is_some(), misfit_after != 0);
+    }
+}
+
+#[test]
+fn weeds_with_a_plant_between_them_are_no_alarm_and_neither_are_those_in_hold() {
+    let mut drive = Drive::at_work();
+    for _ in 0..10 {
+        assert_eq!((drive.pass_stalks(4), drive.alarm()), (4, None));
+        drive.pass_a_plant(0.5);
+        drive.roll(0.5, 0.2);
+    }
+    drive.machine.hold();
+    assert_eq!((drive.pass_stalks(20), drive.alarm()), (20, None));
+    drive.machine.start(false).unwrap();
+    assert_eq!(drive.pass_stalks(20), 5, "what was seen in hold does not count");
+}
+
+#[test]
+fn what_is_narrower_than_the_least_width_is_counted_as_dust_and_is_neither_a_plant_nor_a_misfit() {
+    let mut drive = Drive::at_work();
+    for (setting, value) in [(Setting::MinWidthMm, 25), (Setting::NoPlantM, 2)] {
+        drive.machine.set(setting, value).unwrap();
+    }
+    assert_eq!((drive.pass_stalks(10), drive.alarm()), (10, None));
+    assert_eq!((drive.machine.dust(), drive.machine.objects().len()), (10, 0));
+    assert_eq!(drive.events(), [Event::Warning(Warning::NoPlants)], "nobody has seen a plant");
+    drive.pass(0.5, 0.03);
+    drive.roll(0.5, 0.1);
+    assert_eq!((drive.machine.dust(), drive.machine.objects().len()), (10, 1));
+    drive.pass(0.5, 0.0252);
+    drive.roll(0.5, 0.1);
+    assert_eq!((drive.machine.dust(), drive.machine.objects().len()), (10, 2), "as wide as the least is no dust");
+}
+
+#[test]
+fn the_narrow_rest_of_an_object_is_no_dust() {
+    let mut drive = Drive::in_hold();
+    drive.machine.set(Setting::MinWidthMm, 100).unwrap();
+    drive.edges.push(Edge::Lost { broken: true });
+    drive.roll(0.5, 0.02);
+    drive.beam(false);
+    drive.roll(0.5, 0.1);
+    assert_eq!((drive.machine.dust(), drive.machine.objects().len()), (0, 1));
+}
+
+#[test]
+fn a_beam_that_flickers_is_an_alarm_and_a_ragged_canopy_is_none() {
+    let mut drive = Drive::at_work();
+    for _ in 0..60 {
+        drive.beam(true);
+        drive.roll(0.5, 0.0005);
+        drive.beam(false);
+        drive.roll(0.5, 0.0005);
+    }
+    assert_eq!(drive.alarm(), Some(Alarm::BeamFlickers));
+    // At 5 km/h, a clear stretch every 14 mm.
+    let mut drive = Drive::at_work();
+    drive.roll(1.39, 0.3);
+    for _ in 0..10 {
+        drive.beam(true);
+        drive.roll(1.39, 0.008);
+        drive.beam(false);
+        drive.roll(1.39, 0.006);
+    }
+    assert_eq!(drive.alarm(), None);
+}
+
+#[test]
+fn a_long_way_without_a_plant_is_a_warning_once() {
+    let mut drive = Drive::at_work();
+    drive.machine.set(Setting::NoPlantM, 3).unwrap();
+    let warned = |drive: &mut Drive| {
+        let events = drive.events();
+        events.iter().filter(|event| **event == Event::Warning(Warning::NoPlants)).count()
+    };
+    drive.roll(0.5, 1.9);
+    assert!(!drive.machine.sees_no_plants());
+    drive.roll(0.5, 0.2);
+    assert!(drive.machine.sees_no_plants());
+    assert_eq!(warned(&mut drive), 1);
+    drive.roll(0.5, 5.0);
+    assert_eq!((warned(&mut drive), drive.machine.state()), (0, State::Work), "once is enough");
+    drive.pass_a_plant(0.5);
+    drive.roll(0.5, 0.2);
+    assert!(!drive.machine.sees_no_plants(), "a plant ends it");
+    drive.roll(0.5, 3.0);
+    assert_eq!(warned(&mut drive), 1);
+
+    let mut never = Drive::at_work();
+    never.machine.set(Setting::NoPlantM, 0).unwrap();
+    never.roll(1.3, 150.0);
+    assert!(!never.machine.sees_no_plants());
+}

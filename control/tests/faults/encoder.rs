@@ -1,0 +1,296 @@
+//! An encoder that falls silent, dies, loses a channel or jumps, and what looks like it and is none: stops, trembling, leaves.
+
+use crate::{
+    common::{ByWidth, machine, readings, woken_up},
+    drive::{Drive, TICKS_A_METRE, TURN_US},
+};
+use control::{
+    alarm::Alarm,
+    measure::reset::Cause,
+    memory::Volatile,
+    operate::event::Event,
+    settings::Setting,
+    units::Ticks,
+    weeder::{Controller, Reason},
+};
+
+/// How long the encoder may be silent at a speed until that is sudden, in seconds: the time of ten ticks, and three turns.
+fn sudden_s(speed_m_s: f64) -> f64 {
+    10.0 / (speed_m_s * TICKS_A_METRE) + 0.004
+}
+
+#[test]
+fn an_encoder_that_falls_silent_from_one_moment_to_the_next_has_the_tool_out_until_it_comes_to_ground_seen_since() {
+    for speed_m_s in [0.14, 0.3, 0.7, 1.3] {
+        let mut drive = Drive::at_work();
+        drive.roll(speed_m_s, 0.5);
+        drive.roll(0.0, 5.0 / (speed_m_s * TICKS_A_METRE));
+        assert!(drive.tool_is_in(), "{speed_m_s} m/s");
+        drive.roll(0.0, sudden_s(speed_m_s));
+        assert!(!drive.tool_is_in(), "{speed_m_s} m/s");
+        assert_eq!(drive.machine.reason(), Some(Reason::EncoderDoubtful));
+        drive.roll(0.0, 10.0);
+        assert!(!drive.tool_is_in(), "{speed_m_s} m/s");
+        // Nobody knows how far the machine has rolled: the tool stays out over all that was seen, and a margin ahead of it.
+        for _ in 0..42 {
+            drive.roll(0.5, 0.01);
+            assert!(!drive.tool_is_in(), "{speed_m_s} m/s");
+        }
+        drive.roll(0.5, 0.05);
+        assert!(drive.tool_is_in(), "{speed_m_s} m/s");
+        assert_eq!(drive.alarm(), None);
+    }
+}
+
+#[test]
+fn what_stood_in_the_beam_when_the_encoder_fell_silent_is_a_plant_however_narrow_its_rest() {
+    let mut drive = Drive::at_work();
+    drive.beam(true);
+    drive.roll(0.7, 0.1);
+    drive.roll(0.0, 0.1);
+    drive.roll(0.7, 0.01);
+    drive.beam(false);
+    drive.events();
+    drive.roll(0.7, 0.05);
+    let told = drive.events().into_iter().find_map(|event| match event {
+        Event::Object { vote, .. } => Some(vote.class),
+        _ => None,
+    });
+    assert_eq!(told, Some(control::ground::class::Class::Unknown));
+    assert_eq!(drive.machine.windows(), 1);
+}
+
+#[test]
+fn the_third_silence_within_ten_metres_of_the_one_before_is_an_alarm() {
+    for (between_m, alarm) in [(0.5, Some(Alarm::EncoderSilent)), (9.0, Some(Alarm::EncoderSilent)), (12.0, None)] {
+        let mut drive = Drive::at_work();
+        for silence in 1..=3 {
+            drive.roll(0.7, between_m);
+            drive.roll(0.0, 0.1);
+            drive.roll(0.7, 0.05);
+            assert_eq!(drive.alarm(), alarm.filter(|_| silence == 3), "silence {silence}, {between_m} m apart");
+        }
+    }
+}
+
+#[test]
+fn stops_are_never_an_alarm_however_many_and_however_hard() {
+    let mut drive = Drive::at_work();
+    for stop in 0..30 {
+        drive.roll(0.3 + f64::from(stop) / 30.0, 0.3);
+        drive.brake_by(0.3 + f64::from(stop) / 30.0, 8.0);
+        drive.roll(0.0, 0.5);
+        drive.speed_up(0.7, 2.0);
+    }
+    assert_eq!(drive.alarm(), None);
+}
+
+#[test]
+fn a_hard_stop_is_no_silence_whatever_the_encoder() {
+    // From 16,000 ticks a metre to 40. Progress of an encoder finer than 0.4 mm may be a little shorter.
+    let machines =
+        [(2400, 400, 2.9), (10_000, 200, 2.4), (5000, 300, 2.9), (4000, 530, 2.3), (1000, 400, 2.9), (100, 800, 2.9)];
+    for (ticks_per_rev, wheel_mm, braking_m_s2) in machines {
+        let mut machine = machine();
+        machine.set(Setting::WheelMm, wheel_mm).unwrap();
+        machine.set(Setting::TicksPerRev, ticks_per_rev).unwrap();
+        let a_metre = f64::from(ticks_per_rev) * 1000.0 / (std::f64::consts::PI * f64::from(wheel_mm));
+        let (mut time_us, mut place_m) = (0, 0.0);
+        let mut turn = |speed_m_s: f64, place_m: &mut f64| {
+            time_us += 250;
+            *place_m += speed_m_s * 0.000_25;
+            machine.turn(readings(time_us, (*place_m * a_metre).floor() as i32), []);
+            machine.encoder_is_silent()
+        };
+        let mut silent = 0;
+        for stop in 0..400 {
+            let mut speed_m_s = 0.2 + f64::from(stop) * 0.003;
+            place_m += 0.000_013;
+            // From standstill with 2 m/s2, some way, and to a stop.
+            let from = (0..(speed_m_s / 0.0005) as u32).any(|step| turn(f64::from(step) * 0.0005, &mut place_m));
+            let rolling = (0..1600).any(|_| turn(speed_m_s, &mut place_m));
+            let mut braking = false;
+            while speed_m_s > 0.0 {
+                speed_m_s -= braking_m_s2 * 0.000_25;
+                braking |= turn(speed_m_s.max(0.0), &mut place_m);
+            }
+            let standing = (0..1200).any(|_| turn(0.0, &mut place_m));
+            silent += u32::from(from || rolling || braking || standing);
+        }
+        assert_eq!(silent, 0, "{ticks_per_rev} ticks a turn of {wheel_mm} mm");
+    }
+}
+
+#[test]
+fn a_fine_encoder_that_falls_silent_is_noticed_as_soon() {
+    let mut machine = machine();
+    machine.set(Setting::TicksPerM, 20_000).unwrap();
+    for speed_m_s in [0.3, 0.7, 1.3] {
+        let mut place = 0.0;
+        let base = machine.readings().position.count();
+        let base_us = u64::from(machine.readings().now.steps()) * 4;
+        for turn in 1..4000 {
+            place += speed_m_s * 20_000.0 * 0.000_25;
+            machine.turn(readings(base_us + turn * 250, base + place as i32), []);
+            assert!(!machine.encoder_is_silent() || turn < 200);
+        }
+        let now_us = u64::from(machine.readings().now.steps()) * 4;
+        for turn in 1..200 {
+            machine.turn(readings(now_us + turn * 250, base + place as i32), []);
+        }
+        assert!(machine.encoder_is_silent(), "{speed_m_s} m/s");
+    }
+}
+
+#[test]
+fn an_encoder_that_dies_at_any_place_never_brings_the_tool_back() {
+    // All along a plant's approach, its window and what follows.
+    for died_after in (0..900).step_by(7) {
+        let mut drive = Drive::at_work();
+        drive.roll(0.78, 0.5);
+        drive.pass_a_plant(0.78);
+        drive.roll(0.78, f64::from(died_after) / 1000.0);
+        let was_out = !drive.tool_is_in();
+        for millisecond in 0..300 {
+            drive.roll(0.0, 0.001);
+            assert!(!was_out || !drive.tool_is_in(), "back {millisecond} ms after it died, {died_after} mm on");
+            assert!(millisecond < 31 || !drive.tool_is_in(), "in the row, {died_after} mm on");
+        }
+    }
+}
+
+#[test]
+fn a_machine_that_brakes_keeps_its_tool_in_the_row() {
+    for speed_m_s in [0.3, 0.7, 1.3] {
+        let mut drive = Drive::at_work();
+        drive.roll(speed_m_s, 0.5);
+        drive.brake(speed_m_s);
+        drive.roll(0.0, 5.0);
+        assert!(drive.tool_is_in(), "{speed_m_s} m/s");
+    }
+}
+
+#[test]
+fn an_encoder_that_dies_at_rest_has_the_tool_out_at_the_first_plant_and_is_an_alarm_at_the_third() {
+    let mut drive = Drive::at_work();
+    drive.brake(0.5);
+    drive.roll(0.0, 0.2);
+    assert!(drive.tool_is_in(), "the machine may just stand");
+    for plant in 1..=3 {
+        drive.beam(true);
+        drive.roll(0.0, 0.3);
+        assert!(!drive.tool_is_in(), "plant {plant}");
+        drive.beam(false);
+        drive.roll(0.0, 0.7);
+        assert_eq!(drive.alarm(), (plant == 3).then_some(Alarm::EncoderSilent), "plant {plant}");
+    }
+}
+
+#[test]
+fn leaves_that_move_while_the_machine_stands_keep_the_tool_out_until_it_rolls_on() {
+    let mut drive = Drive::at_work();
+    for _ in 0..5 {
+        drive.brake(0.5);
+        drive.roll(0.0, 0.2);
+        drive.beam(true);
+        drive.beam(false);
+        drive.roll(0.0, 0.1);
+        assert_eq!(drive.machine.reason(), Some(Reason::EncoderDoubtful));
+        drive.roll(0.5, 0.5);
+        assert!(drive.tool_is_in());
+    }
+    assert_eq!(drive.alarm(), None);
+}
+
+#[test]
+fn plants_that_pass_a_rolling_machine_raise_no_doubt_in_the_encoder() {
+    for speed_m_s in [0.02, 0.5, 1.3] {
+        let mut drive = Drive::at_work();
+        for _ in 0..6 {
+            drive.roll(speed_m_s, 0.35);
+            drive.pass_a_plant(speed_m_s);
+            assert_ne!(drive.machine.reason(), Some(Reason::EncoderDoubtful), "{speed_m_s} m/s");
+        }
+        assert_eq!(drive.alarm(), None, "{speed_m_s} m/s");
+    }
+}
+
+/// Has the encoder go to and fro between two counts, so many edges a second, for two seconds.
+fn tremble(drive: &mut Drive, edges_a_second: u64) {
+    let count = drive.place.floor() as i32;
+    for turn in 0..2_000_000 / TURN_US {
+        let edges = turn * TURN_US * edges_a_second / 1_000_000;
+        drive.turn_at(count + (edges % 2) as i32);
+    }
+}
+
+#[test]
+fn edges_without_progress_are_an_alarm_at_work() {
+    // One channel of two at 1 and at 2.5 km/h.
+    for edges_a_second in [265, 663] {
+        let mut drive = Drive::at_work();
+        tremble(&mut drive, edges_a_second);
+        assert_eq!(drive.alarm(), Some(Alarm::EncoderChannelDead), "{edges_a_second}");
+        let mut drive = Drive::in_hold();
+        tremble(&mut drive, edges_a_second);
+        assert_eq!(drive.alarm(), None);
+    }
+}
+
+#[test]
+fn a_wheel_that_trembles_on_an_edge_with_the_engine_is_no_alarm() {
+    let mut drive = Drive::at_work();
+    tremble(&mut drive, 100);
+    assert_eq!(drive.alarm(), None);
+}
+
+#[test]
+fn jumps_are_an_alarm_by_the_way_on_which_they_come() {
+    // From one side of the count's wrap to the other. Each brings two ticks that are not believed.
+    for (metres_between, alarm) in [(0.02, Some(Alarm::EncoderJumps)), (0.05, None)] {
+        for speed_m_s in [0.3, 1.2] {
+            let mut wake_up = woken_up(Cause::PowerOn);
+            wake_up.readings.jumps = u16::MAX - 10;
+            let mut machine = Controller::new(ByWidth, Volatile::new(), wake_up);
+            machine.clear();
+            let mut drive = Drive { machine, time_us: 0, place: 0.0, readings: wake_up.readings, edges: Vec::new() };
+            for _ in 0..200 {
+                drive.readings.jumps = drive.readings.jumps.wrapping_add(1);
+                drive.place += 2.0;
+                drive.roll(speed_m_s, metres_between);
+            }
+            assert_eq!(drive.alarm(), alarm, "a jump every {metres_between} m at {speed_m_s} m/s");
+        }
+    }
+}
+
+#[test]
+fn jumps_at_rest_move_nothing_and_are_an_alarm_where_there_are_many() {
+    for (every_ms, alarm) in [(4, Some(Alarm::EncoderJumps)), (40, None)] {
+        let mut drive = Drive::in_hold();
+        for jump in 1..=200 {
+            drive.readings.jumps += 1;
+            drive.place += 2.0;
+            drive.roll(0.0, f64::from(every_ms) / 1000.0);
+            assert_eq!(drive.machine.readings().position.count(), 0, "jump {jump}");
+        }
+        assert_eq!(drive.alarm(), alarm, "a jump every {every_ms} ms");
+    }
+}
+
+#[test]
+fn the_jumps_of_a_wheel_so_fast_that_an_edge_can_be_missed_are_believed() {
+    for (speed_m_s, believed) in [(7.0, false), (15.0, true)] {
+        let mut drive = Drive::in_hold();
+        drive.roll(speed_m_s, 3.0);
+        let before = drive.machine.readings().position;
+        let (place, jumps) = (drive.place, 5);
+        for _ in 0..jumps {
+            drive.readings.jumps += 1;
+            drive.roll(speed_m_s, 0.1);
+        }
+        let counted = drive.place.floor() as i32 - place.floor() as i32;
+        let doubted = if believed { 0 } else { 2 * jumps };
+        assert_eq!(drive.machine.readings().position - before, Ticks(counted - doubted), "{speed_m_s} m/s");
+    }
+}

@@ -1,0 +1,199 @@
+//! Each fault that the decisions know of: what shows it, what does not, and that the tool is out of the row then.
+//!
+//! Here are those of the way, the speed, the tool and the stack; `encoder`, `crop` and `saved_settings` have the others.
+
+#[path = "../common/mod.rs"]
+mod common;
+mod crop;
+mod drive;
+mod encoder;
+mod saved_settings;
+
+use common::{ByWidth, readings, woken_up};
+use control::{
+    alarm::{Alarm, Warning},
+    measure::{
+        readings::{Edge, Readings},
+        reset::Cause,
+    },
+    memory::Volatile,
+    operate::{event::Event, state::State},
+    settings::Setting,
+    units::{Instant, Interval, Position, Ticks},
+    weeder::{Controller, Reason},
+};
+use drive::{Drive, TURN_US};
+
+#[test]
+fn working_faster_than_the_limit_is_an_alarm_in_both_directions() {
+    for (speed_m_s, alarm) in [(1.35, None), (1.45, Some(Alarm::TooFast)), (-1.35, None), (-1.45, Some(Alarm::TooFast))]
+    {
+        let mut drive = Drive::at_work();
+        drive.roll(speed_m_s, 0.8);
+        assert_eq!(drive.alarm(), alarm, "{speed_m_s} m/s");
+    }
+    let mut drive = Drive::in_hold();
+    drive.roll(5.0, 2.0);
+    assert_eq!(drive.alarm(), None, "on the way to the field");
+}
+
+#[test]
+fn a_jump_in_speed_just_before_a_window_is_counted_as_late_and_the_tool_leaves_at_once() {
+    // The plant's margin is 350 mm behind the beam's place; the lead at 0.3 m/s is 54 mm, at 1.3 m/s 234 mm.
+    for (jumps, late) in [(false, 0), (true, 1)] {
+        let mut drive = Drive::at_work();
+        drive.roll(0.3, 0.5);
+        drive.pass_a_plant(0.3);
+        drive.roll(0.3, 0.1);
+        assert!(drive.tool_is_in());
+        drive.events();
+        drive.roll(if jumps { 1.3 } else { 0.3 }, 0.12);
+        assert!(!drive.tool_is_in());
+        assert_eq!(drive.machine.late(), late);
+        let told = drive.events().contains(&Event::Warning(Warning::LateCommand));
+        assert_eq!(told, jumps);
+        assert_eq!(drive.machine.state(), State::Work);
+    }
+}
+
+#[test]
+fn a_command_is_late_where_the_speed_rises_by_more_than_an_eighth_while_the_tool_swings() {
+    for (rises_by, late) in [(1.1, 0), (1.2, 1)] {
+        let mut drive = Drive::at_work();
+        drive.roll(0.5, 0.5);
+        drive.pass_a_plant(0.5);
+        while drive.tool_is_in() {
+            drive.roll(0.5, 0.001);
+        }
+        drive.roll(0.5 * rises_by, 0.2);
+        assert_eq!(drive.machine.late(), late, "{rises_by}");
+    }
+}
+
+#[test]
+fn in_paper_mode_no_command_is_late() {
+    let mut drive = Drive::at_work();
+    drive.machine.set(Setting::LeadInMs, 0).unwrap();
+    drive.machine.set(Setting::LeadOutMs, 0).unwrap();
+    drive.pass_a_plant(0.7);
+    drive.roll(0.7, 1.0);
+    assert_eq!(drive.machine.late(), 0);
+}
+
+#[test]
+fn rolling_back_to_forgotten_ground_is_an_alarm() {
+    let mut drive = Drive::at_work();
+    for _ in 0..20 {
+        drive.pass_a_plant(0.5);
+        drive.roll(0.5, 0.35);
+    }
+    // The 16 canopies that are remembered go back 8 m; the oldest of them was not the first.
+    drive.roll(-0.5, 6.0);
+    assert_eq!(drive.alarm(), None);
+    drive.roll(-0.5, 3.0);
+    assert_eq!(drive.alarm(), Some(Alarm::RolledBackTooFar));
+}
+
+#[test]
+fn rolling_back_to_ground_that_was_never_seen_has_the_tool_out_and_is_no_alarm() {
+    let mut drive = Drive::at_work();
+    drive.roll(-0.5, 2.0);
+    assert_eq!((drive.alarm(), drive.machine.reason()), (None, Some(Reason::UnseenGround)));
+    drive.roll(0.5, 2.0);
+    assert!(drive.tool_is_in());
+}
+
+#[test]
+fn a_tool_that_does_not_follow_is_an_alarm_where_an_end_switch_tells() {
+    // The switch never closes, though the tool is to be out.
+    let mut drive = Drive::in_hold();
+    drive.roll(0.0, 1.0);
+    assert_eq!(drive.alarm(), None, "without a switch nobody knows");
+    drive.machine.set(Setting::EndSwitch, 1).unwrap();
+    drive.roll(0.0, 0.1);
+    assert_eq!(drive.alarm(), Some(Alarm::ToolStuck));
+
+    // The switch stays closed, though the tool is to be in the row.
+    let mut drive = Drive::at_work();
+    drive.machine.set(Setting::EndSwitch, 1).unwrap();
+    drive.roll(0.5, 1.0);
+    assert_eq!(drive.alarm(), None, "open, and the tool is in the row");
+    drive.pass_a_plant(0.5);
+    drive.roll(0.5, 0.4);
+    assert_eq!(drive.alarm(), Some(Alarm::ToolStuck), "it should have closed");
+
+    let mut drive = Drive::at_work();
+    drive.machine.set(Setting::EndSwitch, 1).unwrap();
+    drive.readings.end_switch_on = true;
+    drive.roll(0.5, 0.05);
+    assert_eq!(drive.alarm(), Some(Alarm::ToolStuck), "closed, and the tool is told to be in the row");
+}
+
+#[test]
+fn a_tool_that_follows_within_its_time_is_no_alarm() {
+    let mut drive = Drive::at_work();
+    drive.machine.set(Setting::EndSwitch, 1).unwrap();
+    let mut is_out = [drive.machine.tool_out(); 360];
+    for turn in 0..40_000 {
+        if turn % 2_000 == 500 {
+            drive.beam(true);
+        }
+        if turn % 2_000 == 1_000 {
+            drive.beam(false);
+        }
+        // 180 ms behind the command, and the contacts bounce.
+        let place = turn % is_out.len();
+        drive.readings.end_switch_on = is_out[place] ^ (turn % 50 == 0);
+        drive.roll(0.5, 0.5 * TURN_US as f64 / 1e6);
+        is_out[place] = drive.machine.tool_out();
+    }
+    assert_eq!(drive.alarm(), None);
+}
+
+#[test]
+fn a_stack_that_is_nearly_used_up_is_an_alarm() {
+    let mut drive = Drive::at_work();
+    drive.readings.stack_free = 48;
+    drive.roll(0.5, 0.1);
+    assert_eq!(drive.alarm(), None);
+    drive.readings.stack_free = 47;
+    drive.roll(0.5, 0.1);
+    assert_eq!(drive.alarm(), Some(Alarm::StackLow));
+}
+
+#[test]
+fn nothing_happens_where_time_and_place_wrap() {
+    // Both counters pass their end in the middle of a row.
+    let ticks_before = 3000;
+    let steps_before = 1_000_000;
+    let moved = |now: Readings| Readings {
+        now: Instant::new(0_u32.wrapping_sub(steps_before)) + Interval::from_steps(now.now.steps()),
+        position: Position::new(i32::MAX - ticks_before) + Ticks(now.position.count()),
+        ..now
+    };
+    let swings = |wraps: bool| {
+        let place = |now: Readings| if wraps { moved(now) } else { now };
+        let mut wake_up = woken_up(Cause::PowerOn);
+        wake_up.readings = place(readings(0, 0));
+        let mut machine = Controller::new(ByWidth, Volatile::new(), wake_up);
+        machine.clear();
+        machine.start(false).unwrap();
+        let (mut swings, mut was_out) = (Vec::new(), true);
+        for turn in 0..24_000_u64 {
+            let count = (turn as f64 * 0.53) as i32;
+            let broken = count % 1000 >= 700 && count > 1000;
+            let now = place(readings(turn * TURN_US, count));
+            let is_edge = count > 1000 && broken != ((count - 1) % 1000 >= 700 && count - 1 > 1000);
+            machine.turn(now, is_edge.then_some(Edge::Seen { position: now.position, broken, second_broken: false }));
+            if machine.tool_out() != was_out {
+                was_out = !was_out;
+                swings.push((turn, was_out));
+            }
+        }
+        assert_eq!(machine.state(), State::Work);
+        swings
+    };
+    let plain = swings(false);
+    assert!(plain.len() > 15, "{plain:?}");
+    assert_eq!(swings(true), plain);
+}

@@ -1,0 +1,67 @@
+//! Saved settings that a machine wakes up with, right or contradicting each other.
+
+use crate::common::{ByWidth, readings, woken_up};
+use control::{
+    alarm::Alarm,
+    measure::{
+        readings::{Edge, Readings},
+        reset::Cause,
+    },
+    memory::Volatile,
+    operate::{refusal::Refusal, saved::SavedSettings, state::State},
+    settings::{Setting, Settings},
+    units::Position,
+    weeder::Controller,
+};
+
+#[test]
+fn saved_settings_are_in_use_after_a_restart() {
+    let mut settings = Settings::new();
+    settings.set(Setting::K, 7).unwrap();
+    let machine = Controller::new(ByWidth, saved(&settings), woken_up(Cause::PowerOn));
+    assert_eq!((machine.state(), machine.settings()), (State::Hold, &settings));
+}
+
+/// A memory with these settings, right or not.
+fn saved(settings: &Settings) -> Volatile {
+    let mut saved = SavedSettings::new(Volatile::new());
+    saved.save(settings);
+    while !saved.carry_on() {}
+    saved.into_memory()
+}
+
+#[test]
+fn a_test_row_that_contradicting_settings_refuse_leaves_what_stands_in_the_beam() {
+    let mut settings = Settings::new();
+    settings.set(Setting::ServoInUs, 2000).unwrap();
+    let mut machine = Controller::new(ByWidth, saved(&settings), woken_up(Cause::PowerOn));
+    machine.clear();
+    machine.turn(readings(0, 0), []);
+    machine.turn(readings(1000, 0), [Edge::Seen { position: Position::new(0), broken: true, second_broken: false }]);
+    assert_eq!(machine.windows(), 1);
+    assert_eq!(machine.test_row(500), Err(Refusal::PulsesEqual));
+    assert_eq!(machine.windows(), 1);
+}
+
+#[test]
+fn saved_settings_that_contradict_each_other_are_an_alarm_and_do_not_start() {
+    let mut settings = Settings::new();
+    settings.set(Setting::ServoInUs, 2000).unwrap();
+    settings.set(Setting::BeamToToolMm, 200).unwrap();
+    let mut machine = Controller::new(ByWidth, saved(&settings), woken_up(Cause::PowerOn));
+    assert_eq!(machine.state(), State::Alarm(Alarm::SettingsContradict));
+    machine.clear();
+    assert_eq!(machine.start(false), Err(Refusal::PulsesEqual));
+    assert_eq!(machine.save(), Err(Refusal::PulsesEqual));
+    // The switch does not start it either.
+    for millisecond in 0..100 {
+        machine.turn(Readings { switch_on: true, ..readings(millisecond * 1000, 0) }, []);
+    }
+    assert_eq!(machine.state(), State::Alarm(Alarm::SettingsContradict));
+    machine.clear();
+    // They can be mended one at a time.
+    machine.set(Setting::ServoInUs, 1500).unwrap();
+    assert_eq!((machine.start(false), machine.needed_mm()), (Err(Refusal::BeamTooNear), 336));
+    machine.set(Setting::BeamToToolMm, 400).unwrap();
+    assert_eq!(machine.start(false), Ok(()));
+}
