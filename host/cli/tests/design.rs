@@ -1,19 +1,15 @@
 //! `weeder design`, as it is called.
 
+mod common;
+
+use common::{assert_refused, said};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output};
 use tempfile::TempDir;
 
 /// The page of the manual that shows a machine file.
 const MANUAL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/building-your-own.md");
-
-/// Runs `weeder design` with these arguments in a folder.
-fn design(folder: &Path, arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
-    command.current_dir(folder).arg("design").args(arguments).output().expect("cargo has built the command")
-}
 
 /// A folder with the file `my.toml`.
 fn folder_with(machine: &str) -> TempDir {
@@ -25,20 +21,13 @@ fn folder_with(machine: &str) -> TempDir {
 /// What it prints for this machine, with these arguments more.
 #[track_caller]
 fn printed(machine: &str, arguments: &[&str]) -> String {
-    let folder = folder_with(machine);
-    let output = design(folder.path(), &[&["--machine", "my.toml"], arguments].concat());
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout).unwrap()
+    said(folder_with(machine).path(), &[&["design", "--machine", "my.toml"], arguments].concat())
 }
 
-/// Asserts status 2 and a message that contains `words`.
+/// Asserts that this machine is refused with these words.
 #[track_caller]
-fn assert_refused(machine: &str, words: &str) {
-    let folder = folder_with(machine);
-    let output = design(folder.path(), &["--machine", "my.toml"]);
-    let message = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(2), "{message}");
-    assert!(message.contains(words), "{message}");
+fn assert_no_machine(machine: &str, words: &str) {
+    assert_refused(folder_with(machine).path(), &["design", "--machine", "my.toml"], words);
 }
 
 /// The cells of the table's line that begins with `name`.
@@ -58,9 +47,7 @@ fn figure<'a>(printed: &'a Value, key: &str) -> &'a Value {
 
 #[test]
 fn without_a_file_the_papers_machine_is_calculated() {
-    let output = design(Path::new("."), &[]);
-    assert!(output.status.success());
-    let table = String::from_utf8(output.stdout).unwrap();
+    let table = said(Path::new("."), &["design"]);
     assert_eq!(line(&table, "rolling resistance  ")[..4], ["rolling resistance", "Eq. 4", "60.36", "N"]);
     assert_eq!(line(&table, "engine")[..5], ["engine", "below Eq. 9", "1.111", "hp", "!"]);
     assert!(table.starts_with("0 of the machine's"), "{table}");
@@ -68,13 +55,12 @@ fn without_a_file_the_papers_machine_is_calculated() {
 
 #[test]
 fn the_printed_machine_is_the_papers_and_can_be_read() {
-    let output = design(Path::new("."), &["--print-machine"]);
-    let machine = String::from_utf8(output.stdout).unwrap();
+    let machine = said(Path::new("."), &["design", "--print-machine"]);
     assert!(
         machine.contains("# Outer diameter (Table 1, no. 7). From 50 to 3000 mm.\ndiameter = \"400 mm\""),
         "{machine}"
     );
-    let paper = String::from_utf8(design(Path::new("."), &[]).stdout).unwrap();
+    let paper = said(Path::new("."), &["design"]);
     assert_eq!(printed(&machine, &[]), paper);
 }
 
@@ -91,7 +77,7 @@ fn json_holds_inputs_and_figures_with_their_units() {
 
 #[test]
 fn the_papers_figures_stand_beside_ours_and_those_of_ones_own() {
-    let paper = String::from_utf8(design(Path::new("."), &["--against-paper"]).stdout).unwrap();
+    let paper = said(Path::new("."), &["design", "--against-paper"]);
     let tractive_force = ["tractive force", "below Eq. 8", "1082.4", "1082.5", "536.6", "N", "follows from an error"];
     assert_eq!(line(&paper, "tractive force")[..7], tractive_force);
     assert!(paper.contains("13 are right, 8 follow from an error before them, and 8 are wrong"), "{paper}");
@@ -101,7 +87,7 @@ fn the_papers_figures_stand_beside_ours_and_those_of_ones_own() {
 
 #[test]
 fn the_comparison_is_printed_as_json_too() {
-    let json: Value = serde_json::from_slice(&design(Path::new("."), &["--against-paper", "--json"]).stdout).unwrap();
+    let json: Value = serde_json::from_str(&said(Path::new("."), &["design", "--against-paper", "--json"])).unwrap();
     let apex = json["comparisons"].as_array().unwrap().iter().find(|row| row["name"] == "apex angle").unwrap();
     assert_eq!(apex["printed"], 120.0);
     assert_eq!(apex["verdict"], "wrong");
@@ -119,20 +105,20 @@ fn nothing_has_to_be_changed_on_the_manuals_machine() {
 
 #[test]
 fn an_unknown_key_is_refused_with_file_line_and_the_known_keys() {
-    assert_refused("[wheel]\ndiametre = \"400 mm\"\n", "my.toml, line 2: wheel.diametre: unknown field `diametre`");
-    assert_refused("[wheel]\ndiametre = \"400 mm\"\n", "`diameter`");
+    assert_no_machine("[wheel]\ndiametre = \"400 mm\"\n", "my.toml, line 2: wheel.diametre: unknown field `diametre`");
+    assert_no_machine("[wheel]\ndiametre = \"400 mm\"\n", "`diameter`");
 }
 
 #[test]
 fn a_wrong_unit_is_refused_with_the_right_ones() {
     let right = "my.toml, line 2: wheel.diameter: \"0.4 kg\" is not a length: write a number and mm, cm or m";
-    assert_refused("[wheel]\ndiameter = \"0.4 kg\"\n", right);
-    assert_refused("[wheel]\ndiameter = 400\n", "the paper's machine has diameter = \"400 mm\"");
+    assert_no_machine("[wheel]\ndiameter = \"0.4 kg\"\n", right);
+    assert_no_machine("[wheel]\ndiameter = 400\n", "the paper's machine has diameter = \"400 mm\"");
 }
 
 #[test]
 fn a_negative_length_is_refused_with_its_range() {
-    assert_refused(
+    assert_no_machine(
         "[wheel]\nwidth = \"-35 mm\"\n",
         "my.toml, line 2: wheel.width is -35 mm: it has to be from 5 to 1000 mm",
     );
@@ -140,7 +126,7 @@ fn a_negative_length_is_refused_with_its_range() {
 
 #[test]
 fn a_friction_angle_of_90_degrees_is_refused_with_its_range() {
-    assert_refused(
+    assert_no_machine(
         "[crop]\nweed_friction = \"90 degrees\"\n",
         "line 2: crop.weed_friction is 90 degrees: it has to be from 5 to 85",
     );
@@ -148,14 +134,12 @@ fn a_friction_angle_of_90_degrees_is_refused_with_its_range() {
 
 #[test]
 fn a_gear_box_that_no_sprocket_fits_is_refused_with_one_that_would() {
-    assert_refused("[engine]\ngear_box_ratio = 1\n", "a ratio near 38 makes it 40 teeth");
+    assert_no_machine("[engine]\ngear_box_ratio = 1\n", "a ratio near 38 makes it 40 teeth");
 }
 
 #[test]
 fn a_file_that_does_not_exist_is_named() {
-    let output = design(Path::new("."), &["--machine", "no-such.toml"]);
-    assert_eq!(output.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&output.stderr).contains("no-such.toml"));
+    assert_refused(Path::new("."), &["design", "--machine", "no-such.toml"], "no-such.toml");
 }
 
 #[test]

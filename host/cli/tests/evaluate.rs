@@ -1,9 +1,11 @@
 //! `weeder evaluate`, as it is called: on the manual's example, on trials that carry no model, and on tables that are wrong.
 
+mod common;
+
+use common::{assert_refused, said};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output};
 use tempfile::TempDir;
 
 /// The manual's example.
@@ -12,19 +14,6 @@ const EXAMPLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/trial-exa
 const HEADER: &str =
     "replication,speed_km_h,spacing_cm,weeds_before,weeds_after,plants,damaged,area_m2,time_s,width_m,power_hp\n";
 
-/// Runs `weeder evaluate` with these arguments in a folder.
-fn evaluate(folder: &Path, arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
-    command.current_dir(folder).arg("evaluate").args(arguments).output().expect("cargo has built the command")
-}
-
-/// What it prints where all is well.
-#[track_caller]
-fn said(output: &Output) -> String {
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout.clone()).expect("it prints text")
-}
-
 /// A folder with the file `trial.csv`, of these lines below the header.
 fn folder_with(lines: &str) -> TempDir {
     let folder = TempDir::new().unwrap();
@@ -32,18 +21,16 @@ fn folder_with(lines: &str) -> TempDir {
     folder
 }
 
-/// Asserts status 2, this message, and that no report was begun.
+/// Asserts that the table is refused with this message, and that no report was begun.
 #[track_caller]
-fn assert_refused(folder: &TempDir, message: &str) {
-    let output = evaluate(folder.path(), &["trial.csv", "--out", "report"]);
-    let heard = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!((output.status.code(), heard.contains(message)), (Some(2), true), "{heard}");
-    assert!(output.stdout.is_empty() && !folder.path().join("report").exists(), "nothing is done by half");
+fn assert_not_judged(folder: &TempDir, message: &str) {
+    assert_refused(folder.path(), &["evaluate", "trial.csv", "--out", "report"], message);
+    assert!(!folder.path().join("report").exists(), "nothing is done by half");
 }
 
 #[test]
 fn the_manual_s_example_is_judged_in_plain_words_and_tables() {
-    let said = said(&evaluate(Path::new("."), &[EXAMPLE]));
+    let said = said(Path::new("."), &["evaluate", EXAMPLE]);
     for line in [
         "24 plots of 8 treatments (1, 1.5, 2 and 2.5 km/h; 50 and 60 cm), 3 of each treatment.",
         "13 of 1318 plants were damaged (0.99 %, which may be 0.53 to 1.68 %), at most 4.00 % in a plot",
@@ -63,7 +50,7 @@ fn the_manual_s_example_is_judged_in_plain_words_and_tables() {
 /// binomial, control = glm.control(epsilon = 1e-300, maxit = 30))`, `summary(g)$coefficients`.
 #[test]
 fn the_json_has_what_r_makes_of_the_same_table() {
-    let json: Value = serde_json::from_str(&said(&evaluate(Path::new("."), &[EXAMPLE, "--json"]))).unwrap();
+    let json: Value = serde_json::from_str(&said(Path::new("."), &["evaluate", EXAMPLE, "--json"])).unwrap();
     assert_eq!(json["plots"].as_array().unwrap().len(), 24);
     assert_eq!(json["treatments"].as_array().unwrap().len(), 8);
     let weeding = &json["responses"][1];
@@ -91,7 +78,7 @@ fn the_json_has_what_r_makes_of_the_same_table() {
 #[test]
 fn the_report_is_one_page_in_a_folder_of_its_own() {
     let folder = TempDir::new().unwrap();
-    let said = said(&evaluate(folder.path(), &[EXAMPLE, "--out", "trials/may"]));
+    let said = said(folder.path(), &["evaluate", EXAMPLE, "--out", "trials/may"]);
     assert!(said.ends_with("Report      trials/may/report.html\n"), "{said}");
     let files: Vec<_> = fs::read_dir(folder.path().join("trials/may")).unwrap().collect();
     assert_eq!(files.len(), 1, "{files:?}");
@@ -106,7 +93,7 @@ fn a_trial_without_damage_and_without_replications_is_judged_as_far_as_it_goes()
         "1,1,50,100,12,60,0,12,127,0.4,2.5\n1,1,60,100,10,50,0,12,126,0.4,2.5\n\
          1,2,50,100,18,60,0,12,65,0.4,2.5\n1,2,60,100,17,50,0,12,64,0.4,2.5\n",
     );
-    let said = said(&evaluate(folder.path(), &["trial.csv"]));
+    let said = said(folder.path(), &["evaluate", "trial.csv"]);
     for line in [
         "None of 220 plants was damaged: in truth below 1.35 %.",
         "Plant damage has no model: it is 0 in every plot",
@@ -121,14 +108,14 @@ fn a_trial_without_damage_and_without_replications_is_judged_as_far_as_it_goes()
 #[test]
 fn a_single_plot_has_its_measures_and_is_told_that_it_carries_no_model() {
     let folder = folder_with("1,1.5,50,200,30,50,1,24,180,0.4,2.5\n");
-    let said = said(&evaluate(folder.path(), &["trial.csv"]));
+    let said = said(folder.path(), &["evaluate", "trial.csv"]);
     assert!(said.contains("159.94") && said.contains("Weeding efficiency has no model"), "{said}");
 }
 
 #[test]
 fn ground_covered_faster_than_the_machine_drives_is_pointed_out() {
     let folder = folder_with("1,1,50,100,12,60,0,12,127,0.4,2.5\n2,1,50,100,10,50,0,12,12,0.4,2.5\n");
-    let said = said(&evaluate(folder.path(), &["trial.csv"]));
+    let said = said(folder.path(), &["evaluate", "trial.csv"]);
     assert!(said.contains("Plot 2: more ground was covered than speed and width allow"), "{said}");
 }
 
@@ -148,7 +135,7 @@ fn a_wrong_line_is_named_and_nothing_is_written() {
             "trial.csv, line 3: replication 1 of 1.5 km/h and 50 cm stands in line 2",
         ),
     ] {
-        assert_refused(&folder_with(&format!("{good}{wrong}\n")), message);
+        assert_not_judged(&folder_with(&format!("{good}{wrong}\n")), message);
     }
 }
 
@@ -156,7 +143,7 @@ fn a_wrong_line_is_named_and_nothing_is_written() {
 fn a_missing_column_is_named() {
     let folder = folder_with("");
     fs::write(folder.path().join("trial.csv"), "replication,speed_km_h\n1,1\n").unwrap();
-    assert_refused(
+    assert_not_judged(
         &folder,
         "trial.csv, line 1: the column `spacing_cm` is missing: the header has to name replication,",
     );
@@ -164,18 +151,13 @@ fn a_missing_column_is_named() {
 
 #[test]
 fn a_file_that_does_not_exist_is_named() {
-    assert_refused(&TempDir::new().unwrap(), "trial.csv cannot be read");
+    assert_not_judged(&TempDir::new().unwrap(), "trial.csv cannot be read");
 }
 
 #[test]
 fn a_report_that_cannot_be_written_is_an_error() {
     let folder = TempDir::new().unwrap();
     fs::write(folder.path().join("report"), "a file, no folder").unwrap();
-    let output = evaluate(folder.path(), &[EXAMPLE, "--out", "report"]);
-    let heard = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(
-        (output.status.code(), heard.contains("report is a file, and a folder has to be named")),
-        (Some(2), true),
-        "{heard}"
-    );
+    let file = "report is a file, and a folder has to be named";
+    assert_refused(folder.path(), &["evaluate", EXAMPLE, "--out", "report"], file);
 }

@@ -1,27 +1,16 @@
 //! `weeder trial` and `weeder sweep`, as they are called.
 
+mod common;
+
+use common::{assert_refused, said, weeder};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Command;
 use tempfile::TempDir;
 
 /// A field so small that a trial in it takes a moment.
 const SMALL: &str = "[plot]\nrows = 1\nrow_m = 6\n";
-
-/// Runs `weeder` with these arguments in a folder.
-fn weeder(folder: &Path, arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
-    command.current_dir(folder).args(arguments).output().expect("cargo has built the command")
-}
-
-/// What a command says that has to succeed.
-#[track_caller]
-fn said(folder: &Path, arguments: &[&str]) -> String {
-    let output = weeder(folder, arguments);
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8_lossy(&output.stdout).into_owned()
-}
 
 /// A folder with the file `small.toml`.
 fn folder() -> TempDir {
@@ -30,14 +19,11 @@ fn folder() -> TempDir {
     folder
 }
 
-/// Asserts status 2 and a message that contains `words`, and that nothing was written.
+/// Asserts that it is refused with these words, and that nothing was written.
 #[track_caller]
-fn assert_refused(arguments: &[&str], words: &str) {
+fn assert_writes_nothing(arguments: &[&str], words: &str) {
     let folder = folder();
-    let output = weeder(folder.path(), arguments);
-    let message = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(2), "{message}");
-    assert!(message.contains(words), "{message}");
+    assert_refused(folder.path(), arguments, words);
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
 }
 
@@ -86,13 +72,16 @@ fn a_trial_gives_programs_its_plots() {
 
 #[test]
 fn what_is_wrong_with_a_trial_is_named_and_nothing_is_written() {
-    assert_refused(&["trial", "--field", "wet"], "wet is none of the presets (transplanted, even-stand");
-    assert_refused(&["trial", "--speeds", "1,fast", "--out", "r"], "it has to be a number from 0.1 to 8");
-    assert_refused(&["trial", "--spacings", "1", "--out", "r"], "it has to be a number from 5 to 500");
-    assert_refused(&["trial", "--replications", "0", "--out", "r"], "it has to be a whole number from 1 to 1000");
-    assert_refused(&["trial", "--spacings", "10", "--field", "small.toml"], "plants 10 cm apart grow together");
+    assert_writes_nothing(&["trial", "--field", "wet"], "wet is none of the presets (transplanted, even-stand");
+    assert_writes_nothing(&["trial", "--speeds", "1,fast", "--out", "r"], "it has to be a number from 0.1 to 8");
+    assert_writes_nothing(&["trial", "--spacings", "1", "--out", "r"], "it has to be a number from 5 to 500");
+    assert_writes_nothing(
+        &["trial", "--replications", "0", "--out", "r"],
+        "it has to be a whole number from 1 to 1000",
+    );
+    assert_writes_nothing(&["trial", "--spacings", "10", "--field", "small.toml"], "plants 10 cm apart grow together");
     let nowhere = ["trial", "--spacings", "10", "--field", "small.toml", "--out", "r"];
-    assert_refused(&nowhere, "ask for a larger spacing or narrower canopies");
+    assert_writes_nothing(&nowhere, "ask for a larger spacing or narrower canopies");
 }
 
 #[test]
@@ -203,10 +192,16 @@ fn what_is_wrong_with_a_field_is_said_in_a_line_with_what_would_be_right() {
 
 #[test]
 fn what_is_wrong_with_a_sweep_is_named_and_nothing_is_written() {
-    assert_refused(&["sweep", "--x", "lead_out_ms", "--out", "s.csv"], "NAME=FROM..TO:STEP");
-    assert_refused(&["sweep", "--x", "lead=1..2:1", "--out", "s.csv"], "lead is neither a parameter of the field nor");
-    assert_refused(&["sweep", "--x", "speed=1..2:0", "--out", "s.csv"], "in steps above 0");
-    assert_refused(&["sweep", "--x", "k=1..3:1", "--result", "money"], "plant_damage");
-    assert_refused(&["sweep", "--x", "speed=1..2:1", "--y", "speed=2..3:1", "--out", "s.csv"], "both axes are `speed`");
-    assert_refused(&["sweep", "--x", "k=1..3:1", "--speed", "-1"], "it has to be a number from 0.1 to 8");
+    assert_writes_nothing(&["sweep", "--x", "lead_out_ms", "--out", "s.csv"], "NAME=FROM..TO:STEP");
+    assert_writes_nothing(
+        &["sweep", "--x", "lead=1..2:1", "--out", "s.csv"],
+        "lead is neither a parameter of the field nor",
+    );
+    assert_writes_nothing(&["sweep", "--x", "speed=1..2:0", "--out", "s.csv"], "in steps above 0");
+    assert_writes_nothing(&["sweep", "--x", "k=1..3:1", "--result", "money"], "plant_damage");
+    assert_writes_nothing(
+        &["sweep", "--x", "speed=1..2:1", "--y", "speed=2..3:1", "--out", "s.csv"],
+        "both axes are `speed`",
+    );
+    assert_writes_nothing(&["sweep", "--x", "k=1..3:1", "--speed", "-1"], "it has to be a number from 0.1 to 8");
 }

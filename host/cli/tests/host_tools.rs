@@ -1,13 +1,17 @@
 //! The host's tools over a pseudo terminal, as a user runs them, with the virtual Uno at its other end.
 
+#[path = "common/typed.rs"]
+mod typed;
+
 use std::fs;
-use std::io::{BufRead, BufReader, Write};
+use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use std::thread;
 use std::time::Duration;
 use trial::firmware;
 use trial::live::{Background, Live, LiveUno, Setup};
+use typed::{printed, typed};
 use uno::pty::Pty;
 
 /// How many lines of a kind a log has by now.
@@ -90,26 +94,7 @@ fn uno() -> Background<LiveUno> {
 
 /// Runs `weeder` with these words, then `--port` and the port, and this input.
 fn weeder(words: &[&str], port: &Path, input: &str) -> Output {
-    let mut weeder = Command::new(env!("CARGO_BIN_EXE_weeder"))
-        .args(words)
-        .arg("--port")
-        .arg(port)
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .expect("cargo has built the command");
-    // One that fails at once reads nothing.
-    let _ = weeder.stdin.take().expect("it is piped").write_all(input.as_bytes());
-    weeder.wait_with_output().expect("it ends")
-}
-
-/// What it printed, where it ended with this status.
-#[track_caller]
-fn printed(output: &Output, status: i32) -> String {
-    let [out, error] = [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes).into_owned());
-    assert_eq!(output.status.code(), Some(status), "{out}{error}");
-    out + &error
+    typed(Command::new(env!("CARGO_BIN_EXE_weeder")).args(words).arg("--port").arg(port), input)
 }
 
 #[test]

@@ -1,22 +1,11 @@
 //! `weeder plan`, as it is called: what it draws can be filled in by hand, and `weeder evaluate` judges it.
 
+mod common;
+
+use common::{assert_refused, said};
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output};
 use tempfile::TempDir;
-
-fn weeder(folder: &Path, arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
-    command.current_dir(folder).args(arguments).output().expect("cargo has built the command")
-}
-
-/// What it prints where all is well.
-#[track_caller]
-fn said(folder: &Path, arguments: &[&str]) -> String {
-    let output = weeder(folder, arguments);
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout).expect("it prints text")
-}
 
 /// The table with every empty cell filled in: more damage and more weeds left the faster, and a good block and a bad one.
 fn filled_in(table: &str) -> String {
@@ -56,10 +45,8 @@ fn a_plan_that_is_filled_in_by_hand_is_judged() {
 fn a_plan_that_is_not_filled_in_yet_is_refused_with_the_cell_that_is_empty() {
     let folder = TempDir::new().unwrap();
     said(folder.path(), &["plan", "--out", "trial.csv"]);
-    let output = weeder(folder.path(), &["evaluate", "trial.csv"]);
-    let message = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(2), "{message}");
-    assert!(message.contains("trial.csv, line 6: weeds_before is ``: it has to be a whole number"), "{message}");
+    let empty = "trial.csv, line 6: weeds_before is ``: it has to be a whole number";
+    assert_refused(folder.path(), &["evaluate", "trial.csv"], empty);
 }
 
 #[test]

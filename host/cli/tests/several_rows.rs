@@ -1,7 +1,9 @@
 //! The host's tools with several rows, as a user runs them, with virtual Unos at their ports.
 
+#[path = "common/typed.rs"]
+mod typed;
+
 use std::fs;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::thread::sleep;
@@ -10,6 +12,7 @@ use tempfile::TempDir;
 use trial::firmware;
 use trial::live::rows::{LiveRows, Mishap};
 use trial::live::{Background, Live, Setup};
+use typed::{printed, typed};
 
 /// Rows that stand, their ports linked in a folder as `row0` and so on.
 fn rows(folder: &TempDir, count: usize) -> Background<LiveRows> {
@@ -56,18 +59,7 @@ impl Drop for Running {
 
 /// Runs `weeder` with these words and this input.
 fn weeder(words: &[&str], input: &str) -> Output {
-    let mut weeder = command(words).spawn().expect("cargo has built the command");
-    // One that fails at once reads nothing.
-    let _ = weeder.stdin.take().expect("it is piped").write_all(input.as_bytes());
-    weeder.wait_with_output().expect("it ends")
-}
-
-/// What it printed, where it ended with this status.
-#[track_caller]
-fn printed(output: &Output, status: i32) -> String {
-    let [out, error] = [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes).into_owned());
-    assert_eq!(output.status.code(), Some(status), "{out}{error}");
-    out + &error
+    typed(&mut command(words), input)
 }
 
 #[test]

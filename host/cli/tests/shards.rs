@@ -1,8 +1,11 @@
 //! `--shard` and `weeder merge`: the parts of a study give the bytes of an undivided one, and what is no whole study is refused.
 
+mod common;
+
+use common::{assert_refused, said, weeder};
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Command;
 use std::thread;
 use std::time::Duration;
 use tempfile::TempDir;
@@ -12,12 +15,6 @@ const SMALL: &str = "[plot]\nrows = 1\nrow_m = 6\n";
 
 /// A trial in it.
 const TRIAL: [&str; 5] = ["trial", "--field", "small.toml", "--seed", "7"];
-
-/// Runs `weeder` with these arguments in a folder.
-fn weeder(folder: &Path, arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
-    command.current_dir(folder).args(arguments).output().expect("cargo has built the command")
-}
 
 /// A folder with the file `small.toml`.
 fn folder() -> TempDir {
@@ -31,8 +28,7 @@ fn folder() -> TempDir {
 fn compute_parts(folder: &Path, study: &[&str], of: u32) {
     for number in (1..=of).rev() {
         let (shard, out) = (format!("{number}/{of}"), format!("{number}.part"));
-        let output = weeder(folder, &[study, &["--shard", &shard, "--out", &out]].concat());
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        said(folder, &[study, &["--shard", &shard, "--out", &out]].concat());
     }
 }
 
@@ -85,14 +81,11 @@ fn more_shards_than_plots_are_a_whole_study_too() {
     assert_eq!(merged.stdout, weeder(folder.path(), &trial).stdout);
 }
 
-/// Asserts status 2 and a message that contains `words`, and that no report was written.
+/// Asserts that it is refused with these words, and that no report was written.
 #[track_caller]
-fn assert_refused(folder: &Path, arguments: &[&str], words: &str) {
-    let output = weeder(folder, arguments);
-    let message = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(2), "{message}");
-    assert!(message.contains(words), "{message}");
-    assert!(output.stdout.is_empty() && !folder.join("report").exists());
+fn assert_reports_nothing(folder: &Path, arguments: &[&str], words: &str) {
+    assert_refused(folder, arguments, words);
+    assert!(!folder.join("report").exists());
 }
 
 #[test]
@@ -101,16 +94,20 @@ fn parts_that_are_no_whole_study_are_refused_by_name() {
     let path = folder.path();
     compute_parts(path, &TRIAL, 3);
     let merge = |parts: &[&'static str]| [&["merge", "--out", "report"], parts].concat();
-    assert_refused(path, &merge(&["1.part", "3.part"]), "part 2/3 is missing");
-    assert_refused(path, &merge(&["1.part", "2.part", "3.part", "2.part"]), "2.part and 2.part are both part 2/3");
+    assert_reports_nothing(path, &merge(&["1.part", "3.part"]), "part 2/3 is missing");
+    assert_reports_nothing(
+        path,
+        &merge(&["1.part", "2.part", "3.part", "2.part"]),
+        "2.part and 2.part are both part 2/3",
+    );
     let other = ["trial", "--field", "small.toml", "--seed", "8", "--shard", "2/3", "--out", "other.part"];
-    assert!(weeder(path, &other).status.success());
+    said(path, &other);
     let seed = "other.part is of another study than 1.part: its experiment.seed is 8, and there it is 7";
-    assert_refused(path, &merge(&["1.part", "other.part", "3.part"]), seed);
+    assert_reports_nothing(path, &merge(&["1.part", "other.part", "3.part"]), seed);
     let sweep = ["sweep", "--field", "small.toml", "--x", "k=1..9:1", "--shard", "2/3", "--out", "sweep.part"];
-    assert!(weeder(path, &sweep).status.success());
+    said(path, &sweep);
     let command = "sweep.part is of another study than 1.part: its command is \"sweep\", and there it is \"trial\"";
-    assert_refused(path, &merge(&["1.part", "sweep.part", "3.part"]), command);
+    assert_reports_nothing(path, &merge(&["1.part", "sweep.part", "3.part"]), command);
 
     let text = fs::read_to_string(path.join("2.part")).unwrap();
     let change = |name: &str, from: &str, to: &str| {
@@ -119,13 +116,13 @@ fn parts_that_are_no_whole_study_are_refused_by_name() {
     };
     let version = concat!("\"version\":\"", env!("CARGO_PKG_VERSION"), "\"");
     change("older.part", version, "\"version\":\"0.0.9\"");
-    assert_refused(path, &merge(&["1.part", "older.part", "3.part"]), "older.part is of weeder 0.0.9 (build ");
+    assert_reports_nothing(path, &merge(&["1.part", "older.part", "3.part"]), "older.part is of weeder 0.0.9 (build ");
     change("built.part", "\"build\":\"", "\"build\":\"0");
-    assert_refused(path, &merge(&["1.part", "built.part", "3.part"]), "built.part is of weeder ");
+    assert_reports_nothing(path, &merge(&["1.part", "built.part", "3.part"]), "built.part is of weeder ");
     fs::write(path.join("cut.part"), &text[..text.len() / 2]).unwrap();
-    assert_refused(path, &merge(&["1.part", "cut.part", "3.part"]), "cut.part, line ");
-    assert_refused(path, &merge(&["1.part", "small.toml", "3.part"]), "small.toml is no part of a study");
-    assert_refused(path, &merge(&["1.part", "no.part", "3.part"]), "no.part cannot be read: No such file");
+    assert_reports_nothing(path, &merge(&["1.part", "cut.part", "3.part"]), "cut.part, line ");
+    assert_reports_nothing(path, &merge(&["1.part", "small.toml", "3.part"]), "small.toml is no part of a study");
+    assert_reports_nothing(path, &merge(&["1.part", "no.part", "3.part"]), "no.part cannot be read: No such file");
 }
 
 #[test]
@@ -133,21 +130,21 @@ fn what_does_not_go_with_parts_is_refused() {
     let folder = folder();
     let path = folder.path();
     for shard in ["0/4", "5/4", "2", "x/y"] {
-        assert_refused(
+        assert_reports_nothing(
             path,
             &[&TRIAL[..], &["--shard", shard, "--out", "p"]].concat(),
             "it has to be I/N, such as 2/4",
         );
     }
-    assert_refused(path, &[&TRIAL[..], &["--shard", "1/4"]].concat(), "--out <FOLDER>");
-    assert_refused(path, &["soak", "--out", "p"], "--shard <I/N>");
+    assert_reports_nothing(path, &[&TRIAL[..], &["--shard", "1/4"]].concat(), "--out <FOLDER>");
+    assert_reports_nothing(path, &["soak", "--out", "p"], "--shard <I/N>");
     let soak = ["soak", "--hours", "1", "--uno-minutes", "0", "--shard", "1/1", "--out", "soak.part"];
-    assert!(weeder(path, &soak).status.success());
-    assert_refused(path, &["merge", "soak.part", "--out", "report"], "a soak, which writes no file");
-    assert_refused(path, &["merge", "soak.part", "--brief"], "--brief is for those of a trial");
-    assert_refused(path, &["merge", "soak.part", "--result", "alarms"], "--result is for those of a sweep");
+    said(path, &soak);
+    assert_reports_nothing(path, &["merge", "soak.part", "--out", "report"], "a soak, which writes no file");
+    assert_reports_nothing(path, &["merge", "soak.part", "--brief"], "--brief is for those of a trial");
+    assert_reports_nothing(path, &["merge", "soak.part", "--result", "alarms"], "--result is for those of a sweep");
     let nowhere = [&TRIAL[..], &["--shard", "1/4", "--out", "no/such/folder/p"]].concat();
-    assert_refused(path, &nowhere, "no/such/folder/p cannot be written");
+    assert_reports_nothing(path, &nowhere, "no/such/folder/p cannot be written");
 }
 
 #[test]
@@ -176,5 +173,5 @@ fn a_trial_of_more_plants_than_can_be_counted_is_refused() {
     let folder = folder();
     fs::write(folder.path().join("huge.toml"), "[plot]\nrows = 1000\nrow_m = 1000\n").unwrap();
     let trial = ["trial", "--field", "huge.toml", "--replications", "1000"];
-    assert_refused(folder.path(), &trial, "has to have at most 2000000000");
+    assert_reports_nothing(folder.path(), &trial, "has to have at most 2000000000");
 }

@@ -1,8 +1,9 @@
 //! `weeder train` and `weeder classify`, as they are called.
 
+mod common;
+
+use common::{assert_refused, said, weeder};
 use std::fs;
-use std::path::Path;
-use std::process::{Command, Output};
 use study::training::MOST_EXAMPLES;
 use tempfile::TempDir;
 
@@ -11,12 +12,6 @@ const BUILT_IN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../control/src/g
 
 const HEADER: &str = "speed_mm_s,spacing_mm,delay_mm,hold_mm,actuation_mm,label\n";
 
-/// Runs `weeder` with these arguments in a folder.
-fn weeder(folder: &Path, arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
-    command.current_dir(folder).args(arguments).output().expect("cargo has built the command")
-}
-
 /// A folder with the file `objects.csv`, of these lines below the header.
 fn folder_with(lines: &str) -> TempDir {
     let folder = TempDir::new().unwrap();
@@ -24,28 +19,22 @@ fn folder_with(lines: &str) -> TempDir {
     folder
 }
 
-/// Asserts status 2 and a message that contains `words`.
+/// Asserts that these objects and arguments are refused with these words.
 #[track_caller]
-fn assert_refused(lines: &str, arguments: &[&str], words: &str) {
-    let folder = folder_with(lines);
-    let output = weeder(folder.path(), arguments);
-    let message = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(2), "{message}");
-    assert!(message.contains(words), "{message}");
+fn assert_not_taken(lines: &str, arguments: &[&str], words: &str) {
+    assert_refused(folder_with(lines).path(), arguments, words);
 }
 
 #[test]
 fn the_built_in_table_is_what_the_command_writes() {
     let folder = TempDir::new().unwrap();
-    let output = weeder(folder.path(), &["train", "--synthetic", "--out", "table.rs", "--picture", "regions.svg"]);
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let said = said(folder.path(), &["train", "--synthetic", "--out", "table.rs", "--picture", "regions.svg"]);
     let written = fs::read_to_string(folder.path().join("table.rs")).unwrap();
     let built_in = fs::read_to_string(BUILT_IN).unwrap();
     assert!(
         written == built_in,
         "the table is out of date: run `cargo run --release -p weeder-cli -- train --synthetic --out {BUILT_IN}`"
     );
-    let said = String::from_utf8_lossy(&output.stdout).into_owned();
     assert_eq!(said.matches("Plants taken for weeds   0 of ").count(), 3, "{said}");
     assert!(fs::read_to_string(folder.path().join("regions.svg")).unwrap().starts_with("<svg"));
 }
@@ -53,10 +42,8 @@ fn the_built_in_table_is_what_the_command_writes() {
 #[test]
 fn examples_written_as_csv_are_known_to_the_firmware() {
     let folder = TempDir::new().unwrap();
-    assert!(weeder(folder.path(), &["train", "--synthetic", "--out", "examples.csv"]).status.success());
-    let output = weeder(folder.path(), &["classify", "examples.csv"]);
-    assert_eq!(output.status.code(), Some(0));
-    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    said(folder.path(), &["train", "--synthetic", "--out", "examples.csv"]);
+    let said = said(folder.path(), &["classify", "examples.csv"]);
     assert!(said.contains("Treated as they should   100.00 % of all"), "{said}");
 }
 
@@ -95,8 +82,8 @@ fn objects_without_labels_are_classified_without_a_score() {
 fn a_table_larger_than_the_flash_budget_is_refused_by_name() {
     let above = MOST_EXAMPLES + 1;
     let room = format!("it has to be a whole number from 0 to {MOST_EXAMPLES}");
-    assert_refused("", &["train", "--synthetic", "--max", &above.to_string()], &room);
-    assert_refused("", &["train", "--synthetic", "--max", "9"], "too many examples for the flash budget");
+    assert_not_taken("", &["train", "--synthetic", "--max", &above.to_string()], &room);
+    assert_not_taken("", &["train", "--synthetic", "--max", "9"], "too many examples for the flash budget");
 }
 
 #[test]
@@ -110,32 +97,32 @@ fn objects_that_take_more_examples_than_the_flash_has_room_for_are_refused_by_na
     let chessboard: String = (0..400).map(square).collect();
     for most in ["64".to_owned(), MOST_EXAMPLES.to_string()] {
         let room = format!("and there is room for {most}: take out objects with a wrong label");
-        assert_refused(
+        assert_not_taken(
             &chessboard,
             &["train", "objects.csv", "--max", &most],
             "too many examples for the flash budget",
         );
-        assert_refused(&chessboard, &["train", "objects.csv", "--max", &most], &room);
+        assert_not_taken(&chessboard, &["train", "objects.csv", "--max", &most], &room);
     }
 }
 
 #[test]
 fn a_table_that_teaches_nothing_is_refused_with_file_and_line() {
     let train = ["train", "objects.csv"];
-    assert_refused("", &train, "objects.csv, line 1: nothing stands below the header");
-    assert_refused("694,500,226,250,573,plant\n", &train, "objects.csv, line 2: up to here there is no label weed");
-    assert_refused("694,500,NaN,250,573,plant\n", &train, "objects.csv, line 2: delay_mm is `NaN`");
+    assert_not_taken("", &train, "objects.csv, line 1: nothing stands below the header");
+    assert_not_taken("694,500,226,250,573,plant\n", &train, "objects.csv, line 2: up to here there is no label weed");
+    assert_not_taken("694,500,NaN,250,573,plant\n", &train, "objects.csv, line 2: delay_mm is `NaN`");
 }
 
 #[test]
 fn a_k_that_cannot_vote_is_refused() {
-    assert_refused("", &["train", "--synthetic", "--k", "16"], "it has to be auto or a number from 1 to 15");
-    assert_refused("", &["classify", "objects.csv", "--k", "0"], "it has to be a whole number from 1 to 15");
+    assert_not_taken("", &["train", "--synthetic", "--k", "16"], "it has to be auto or a number from 1 to 15");
+    assert_not_taken("", &["classify", "objects.csv", "--k", "0"], "it has to be a whole number from 1 to 15");
 }
 
 #[test]
 fn a_table_is_written_as_rust_or_csv_only() {
-    assert_refused(
+    assert_not_taken(
         "",
         &["train", "--synthetic", "--out", "table.txt"],
         "a table is written as Rust (.rs) or as CSV (.csv)",
@@ -144,6 +131,6 @@ fn a_table_is_written_as_rust_or_csv_only() {
 
 #[test]
 fn objects_come_from_files_or_from_the_simulated_field() {
-    assert_refused("", &["train"], "FILE.csv");
-    assert_refused("", &["train", "objects.csv", "--synthetic"], "cannot be used with");
+    assert_not_taken("", &["train"], "FILE.csv");
+    assert_not_taken("", &["train", "objects.csv", "--synthetic"], "cannot be used with");
 }
