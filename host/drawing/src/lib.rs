@@ -1,4 +1,4 @@
-//! What all pictures are drawn with: paper, ink, and a few shapes and words in SVG.
+//! What all pictures are drawn with: paper, ink, the colours of what stands in a row, and a few shapes and words in SVG.
 //!
 //! A picture brings its own light background, so that it reads the same on a light page and on a dark one. Places and
 //! sizes are pixels, downwards and to the right, rounded to a tenth.
@@ -15,6 +15,27 @@ pub const INK: &str = "#33312c";
 
 /// Colour of axes and their marks.
 pub const PALE_INK: &str = "#8a857a";
+
+/// A plant.
+pub const PLANT: &str = "#4c9a50";
+
+/// A weed.
+pub const WEED: &str = "#a0672c";
+
+/// Ground that was weeded.
+pub const WEEDED: &str = "#b99a72";
+
+/// Ground that was left alone.
+pub const LEFT_ALONE: &str = "#dfe7ee";
+
+/// What is neither right nor wrong: a margin that was cut, a plant that was not known.
+pub const DOUBTFUL: &str = "#e0a526";
+
+/// What is wrong: a plant that was damaged, an alarm.
+pub const WRONG: &str = "#cf3a32";
+
+/// What was written or measured beside it: a label, the tool's curve.
+pub const NOTE: &str = "#2a6f97";
 
 /// Width and height of a legend's mark.
 pub const MARK_SIZE: f64 = 12.0;

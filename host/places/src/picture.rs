@@ -5,7 +5,10 @@
 
 use crate::job::{Did, Job, What};
 use crate::plane::{Metres, Place, Plane};
-use drawing::{INK, Legend, PALE_INK, document, line, paper, swatch, tenth, words};
+use drawing::{
+    DOUBTFUL, INK, LEFT_ALONE, Legend, NOTE, PALE_INK, PLANT, WEED, WEEDED, WRONG, document, line, paper, swatch,
+    tenth, words,
+};
 use link::Class;
 use std::collections::HashSet;
 use svg::Document;
@@ -19,22 +22,14 @@ const HEAD: f64 = 56.0;
 /// The least that is drawn, in metres: a map of a point has no scale.
 const LEAST_M: f64 = 5.0;
 
-const PLANT: &str = "#4c9a50";
-const UNKNOWN: &str = "#e0a526";
-const WEED: &str = "#a0672c";
-const ALARM: &str = "#cf3a32";
-const LABEL: &str = "#2a6f97";
-const WEEDED: &str = "#b99a72";
-const SPARED: &str = "#dfe7ee";
-
 /// The colour and the size of what is drawn as a point.
 fn mark(what: What) -> Option<(&'static str, f64)> {
     match what {
         What::Object { class: Class::Plant, .. } => Some((PLANT, 2.5)),
-        What::Object { class: Class::Unknown, .. } => Some((UNKNOWN, 2.5)),
+        What::Object { class: Class::Unknown, .. } => Some((DOUBTFUL, 2.5)),
         What::Object { class: Class::Weed, .. } => Some((WEED, 2.0)),
-        What::Label(_) => Some((LABEL, 3.0)),
-        What::Alarm => Some((ALARM, 4.0)),
+        What::Label(_) => Some((NOTE, 3.0)),
+        What::Alarm => Some((WRONG, 4.0)),
         What::Guarded | What::SwingOut | What::SwingIn => None,
     }
 }
@@ -67,7 +62,7 @@ pub fn draw(jobs: &[&Job]) -> Option<Document> {
 
     let mut ground_drawn = Group::new();
     for ground in grounds() {
-        let colour = if ground.did == Did::Weeded { WEEDED } else { SPARED };
+        let colour = if ground.did == Did::Weeded { WEEDED } else { LEFT_ALONE };
         for line in &ground.lines {
             let points: Vec<String> =
                 line.iter().map(|&place| pixel(place)).map(|(x, y)| format!("{x:.1},{y:.1}")).collect();
@@ -89,12 +84,12 @@ pub fn draw(jobs: &[&Job]) -> Option<Document> {
     let mut legend = Legend::new(FRAME, 16.0);
     let entries = [
         (WEEDED, "weeded"),
-        (SPARED, "not weeded"),
+        (LEFT_ALONE, "not weeded"),
         (PLANT, "plant"),
-        (UNKNOWN, "unknown, kept"),
+        (DOUBTFUL, "unknown, kept"),
         (WEED, "tall weed"),
-        (LABEL, "label"),
-        (ALARM, "alarm"),
+        (NOTE, "label"),
+        (WRONG, "alarm"),
     ];
     for (colour, meaning) in entries {
         legend.explain(|x, y| swatch(x, y, colour), meaning);

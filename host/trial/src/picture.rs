@@ -2,7 +2,10 @@
 //!
 //! The row is broken into lanes, to be read like lines of a text.
 
-use drawing::{Legend, MARK_SIZE, PALE_INK, PAPER, document, line, paper, rectangle, swatch, tenth, words};
+use drawing::{
+    DOUBTFUL, LEFT_ALONE, Legend, MARK_SIZE, NOTE, PALE_INK, PAPER, PLANT, WEED, WEEDED, WRONG, document, line, paper,
+    rectangle, swatch, tenth, words,
+};
 use field::row::{Kind, Row, Thing};
 use field::verdict::{Judgement, Verdict};
 use std::ops::Range;
@@ -31,15 +34,8 @@ const IN_Y: f64 = 132.0;
 const OUT_Y: f64 = 96.0;
 const SCALE_Y: f64 = 140.0;
 
-const PLANT: &str = "#4c9a50";
-const MARGIN_CUT: &str = "#e0a526";
-const DAMAGED: &str = "#cf3a32";
-const WEED: &str = "#a0672c";
 const BEAM: &str = "#6a6fb5";
 const WINDOW: &str = "#c58fb8";
-const WEEDED: &str = "#b99a72";
-const OUT: &str = "#dfe7ee";
-const CURVE: &str = "#2a6f97";
 
 /// Draws a row and what happened to it.
 pub fn draw(row: &Row, judgement: &Judgement) -> Document {
@@ -66,8 +62,10 @@ fn draw_lane(row: &Row, judgement: &Judgement, ground: &Range<f64>, clip: &str) 
 
     let mut drawn = Group::new().set("clip-path", format!("url(#{clip})"));
     drawn = drawn.add(rectangle(0.0, TOOL_Y, length, TOOL_HEIGHT, WEEDED));
-    let strips =
-        [(&judgement.clear_mm, TOOL_Y, TOOL_HEIGHT, OUT), (&judgement.windows_mm, WINDOW_Y, STRIP_HEIGHT, WINDOW)];
+    let strips = [
+        (&judgement.clear_mm, TOOL_Y, TOOL_HEIGHT, LEFT_ALONE),
+        (&judgement.windows_mm, WINDOW_Y, STRIP_HEIGHT, WINDOW),
+    ];
     for (stretches, y, height, colour) in strips {
         for stretch in stretches.iter().filter(|stretch| is_here(stretch)) {
             let (from, to) = (stretch.start.max(ground.start), stretch.end.min(ground.end));
@@ -93,7 +91,7 @@ fn draw_lane(row: &Row, judgement: &Judgement, ground: &Range<f64>, clip: &str) 
             Polyline::new()
                 .set("points", points.join(" "))
                 .set("fill", "none")
-                .set("stroke", CURVE)
+                .set("stroke", NOTE)
                 .set("stroke-width", 1.6)
                 .set("stroke-linejoin", "round"),
         );
@@ -153,8 +151,8 @@ fn canopy(plant: &Thing, x: f64, verdict: Verdict) -> Group {
 fn colour(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::Kept => PLANT,
-        Verdict::MarginCut => MARGIN_CUT,
-        Verdict::Damaged => DAMAGED,
+        Verdict::MarginCut => DOUBTFUL,
+        Verdict::Damaged => WRONG,
     }
 }
 
@@ -202,9 +200,9 @@ fn legend() -> Group {
         (WEED, "tall weed"),
         (BEAM, "beam broken"),
         (WINDOW, "window"),
-        (OUT, "tool clear"),
+        (LEFT_ALONE, "tool clear"),
         (WEEDED, "tool not clear"),
-        (CURVE, "tool's angle"),
+        (NOTE, "tool's angle"),
     ];
     let mut legend = Legend::new(SIDE, 22.0);
     for (verdict, meaning) in verdicts {
@@ -236,7 +234,7 @@ mod tests {
         let drawn = draw(&trial.row, &outcome.judgement).to_string();
         assert_eq!(drawn.matches("<ellipse").count(), 2);
         // Both plants, and the legend.
-        assert_eq!(drawn.matches(DAMAGED).count(), 3);
+        assert_eq!(drawn.matches(WRONG).count(), 3);
         assert_eq!(drawn.matches(PLANT).count(), 1);
     }
 
