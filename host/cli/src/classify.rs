@@ -31,7 +31,7 @@ pub struct Arguments {
         long,
         value_name = "N",
         value_parser = whole_within(1..=MAX_K),
-        help = format!("Examples that vote, 1 to {MAX_K}; as the firmware starts with where none are given")
+        help = format!("Examples that vote, 1 to {MAX_K}; left out, as many as the firmware starts with")
     )]
     k: Option<u8>,
     /// Print a JSON object for each instead of the table.

@@ -25,7 +25,7 @@ pub struct CourseArguments {
     /// Number of crop plants, 1 to 1000.
     #[arg(long, default_value = "20", value_parser = whole_within(1..=1000_usize))]
     plants: usize,
-    /// Number of tall weeds between them, 0 to 1000; where none is given, 5, or as many of these as there is room for.
+    /// Number of tall weeds between them, 0 to 1000; left out, 5, or as many as there is room for.
     #[arg(long, value_parser = whole_within(0..=1000_usize))]
     weeds: Option<usize>,
     /// Which of all the possible rows, 0 to 18446744073709551615: the same seed gives the same row.

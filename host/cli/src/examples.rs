@@ -40,7 +40,7 @@ enum Action {
         #[command(flatten)]
         port: Port,
     },
-    /// Teach the machine a table's examples; nothing is sent unless all of them find room.
+    /// Teach the machine a table's examples; nothing is sent unless there is room for all of them.
     #[command(after_help = "\
 An Uno has room for 32 examples beside its built-in table. They are kept over a loss of power.\n\n\
 Example: weeder examples push chilli.csv --replace")]
@@ -48,10 +48,10 @@ Example: weeder examples push chilli.csv --replace")]
         /// The table; - for standard input.
         #[arg(value_name = "FILE.csv", value_parser = source::file)]
         file: PathBuf,
-        /// Have the machine forget what it was taught and the table does not name.
+        /// Have the machine forget those examples that the table does not have.
         #[arg(long)]
         replace: bool,
-        /// Teach even what the built-in examples are sure is the other class.
+        /// Teach even what the built-in examples contradict.
         #[arg(long)]
         force: bool,
         /// Print what was done as JSON.

@@ -23,23 +23,23 @@ const RETRY: Duration = Duration::from_secs(1);
 /// Where beam and tool stand beside the antenna, as the user has measured it.
 #[derive(Args)]
 pub struct AntennaArguments {
-    /// How far the beam stands ahead of the antenna in mm, -20000 to 20000; below 0 behind it. 0 where it is not told.
+    /// How far the beam stands ahead of the antenna in mm, -20000 to 20000; below 0 behind it. Left out, 0.
     #[arg(long, value_name = "MM", value_parser = number_within(-20_000.0..=20_000.0))]
     beam_ahead: Option<f64>,
     /// How far it crosses the row to the right of the antenna, seen forward, in mm, -20000 to 20000; below 0 to the
-    /// left. 0 where it is not told.
+    /// left. Left out, 0.
     #[arg(long, value_name = "MM", value_parser = number_within(-20_000.0..=20_000.0))]
     beam_right: Option<f64>,
-    /// The same of the tool, -20000 to 20000; as far behind the beam as `beam_to_tool_mm` where it is not told.
+    /// The same for the tool, -20000 to 20000; left out, `beam_to_tool_mm` behind the beam.
     #[arg(long, value_name = "MM", value_parser = number_within(-20_000.0..=20_000.0))]
     tool_ahead: Option<f64>,
-    /// The same of the tool, -20000 to 20000; as the beam where it is not told.
+    /// The same for the tool, -20000 to 20000; left out, as for the beam.
     #[arg(long, value_name = "MM", value_parser = number_within(-20_000.0..=20_000.0))]
     tool_right: Option<f64>,
-    /// From the moment of a fix until its line comes, in ms, 0 to 2000. 0 where it is not told.
+    /// From the moment of a fix until its line comes, in ms, 0 to 2000. Left out, 0.
     #[arg(long, value_name = "MS", value_parser = number_within(0.0..=2000.0))]
     gps_delay: Option<f64>,
-    /// The standard deviation of a fix in mm, 1 to 20000; what is usual for its quality where it is not told.
+    /// The standard deviation of a fix in mm, 1 to 20000; left out, what is usual for its quality.
     #[arg(long, value_name = "MM", value_parser = number_within(1.0..=20_000.0))]
     gps_error: Option<f64>,
 }

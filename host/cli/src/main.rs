@@ -97,7 +97,7 @@ enum Command {
     Serve(serve::Arguments),
     /// Write down what the machine does, for as long as it does it.
     Record(record::Arguments),
-    /// Decide anew on the host what a log's machine met, and say where that differs.
+    /// Replay a log by the same decisions on this computer, and say where the result differs.
     Replay(replay::Arguments),
     /// Make a map of a record with a satellite receiver, and count the stand.
     Map(Box<map::Arguments>),

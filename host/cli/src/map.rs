@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 #[derive(Args)]
 #[command(after_help = "\
 It is GeoJSON (WGS84), which QGIS opens as it is: a point for each plant, weed, swing, alarm and label, and lines of the ground weeded and \
-not weeded. docs/map.md says what error to expect. What is told of the antenna here goes before what the record says.\n\n\
+not weeded. docs/map.md says what error to expect. What you say of the antenna here counts instead of what the record says.\n\n\
 Examples:
   weeder map field.csv -o field.geojson --svg field.svg
   weeder map monday.csv tuesday.csv -o field.geojson --row-spacing 750 --table field-table.csv
@@ -41,7 +41,7 @@ pub struct Arguments {
     /// From row to row in mm, 50 to 5000, for the area.
     #[arg(long, value_name = "MM", default_value = "600", value_parser = number_within(50.0..=5000.0))]
     row_spacing: f64,
-    /// From plant to plant in mm, 20 to 5000, for those that are missing; the median of those found where it is not told.
+    /// From plant to plant in mm, 20 to 5000, to count missing plants; left out, the median of those found.
     #[arg(long, value_name = "MM", value_parser = number_within(20.0..=5000.0))]
     spacing: Option<f64>,
     /// The longest way without a fix over which places are interpolated, in m, 0 to 1000.

@@ -36,7 +36,7 @@ pub struct Arguments {
     /// Print what counts most of a trial's table, and nothing else.
     #[arg(long, conflicts_with = "json")]
     brief: bool,
-    /// The result that a sweep's table with two axes shows, plant_damage unless told.
+    /// The result that a sweep's table with two axes shows; left out, plant_damage.
     #[arg(long, value_parser = PossibleValuesParser::new(Results::NAMES))]
     result: Option<String>,
 }

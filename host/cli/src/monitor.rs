@@ -32,7 +32,7 @@ pub struct Arguments {
     /// Lines in, lines out, for pipes; ends when the input does and the last answer has come.
     #[arg(long)]
     plain: bool,
-    /// Write all that happens to this log; of several rows the folder, in which each has a log by its name.
+    /// Write all that happens to this log; with several rows, to a folder in which each has a log of its name.
     #[arg(long, value_name = "FILE.csv|FOLDER")]
     log: Option<PathBuf>,
 }

@@ -29,7 +29,7 @@ Examples:\n  \
     weeder record --out field --all                      every row, a log for each in the folder field\n  \
     weeder record --out field.csv --gps /dev/ttyUSB0 --gps-baud 38400 --beam-ahead 620 --beam-right -40")]
 pub struct Arguments {
-    /// The log; one that is there is gone on with. Of several rows the folder, in which each has a log by its name.
+    /// The log; one that exists is continued. With several rows, a folder in which each has a log of its name.
     #[arg(long, value_name = "FILE.csv|FOLDER")]
     out: PathBuf,
     #[command(flatten)]

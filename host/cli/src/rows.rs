@@ -32,7 +32,7 @@ pub struct Arguments {
 
 #[derive(Subcommand)]
 enum Action {
-    /// Call the board at a port so; the rows stand in the order in which they were named.
+    /// Give a row's name to the board at a port; the rows are listed in the order in which they were named.
     #[command(after_help = "Example: weeder rows name left /dev/ttyACM0")]
     Name {
         /// The row's name: 1 to 24 characters that can be a file's name.

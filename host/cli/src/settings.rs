@@ -32,7 +32,7 @@ enum Action {
     /// Write the machine's settings into a TOML file; one that is there keeps its comments.
     #[command(after_help = "Example: weeder settings pull --json | jq .wheel_mm")]
     Pull {
-        /// The file; of several rows the folder, in which each gets a file by its name.
+        /// The file; with several rows, a folder in which each gets a file of its name.
         #[arg(value_name = "FILE.toml|FOLDER", required_unless_present = "json")]
         file: Option<FileName>,
         /// Print them as JSON as well.
@@ -41,18 +41,18 @@ enum Action {
         #[command(flatten)]
         ports: Ports,
     },
-    /// Set a file's settings on the machine and have it keep them for good; nothing is sent unless all of them can be right.
+    /// Set a file's settings on the machine and save them there; nothing is sent unless all of them can be right.
     #[command(after_help = "\
 Opening the port is a reset on most Unos, and so is a loss of power: what is not saved is gone then.\n\n\
 Example: weeder settings push machine.toml --port /dev/ttyACM0")]
     Push {
-        /// The file, which is for all rows; - for standard input; or of several rows the folder, in which each has a file by its name.
+        /// The file, the same for all rows; - for standard input; or, with several rows, a folder in which each has a file of its name.
         #[arg(value_name = "FILE.toml|FOLDER", value_parser = source::file)]
         file: PathBuf,
-        /// Leave out the machine's `save`: its next reset, which on most Unos is the next opening of the port, takes them back.
+        /// Do not `save` them on the machine: they are lost at its next reset, which on most Unos is the next opening of the port.
         #[arg(long)]
         no_save: bool,
-        /// What is done anyway; scripts may still say so.
+        /// Does nothing, as the settings are saved anyway; older scripts say it.
         #[arg(long, hide = true, conflicts_with = "no_save")]
         save: bool,
         /// Print which were set as JSON.
@@ -61,10 +61,10 @@ Example: weeder settings push machine.toml --port /dev/ttyACM0")]
         #[command(flatten)]
         ports: Ports,
     },
-    /// Say which of a file's settings the machine has otherwise; the status is 1 where there is one.
+    /// Say which of a file's settings differ on the machine; the status is 1 where one does.
     #[command(after_help = "Example: weeder settings diff machine.toml && echo the same")]
     Diff {
-        /// The file, which is for all rows; - for standard input; or of several rows the folder, in which each has a file by its name.
+        /// The file, the same for all rows; - for standard input; or, with several rows, a folder in which each has a file of its name.
         #[arg(value_name = "FILE.toml|FOLDER", value_parser = source::file)]
         file: PathBuf,
         /// Print the differences as JSON.

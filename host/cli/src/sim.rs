@@ -34,7 +34,7 @@ The status is 1 where a plant was damaged.")]
 pub struct Arguments {
     #[command(flatten)]
     course: CourseArguments,
-    /// Command the swings where they should be done, as the paper does: without leads for the servo's time.
+    /// Command each swing where it should be done, as the paper does, without leads for the servo's time.
     #[arg(long)]
     paper: bool,
     /// Write the tables as CSV and a picture of the row into this folder, which is made where there is none.

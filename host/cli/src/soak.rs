@@ -44,7 +44,7 @@ pub struct Arguments {
     /// Run this firmware instead of building the one in this repository.
     #[arg(long, value_name = "FILE.elf")]
     elf: Option<PathBuf>,
-    /// Work only the hours and rows of this shard, the Ith of N, and write what they have shown to the file of --out.
+    /// Run only the hours and rows of this shard, the Ith of N, and write their result to the file of --out.
     #[arg(long, value_name = "I/N", requires = "out", conflicts_with = "json")]
     shard: Option<Shard>,
     /// The file for the part of --shard.

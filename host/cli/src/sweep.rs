@@ -70,7 +70,7 @@ pub struct Arguments {
     /// The result that a table with two axes shows.
     #[arg(long, default_value = RESULT, value_parser = PossibleValuesParser::new(Results::NAMES))]
     result: String,
-    /// Who weeds: the firmware, the firmware without its leads, the paper's controller, or who knows every plant.
+    /// Who weeds: the firmware, the firmware without its leads, the paper's controller, or a controller that knows every plant.
     #[arg(long, value_enum, default_value = "firmware")]
     controller: ControllerName,
     /// The field's conditions: a preset, or a TOML file, as of `weeder trial`.

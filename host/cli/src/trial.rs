@@ -61,7 +61,7 @@ pub struct Arguments {
     /// set-up, chilli, broccoli, maize), or a TOML file that says what differs from the first of them; - for standard input.
     #[arg(long, value_name = "PRESET|FILE.toml", value_parser = source::named, default_value = "transplanted")]
     field: String,
-    /// A table of examples that the firmware is taught beforehand, as `weeder examples push` would; - for standard input.
+    /// A table of examples to teach the firmware beforehand, as `weeder examples push` would; - for standard input.
     #[arg(long, value_name = "FILE.csv", value_parser = source::file)]
     examples: Option<PathBuf>,
     /// Who weeds the same ground beside the firmware.

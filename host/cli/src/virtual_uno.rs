@@ -57,7 +57,7 @@ pub struct Arguments {
     /// End after so many seconds of the Unos' own time, 1 to 86400, and say how long that took.
     #[arg(long = "for", value_name = "SECONDS", value_parser = whole_within(1..=86_400_u64))]
     seconds: Option<u64>,
-    /// Have the machine stand still instead of rolling along the row.
+    /// Have the machine stand still, not roll along the row.
     #[arg(long)]
     stand: bool,
     /// Start this bootloader at every reset, with an empty flash before it unless --elf is given too: a file's, or

@@ -27,13 +27,13 @@ pub enum ExamplesError {
     Link(#[from] LinkError),
     /// The firmware has other built-in examples than this program.
     #[error(
-        "the firmware has other built-in examples than this program, so what it was taught cannot be told in millimetres: use the \
+        "the firmware has other built-in examples than this program, so what it was taught cannot be given in millimetres: use the \
          `weeder` that was built with it, or put this one's on the board by `weeder flash`"
     )]
     OtherTable,
     /// An example has features that no object in whole millimetres has.
     #[error(
-        "the machine was taught an example by hand that is none of any object: have it forget that one, by `forget {number}`"
+        "the machine was taught an example by hand that no object can have: have it forget that one, by `forget {number}`"
     )]
     NoObject {
         /// Its number.
@@ -44,8 +44,8 @@ pub enum ExamplesError {
     AtWork,
     /// They do not find room.
     #[error(
-        "{new} examples are new to the machine, which has room for {free} of its {CAPACITY}: leave some out, or have it forget what \
-         the file does not name by --replace; nothing was sent"
+        "{new} examples are new to the machine, which has room for {free} of its {CAPACITY}: leave some out, or have it forget those \
+         that the file does not have, by --replace; nothing was sent"
     )]
     NoRoom {
         /// Examples that would be taught.

@@ -138,7 +138,7 @@ pub enum LinkError {
     #[error("the Uno was reset while it was asked `{0}`: see to its supply, then try again")]
     Restarted(String),
     /// The firmware refused.
-    #[error("the firmware answers `{command}` by `{answer}`")]
+    #[error("the firmware answers `{command}` with `{answer}`")]
     Refused {
         /// The command.
         command: String,

@@ -111,7 +111,7 @@ pub enum LogError {
         source: io::Error,
     },
     /// The file is something else.
-    #[error("{0} is there and is no log: choose another name")]
+    #[error("{0} exists already and is no log: choose another name")]
     NoLog(PathBuf),
 }
 

@@ -94,7 +94,7 @@ fn events_before_an_answer_are_kept_and_do_not_belong_to_it() {
 fn a_refusal_is_an_error_with_the_firmware_s_words() {
     let mut link = link(|_| b"error: no such command, help lists them all\r\n".to_vec());
     let error = link.ask("hepl").unwrap_err().to_string();
-    assert_eq!(error, "the firmware answers `hepl` by `error: no such command, help lists them all`");
+    assert_eq!(error, "the firmware answers `hepl` with `error: no such command, help lists them all`");
 }
 
 #[test]

@@ -43,13 +43,13 @@ pub struct Knock<'a> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum Denial {
     /// It means somebody else.
-    #[error("this is not the address that `weeder serve` has said: type that one, with its number")]
+    #[error("this is not the address that `weeder serve` printed: type that one, with its number")]
     ForeignHost,
     /// It comes from a page of somebody else's, or does not say from which.
-    #[error("this request comes from another page: open the address that `weeder serve` has said")]
+    #[error("this request comes from another page: open the address that `weeder serve` printed")]
     ForeignOrigin,
     /// It has shown no code.
-    #[error("this phone is not paired: open the address that `weeder serve` has said, and type its code")]
+    #[error("this phone is not paired: open the address that `weeder serve` printed, and type its code")]
     NotPaired,
 }
 

@@ -97,7 +97,7 @@ pub enum ServeError {
     #[error("{0} is none of this computer's addresses: say --lan alone, or name one that it has")]
     NotMine(Ipv4Addr),
     /// The address cannot be had.
-    #[error("{address} cannot be listened at")]
+    #[error("no connection can be taken at {address}")]
     NotBound {
         /// The address.
         address: SocketAddr,

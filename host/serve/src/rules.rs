@@ -36,9 +36,7 @@ pub enum Forbidden {
     #[error("that is no command: it has to be one line of 1 to {} printable ASCII characters", link::COMMAND_LENGTH)]
     NoLine,
     /// It is none that is known here.
-    #[error(
-        "that is no command that `weeder serve` knows, and it passes none on that it does not know: `help` lists them"
-    )]
+    #[error("`weeder serve` does not know that command, and passes on only those that it knows: `help` lists them")]
     Unknown,
     /// The operator has not allowed it.
     #[error("this is not allowed from here: go to the machine, or have `weeder serve` started with --allow-start")]

@@ -18,7 +18,7 @@ pub enum ConsoleError {
     #[error(transparent)]
     Uno(#[from] UnoError),
     /// The firmware refused.
-    #[error("the firmware answers `{command}` by `{answer}`")]
+    #[error("the firmware answers `{command}` with `{answer}`")]
     Refused {
         /// The command.
         command: String,

@@ -175,7 +175,7 @@ pub enum BoundsError {
         function: String,
     },
     /// An instruction whose time is not known.
-    #[error("{function} has `{what}` at {address:#06x}, which takes as long as it takes")]
+    #[error("{function} has `{what}` at {address:#06x}, which has no fixed time")]
     NoTime {
         /// The instruction.
         what: String,
