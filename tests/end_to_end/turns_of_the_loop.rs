@@ -1,8 +1,9 @@
 //! How long the main loop takes to turn, whatever is typed and told.
 //!
-//! Between two turns nobody looks at the ground: what the loop decides is as late as a turn is long. A turn may therefore take a
-//! millisecond, in which a machine at 5 km/h rolls 1.4 mm, and little more where so many examples as may vote are asked what an object is. It
-//! is counted in cycles from one reset of the watchdog to the next, what interrupts take of it included.
+//! Between two turns nobody looks at the ground: what the loop decides is as late as a turn is long. A turn may
+//! therefore take a millisecond, in which a machine at 5 km/h rolls 1.4 mm, and little more where so many examples as
+//! may vote are asked what an object is. It is counted in cycles from one reset of the watchdog to the next, what
+//! interrupts take of it included.
 
 use crate::common::{Run, ask, run_for_ms, steady, trial, woken_up};
 use control::ground::field_examples;

@@ -1,9 +1,9 @@
 //! Where a command writes its files: one way for all, checked before any work is done.
 //!
-//! The rule for `--out`: a report, which is a page or several files, goes into a folder (`FOLDER`), which is made where there is
-//! none; a single table goes to a file (`FILE.csv`), and so does a study's part. An argument can only be written to once it has been checked, and a command
-//! checks before it works. What is wrong all the same after the work, such as a disk that has filled up, is told after the
-//! result has been printed.
+//! The rule for `--out`: a report, which is a page or several files, goes into a folder (`FOLDER`), which is made where
+//! there is none; a single table goes to a file (`FILE.csv`), and so does a study's part. An argument can only be
+//! written to once it has been checked, and a command checks before it works. What is wrong all the same after the
+//! work, such as a disk that has filled up, is told after the result has been printed.
 
 use anyhow::{Context, Result, bail, ensure};
 use files::whole_file;

@@ -1,7 +1,7 @@
 //! `weeder monitor`: what the machine does, as it does it, with its console below; of several rows all at a glance.
 //!
-//! [`Rows`](link::rows::Rows) talk to the machine, [`model`] keeps what is known of it, [`view`] draws that, and [`terminal`] joins them with
-//! the keyboard. [`plain`] does without a screen: lines in, lines out.
+//! [`Rows`](link::rows::Rows) talk to the machine, [`model`] keeps what is known of it, [`view`] draws that, and
+//! [`terminal`] joins them with the keyboard. [`plain`] does without a screen: lines in, lines out.
 
 mod command_line;
 mod model;

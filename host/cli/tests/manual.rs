@@ -192,6 +192,33 @@ fn commands_in_the_manual_that_need_no_uno_do_what_they_say() {
     }
 }
 
+/// All files in a folder and those below.
+fn files_below(folder: &Path, files: &mut Vec<PathBuf>) {
+    for entry in fs::read_dir(folder).expect("it is a folder") {
+        let path = entry.expect("it can be read").path();
+        if path.is_dir() { files_below(&path, files) } else { files.push(path) }
+    }
+}
+
+#[test]
+fn every_file_that_contributing_names_is_there() {
+    let root = Path::new(ROOT);
+    let text = fs::read_to_string(root.join("CONTRIBUTING.md")).expect("it is there");
+    let mut files = Vec::new();
+    for folder in ["control", "docs", "host", "knn", "page/src", "src", "tests"] {
+        files_below(&root.join(folder), &mut files);
+    }
+    let ends = [".md", ".rs", ".svg", ".toml", ".ts"];
+    let quoted = text.split('`').skip(1).step_by(2).filter(|word| !word.contains([' ', '*']) && !word.contains("NAME"));
+    let names: Vec<&str> = quoted.filter(|word| ends.iter().any(|end| word.ends_with(end))).collect();
+    assert!(names.len() > 80, "only {} names were found", names.len());
+    for name in names {
+        // Beside one that was named in full, a name alone does.
+        let is_there = root.join(name).is_file() || files.iter().any(|file| file.ends_with(name));
+        assert!(is_there, "there is no {name}");
+    }
+}
+
 #[test]
 fn the_readme_names_every_console_command() {
     let readme = fs::read_to_string(Path::new(ROOT).join("README.md")).expect("there is a README");

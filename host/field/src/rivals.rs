@@ -7,9 +7,10 @@
 //!
 //! Where the beam stands nearer to the tool than a canopy is wide, it is late for another reason than its authors knew.
 //!
-//! [`all_knowing`] knows where each stem stands and what the servo may take: it has the tool out over the zones round the stems, by the
-//! servo's slowest swing, and in the row everywhere else. What it damages nobody could keep. It is no bound: it allows for the slowest swing each
-//! time, and keeps the whole length of a zone that is round. The bound is [`crate::bound`]. Both have the machine of the [`Trial`], with the same servo.
+//! [`all_knowing`] knows where each stem stands and what the servo may take: it has the tool out over the zones round
+//! the stems, by the servo's slowest swing, and in the row everywhere else. Nobody could keep a plant that it damages. It is no
+//! bound: it allows for the slowest swing each time, and keeps the whole length of a zone that is round. The bound is
+//! [`crate::bound`]. Both have the machine of the [`Trial`], with the same servo.
 
 use crate::ground::union;
 use crate::machine::Machine;

@@ -247,8 +247,9 @@ impl Row {
         self.things.iter().filter(|thing| thing.kind == Kind::Weed)
     }
 
-    /// The stretch of ground that counts as the row. Where its ends were not given: half a mean spacing beyond the outermost plants, so that every plant
-    /// has a spacing's length of its own, and in any case everything that stands in it.
+    /// The stretch of ground that counts as the row. Where its ends were not given: half a mean spacing beyond the
+    /// outermost plants, so that every plant has a spacing's length of its own, and in any case everything that stands
+    /// in it.
     pub fn span_mm(&self) -> Range<f64> {
         if let Some(ground_mm) = &self.ground_mm {
             return ground_mm.clone();

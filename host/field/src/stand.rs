@@ -72,7 +72,7 @@ impl Stand {
     pub fn grow(conditions: &Conditions, spacing_mm: f64, rng: &mut impl Rng) -> Result<Self, Problem> {
         let Conditions { plot, crop, weeds, sensors, machine, .. } = conditions;
         let span_mm = 0.0..plot.row_m * 1000.0;
-        // Each has a chance of its own, so that a parameter of one leaves the others as they are.
+        // Each has random numbers of its own, so that a parameter of one leaves the others as they are.
         let [mut leaf_rng, mut weed_rng, mut dust_rng] = [(); 3].map(|()| ChaCha8Rng::from_rng(rng));
         let [mut height_rng, mut stem_rng, mut size_rng, mut next_rng] = [1, 2, 3, 4].map(|stream| {
             let mut rng = leaf_rng.clone();

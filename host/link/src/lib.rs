@@ -8,8 +8,9 @@
 //! Whatever comes from the port is suspect: noise, lines without an end, a firmware that is not the weeder's. What is kept
 //! of it is bounded, characters that could move a terminal's cursor are taken out, and no wait is endless.
 //!
-//! A link does not reconnect: one whose port is gone says so, and the session opens another. [`rows`] has several sessions at once, and
-//! [`row_names`] knows which board is which row's. Nothing here knows what stands in a row, or a simulator. In a browser there is no serial port, and all but that compiles for it.
+//! A link does not reconnect: one whose port is gone says so, and the session opens another. [`rows`] has several
+//! sessions at once, and [`row_names`] knows which board is which row's. Nothing here knows what stands in a row, or a
+//! simulator. In a browser there is no serial port, and all but that compiles for it.
 
 pub mod advice;
 pub mod completion;

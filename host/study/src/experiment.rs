@@ -1,10 +1,11 @@
 //! The paper's experiment: speeds by plant spacings by replications, in a simulated field, with several controllers on the
 //! same ground.
 //!
-//! Each plot's rows grow and are driven from the seed, the plot and the row alone, so that the result depends neither on the
-//! number of threads or machines nor on which controllers take part. The firmware is either its native twin ([`field::twin`]) or the ELF on the
-//! virtual Uno ([`mod@trial`]); its rivals ([`field::rivals`]) are models in both cases. A plot comes out as somebody
-//! with a notebook would write it down ([`PlotRecord`]), and is judged by the same code as a real one.
+//! Each plot's rows grow and are driven from the seed, the plot and the row alone, so that the result depends neither
+//! on the number of threads or machines nor on which controllers take part. The firmware is either its native twin
+//! ([`field::twin`]) or the ELF on the virtual Uno ([`mod@trial`]); its rivals ([`field::rivals`]) are models in both
+//! cases. A plot comes out as somebody with a notebook would write it down ([`PlotRecord`]), and is judged by the same
+//! code as a real one.
 
 mod taught;
 

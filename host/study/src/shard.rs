@@ -1,10 +1,11 @@
 //! A study on several machines: which of its plots, points or runs each of them computes, and how the parts that they write
 //! become the whole again.
 //!
-//! A study numbers what it computes from 0, and each number has a chance of its own, by the seed and the number. Shard I of N has every Nth,
-//! from the Ith on, so that each has some of what is quick and of what takes long. A part is lines of JSON: a [`Header`] that says
-//! what decides the study's result, then each outcome with its number. Numbers are written such that the same bits are read.
-//! [`together`] holds parts against each other, and [`outcomes`] puts them in order; where they are from nobody knows any more.
+//! A study numbers what it computes from 0. Each of these has random numbers of its own, from the seed and its number.
+//! Shard I of N has every Nth, from the Ith on, so that each has some of what is quick and of what takes long. A part is
+//! lines of JSON: a [`Header`] that says what decides the study's result, then each outcome with its number. Numbers
+//! are written such that the same bits are read. [`together`] holds parts against each other, and [`outcomes`] puts
+//! them in order; from there on it does not matter where they were computed.
 //!
 //! Nothing here computes, opens files or starts anything: who runs the shards is the user's scheduler.
 

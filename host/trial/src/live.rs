@@ -1,9 +1,10 @@
 //! The virtual Uno, live: in real time, at a pseudo terminal that any serial program opens, with a machine around it that rolls
 //! along a row again and again.
 //!
-//! [`LiveUno::start`] powers it up, [`LiveUno::run`] lets it run until it is told to stop, and [`Live::run_in_background`] does so in
-//! a thread. [`rows`] has several, whose encoder is the same. Each millisecond of the chip's time, bytes are taken from and given to the terminal; then the host's clock is
-//! waited for. A host that is too slow makes the chip slower, never the time between two of its events wrong.
+//! [`LiveUno::start`] powers it up, [`LiveUno::run`] lets it run until it is told to stop, and
+//! [`Live::run_in_background`] does so in a thread. [`rows`] has several, whose encoder is the same. Each millisecond
+//! of the chip's time, bytes are taken from and given to the terminal; then the host's clock is waited for. A host that
+//! is too slow makes the chip slower, never the time between two of its events wrong.
 //!
 //! - **Reset.** A program that opens the port of a real Uno resets it, by the modem line DTR. A pseudo terminal has no such
 //!   line; so the opening itself is what resets, unless [`Setup::keeps_running_when_opened`]. Then a bootloader waits for a

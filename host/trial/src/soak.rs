@@ -4,7 +4,7 @@
 //! on the host; in each hour its clock and its count run over their ends. [`minutes`] does the same for minutes with the real ELF
 //! on the virtual Uno. Both have faults injected by chance, and an operator who clears what is latched and starts again.
 //!
-//! Each hour of the decisions and each row of the firmware has a chance of its own, by the seed and its number, so that [`hour`] and
+//! Each hour of the decisions and each row of the firmware has random numbers of its own, from the seed and its number, so that [`hour`] and
 //! [`row`] can be called anywhere: [`total`] of all of them is the same.
 //!
 //! A plant is *harmed* where the tool was not fully out over its canopy although the firmware could know of it: this must not

@@ -1,4 +1,5 @@
-//! Virtual Unos before one wheel, as the laptop at their ports finds them: what happens to one of them disturbs no other, and all of them hold.
+//! Virtual Unos before one wheel, as the laptop at their ports finds them: what happens to one of them disturbs no
+//! other, and all of them hold.
 
 use field::machine::Machine;
 use field::planting::Planting;

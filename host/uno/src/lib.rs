@@ -5,10 +5,11 @@
 //! write the files, [`bounds`] proves what a firmware can need at most, [`waveform`] writes down what was on the pins,
 //! [`capture`] reads a recording of them, and [`pty`] is a serial port that other programs open.
 //!
-//! [`Uno::boot`] powers it up, [`Uno::wired`] says what is at its pins. [`Uno::set`] and [`Uno::drive`] put levels on its inputs,
-//! [`Uno::send`] types into its serial line, [`Uno::run_until`] lets its clock run; [`Uno::changes`], [`Uno::pulses`] and
-//! [`Uno::received`] say what it did. Time is the chip's own cycle count since the first power-up and goes on over resets; the host's clock plays no part. Every
-//! Uno is by itself, so that several can run in parallel threads.
+//! [`Uno::boot`] powers it up, [`Uno::wired`] says what is at its pins. [`Uno::set`] and [`Uno::drive`] put levels on
+//! its inputs, [`Uno::send`] types into its serial line, [`Uno::run_until`] lets its clock run; [`Uno::changes`],
+//! [`Uno::pulses`] and [`Uno::received`] say what it did. Time is the chip's own cycle count since the first power-up
+//! and goes on over resets; the host's clock plays no part. Every Uno is by itself, so that several can run in parallel
+//! threads.
 //!
 //! # What is set right against simavr
 //!

@@ -19,8 +19,8 @@ use std::time::{Duration, Instant};
 /// Time after which it looks again at whether something was typed.
 const LOOK: Duration = Duration::from_millis(20);
 
-/// Goes on until the input has ended and its last command has been answered; bad where one was refused. `are_there` says which rows were there
-/// when they were opened.
+/// Goes on until the input has ended and its last command has been answered; bad where one was refused. `are_there`
+/// says which rows were there when they were opened.
 ///
 /// # Errors
 /// Where a line is no command, an Uno goes away with commands unanswered, or output or log fail.

@@ -2,12 +2,13 @@
 //!
 //! The trial had four speeds, two spacings and three replications: 24 plots, which the adjusted R2 of Eq. 30 and 31 agree with.
 //!
-//! **Which of its figures fit Eq. 27?** The paper's capacity of 0.041 ha/h, with some 85 % of the weeds gone, 2 % of the plants damaged and its
-//! engine of 2.5 hp, makes a performance index of 137, and no machine of that capacity and power could exceed 164. The printed 185 to 202
-//! need 0.056 to 0.060 ha/h at 2.5 hp, or 1.8 to 1.7 hp at 0.041 ha/h. With the capacities that Eq. 24 and 25 give for its width of 0.40 m and its field
-//! efficiencies, the index doubles from 123 at 1 km/h to 257 at 2.5 km/h, since capacity grows with speed: for 202 and 185 the power
-//! would have to grow with it, from 1.5 to 3.5 hp. So Fig. 10, where the index rises with speed, is what Eq. 27 says of one
-//! engine; Eq. 30, where it falls, is not.
+//! **Which of its figures fit Eq. 27?** The paper's capacity of 0.041 ha/h, with some 85 % of the weeds gone, 2 % of
+//! the plants damaged and its engine of 2.5 hp, makes a performance index of 137, and no machine of that capacity and
+//! power could exceed 164. The printed 185 to 202 need 0.056 to 0.060 ha/h at 2.5 hp, or 1.8 to 1.7 hp at 0.041 ha/h.
+//! With the capacities that Eq. 24 and 25 give for its width of 0.40 m and its field efficiencies, the index doubles
+//! from 123 at 1 km/h to 257 at 2.5 km/h, since capacity grows with speed: for 202 and 185 the power would have to grow
+//! with it, from 1.5 to 3.5 hp. So Fig. 10, where the index rises with speed, is what Eq. 27 says of one engine; Eq.
+//! 30, where it falls, is not.
 
 use super::Response;
 use serde::Serialize;

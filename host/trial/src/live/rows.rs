@@ -1,8 +1,8 @@
 //! Several virtual Unos before one wheel: a machine with several rows, each with an Uno, a pseudo terminal and plants of its own.
 //!
-//! The encoder's edges come to all of them at the same cycle, as over one cable. They run in step, some milliseconds at a time, in
-//! up to as many threads as there are cores; a host that is too slow makes all of them slower together. One that stops, because its firmware
-//! crashes, keeps none of the others from running.
+//! The encoder's edges come to all of them at the same cycle, as over one cable. They run in step, some milliseconds at
+//! a time, in up to as many threads as there are cores; a host that is too slow makes all of them slower together. One
+//! that stops, because its firmware crashes, keeps none of the others from running.
 //!
 //! The cable itself is not simulated: no edge is lost on it, and none comes late.
 

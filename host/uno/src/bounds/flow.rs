@@ -399,8 +399,8 @@ impl<'p, 'a> Follower<'p, 'a> {
     }
 }
 
-/// Cycles for which the core stands still behind an instruction, because of the EEPROM (data sheet, section 8.6.3). A write of the whole register may
-/// order either; it is taken for the longer.
+/// Cycles for which the core stands still behind an instruction, because of the EEPROM (data sheet, section 8.6.3). A
+/// write of the whole register may order either; it is taken for the longer.
 fn halt_cycles(instruction: &Instruction) -> u32 {
     match (instruction.operation, instruction.data_address()) {
         (Sbi, Some(EECR)) => match instruction.operand('b') {
