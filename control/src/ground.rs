@@ -160,7 +160,7 @@ impl Ground {
     }
 
     /// Forgets everything: none of what was seen is to be relied on, and the tool keeps off it.
-    #[inline(never)]
+    #[cfg_attr(target_arch = "avr", inline(never))]
     pub fn forget(&mut self) {
         self.watch.forget();
         self.guard = Guard::NONE;
@@ -213,7 +213,7 @@ impl Ground {
     ///
     /// # Errors
     /// [`ScheduleFull`], as for a plant that was seen.
-    #[inline(never)]
+    #[cfg_attr(target_arch = "avr", inline(never))]
     pub fn guard(&mut self) -> Option<Result<Place, ScheduleFull>> {
         // What is in the beam may be the plant.
         let seen_to = self.watch.open().unwrap_or(self.watch.frontier());

@@ -9,8 +9,9 @@
 //! Position and time are arguments everywhere, so that a test can bend both. What this crate does not do: read a pin,
 //! wait, or know how its text reaches a terminal.
 //!
-//! `#[inline(never)]` stands where the firmware is measurably shorter for it: a function of its own has the chip's registers
-//! to itself, while one that is copied into a large caller spills them to the stack.
+//! `inline(never)` stands where the firmware is measurably shorter for it: a function of its own has the chip's registers
+//! to itself, while one that is copied into a large caller spills them to the stack. Where every turn calls it, that is said of the
+//! chip alone: elsewhere such a function takes longer.
 
 #![no_std]
 #![forbid(unsafe_code)]

@@ -28,7 +28,7 @@ impl Position {
     }
 
     /// Whether this place lies ahead of `other`.
-    #[inline(never)]
+    #[cfg_attr(target_arch = "avr", inline(never))]
     pub fn is_ahead_of(self, other: Self) -> bool {
         (self - other).0 > 0
     }
@@ -61,7 +61,7 @@ impl Place {
     }
 
     /// Whether this place lies ahead of `other`.
-    #[inline(never)]
+    #[cfg_attr(target_arch = "avr", inline(never))]
     pub fn is_ahead_of(self, other: Self) -> bool {
         (self - other).0 > 0
     }
@@ -152,19 +152,19 @@ impl Grain {
     }
 
     /// The place at which the odometer has counted so far.
-    #[inline(never)]
+    #[cfg_attr(target_arch = "avr", inline(never))]
     pub const fn place(self, position: Position) -> Place {
         Place((position.0 >> self.shift) as i16)
     }
 
     /// A distance in units, which is to be less than 13 m.
-    #[inline(never)]
+    #[cfg_attr(target_arch = "avr", inline(never))]
     pub const fn length(self, distance: Ticks) -> Length {
         Length((distance.0 >> self.shift) as i16)
     }
 
     /// A distance in ticks.
-    #[inline(never)]
+    #[cfg_attr(target_arch = "avr", inline(never))]
     pub const fn ticks(self, length: Length) -> Ticks {
         Ticks((length.0 as i32) << self.shift)
     }
@@ -189,7 +189,7 @@ impl Instant {
     }
 
     /// The moment in coarse steps.
-    #[inline(never)]
+    #[cfg_attr(target_arch = "avr", inline(never))]
     pub const fn coarse(self) -> Coarse {
         Coarse((self.0 >> 4) as u16)
     }
@@ -261,7 +261,7 @@ pub struct TicksPerSecond(pub i32);
 
 impl TicksPerSecond {
     /// Whether the machine rolls faster than that many ticks a second, forward or back.
-    #[inline(never)]
+    #[cfg_attr(target_arch = "avr", inline(never))]
     pub fn is_beyond(self, limit: u16) -> bool {
         self.0.unsigned_abs() > limit.into()
     }
@@ -269,7 +269,7 @@ impl TicksPerSecond {
     /// How far the machine rolls at this speed, in so many milliseconds.
     ///
     /// Right while speed times milliseconds stays below 2^31: up to 2.1 million ticks a second over a whole second.
-    #[inline(never)]
+    #[cfg_attr(target_arch = "avr", inline(never))]
     pub fn distance_in_ms(self, milliseconds: u16) -> Ticks {
         // Divided without its sign: the chip has one division routine then, the shorter.
         let magnitude = (self.0.unsigned_abs().wrapping_mul(u32::from(milliseconds)) / 1000) as i32;
@@ -311,13 +311,13 @@ impl Wheel {
 
     /// A distance in ticks, rounded to the nearest: `mm * ticks_per_rev / (pi * diameter)`, the paper's Eq. 1 and 2, or by
     /// what was measured. Right to a tick up to 4 m.
-    #[inline(never)]
+    #[cfg_attr(target_arch = "avr", inline(never))]
     pub const fn ticks(self, millimetres: u16) -> Ticks {
         Ticks((((millimetres as u32) << 20) + self.tick / 2).wrapping_div(self.tick) as i32)
     }
 
     /// A distance in millimetres, rounded toward zero and limited to what 16 bits hold; right to 1 mm and 0.02 %.
-    #[inline(never)]
+    #[cfg_attr(target_arch = "avr", inline(never))]
     pub const fn millimetres(self, distance: Ticks) -> i16 {
         let magnitude = distance.0.unsigned_abs();
         // What is not too far keeps the product in 32 bits.

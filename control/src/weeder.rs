@@ -188,7 +188,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     }
 
     /// The second beam is broken or not, with the machine at a position.
-    #[inline(never)]
+    #[cfg_attr(target_arch = "avr", inline(never))]
     fn look_again(&mut self, position: Position, broken: bool) {
         match self.ground.look_again(position, broken) {
             Some(Compared::Slip) => {

@@ -28,7 +28,7 @@ impl Guard {
     pub const NONE: Self = Self { due: Place::new(0), left: 0 };
 
     /// Takes an object that is kept.
-    #[inline(never)]
+    #[cfg_attr(target_arch = "avr", inline(never))]
     pub fn see(&mut self, plant: &Object, geometry: &Geometry) {
         let (spacing, scatter) = (geometry.guard_spacing, geometry.guard_scatter);
         // Of one whose beginning was not seen, nobody knows the middle.
@@ -43,7 +43,7 @@ impl Guard {
     }
 
     /// The ground that is to be guarded now that the beam has seen what stands up to a place: where a plant was due.
-    #[inline(never)]
+    #[cfg_attr(target_arch = "avr", inline(never))]
     pub fn pass(&mut self, seen_to: Place, geometry: &Geometry) -> Option<Object> {
         let (due, scatter) = (self.due, geometry.guard_scatter);
         if self.left == 0 || !seen_to.is_ahead_of(due + scatter) {

@@ -60,7 +60,7 @@ impl Slip {
 
     /// Slip in thousandths of the wheel's way, above 0 where it turns farther than the machine rolls; none where too few plants have
     /// told it.
-    #[inline(never)]
+    #[cfg_attr(target_arch = "avr", inline(never))]
     pub fn permille(&self) -> Option<i16> {
         let turned = (Self::WHOLE + i16::from(self.excess)) as u16;
         let rolled_permille = (256_000 / u32::from(turned)) as i16;
@@ -127,7 +127,7 @@ impl SecondBeam {
     };
 
     /// Watches from a place on, and forgets what was seen before, and what was measured with it.
-    #[inline(never)]
+    #[cfg_attr(target_arch = "avr", inline(never))]
     pub fn begin(&mut self, place: Place) {
         self.watch = Watch::start(place, false);
         (self.awaited, self.missed) = (0, 0);
@@ -155,7 +155,7 @@ impl SecondBeam {
     }
 
     /// The first beam has seen an object, which is to come to this one.
-    #[inline(never)]
+    #[cfg_attr(target_arch = "avr", inline(never))]
     pub fn await_object(&mut self, object: Object) {
         if object.width() < SEEN_BY_BOTH {
             return;

@@ -68,7 +68,7 @@ const PAID_BY: u8 = 8;
 const DEBT: u8 = 48;
 
 /// A time in shorter form, or the longest that there is.
-#[inline(never)]
+#[cfg_attr(target_arch = "avr", inline(never))]
 const fn shortened(time: u16) -> Short {
     if time < 1 << 10 { (time >> 2) as Short } else { Short::MAX }
 }
@@ -144,7 +144,7 @@ impl EncoderMonitor {
     /// `progress` is a distance of some two millimetres, so that it means the same for every encoder, and four ticks at least. That
     /// is a whole cycle of both channels, over which it does not matter that an encoder spaces its edges unevenly, and more
     /// than a wheel makes that trembles on an edge, or one dead channel.
-    #[inline(never)]
+    #[cfg_attr(target_arch = "avr", inline(never))]
     pub fn read(&mut self, now: Instant, position: Position, doubted: u8, progress: u8) -> Option<Alarm> {
         let now = now.coarse();
         let place = position.count() as u16;

@@ -99,7 +99,7 @@ impl Odometer {
     /// Takes a reading of the count and of the jumps in it, modulo 65,536; returns how many ticks, 32 at the most, came by jumps
     /// that are not believed. None is doubted of a wheel that
     /// `is_fast`.
-    #[inline(never)]
+    #[cfg_attr(target_arch = "avr", inline(never))]
     pub fn read(&mut self, counted: Position, jumps: u16, is_fast: bool) -> u8 {
         let counted = counted.count() as u16;
         let moved = counted.wrapping_sub(self.counted).cast_signed();
@@ -116,7 +116,7 @@ impl Odometer {
     }
 
     /// The place that a count stands for.
-    #[inline(never)]
+    #[cfg_attr(target_arch = "avr", inline(never))]
     pub fn place(&self, counted: Position) -> Position {
         counted - self.surplus
     }

@@ -77,7 +77,7 @@ impl SpeedMeter {
         (self.speed != before).then_some(self.speed)
     }
 
-    #[inline(never)]
+    #[cfg_attr(target_arch = "avr", inline(never))]
     fn moved(&mut self, reading: Sample) {
         self.last = reading;
         if self.count == 0 {

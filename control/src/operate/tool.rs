@@ -69,7 +69,7 @@ impl Tool {
     }
 
     /// Whether the servo has had its pulse for so long.
-    #[inline(never)]
+    #[cfg_attr(target_arch = "avr", inline(never))]
     fn is_settled(&self, now: Instant, milliseconds: u16) -> bool {
         now - self.since >= Interval::from_ms(milliseconds.into())
     }

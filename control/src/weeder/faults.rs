@@ -101,7 +101,7 @@ impl Misfits {
 
 impl<C: Classifier, M: Memory> Controller<C, M> {
     /// The fault that the readings show, if any; so many of the encoder's ticks are `doubted`.
-    #[inline(never)]
+    #[cfg_attr(target_arch = "avr", inline(never))]
     pub(super) fn fault(&mut self, doubted: u8) -> Option<Alarm> {
         let Readings { now, position, end_switch_on, stack_free, .. } = self.sensors.readings;
         let working = self.is_working();
