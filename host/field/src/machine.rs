@@ -59,7 +59,7 @@ pub struct Dirt {
 }
 
 /// Counts of a pulse: both edges of both channels.
-const PULSE_TICKS: i64 = 4;
+pub const PULSE_TICKS: i64 = 4;
 
 impl Dirt {
     /// Whether pulse number `pulse` is hidden: always the same ones for the same seed. It is asked for each pulse of a row, so
@@ -109,11 +109,6 @@ impl Machine {
     /// The pulse in which a clean encoder is at a count.
     pub fn pulse(&self, clean_ticks: i64) -> i64 {
         clean_ticks.div_euclid(PULSE_TICKS)
-    }
-
-    /// Counts of those of the pulses that dirt hides.
-    pub fn hidden_ticks(&self, pulses: Range<i64>) -> i64 {
-        pulses.filter(|&pulse| self.dirt.hides(pulse)).count() as i64 * PULSE_TICKS
     }
 
     /// Counts that are missing so far of the hidden pulse in which a clean encoder is: while A is hidden, B alone counts one back
@@ -335,7 +330,7 @@ mod tests {
         let missing = |ticks: i64| {
             let pulse = machine.pulse(ticks);
             let in_pulse = if machine.dirt.hides(pulse) { machine.hidden_in_pulse(ticks) } else { 0 };
-            machine.hidden_ticks(0..pulse) + in_pulse
+            (0..pulse).filter(|&pulse| machine.dirt.hides(pulse)).count() as i64 * PULSE_TICKS + in_pulse
         };
         assert!((60..160).contains(&missing(clean)), "{} of {clean}", missing(clean));
         assert_eq!(decode(&changes), clean - missing(clean));

@@ -229,7 +229,9 @@ impl Motion {
 
     /// The stretch that the machine rolled over during a time.
     pub fn stretch_mm(&self, times_s: &Range<f64>) -> Range<f64> {
-        let turns = self.pieces.iter().filter(|piece| times_s.contains(&piece.start_s)).map(|piece| piece.start_mm);
+        let first = self.pieces.partition_point(|piece| piece.start_s < times_s.start);
+        let turns =
+            self.pieces[first..].iter().take_while(|piece| piece.start_s < times_s.end).map(|piece| piece.start_mm);
         let end_mm = self.position_mm(times_s.end);
         let from_mm = self.position_mm(times_s.start);
         turns
@@ -295,28 +297,36 @@ impl Motion {
 /// A motion as somebody sees it who goes along: asked for one time after the other, it need not search for the piece.
 #[derive(Clone, Debug)]
 pub struct Course<'a> {
-    motion: &'a Motion,
-    /// The piece of the last time asked for.
-    piece: usize,
+    /// The piece of the last time asked for, those behind it, and behind all of them the machine that stands.
+    piece: Piece,
+    to_come: std::slice::Iter<'a, Piece>,
+    end: Piece,
 }
 
 impl<'a> Course<'a> {
     /// A motion from its beginning on.
     pub fn along(motion: &'a Motion) -> Self {
-        Self { motion, piece: 0 }
+        let end = Piece {
+            start_s: motion.end_s,
+            end_s: f64::INFINITY,
+            start_mm: motion.end_mm,
+            end_mm: motion.end_mm,
+            speed_mm_s: 0.0,
+            acceleration_mm_s2: 0.0,
+            wheel_start_mm: motion.wheel_mm(motion.end_s),
+            wheel_mm_a_mm: 1.0,
+        };
+        let mut to_come = motion.pieces.iter();
+        Self { piece: *to_come.next().unwrap_or(&end), to_come, end }
     }
 
     /// [`Motion::wheel_mm`] at a time from 0 on, no earlier than the last one asked for.
+    #[inline]
     pub fn wheel_mm(&mut self, time_s: f64) -> f64 {
-        let Motion { start_mm, pieces, .. } = self.motion;
-        while pieces.get(self.piece).is_some_and(|piece| piece.end_s <= time_s) {
-            self.piece += 1;
+        while self.piece.end_s <= time_s {
+            self.piece = *self.to_come.next().unwrap_or(&self.end);
         }
-        match (pieces.get(self.piece), pieces.last()) {
-            (Some(piece), _) => piece.wheel_mm(piece.position_mm(time_s)),
-            (None, Some(last)) => last.wheel_mm(last.end_mm),
-            (None, None) => *start_mm,
-        }
+        self.piece.wheel_mm(self.piece.position_mm(time_s))
     }
 }
 

@@ -17,7 +17,7 @@ use crate::machine::Machine;
 use crate::servo::Servo;
 use crate::stand::Stem;
 use crate::trial::Trial;
-use crate::twin::{Sensors, ServoLine};
+use crate::twin::{Levels, Sensors, ServoLine, Turn, turns};
 use control::operate::servo;
 use signal::Pulse;
 use std::ops::Range;
@@ -46,15 +46,15 @@ pub fn as_in_the_paper(trial: &Trial) -> Vec<Pulse> {
     let tick_mm = trial.machine.tick_mm();
     let ticks = |mm: f64| (mm / tick_mm).round() as i64;
     let (delay, hold) = (ticks(beam_to_tool_mm - PAPER_MARGIN_MM), ticks(2.0 * PAPER_MARGIN_MM));
-    let mut sensors = Sensors::new(trial);
-    let mut broken = !trial.machine.beam_before(&trial.row, &trial.motion).high;
+    let mut sensors = Sensors::new(trial, PAPER_TURN_S);
+    let Levels { mut broken, .. } = Levels::before(trial);
     let mut canopy: Option<Range<i64>> = None;
     let mut slot: Option<Range<i64>> = None;
     swing(trial, servo, PAPER_TURN_S, 0, |time_s| {
-        while let Some((_, levels)) = sensors.next_edge(time_s) {
-            broken = levels.broken;
+        let Turn { position, edges, .. } = sensors.read();
+        if let Some(last) = edges.last() {
+            broken = last.levels.broken;
         }
-        let position = sensors.position(time_s);
         match &mut canopy {
             None if broken => canopy = Some(position..position),
             Some(canopy) if broken => canopy.end = position,
@@ -68,7 +68,7 @@ pub fn as_in_the_paper(trial: &Trial) -> Vec<Pulse> {
             }
             _ => {}
         }
-        slot.as_ref().is_some_and(|slot| slot.contains(&position))
+        (slot.as_ref().is_some_and(|slot| slot.contains(&position)), time_s)
     })
 }
 
@@ -89,23 +89,46 @@ pub fn all_knowing(trial: &Trial, stems: &[Stem]) -> Vec<Pulse> {
         .collect();
     // A tool that has no time to be in the row and out again stays out.
     let swings_s = union(windows.into_iter().map(|window| window.start..window.end + slowest_s).collect());
-    let mut next = 0;
-    swing(trial, machine.servo, TURN_S, SERVO_GAP_MS, |time_s| {
-        while swings_s.get(next).is_some_and(|swing| swing.end - slowest_s <= time_s) {
-            next += 1;
-        }
-        swings_s.get(next).is_some_and(|swing| swing.start <= time_s)
-    })
+    let out_s = swings_s.into_iter().map(|swing| swing.start..swing.end - slowest_s).collect();
+    swing(trial, machine.servo, TURN_S, SERVO_GAP_MS, out_during(out_s))
 }
 
-/// A loop that has the tool out whenever `is_out` at the time of a turn says so. It begins in the row.
-fn swing(trial: &Trial, servo: Servo, turn_s: f64, gap_ms: u8, mut is_out: impl FnMut(f64) -> bool) -> Vec<Pulse> {
-    let width = |microseconds: f64| servo::from_us(microseconds.round() as u16);
-    let mut line = ServoLine::new(width(servo.in_us), gap_ms);
-    let turns = (trial.motion.duration_s() / turn_s).ceil() as u64;
-    for turn in 0..=turns {
-        let time_s = turn as f64 * turn_s;
-        line.command(width(if is_out(time_s) { servo.out_us } else { servo.in_us }), time_s);
+/// For [`swing`]: out during these times, which are in ascending order.
+fn out_during(times_s: Vec<Range<f64>>) -> impl FnMut(f64) -> (bool, f64) {
+    let mut next = 0;
+    move |time_s| {
+        while times_s.get(next).is_some_and(|out| out.end <= time_s) {
+            next += 1;
+        }
+        match times_s.get(next) {
+            Some(out) if out.start <= time_s => (true, out.end),
+            Some(out) => (false, out.start),
+            None => (false, f64::INFINITY),
+        }
+    }
+}
+
+/// A loop that has the tool out whenever `is_out` at the time of a turn says so, which also says before which time it says nothing
+/// else: turns until then are passed over, once the line shows it. It begins in the row.
+fn swing(
+    trial: &Trial,
+    servo: Servo,
+    turn_s: f64,
+    gap_ms: u8,
+    mut is_out: impl FnMut(f64) -> (bool, f64),
+) -> Vec<Pulse> {
+    let [in_row, out] = [servo.in_us, servo.out_us].map(|microseconds| servo::from_us(microseconds.round() as u16));
+    let mut line = ServoLine::new(in_row, gap_ms);
+    let (mut turn, last) = (0, turns(trial, turn_s));
+    while turn <= last {
+        let time_s = f64::from(turn) * turn_s;
+        let (swings_out, until_s) = is_out(time_s);
+        let width = if swings_out { out } else { in_row };
+        line.command(width, time_s);
+        turn += 1;
+        if line.shows(width) {
+            turn = turn.max((until_s / turn_s) as u32);
+        }
     }
     line.into_pulses()
 }
@@ -116,6 +139,8 @@ mod tests {
     use crate::motion::mm_s;
     use crate::row::{Row, Thing};
     use crate::verdict::{Timing, Verdict, judge};
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
 
     const PLACES: [f64; 8] = [500.0, 1000.0, 1500.0, 2000.0, 2500.0, 3000.0, 3500.0, 4000.0];
 
@@ -127,6 +152,32 @@ mod tests {
         let judgement = judge(&trial.row, &trial.machine, &trial.motion, trial.timing, &pulses, 0);
         assert!(judgement.weeded_share > 0.1);
         judgement.count(Verdict::Damaged)
+    }
+
+    #[test]
+    fn a_loop_that_passes_turns_over_gives_the_pulses_of_one_that_takes_them_all() {
+        let row = Row::new(PLACES.map(|place_mm| Thing::plant(place_mm, 150.0)).to_vec()).unwrap();
+        for seed in 0..200 {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let machine = Machine::default();
+            let trial = Trial::at_speed(row.clone(), machine, Timing::default(), rng.random_range(200.0..1500.0));
+            // From less than a turn to many frames, and some that begin with a turn.
+            let mut time_s = 0.0;
+            let out_s: Vec<Range<f64>> = (0..40)
+                .map(|_| {
+                    let start_s = time_s + rng.random_range(0.0..0.2);
+                    let start_s = if rng.random() { (start_s / TURN_S).round() * TURN_S } else { start_s };
+                    time_s = start_s.max(time_s) + rng.random_range(0.0_f64..0.6).powi(3);
+                    start_s..time_s
+                })
+                .collect();
+            let gap_ms = if rng.random() { SERVO_GAP_MS } else { 0 };
+            let mut each_turn = out_during(out_s.clone());
+            let passing_over = swing(&trial, machine.servo, TURN_S, gap_ms, out_during(out_s));
+            let taking_all = swing(&trial, machine.servo, TURN_S, gap_ms, |time_s| (each_turn(time_s).0, time_s));
+            assert!(taking_all.len() > 5);
+            assert_eq!(passing_over, taking_all, "seed {seed}");
+        }
     }
 
     #[test]

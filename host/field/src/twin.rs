@@ -7,8 +7,8 @@
 //!
 //! Console, EEPROM, interrupts and cycles are not in it: for those there is the virtual Uno.
 
-use crate::machine::{Machine, time_at_s};
-use crate::motion::{Course, marks};
+use crate::machine::{Machine, PULSE_TICKS, time_at_s};
+use crate::motion::{Course, Motion, marks};
 use crate::trial::{Start, Trial};
 use crate::wiring;
 use control::ground::class::label;
@@ -93,6 +93,11 @@ impl ServoLine {
         }
     }
 
+    /// Whether no other width is on the line, or comes next.
+    pub fn shows(&self, width: HalfMicros) -> bool {
+        self.width == width
+    }
+
     fn begin(&mut self, width: HalfMicros, rise: u64) {
         (self.width, self.rise) = (width, rise);
         let cycle = rise * CYCLES_A_STEP;
@@ -105,73 +110,159 @@ impl ServoLine {
     }
 }
 
-/// What the machine's sensors say, turn by turn: the encoder's count, and the beam's edges since the turn before.
+/// What the machine's sensors say, turn by turn of a loop: the encoder's count, and the beams' edges since the turn before.
+///
+/// None of it depends on what the firmware does. So counts are worked out some turns ahead, that no decision has to wait for them.
 pub struct Sensors<'a> {
-    machine: &'a Machine,
+    motion: &'a Motion,
     course: Course<'a>,
+    encoder: Encoder<'a>,
+    turn_s: f64,
+    /// The next turn, and the counts of some from a multiple of their number on.
+    turn: u32,
+    counts: [i64; AHEAD],
+    /// Every edge of the beams: of so many of them the count is known, and so many have been told.
+    edges: Vec<Seen>,
+    counted: usize,
+    told: usize,
+}
+
+/// Turns of which the counts are worked out at once.
+const AHEAD: usize = 64;
+
+/// What the sensors say in a turn.
+pub struct Turn<'a> {
+    /// When it is.
+    pub time_s: f64,
+    /// The encoder's count.
+    pub position: i64,
+    /// The beams' edges since the turn before, in their order.
+    pub edges: &'a [Seen],
+}
+
+/// An edge of a beam.
+#[derive(Clone, Copy, Debug)]
+pub struct Seen {
+    /// When it comes.
+    time_s: f64,
+    /// The encoder's count when it comes.
+    pub position: i64,
+    /// Which of the beams are broken from then on.
+    pub levels: Levels,
+}
+
+impl<'a> Sensors<'a> {
+    /// Those of a trial, whose motion begins at time 0, for a loop whose turns begin so far apart.
+    pub fn new(trial: &'a Trial, turn_s: f64) -> Self {
+        let Trial { machine, motion, row, .. } = trial;
+        let mut edges = machine.beam_changes(row, motion, 0);
+        edges.extend(machine.second_beam_changes(row, motion, 0));
+        edges.sort_by_key(|edge| edge.cycle);
+        let mut levels = Levels::before(trial);
+        let edges = edges.into_iter().map(|edge| {
+            levels = levels.behind(edge);
+            Seen { time_s: time_at_s(0, edge.cycle), position: 0, levels }
+        });
+        Self {
+            motion,
+            course: Course::along(motion),
+            encoder: Encoder::of(machine, motion),
+            turn_s,
+            turn: 0,
+            counts: [0; AHEAD],
+            edges: edges.collect(),
+            counted: 0,
+            told: 0,
+        }
+    }
+
+    /// What they say in the next turn.
+    #[inline]
+    pub fn read(&mut self) -> Turn<'_> {
+        let ahead = self.turn as usize % AHEAD;
+        if ahead == 0 {
+            self.look_ahead();
+        }
+        let time_s = f64::from(self.turn) * self.turn_s;
+        self.turn += 1;
+        let first = self.told;
+        while self.edges.get(self.told).is_some_and(|edge| edge.time_s <= time_s) {
+            self.told += 1;
+        }
+        Turn { time_s, position: self.counts[ahead], edges: &self.edges[first..self.told] }
+    }
+
+    /// Works out the counts of the next turns, and of the edges until then.
+    #[inline(never)]
+    fn look_ahead(&mut self) {
+        let Self { motion, course, encoder, turn_s, turn, counts, edges, counted, .. } = self;
+        // All of a clean encoder's first: they do not depend on each other, and the computer works on several at once.
+        for (count, turn) in counts.iter_mut().zip(*turn..) {
+            *count = encoder.clean_ticks(course.wheel_mm(f64::from(turn) * *turn_s));
+        }
+        for (count, turn) in counts.iter_mut().zip(*turn..) {
+            let time_s = f64::from(turn) * *turn_s;
+            while let Some(edge) = edges.get_mut(*counted).filter(|edge| edge.time_s <= time_s) {
+                edge.position = encoder.count(encoder.clean_ticks(motion.wheel_mm(edge.time_s)));
+                *counted += 1;
+            }
+            *count = encoder.count(*count);
+        }
+    }
+}
+
+/// The encoder's count, as the wheel turns.
+struct Encoder<'a> {
+    machine: &'a Machine,
     start_mm: f64,
     tick_mm: f64,
-    /// The beams' edges to come, and when the next one does.
-    edges: std::vec::IntoIter<PinChange>,
-    next: Option<(f64, Levels)>,
-    /// Which of the beams are broken behind the last edge that was asked for.
-    levels: Levels,
     /// The pulse in which a clean encoder is, whether dirt hides it, and the counts that it has hidden before.
     pulse: i64,
     is_hidden: bool,
     hidden_ticks: i64,
 }
 
-impl<'a> Sensors<'a> {
-    /// Those of a trial, whose motion begins at time 0.
-    pub fn new(trial: &'a Trial) -> Self {
-        let Trial { machine, motion, row, .. } = trial;
-        let mut edges = machine.beam_changes(row, motion, 0);
-        edges.extend(machine.second_beam_changes(row, motion, 0));
-        edges.sort_by_key(|edge| edge.cycle);
-        let levels = Levels {
-            broken: !machine.beam_before(row, motion).high,
-            second_broken: machine.second_beam_before(row, motion).is_some_and(|before| !before.high),
-        };
-        let mut edges = edges.into_iter();
+impl<'a> Encoder<'a> {
+    /// That of a machine at the beginning of its motion.
+    fn of(machine: &'a Machine, motion: &Motion) -> Self {
         Self {
             machine,
-            course: Course::along(motion),
             start_mm: motion.start_mm(),
             tick_mm: machine.tick_mm(),
-            next: edges.next().map(|edge| levels.behind(edge)),
-            edges,
-            levels,
             pulse: 0,
             is_hidden: machine.dirt.hides(0),
             hidden_ticks: 0,
         }
     }
 
-    /// The encoder's count at a time, no earlier than the last one asked for.
-    pub fn position(&mut self, time_s: f64) -> i64 {
-        let ticks = marks(self.course.wheel_mm(time_s) - self.start_mm, self.tick_mm);
+    /// What a clean encoder counts until the wheel's rim is at a place.
+    #[inline]
+    fn clean_ticks(&self, wheel_mm: f64) -> i64 {
+        marks(wheel_mm - self.start_mm, self.tick_mm)
+    }
+
+    /// The count where a clean encoder's is `ticks`; asked for in the order of time.
+    #[inline(always)]
+    fn count(&mut self, ticks: i64) -> i64 {
         let pulse = self.machine.pulse(ticks);
         if pulse != self.pulse {
-            // What is lost on the way there comes back on the way back.
-            self.hidden_ticks += if pulse > self.pulse {
-                self.machine.hidden_ticks(self.pulse..pulse)
-            } else {
-                -self.machine.hidden_ticks(pulse..self.pulse)
-            };
-            self.pulse = pulse;
-            self.is_hidden = self.machine.dirt.hides(pulse);
+            self.roll_to(pulse);
         }
         let in_pulse = if self.is_hidden { self.machine.hidden_in_pulse(ticks) } else { 0 };
         ticks - self.hidden_ticks - in_pulse
     }
 
-    /// The next edge of a beam before a time: when it comes, and which of them are broken from then on.
-    pub fn next_edge(&mut self, before_s: f64) -> Option<(f64, Levels)> {
-        let edge = self.next.filter(|&(edge_s, _)| edge_s <= before_s)?;
-        self.levels = edge.1;
-        self.next = self.edges.next().map(|edge| self.levels.behind(edge));
-        Some(edge)
+    /// Counts what dirt hides on the way to a pulse. What is lost on the way there comes back on the way back.
+    #[inline(never)]
+    fn roll_to(&mut self, pulse: i64) {
+        let step = (pulse - self.pulse).signum();
+        while self.pulse != pulse {
+            // The whole pulse is behind, or is ahead again.
+            self.hidden_ticks += if self.is_hidden && step > 0 { PULSE_TICKS } else { 0 };
+            self.pulse += step;
+            self.is_hidden = self.machine.dirt.hides(self.pulse);
+            self.hidden_ticks -= if self.is_hidden && step < 0 { PULSE_TICKS } else { 0 };
+        }
     }
 }
 
@@ -185,12 +276,19 @@ pub struct Levels {
 }
 
 impl Levels {
-    /// When an edge comes, and which beams are broken from then on.
-    fn behind(self, edge: PinChange) -> (f64, Self) {
+    /// Those before the motion begins.
+    pub fn before(trial: &Trial) -> Self {
+        let Trial { machine, motion, row, .. } = trial;
+        Self {
+            broken: !machine.beam_before(row, motion).high,
+            second_broken: machine.second_beam_before(row, motion).is_some_and(|before| !before.high),
+        }
+    }
+
+    /// Those from an edge on.
+    fn behind(self, edge: PinChange) -> Self {
         let broken = !edge.high;
-        let levels =
-            if edge.pin == wiring::BEAM { Self { broken, ..self } } else { Self { second_broken: broken, ..self } };
-        (time_at_s(0, edge.cycle), levels)
+        if edge.pin == wiring::BEAM { Self { broken, ..self } } else { Self { second_broken: broken, ..self } }
     }
 }
 
@@ -199,8 +297,7 @@ impl Levels {
 /// # Errors
 /// Where they refuse a setting, or to start.
 pub fn weed(trial: &Trial) -> Result<Weeded, Refused> {
-    let mut sensors = Sensors::new(trial);
-    let broken = !trial.machine.beam_before(&trial.row, &trial.motion).high;
+    let Levels { broken, .. } = Levels::before(trial);
     let readings = Readings::new(instant(0), Position::new(0));
     let wake_up = WakeUp { readings, beam_broken: broken, cause: Cause::PowerOn };
     let classifier = Nearest::new(&EXAMPLES[..], Volatile::new());
@@ -217,24 +314,28 @@ pub fn weed(trial: &Trial) -> Result<Weeded, Refused> {
 
     let orders = weeder.orders();
     let mut line = ServoLine::new(orders.pulse, orders.gap_ms);
-    let turns = (trial.motion.duration_s() / TURN_S).ceil() as u64;
-    for turn in 0..=turns {
-        let time_s = turn as f64 * TURN_S;
-        let mut edges = Vec::new();
-        while let Some((edge_s, Levels { broken, second_broken })) = sensors.next_edge(time_s) {
-            let position = Position::new(sensors.position(edge_s) as i32);
-            edges.push(Edge::Seen { position, broken, second_broken });
-        }
-        let position = Position::new(sensors.position(time_s) as i32);
-        let orders = weeder.turn(Readings::new(instant(turn), position), edges);
+    let mut sensors = Sensors::new(trial, TURN_S);
+    for turn in 0..=turns(trial, TURN_S) {
+        let Turn { time_s, position, edges } = sensors.read();
+        let edges = edges.iter().map(|&Seen { position, levels: Levels { broken, second_broken }, .. }| Edge::Seen {
+            position: Position::new(position as i32),
+            broken,
+            second_broken,
+        });
+        let orders = weeder.turn(Readings::new(instant(turn), Position::new(position as i32)), edges);
         line.command(orders.pulse, time_s);
     }
     Ok(Weeded { pulses: line.into_pulses(), state: weeder.state() })
 }
 
+/// The number of the last turn of a loop in a trial.
+pub(crate) fn turns(trial: &Trial, turn_s: f64) -> u32 {
+    (trial.motion.duration_s() / turn_s).ceil() as u32
+}
+
 /// The firmware's clock in a turn.
-fn instant(turn: u64) -> Instant {
-    Instant::new((turn as u32).wrapping_mul(STEPS_A_TURN).wrapping_add(STILL_STEPS))
+fn instant(turn: u32) -> Instant {
+    Instant::new(turn.wrapping_mul(STEPS_A_TURN).wrapping_add(STILL_STEPS))
 }
 
 /// Types a line into the decisions' console.
@@ -252,4 +353,61 @@ fn type_line(weeder: &mut Weeder, command: &str) -> Result<(), Refused> {
         return Ok(());
     }
     Err(Refused { command: command.to_owned(), answer: said.trim_end().to_owned() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::machine::Dirt;
+    use crate::planting::Planting;
+    use crate::verdict::Timing;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    /// The encoder's count at a time, all of the way to there looked at anew.
+    fn count_at(Trial { machine, motion, .. }: &Trial, time_s: f64) -> i64 {
+        let ticks = machine.ticks(motion, time_s);
+        let pulse = machine.pulse(ticks);
+        let hidden = |pulses: std::ops::Range<i64>| pulses.filter(|&pulse| machine.dirt.hides(pulse)).count() as i64;
+        let in_pulse = if machine.dirt.hides(pulse) { machine.hidden_in_pulse(ticks) } else { 0 };
+        ticks - PULSE_TICKS * (hidden(0..pulse) - hidden(pulse..0)) - in_pulse
+    }
+
+    #[test]
+    fn counts_that_are_worked_out_ahead_are_those_of_each_turn_and_each_edge_by_itself() {
+        for seed in 0..8 {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let row =
+                Planting { plants: 6, weeds: 4, ragged: true, ..Planting::default() }.grow_with_room(seed).unwrap();
+            let dirt = Dirt { share: rng.random_range(0.0..0.1), seed };
+            let machine = Machine { second_beam_mm: 150.0, dirt, ..Machine::default() };
+            let speed_mm_s = rng.random_range(300.0..900.0);
+            // Farther back than it began, too, where counts are negative.
+            let motion = Motion::starting_at(0.0)
+                .change_speed(speed_mm_s, 900.0)
+                .stop_at(1000.0, 900.0)
+                .go_on_for(0.3)
+                .change_speed(-speed_mm_s, 900.0)
+                .stop_at(-200.0, 900.0)
+                .change_speed(speed_mm_s, 900.0)
+                .roll_to(3500.0)
+                .with_slip(|| rng.random_range(-0.05..0.1));
+            let trial = Trial { motion, ..Trial::at_speed(row, machine, Timing::default(), speed_mm_s) };
+            let mut sensors = Sensors::new(&trial, TURN_S);
+            let mut told = 0;
+            for _ in 0..=turns(&trial, TURN_S) {
+                let Turn { time_s, position, edges } = sensors.read();
+                assert_eq!(position, count_at(&trial, time_s), "seed {seed} at {time_s} s");
+                for edge in edges {
+                    assert!(time_s - TURN_S < edge.time_s && edge.time_s <= time_s, "seed {seed} at {time_s} s");
+                    assert_eq!(edge.position, count_at(&trial, edge.time_s), "seed {seed} at {} s", edge.time_s);
+                }
+                told += edges.len();
+            }
+            let all = trial.machine.pin_changes(&trial.row, &trial.motion, 0);
+            let of_beams = all.iter().filter(|change| [wiring::BEAM, wiring::SECOND_BEAM].contains(&change.pin));
+            assert!(told > 40, "{told}");
+            assert_eq!(told, of_beams.count(), "seed {seed}");
+        }
+    }
 }
