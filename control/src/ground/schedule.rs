@@ -88,7 +88,7 @@ impl Schedule {
     }
 
     /// A canopy that reaches to within a distance of a place goes as far as the place.
-    #[inline(never)]
+    #[cfg_attr(target_arch = "avr", inline(never))]
     pub fn widen(&mut self, place: Place, within: Length) {
         for canopy in &mut self.canopies {
             let (before, behind) = (canopy.leading - place, place - canopy.trailing);
@@ -124,7 +124,8 @@ impl Schedule {
         }
         // Compared by distance from the near end, the counter's wrapping does no harm.
         let length = (far - near) + margin;
-        self.canopies.iter().any(|canopy| (canopy.leading - near) <= length && (canopy.trailing - near) >= -margin)
+        // Most lie behind the tool, and are told by their end.
+        self.canopies.iter().any(|canopy| (canopy.trailing - near) >= -margin && (canopy.leading - near) <= length)
     }
 
     /// Windows at the tool or ahead of it.
