@@ -15,6 +15,8 @@ const TURNS = 300;
 class Connected {
     readonly happened: Happening[] = [];
     readonly session: Session;
+    /** Time in which the page slept, and the machine's answers lay unread. */
+    sleptMs = 0;
     readonly #operator = wokenUp();
 
     /** `dropped` says which of the lines, counted from 0, others have dropped on their way, where they share the machine. */
@@ -38,7 +40,7 @@ class Connected {
     }
 
     get nowMs(): number {
-        return (this.#operator.uno.cycle / CYCLES_PER_SECOND) * 1000;
+        return (this.#operator.uno.cycle / CYCLES_PER_SECOND) * 1000 + this.sleptMs;
     }
 
     async turn(): Promise<void> {
@@ -74,6 +76,18 @@ test("HOLD at any moment of a session holds the machine, and the session goes on
         assert(!machine.has("lost"), `the session is lost at moment ${index}`);
         assert.equal(machine.mode, "hold");
     }
+});
+
+test("a page that sleeps at any moment of a session loses no machine that answers", async () => {
+    for (const sleptMs of [3_000, 60_000, 3_600_000])
+        for (const every of [20, 33, 50]) {
+            const machine = new Connected();
+            for (let turn = 0; turn < TURNS && !machine.has("help"); turn++) {
+                await machine.turn();
+                if (turn % every === 0) machine.sleptMs += sleptMs;
+            }
+            assert(machine.has("help") && !machine.has("lost"), `${sleptMs} ms at every ${every}. turn`);
+        }
 });
 
 test("a HOLD of others, who share the machine, drops no question of the page's own for good", async () => {

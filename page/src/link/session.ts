@@ -29,6 +29,8 @@ const POLL_MS = 100;
 const PATIENCE_MS = 2000;
 /** The same where others type to the machine as well, and whoever asks it for all of them gives an answer in any case. */
 const SHARED_PATIENCE_MS = 35_000;
+/** The longest that counts between two turns. A page that was busy, or asleep, has not waited: the answer may lie there unread. */
+const LONGEST_TURN_MS = 200;
 /** Time in which the greeting comes after a reset, behind a bootloader: the old ones wait for two seconds. */
 const BOOT_MS = 3000;
 /** How often the firmware's name is asked for again. */
@@ -78,7 +80,10 @@ export class Session {
     /** What was typed and is not answered yet, in the order of the answers. */
     #asked: Question[] = [];
     #waiting: Question[] = [];
-    #now = 0;
+    /** Time that was spent waiting, by the wire's clock. */
+    #now: number;
+    /** The wire's time at the last turn. */
+    #turnedAt: number;
     #pollAt = Number.POSITIVE_INFINITY;
     #ended = false;
     /** Whether the wire tells the status by itself, as one does at which there are others. */
@@ -91,7 +96,7 @@ export class Session {
     /** `resets` says whether opening the wire resets the Uno. */
     constructor(wire: Wire, now: number, resets: boolean) {
         this.#wire = wire;
-        this.#now = now;
+        [this.#now, this.#turnedAt] = [now, now];
         this.#greetingBy = resets ? now + BOOT_MS : now;
         wire.onText = (text) => this.#hear(text);
         wire.onEnd = (why) => this.#end(why);
@@ -117,21 +122,23 @@ export class Session {
 
     /** Goes on, at a time. */
     turn(now: number): void {
-        this.#now = now;
+        this.#now += Math.min(now - this.#turnedAt, LONGEST_TURN_MS);
+        this.#turnedAt = now;
         if (this.#ended) return;
-        if (now >= this.#greetingBy) {
+        if (this.#now >= this.#greetingBy) {
             this.#greetingBy = Number.POSITIVE_INFINITY;
             void this.#begin();
         }
         const [oldest] = this.#asked;
-        if (oldest && now - oldest.since > (this.#isShared ? SHARED_PATIENCE_MS : PATIENCE_MS)) this.#giveUp(oldest);
+        if (oldest && this.#now - oldest.since > (this.#isShared ? SHARED_PATIENCE_MS : PATIENCE_MS))
+            this.#giveUp(oldest);
         if (this.#asked.length > 0) return;
-        if (this.#waiting.length === 0 && now >= this.#pollAt && !this.#isShared) {
-            this.#pollAt = now + POLL_MS;
+        if (this.#waiting.length === 0 && this.#now >= this.#pollAt && !this.#isShared) {
+            this.#pollAt = this.#now + POLL_MS;
             void this.#ask("status", false).catch(() => {});
         }
         const next = this.#waiting.shift();
-        if (next) this.#send({ ...next, since: now });
+        if (next) this.#send({ ...next, since: this.#now });
     }
 
     /** Ends it, and lets go of the wire, as does a session that ends by itself. */
