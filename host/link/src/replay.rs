@@ -360,7 +360,10 @@ impl<'a> Stretch<'a> {
             Happened::Event(EventLine::State(mode)) => mode,
             _ => return None,
         };
-        match (self.happened[place + 1..].iter().find_map(swing_or_status), mode) {
+        let is_state = |(_, happened): &&(_, _)| matches!(happened, Happened::Event(EventLine::State(_)));
+        // Behind the next change of state, a swing is that one's.
+        let mut until_next = self.happened[place + 1..].iter().take_while(|happened| !is_state(happened));
+        match (until_next.find_map(swing_or_status), mode) {
             (Some((position, true)), _) | (Some((position, false)), Mode::Work) => Some(position),
             _ => self.happened[..place].iter().rev().find_map(swing_or_status).map(|(position, _)| position),
         }
