@@ -10,7 +10,6 @@ fn a_classification_among_32_examples_in_flash_takes_at_most_2900_cycles() {
     let elf = firmware::build_bench().expect("the bench builds");
     let costs = bench::classifier(&elf, |_| ()).expect("the bench runs, and every answer is the plain search's");
     let (_, cycles) = costs.tasks.iter().find(|(task, _)| *task == Task::Classify(32)).expect("it is measured");
-    println!("{cycles:?}");
     assert!(cycles.mean <= 2900.0, "{cycles:?}");
     assert!(cycles.most <= 3600, "{cycles:?}");
     assert!(costs.stack < 200, "{} bytes of stack", costs.stack);

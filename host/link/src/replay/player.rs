@@ -33,6 +33,10 @@ const SURE_MM_S: f64 = 50.0;
 /// How fast it rolls at the most where neither its speed nor the host's clock says how fast.
 const MOST_MM_S: f64 = 200.0;
 
+/// How far from the even speed to the slower or the faster of two a machine is taken to have been all the time between two lines: one
+/// that gained its speed right behind the first is nearly there, and none came to rest before it told so.
+const EXTREME: f64 = 7.0 / 8.0;
+
 /// By what share the machine's own measure of a steady speed may be off.
 const UNSURE: f64 = 0.02;
 
@@ -64,8 +68,8 @@ impl Pace {
         let (one, other) = (from.abs(), to.abs());
         match self {
             Self::Even => even,
-            Self::Slow => (even + 7.0 * one.min(other)) / 8.0 * (1.0 - UNSURE),
-            Self::Fast => (even + 7.0 * one.max(other)) / 8.0 * (1.0 + UNSURE),
+            Self::Slow => (even + EXTREME * (one.min(other) - even)) * (1.0 - UNSURE),
+            Self::Fast => (even + EXTREME * (one.max(other) - even)) * (1.0 + UNSURE),
         }
     }
 }
