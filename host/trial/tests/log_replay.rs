@@ -38,13 +38,18 @@ fn logged(row: &Row, motion: &Motion, commands: &[&str]) -> Vec<Entry> {
 
 /// As [`logged`], of a machine that sets off so many cycles after it was switched on, whether or not the session has begun.
 fn logged_from(row: &Row, motion: &Motion, commands: &[&str], sets_off: u64) -> Vec<Entry> {
+    let (port, end) = port_along(row, motion, sets_off);
+    logged_at(port, None, commands, end)
+}
+
+/// The port of a machine that rolls along the row, and a place in ticks just before its end.
+fn port_along(row: &Row, motion: &Motion, sets_off: u64) -> (HostPort, i64) {
     let machine = Machine::default();
-    let ticks = machine.ticks(motion, motion.duration_s());
     let mut uno = trial::boot(&firmware::build().expect("the firmware builds"), &[machine.beam_before(row, motion)])
         .expect("the firmware wakes up");
     let changes = machine.pin_changes(row, motion, uno.cycle() + sets_off);
     uno.drive(changes);
-    logged_at(HostPort::new(uno), None, commands, ticks - 10)
+    (HostPort::new(uno), machine.ticks(motion, motion.duration_s()) - 10)
 }
 
 /// The log of a session over a port, until the machine has stood for a second behind a place in ticks. Someone may type more by chance.
@@ -203,7 +208,6 @@ fn a_row_with_changes_of_speed_and_a_stop_is_decided_the_same_on_the_host() {
 /// busy with something else now and then.
 #[test]
 fn rows_by_chance_are_decided_the_same_on_the_host_whatever_is_typed_and_whenever_it_is_read() {
-    let elf = firmware::build().expect("the firmware builds");
     let (mut objects, mut swings) = (0, 0);
     for seed in 0..ROWS {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -223,14 +227,9 @@ fn rows_by_chance_are_decided_the_same_on_the_host_whatever_is_typed_and_wheneve
         let motion = Motion::steady(start_mm, 800.0, speed_mm_s, end_mm).change_speed(0.0, 1500.0);
         let commands: &[&str] = [&["start"][..], &["start now"], &["clear", "start now"]][rng.random_range(0..3)];
 
-        let machine = Machine::default();
-        let mut uno = trial::boot(&elf, &[machine.beam_before(&row, &motion)]).expect("the firmware wakes up");
-        let changes = machine.pin_changes(&row, &motion, uno.cycle() + rng.random_range(0..24_000_000));
-        uno.drive(changes);
-        let mut port = HostPort::new(uno);
+        let (mut port, end) = port_along(&row, &motion, rng.random_range(0..24_000_000));
         port.busy = (seed % 2 == 0).then(|| ChaCha8Rng::from_rng(&mut rng));
         let typed = (seed % 4 < 3).then(|| ChaCha8Rng::from_rng(&mut rng));
-        let end = machine.ticks(&motion, motion.duration_s()) - 10;
         let log = logged_at(port, typed, commands, end);
         let replayed = replay(&log).expect("the log can be replayed");
         assert_eq!(replayed.difference, None, "seed {seed}, {commands:?}: {replayed:#?}\n{log:#?}");
