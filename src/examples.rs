@@ -41,7 +41,8 @@ impl Examples<{ features::COUNT }> for BuiltIn {
         Self::table().example(index)
     }
 
-    #[inline]
+    // Out of line, as an object is classified in one go, for a label, and in several.
+    #[inline(never)]
     fn keep_nearest<const CLASSES: usize>(&self, query: &[u8; features::COUNT], nearest: &mut Nearest<CLASSES>) {
         Self::table().keep_nearest(query, nearest);
     }

@@ -50,8 +50,23 @@ pub struct Ground {
     corrected_by: i8,
     /// The last plant's leading edge, or where watching began; no farther behind than is remembered.
     last_plant: Place,
+    unjudged: Unjudged,
     /// Whether the tool has just come to ground that had to be left behind.
     rolled_back_too_far: bool,
+}
+
+/// The object that was seen in full, and of which nobody knows yet what it is.
+///
+/// It begins with what is told apart, so that none is all zeros: a machine that has not woken up takes no flash.
+#[derive(Clone, Copy, Debug)]
+#[repr(u8)]
+enum Unjudged {
+    /// There is none.
+    None,
+    /// Where it stands is forgotten.
+    Forgotten,
+    /// As far as both beams have seen it.
+    Seen(Object),
 }
 
 impl Ground {
@@ -66,6 +81,7 @@ impl Ground {
         second_beam: SecondBeam::NONE,
         corrected_by: 0,
         last_plant: Place::new(0),
+        unjudged: Unjudged::None,
         rolled_back_too_far: false,
     };
 
@@ -163,6 +179,9 @@ impl Ground {
     #[cfg_attr(target_arch = "avr", inline(never))]
     pub fn forget(&mut self) {
         self.watch.forget();
+        if let Unjudged::Seen(_) = self.unjudged {
+            self.unjudged = Unjudged::Forgotten;
+        }
         self.guard = Guard::NONE;
         self.forget_slip();
         self.schedule.spoil(self.watch.frontier());
@@ -179,6 +198,7 @@ impl Ground {
         self.watch = Watch::start(self.beam, self.watch.is_broken());
         self.last_plant = self.beam;
         self.forget();
+        self.unjudged = Unjudged::None;
     }
 
     /// Takes the operator's word that no plant stands under the tool and ahead of it where nothing is known, if the tool is there.
@@ -189,24 +209,37 @@ impl Ground {
         }
     }
 
-    /// Remembers an object as a plant.
-    ///
-    /// # Errors
-    /// [`ScheduleFull`] when more plants stand between beam and tool than can be remembered.
-    pub fn keep(&mut self, plant: Object) -> Result<(), ScheduleFull> {
-        self.last_plant = plant.leading;
-        self.guard.see(&plant, &self.geometry);
-        self.schedule.push(plant, self.tool(), self.geometry.margin)?;
+    /// An object is being judged: until that is done, the ground is closed from where it begins, as by one that is still being seen.
+    pub fn await_judgement(&mut self, object: Object) {
+        self.unjudged = Unjudged::Seen(object);
         // A wide one has come to the second beam before its end was seen by the first.
         if let Some(begin) = self.second_beam.open() {
             self.widen(begin);
         }
-        Ok(())
+    }
+
+    /// The object is judged, and if it is a plant it is remembered.
+    ///
+    /// # Errors
+    /// [`ScheduleFull`] when more plants stand between beam and tool than can be remembered.
+    pub fn judged(&mut self, object: Object, is_plant: bool) -> Result<(), ScheduleFull> {
+        let unjudged = core::mem::replace(&mut self.unjudged, Unjudged::None);
+        if !is_plant || matches!(unjudged, Unjudged::None) {
+            return Ok(());
+        }
+        self.last_plant = object.leading;
+        let Unjudged::Seen(plant) = unjudged else { return Ok(()) };
+        self.guard.see(&object, &self.geometry);
+        self.schedule.push(plant, self.tool(), self.geometry.margin)
     }
 
     /// What the second beam has an edge of goes that far.
     fn widen(&mut self, place: Place) {
-        self.schedule.widen(place, Length(self.geometry.second_beam.0 >> 2));
+        let within = Length(self.geometry.second_beam.0 >> 2);
+        if let Unjudged::Seen(object) = &mut self.unjudged {
+            object.widen(place, within);
+        }
+        self.schedule.widen(place, within);
     }
 
     /// Guards the ground where a plant was due, once the beam has seen that none stands there; returns its middle.
@@ -215,8 +248,8 @@ impl Ground {
     /// [`ScheduleFull`], as for a plant that was seen.
     #[cfg_attr(target_arch = "avr", inline(never))]
     pub fn guard(&mut self) -> Option<Result<Place, ScheduleFull>> {
-        // What is in the beam may be the plant.
-        let seen_to = self.watch.open().unwrap_or(self.watch.frontier());
+        // What is in the beam, or being judged, may be the plant.
+        let seen_to = self.open().unwrap_or(self.watch.frontier());
         let guarded = self.guard.pass(seen_to, &self.geometry)?;
         let pushed = self.schedule.push(guarded, self.tool(), self.geometry.margin);
         Some(pushed.map(|()| guarded.leading + self.geometry.guard_scatter))
@@ -288,9 +321,9 @@ impl Ground {
         self.ticks((self.schedule.known_from() - self.tool()).max(Length::ZERO))
     }
 
-    /// Windows at the tool or ahead of it, the one still being seen included.
+    /// Windows at the tool or ahead of it, the one that is still being seen or judged included.
     pub fn windows(&self) -> u8 {
-        self.schedule.ahead(self.tool(), self.geometry.margin) + u8::from(self.watch.open().is_some())
+        self.schedule.ahead(self.tool(), self.geometry.margin) + u8::from(self.open().is_some())
     }
 
     /// Whether closed ground comes up before the tool could be out of the row, or in its place again.
@@ -313,15 +346,20 @@ impl Ground {
     }
 
     /// Whether any of the ground between two distances from the tool is closed: unknown, or within the margin of a canopy, the
-    /// one that is still being seen and the one that is due included.
+    /// one that is still being seen or judged and the one that is due included.
     fn is_closed(&self, one: Length, other: Length) -> bool {
         let margin = self.geometry.margin;
         let (near, far) = (self.tool() + one.min(other), self.tool() + one.max(other));
         let reaches = |leading| far - leading >= -margin;
         self.schedule.is_closed(near, far, margin)
-            || self.watch.open().is_some_and(reaches)
+            || self.open().is_some_and(reaches)
             || self.guard.awaited(self.watch.frontier(), &self.geometry).is_some_and(reaches)
             || self.second_beam.open_alone().is_some_and(reaches)
+    }
+
+    /// Where the first object begins of which it is not known yet where it ends, or what it is.
+    fn open(&self) -> Option<Place> {
+        if let Unjudged::Seen(object) = self.unjudged { Some(object.leading) } else { self.watch.open() }
     }
 
     /// The ground that the tool works on.
@@ -337,6 +375,12 @@ mod tests {
 
     const SPEED: TicksPerSecond = TicksPerSecond(1000);
 
+    /// A canopy is judged to be one.
+    fn keep(ground: &mut Ground, canopy: Object) -> Result<(), ScheduleFull> {
+        ground.await_judgement(canopy);
+        ground.judged(canopy, true)
+    }
+
     /// Ground that the beam has seen from 0 to 3000, with a canopy from 1000 to 1300, without leads.
     fn ground() -> (Ground, Settings) {
         let mut settings = Settings::new();
@@ -350,7 +394,7 @@ mod tests {
         ground.edge(Position::new(1300), false);
         let canopy = ground.roll_to(Position::new(1400)).expect("the gap has been seen");
         assert_eq!((ground.spacing(&canopy), canopy.width()), (Ticks(1000), Length(300)));
-        ground.keep(canopy).expect("there is room");
+        keep(&mut ground, canopy).expect("there is room");
         (ground, settings)
     }
 
@@ -471,7 +515,7 @@ mod tests {
             ground.edge(Position::new(leading), true);
             ground.edge(Position::new(leading + 100), false);
             let canopy = ground.roll_to(Position::new(leading + 200)).expect("the gap has been seen");
-            ground.keep(canopy).expect("there is room");
+            keep(&mut ground, canopy).expect("there is room");
         }
         let end = 1000 + 400 * plants;
         let told = (0..end).rev().filter(|&position| {
@@ -490,7 +534,7 @@ mod tests {
             ground.edge(Position::new(2000), true);
             ground.edge(Position::new(2300), false);
             let canopy = ground.roll_to(Position::new(2400)).expect("the gap has been seen");
-            ground.keep(canopy).expect("there is room");
+            keep(&mut ground, canopy).expect("there is room");
             settings.set(setting, value).expect("within its range");
             ground.follow(&settings, Position::new(2400), SPEED);
             assert_eq!(ground.roll_to(Position::new(3300)), None);

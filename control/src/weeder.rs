@@ -19,7 +19,7 @@ use crate::{
     ground::{
         Ground,
         class::{Class, Classifier, Vote},
-        features::{self, Features},
+        features,
         object::Object,
         schedule::ScheduleFull,
         second_beam::Compared,
@@ -79,6 +79,9 @@ pub struct Controller<C, M> {
     mistakes: u16,
     /// Objects that were narrower than any plant or weed.
     dust: u16,
+    /// The object that is being judged, if one is.
+    judging: Object,
+    is_judging: bool,
     no_plants: NoPlants,
     misfits: Misfits,
     told: Told,
@@ -110,6 +113,8 @@ impl<C: Classifier, M: Memory> Asleep<C, M> {
             is_enough: false,
             mistakes: 0,
             dust: 0,
+            judging: Object::NONE,
+            is_judging: false,
             no_plants: NoPlants::since(Position::new(0)),
             misfits: Misfits::NONE,
             told: Told::NONE,
@@ -240,7 +245,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             Some(Err(ScheduleFull)) => self.raise(Alarm::ScheduleFull),
             None => {}
         }
-        // As judging does, these take a good part of what a turn may take: a turn does one of them.
+        // Each of these takes a good part of what a turn may take: a turn does one of them.
         if !self.is_enough {
             if self.configuration.has_changed() {
                 self.follow_settings();
@@ -250,6 +255,9 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             } else if self.leads_are_old {
                 self.ground.lead(self.configuration.settings(), self.sensors.meter.speed());
                 (self.leads_are_old, self.is_enough) = (false, true);
+            } else if self.is_judging {
+                // The last of them, as one object may come after the other.
+                self.go_on_judging();
             }
         }
         if let Some(alarm) = self.fault(doubted) {
@@ -285,8 +293,10 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         self.sensors.encoder.is_doubtful() || out && self.sensors.encoder.is_quiet() || self.ground.must_be_out(out)
     }
 
-    /// Classifies a complete object and remembers it unless it is a weed. What is dust is only counted.
+    /// Begins to judge a complete object, which takes some turns more. What is dust is only counted.
     fn judge(&mut self, object: Object) {
+        // Two can be complete within some turns only where they stand closer than plants do.
+        self.finish_judging();
         self.is_enough = true;
         let position = self.sensors.readings.position;
         let spacing = self.ground.spacing(&object);
@@ -298,17 +308,44 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             return;
         }
         self.no_plants = NoPlants::since(position);
+        let judged = Judged { speed_class_mm_s, spacing_mm, width_mm, vote: Vote::UNKNOWN, label: None };
+        self.objects.remember(judged);
+        self.ground.await_judgement(object);
+        (self.judging, self.is_judging) = (object, true);
         // What is left of an object whose beginning was not seen may be as narrow as a weed.
         let vote = if object.cut {
-            Vote { class: Class::Unknown, votes: 0 }
+            Some(Vote::UNKNOWN)
         } else {
-            let features = Features::describe(speed_class_mm_s, spacing_mm, width_mm);
-            self.classifier.classify(&features, self.configuration.get(Setting::K) as u8)
+            self.classifier.begin(&judged.features(), self.configuration.get(Setting::K) as u8)
         };
-        self.objects.remember(Judged { speed_class_mm_s, spacing_mm, width_mm, vote, label: None });
-        let leading = self.ground.position_of(object.leading, position);
-        self.events.add(Event::Object { vote, leading, spacing, plan: self.ground.plan(&object) });
-        if vote.class != Class::Weed && self.ground.keep(object).is_err() {
+        self.decide(vote);
+    }
+
+    /// Judges what is being judged, however long it takes.
+    fn finish_judging(&mut self) {
+        while self.is_judging {
+            self.go_on_judging();
+        }
+    }
+
+    /// Judges on.
+    fn go_on_judging(&mut self) {
+        self.is_enough = true;
+        let vote = self.classifier.go_on();
+        self.decide(vote);
+    }
+
+    /// Tells of the object that is being judged, once there is a vote, and keeps it unless it is a weed.
+    #[cfg_attr(target_arch = "avr", inline(never))]
+    fn decide(&mut self, vote: Option<Vote>) {
+        let (Some(vote), Some(judged)) = (vote, self.objects.newest()) else { return };
+        judged.vote = vote;
+        let (object, width_mm) = (self.judging, judged.width_mm);
+        self.is_judging = false;
+        let leading = self.ground.position_of(object.leading, self.sensors.readings.position);
+        let (spacing, plan) = (self.ground.spacing(&object), self.ground.plan(&object));
+        self.events.add(Event::Object { vote, leading, spacing, plan });
+        if self.ground.judged(object, vote.class != Class::Weed).is_err() {
             self.raise(Alarm::ScheduleFull);
         }
         self.count_misfit(vote.class, width_mm);

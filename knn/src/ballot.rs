@@ -3,7 +3,7 @@
 use crate::Neighbour;
 
 /// The votes of `CLASSES` classes.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Ballot<const CLASSES: usize> {
     votes: [usize; CLASSES],
     /// Whether a voter's label is not a class.

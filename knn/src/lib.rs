@@ -70,6 +70,7 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
+mod answer;
 mod ballot;
 mod classify;
 mod distance;
@@ -79,7 +80,8 @@ mod neighbour;
 mod scale;
 mod table;
 
-pub use classify::{Answer, ClassifyError, Kind, MAX_K, classify};
+pub use answer::{Answer, ClassifyError, Kind, MAX_K};
+pub use classify::classify;
 pub use distance::{MAX_FEATURES, squared_distance};
 pub use examples::{Example, Examples, VACANT};
 pub use nearest::Nearest;

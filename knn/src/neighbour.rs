@@ -10,6 +10,9 @@
 pub struct Neighbour([u8; 4]);
 
 impl Neighbour {
+    /// Nobody in particular, to begin with.
+    pub const NONE: Self = Self::new(0, 0);
+
     /// An example at a squared distance, of which 24 bits are kept.
     #[inline]
     #[must_use]

@@ -3,7 +3,7 @@
 //! Features come from few values, or from the extremes, as often as from all bytes: level distances, on which the rules
 //! for ties rest, are then common.
 
-use knn::{Answer, ClassifyError, Example, Examples, Kind, MAX_K, Nearest, Scale, Table, classify};
+use knn::{Answer, ClassifyError, Example, Examples, Kind, MAX_K, Nearest, Neighbour, Scale, Table, classify};
 use proptest::prelude::*;
 use smartcore::{
     dataset::iris,
@@ -108,6 +108,14 @@ macro_rules! for_features {
                     prop_assert_eq!(classify(&(&table, left), &query, k, radius), answer);
                     prop_assert_eq!(classify(&OneByOne(&shuffled), &query, k, radius), answer);
                     prop_assert_eq!(classify(&(AtOnce(left), AtOnce(right)), &query, k, radius), answer);
+                    let nearest: &mut Nearest<3> = &mut Nearest::<3, _>::new([Neighbour::new(99, 1); MAX_K as usize]);
+                    for _ in 0..2 {
+                        prop_assert_eq!(nearest.begin(k), Ok(()));
+                        left.keep_nearest(&query, nearest);
+                        AtOnce(right).keep_nearest(&query, nearest);
+                        prop_assert_eq!(nearest.answer(radius), answer);
+                        prop_assert_eq!(nearest.answer(radius), answer);
+                    }
                 }
             }
         }

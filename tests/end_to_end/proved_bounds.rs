@@ -5,7 +5,7 @@
 
 use crate::common::{Run, ask, elf, run_for_ms, woken_up};
 use crate::interrupt_budgets::roll;
-use control::ground::{examples, field_examples, schedule};
+use control::ground::{examples, field_examples, nearest, schedule};
 use control::operate::saved;
 use control::say::command::LINE_LENGTH;
 use control::settings::Setting;
@@ -144,8 +144,11 @@ fn loops_are_said_to_turn_as_often_as_the_constants_behind_them_have_it() {
         );
     }
     assert_eq!(passes("knn::nearest::Nearest::are_level"), usize::from(u8::MAX) + 1);
-    assert_eq!(passes("knn::classify::search"), usize::from(field_examples::CAPACITY).max(examples::COUNT) + 1);
-    assert_eq!(passes("control::ground::nearest::Nearest::vote"), usize::from(MAX_K) + 1);
+    assert_eq!(passes("weeder_firmware::examples::BuiltIn::keep_nearest"), examples::COUNT + 1);
+    assert_eq!(passes("control::weeder::Controller::go_on_judging"), nearest::AT_ONCE + 1);
+    let parts = 1 + usize::from(field_examples::CAPACITY) / nearest::AT_ONCE + 1;
+    assert_eq!(passes("control::weeder::Controller::finish_judging"), parts + 1);
+    assert_eq!(passes("knn::nearest::Nearest::answer"), usize::from(MAX_K) + 1);
     // What is copied lies in a variable or on the stack.
     let longest = Image::read(&elf()).expect("it is an ELF").variables.values().map(|variable| variable.size).max();
     for function in ["memcpy", "memmove", "memset"] {

@@ -26,6 +26,11 @@ pub struct Vote {
     pub votes: u8,
 }
 
+impl Vote {
+    /// Nobody knows, and nobody has voted.
+    pub const UNKNOWN: Self = Self { class: Class::Unknown, votes: 0 };
+}
+
 /// Labels in an example table.
 pub mod label {
     /// A tall weed.
@@ -59,8 +64,20 @@ pub trait Classifier {
     /// Classifies an object by its `k` nearest examples.
     fn classify(&self, features: &Features, k: u8) -> Vote;
 
-    /// What the built-in examples alone take an object for; [`Class::Unknown`] where there are none.
-    fn built_in_class(&self, features: &Features) -> Class;
+    /// Begins to classify an object as [`classify`](Self::classify) does, but takes no longer than a turn of the loop may; the vote, if
+    /// that was enough. Otherwise [`go_on`](Self::go_on) is called until it has the vote.
+    fn begin(&mut self, features: &Features, k: u8) -> Option<Vote> {
+        Some(self.classify(features, k))
+    }
+
+    /// Goes on with what was begun, for no longer than a turn of the loop may take; the vote, if that was enough. The examples are those
+    /// that there were when it began.
+    fn go_on(&mut self) -> Option<Vote> {
+        Some(Vote::UNKNOWN)
+    }
+
+    /// What the built-in examples alone take an object for; [`Class::Unknown`] where there are none. What was begun is dropped.
+    fn built_in_class(&mut self, features: &Features) -> Class;
 
     /// Adds an object as an example of the class `label`, to be kept over a loss of power.
     ///

@@ -182,8 +182,9 @@ mod tests {
     fn whatever_passes_at_most_a_third_of_the_examples_are_among_the_nearest_when_the_search_meets_them() {
         let among_the_nearest = |object: Features| {
             let query = SCALE.quantise(&object.values());
-            let mut places = [Neighbour::new(0, 0); K as usize];
-            let mut nearest = knn::Nearest::<{ label::COUNT }>::new(&mut places);
+            let nearest: &mut knn::Nearest<{ label::COUNT }> =
+                &mut knn::Nearest::<{ label::COUNT }, _>::new([Neighbour::NONE; K as usize]);
+            nearest.begin(K).expect("there are so many places");
             let finds_a_place = |example: &&Example<{ features::COUNT }>| {
                 let before = (nearest.places().0.to_vec(), nearest.places().1);
                 nearest.join(example.neighbour_of(&query));

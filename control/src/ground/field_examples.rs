@@ -33,8 +33,8 @@ pub struct FieldExamples<M> {
     examples: [Taught; CAPACITY as usize],
     /// Slots from the first on, behind which no slot holds an example.
     used: u8,
-    /// Slots that are yet to be written, or erased where they hold none any more.
-    pending: [bool; CAPACITY as usize],
+    /// A bit for each slot that is yet to be written, or erased where it holds none any more.
+    pending: [u8; CAPACITY as usize / 8],
     spoiled: u8,
     /// The slot that is being written.
     writing: u8,
@@ -52,7 +52,7 @@ impl<M: Memory> FieldExamples<M> {
             memory,
             examples,
             used: 0,
-            pending: [false; CAPACITY as usize],
+            pending: [0; CAPACITY as usize / 8],
             spoiled: 0,
             writing: 0,
             bytes: [0; SLOT],
@@ -96,7 +96,8 @@ impl<M: Memory> FieldExamples<M> {
         let Some(number) = self.examples.iter().position(|example| !is_held(example)) else {
             return Err(example);
         };
-        (self.examples[number], self.pending[number]) = (example, true);
+        self.examples[number] = example;
+        *self.pending(number as u8) |= bit(number as u8);
         self.used = self.used.max(number as u8 + 1);
         Ok(number as u8)
     }
@@ -107,7 +108,7 @@ impl<M: Memory> FieldExamples<M> {
             return false;
         };
         example.label = VACANT;
-        self.pending[usize::from(number)] = true;
+        *self.pending(number) |= bit(number);
         true
     }
 
@@ -116,13 +117,13 @@ impl<M: Memory> FieldExamples<M> {
         if !self.write_next_byte() {
             return false;
         }
-        let Some(number) = self.pending.iter().position(|&is_pending| is_pending) else {
+        let Some(number) = (0..CAPACITY).find(|&number| *self.pending(number) & bit(number) != 0) else {
             return true;
         };
-        self.pending[number] = false;
-        let example = &self.examples[number];
+        *self.pending(number) ^= bit(number);
+        let example = &self.examples[usize::from(number)];
         let bytes = if is_held(example) { encode(*example) } else { [ERASED; SLOT] };
-        self.begin(number as u8, bytes);
+        self.begin(number, bytes);
         false
     }
 
@@ -134,6 +135,11 @@ impl<M: Memory> FieldExamples<M> {
     /// The memory, to be looked at or put into another machine.
     pub fn into_memory(self) -> M {
         self.memory
+    }
+
+    /// The byte with the bit of a slot that may be pending.
+    fn pending(&mut self, number: u8) -> &mut u8 {
+        &mut self.pending[usize::from(number / 8)]
     }
 
     #[inline(never)]
@@ -156,6 +162,11 @@ impl<M: Memory> FieldExamples<M> {
         self.left = left;
         false
     }
+}
+
+/// The bit of a slot in its byte.
+const fn bit(number: u8) -> u8 {
+    1 << (number % 8)
 }
 
 /// Where a slot begins.

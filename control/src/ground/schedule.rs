@@ -91,16 +91,7 @@ impl Schedule {
     #[cfg_attr(target_arch = "avr", inline(never))]
     pub fn widen(&mut self, place: Place, within: Length) {
         for canopy in &mut self.canopies {
-            let (before, behind) = (canopy.leading - place, place - canopy.trailing);
-            if before > within || behind > within {
-                continue;
-            }
-            if before > Length::ZERO {
-                canopy.leading = place;
-            }
-            if behind > Length::ZERO {
-                canopy.trailing = place;
-            }
+            canopy.widen(place, within);
         }
     }
 

@@ -27,12 +27,8 @@ pub struct Watch {
 
 impl Watch {
     /// A watch that has not begun.
-    pub const NONE: Self = Self {
-        frontier: Place::new(0),
-        broken: false,
-        broken_at_frontier: false,
-        object: Some(Object { leading: Place::new(0), trailing: Place::new(0), cut: false }),
-    };
+    pub const NONE: Self =
+        Self { frontier: Place::new(0), broken: false, broken_at_frontier: false, object: Some(Object::NONE) };
 
     /// Begins to watch at a place, with the beam broken or not.
     pub fn start(place: Place, broken: bool) -> Self {

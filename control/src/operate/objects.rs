@@ -67,10 +67,10 @@ impl Objects {
         self.get(self.len().checked_sub(1)?)
     }
 
-    /// The last one, unless it has its label.
-    pub fn unlabelled(&mut self) -> Option<&mut Judged> {
+    /// The last one.
+    pub fn newest(&mut self) -> Option<&mut Judged> {
         let last = self.place(self.len().checked_sub(1)?);
-        self.objects.get_mut(last).filter(|object| object.label.is_none())
+        self.objects.get_mut(last)
     }
 
     /// Where one of them lies.
@@ -94,7 +94,7 @@ mod tests {
     #[test]
     fn the_last_objects_are_kept_in_their_order_and_the_last_one_is_labelled() {
         let mut objects = Objects::NONE;
-        assert!(objects.unlabelled().is_none());
+        assert!(objects.newest().is_none());
         for seen in 1..=40_i16 {
             objects.remember(judged(seen));
             let oldest = (seen - CAPACITY as i16).max(0) + 1;
@@ -102,10 +102,9 @@ mod tests {
                 (0..objects.len()).filter_map(|number| objects.get(number)).map(|o| o.width_mm).collect();
             assert_eq!(widths, (oldest..=seen).collect::<Vec<_>>());
             assert_eq!(objects.get(objects.len()), None);
-            let last = objects.unlabelled().expect("it has no label");
+            let last = objects.newest().expect("it was remembered");
             assert_eq!(last.width_mm, seen);
             last.label = Some(1);
-            assert!(objects.unlabelled().is_none());
         }
     }
 }

@@ -58,7 +58,7 @@ impl Classifier for ByWidth {
         Vote { class: Class::Weed, votes: 1 }
     }
 
-    fn built_in_class(&self, _: &Features) -> Class {
+    fn built_in_class(&mut self, _: &Features) -> Class {
         Class::Unknown
     }
 

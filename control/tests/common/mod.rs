@@ -17,17 +17,40 @@ use knn::Example;
 
 /// Takes for a weed what is narrower than 60 mm.
 #[derive(Clone, Debug)]
-pub struct ByWidth;
+pub struct ByWidth {
+    /// Turns more than one that it takes.
+    turns: u16,
+    /// What it will say, and in how many turns.
+    vote: (Vote, u16),
+}
+
+impl ByWidth {
+    /// One that answers so many turns later.
+    pub fn late_by(turns: u16) -> Self {
+        Self { turns, vote: (Vote::UNKNOWN, 0) }
+    }
+}
 
 impl Classifier for ByWidth {
     fn wake_up(&mut self) {}
+
+    fn begin(&mut self, features: &Features, k: u8) -> Option<Vote> {
+        self.vote = (self.classify(features, k), self.turns);
+        (self.turns == 0).then_some(self.vote.0)
+    }
+
+    fn go_on(&mut self) -> Option<Vote> {
+        let (vote, turns) = &mut self.vote;
+        *turns -= 1;
+        (*turns == 0).then_some(*vote)
+    }
 
     fn classify(&self, features: &Features, _: u8) -> Vote {
         let class = if features.hold_mm < 160 { Class::Weed } else { Class::Plant };
         Vote { class, votes: 1 }
     }
 
-    fn built_in_class(&self, _: &Features) -> Class {
+    fn built_in_class(&mut self, _: &Features) -> Class {
         Class::Unknown
     }
 
@@ -58,7 +81,12 @@ impl Classifier for ByWidth {
 
 /// A machine in HOLD that woke up without saved settings and was told that this is right.
 pub fn machine() -> Machine {
-    let mut machine = Controller::new(ByWidth, Volatile::new(), woken_up(Cause::PowerOn));
+    machine_that_judges(ByWidth::late_by(0))
+}
+
+/// The same, with a classifier that may take its time.
+pub fn machine_that_judges(classifier: ByWidth) -> Machine {
+    let mut machine = Controller::new(classifier, Volatile::new(), woken_up(Cause::PowerOn));
     machine.clear();
     machine
 }

@@ -44,7 +44,16 @@ pub struct Rolling {
 impl Rolling {
     /// At work, with these settings, a beam that answers at once, and nothing known of the ground.
     pub fn along(first_mm: Vec<(f64, f64)>, second_mm: Vec<(f64, f64)>, settings: &[(Setting, u16)]) -> Self {
-        let mut machine = machine();
+        Self::with(machine(), first_mm, second_mm, settings)
+    }
+
+    /// The same, with a machine that woke up in HOLD.
+    pub fn with(
+        mut machine: Machine,
+        first_mm: Vec<(f64, f64)>,
+        second_mm: Vec<(f64, f64)>,
+        settings: &[(Setting, u16)],
+    ) -> Self {
         for &(setting, value) in [(Setting::BeamResponseMs, 0)].iter().chain(settings) {
             machine.set(setting, value).unwrap();
         }
@@ -68,22 +77,32 @@ impl Rolling {
     pub fn roll_to(&mut self, to_mm: f64, speed_mm_s: f64) {
         let step_mm = (to_mm - self.place_mm).signum() * speed_mm_s * TURN_US as f64 / 1e6;
         while (to_mm - self.place_mm) * step_mm > 0.0 {
-            self.place_mm += step_mm;
-            self.wheel_mm += step_mm * self.turns;
-            self.time_us += TURN_US;
-            let sees = |seen: &[(f64, f64)], place| seen.iter().any(|&(from, to)| (from..to).contains(&place));
-            let levels = (sees(&self.first_mm, self.place_mm), sees(&self.second_mm, self.place_mm - SECOND_BEAM_MM));
-            let (broken, second_broken) = levels;
-            let now = self.readings();
-            let edge = Edge::Seen { position: now.position, broken, second_broken };
-            let edges = (levels != std::mem::replace(&mut self.levels, levels)).then_some(edge);
-            self.machine.turn(now, edges);
-            if !self.machine.tool_out() {
-                self.weeded_mm.push(self.place_mm - BEAM_TO_TOOL_MM);
-            }
-            while let Some(event) = self.machine.next_event() {
-                self.told.push((event, self.place_mm));
-            }
+            self.turn(step_mm);
+        }
+    }
+
+    /// Stands for so many turns of the loop.
+    pub fn stand(&mut self, turns: u16) {
+        (0..turns).for_each(|_| self.turn(0.0));
+    }
+
+    /// Rolls by so much in a turn of the loop.
+    fn turn(&mut self, step_mm: f64) {
+        self.place_mm += step_mm;
+        self.wheel_mm += step_mm * self.turns;
+        self.time_us += TURN_US;
+        let sees = |seen: &[(f64, f64)], place| seen.iter().any(|&(from, to)| (from..to).contains(&place));
+        let levels = (sees(&self.first_mm, self.place_mm), sees(&self.second_mm, self.place_mm - SECOND_BEAM_MM));
+        let (broken, second_broken) = levels;
+        let now = self.readings();
+        let edge = Edge::Seen { position: now.position, broken, second_broken };
+        let edges = (levels != std::mem::replace(&mut self.levels, levels)).then_some(edge);
+        self.machine.turn(now, edges);
+        if !self.machine.tool_out() {
+            self.weeded_mm.push(self.place_mm - BEAM_TO_TOOL_MM);
+        }
+        while let Some(event) = self.machine.next_event() {
+            self.told.push((event, self.place_mm));
         }
     }
 

@@ -95,7 +95,7 @@ impl Classifier for Judge<'_> {
         if seen.is_given { seen.vote } else { self.nearest.classify(&by_machine, k) }
     }
 
-    fn built_in_class(&self, features: &Features) -> Class {
+    fn built_in_class(&mut self, features: &Features) -> Class {
         self.built_in.built_in_class(&self.by_machine(features))
     }
 
@@ -135,7 +135,7 @@ mod tests {
         let plant = Features::describe(556, 500, 150);
         let taught = Example::new(control::ground::examples::scale().quantise(&plant.values()), label::WEED);
         let examples = [&EXAMPLES[..], &[taught; 5]].concat();
-        let judge = Judge::new(&examples, EXAMPLES.len(), Rc::new(Witness::default()));
+        let mut judge = Judge::new(&examples, EXAMPLES.len(), Rc::new(Witness::default()));
         assert_eq!(judge.classify(&plant, 3).class, Class::Weed, "the field has taught it so");
         assert_eq!(judge.built_in_class(&plant), Class::Plant);
     }

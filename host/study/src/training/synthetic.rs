@@ -240,7 +240,7 @@ impl Classifier for &Recorder<'_> {
 
     // It knows the truth already: there is nothing to teach it, and nothing to forget.
 
-    fn built_in_class(&self, _: &Features) -> Class {
+    fn built_in_class(&mut self, _: &Features) -> Class {
         Class::Unknown
     }
 

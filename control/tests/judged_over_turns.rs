@@ -1,0 +1,119 @@
+//! An object whose judgement takes some turns of the loop: until it is judged, the ground is closed from where it begins.
+//!
+//! A machine that judges at once goes the same way beside one that takes its time. The second is never in the row where the first is
+//! out, tells of the same objects, and knows the same plants in the end.
+
+mod common;
+#[path = "common/rolling.rs"]
+mod rolling;
+
+use common::{ByWidth, machine_that_judges};
+use control::{
+    alarm::Alarm,
+    ground::class::Vote,
+    operate::{event::Event, state::State},
+    settings::Setting,
+    units::{Position, Ticks},
+};
+use proptest::prelude::*;
+use rolling::{BEAM_TO_TOOL_MM, MARGIN_MM, Rolling, SECOND_BEAM_MM};
+
+/// What is told of an object, but for the plan, which goes by what is known of the slip when it is told.
+fn object(event: Event) -> Option<(Vote, Position, Ticks)> {
+    if let Event::Object { vote, leading, spacing, .. } = event { Some((vote, leading, spacing)) } else { None }
+}
+
+/// A machine that judges so many turns late, with a second beam or without.
+fn rolling(turns: u16, seen_mm: &[(f64, f64)], unseen: usize, settings: &[(Setting, u16)]) -> Rolling {
+    // The first beam misses one of them.
+    let first_mm = seen_mm.iter().enumerate().filter(|&(number, _)| number != unseen).map(|(_, &thing)| thing);
+    Rolling::with(machine_that_judges(ByWidth::late_by(turns)), first_mm.collect(), seen_mm.to_vec(), settings)
+}
+
+#[test]
+fn what_is_being_judged_is_closed_from_where_it_begins_and_a_weed_is_open_afterwards() {
+    let weed_mm = (600.0, 620.0);
+    let mut late = rolling(2000, &[weed_mm], usize::MAX, &[]);
+    // So near that the servo would have to be told.
+    late.roll_to(weed_mm.0 + BEAM_TO_TOOL_MM - MARGIN_MM, 500.0);
+    assert!(late.machine.tool_out(), "nobody knows yet that it is a weed");
+    assert_eq!((late.told_of(object).len(), late.machine.windows()), (0, 1));
+    late.roll_to(weed_mm.0 + BEAM_TO_TOOL_MM, 100.0);
+    assert!(!late.machine.tool_out());
+    assert_eq!((late.told_of(object).len(), late.machine.windows()), (1, 0));
+}
+
+#[test]
+fn an_object_that_is_forgotten_while_it_is_being_judged_is_told_and_not_kept() {
+    let mut late = rolling(20, &[(600.0, 700.0)], usize::MAX, &[]);
+    late.roll_to(725.0, 500.0);
+    assert_eq!((late.told_of(object).len(), late.machine.windows()), (0, 1));
+    late.lose_edges();
+    assert_eq!(late.machine.windows(), 0);
+    late.roll_to(800.0, 500.0);
+    assert_eq!(late.told_of(object).len(), 1);
+    assert_eq!((late.machine.windows(), late.machine.state()), (0, State::Alarm(Alarm::BeamEdgesLost)));
+}
+
+#[test]
+fn a_second_object_does_not_wait_for_the_first_to_be_judged() {
+    let mut late = rolling(u16::MAX, &[(600.0, 700.0), (740.0, 780.0)], usize::MAX, &[]);
+    late.roll_to(790.0, 1000.0);
+    assert_eq!(late.told_of(object).len(), 0);
+    late.roll_to(810.0, 1000.0);
+    assert_eq!(late.told_of(object).len(), 1);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn whoever_takes_his_time_is_out_wherever_whoever_judges_at_once_is_and_knows_as_much_in_the_end(
+        turns in 1_u16..8,
+        things in prop::collection::vec((3.0..400.0, prop_oneof![5.0..40.0, 70.0..200.0]), 1..12),
+        legs in prop::collection::vec((50.0..1500.0, prop_oneof![4 => 20.0..900.0, 1 => -200.0..-10.0]), 1..12),
+        second in any::<bool>(),
+        unseen in 0_usize..20,
+        guard_mm in prop_oneof![Just(0_u16), 200_u16..400],
+        merge_gap_mm in 0_u16..30,
+    ) {
+        let mut end_mm = BEAM_TO_TOOL_MM;
+        let things: Vec<(f64, f64)> = things
+            .into_iter()
+            .map(|(gap_mm, width_mm)| {
+                let begin_mm = end_mm + gap_mm;
+                end_mm = begin_mm + width_mm;
+                (begin_mm, end_mm)
+            })
+            .collect();
+        let settings = [
+            // An alarm for weeds that are none comes with the last one's judgement.
+            (Setting::MisfitAfter, 0),
+            // A second beam tells the slip, and where a plant is due goes by what is known of it when the one before is judged.
+            (Setting::GuardSpacingMm, if second { 0 } else { guard_mm }),
+            (Setting::MergeGapMm, merge_gap_mm),
+            (Setting::SecondBeamMm, if second { SECOND_BEAM_MM as u16 } else { 0 }),
+        ];
+        let unseen = if second { unseen } else { usize::MAX };
+        let [mut quick, mut late] = [0, turns].map(|turns| rolling(turns, &things, unseen, &settings));
+        for (speed_mm_s, way_mm) in legs {
+            let to_mm = quick.place_mm + way_mm;
+            // Turn by turn.
+            let step_mm = f64::signum(way_mm) * speed_mm_s / 1000.0;
+            while (to_mm - quick.place_mm) * step_mm > 0.0 {
+                let next_mm = quick.place_mm + step_mm;
+                quick.roll_to(next_mm, speed_mm_s);
+                late.roll_to(next_mm, speed_mm_s);
+                prop_assert!(
+                    late.machine.tool_out() || !quick.machine.tool_out(),
+                    "in the row at {next_mm} mm, where the other is out"
+                );
+            }
+        }
+        late.stand(turns);
+        quick.stand(turns);
+        prop_assert_eq!(quick.told_of(object), late.told_of(object));
+        prop_assert_eq!(quick.machine.windows(), late.machine.windows());
+        prop_assert_eq!(quick.machine.state(), late.machine.state());
+    }
+}

@@ -1,0 +1,57 @@
+//! What a search answers, and why there may be no answer.
+
+/// The largest k.
+pub const MAX_K: u8 = 15;
+
+/// What an answer is worth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Kind {
+    /// One class has more votes than any other, and the nearest example is within the radius.
+    Known,
+    /// Two or more classes share the most votes; the nearest example is within the radius.
+    Tie,
+    /// The nearest example is farther than the radius: nothing like it was learned.
+    Stranger,
+}
+
+/// The class of a query, and what speaks for it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Answer<const CLASSES: usize> {
+    /// The class with the most votes. Among equals the one with the nearest example; among these the smallest label.
+    /// For a [`Kind::Tie`] or a [`Kind::Stranger`] it is only the best guess.
+    pub label: u8,
+    /// The votes of each class: k in all, and more where several examples are as far as the k-th nearest.
+    pub votes: [usize; CLASSES],
+    /// The squared distance to the nearest example (see [`squared_distance`](crate::squared_distance)).
+    pub nearest: u32,
+    /// What the answer is worth.
+    pub kind: Kind,
+}
+
+/// Why there is no answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum ClassifyError {
+    /// k is 0 or above [`MAX_K`].
+    KOutOfRange,
+    /// There is no example at all.
+    NoExamples,
+    /// There are examples, but fewer than k.
+    TooFewExamples,
+    /// The label of an example that would vote is not below the number of classes.
+    UnknownLabel,
+}
+
+impl core::fmt::Display for ClassifyError {
+    fn fmt(&self, formatter: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        formatter.write_str(match self {
+            Self::KOutOfRange => "k is out of range: choose 1 to 15",
+            Self::NoExamples => "there are no examples: add at least k",
+            Self::TooFewExamples => "k is above the number of examples: add examples or choose a smaller k",
+            Self::UnknownLabel => {
+                "an example's label is not a class: labels run from 0 to the number of classes less 1"
+            }
+        })
+    }
+}
+
+impl core::error::Error for ClassifyError {}
