@@ -3,7 +3,10 @@
 //! A record in the ELF's section `.loop_bounds`, which takes no flash and no cycle, names a place in the loop and how often the program
 //! comes by it at most. The tool takes it at its word; what it says is to be seen in the source around it.
 
-use core::arch::asm;
+use core::arch::{asm, global_asm};
+
+// Nothing in the program refers to the records, so the linker is asked for them by this name (memory.x).
+global_asm!(".pushsection .loop_bounds, \"\", @progbits", ".globl loop_bounds", "loop_bounds:", ".popsection");
 
 /// The program comes by this place so often at most, each time that it comes to the innermost loop around it.
 #[inline(always)]

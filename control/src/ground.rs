@@ -321,9 +321,12 @@ impl Ground {
         self.ticks((self.schedule.known_from() - self.tool()).max(Length::ZERO))
     }
 
-    /// Windows at the tool or ahead of it, the one that is still being seen or judged included.
+    /// Windows at the tool or ahead of it, those that are still being seen or judged included.
     pub fn windows(&self) -> u8 {
-        self.schedule.ahead(self.tool(), self.geometry.margin) + u8::from(self.open().is_some())
+        let unjudged = matches!(self.unjudged, Unjudged::Seen(_));
+        self.schedule.ahead(self.tool(), self.geometry.margin)
+            + u8::from(unjudged)
+            + u8::from(self.watch.open().is_some())
     }
 
     /// Whether closed ground comes up before the tool could be out of the row, or in its place again.

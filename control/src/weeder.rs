@@ -295,8 +295,10 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// Begins to judge a complete object, which takes some turns more. What is dust is only counted.
     fn judge(&mut self, object: Object) {
-        // Two can be complete within some turns only where they stand closer than plants do.
-        self.finish_judging();
+        // One that is seen so soon after another is no plant beside a plant; where nobody knows, it is kept.
+        if self.is_judging {
+            self.decide(Some(Vote::UNKNOWN));
+        }
         self.is_enough = true;
         let position = self.sensors.readings.position;
         let spacing = self.ground.spacing(&object);
@@ -321,14 +323,8 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         self.decide(vote);
     }
 
-    /// Judges what is being judged, however long it takes.
-    fn finish_judging(&mut self) {
-        while self.is_judging {
-            self.go_on_judging();
-        }
-    }
-
     /// Judges on.
+    #[cfg_attr(target_arch = "avr", inline(never))]
     fn go_on_judging(&mut self) {
         self.is_enough = true;
         let vote = self.classifier.go_on();

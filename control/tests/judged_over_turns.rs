@@ -56,12 +56,13 @@ fn an_object_that_is_forgotten_while_it_is_being_judged_is_told_and_not_kept() {
 }
 
 #[test]
-fn a_second_object_does_not_wait_for_the_first_to_be_judged() {
-    let mut late = rolling(u16::MAX, &[(600.0, 700.0), (740.0, 780.0)], usize::MAX, &[]);
-    late.roll_to(790.0, 1000.0);
-    assert_eq!(late.told_of(object).len(), 0);
-    late.roll_to(810.0, 1000.0);
-    assert_eq!(late.told_of(object).len(), 1);
+fn what_is_still_being_judged_when_the_next_object_comes_is_kept() {
+    let mut late = rolling(u16::MAX, &[(600.0, 620.0), (660.0, 680.0)], usize::MAX, &[]);
+    late.roll_to(690.0, 1000.0);
+    assert_eq!((late.told_of(object).len(), late.machine.windows()), (0, 2));
+    late.roll_to(710.0, 1000.0);
+    assert_eq!(late.told_of(object).iter().map(|&(vote, ..)| vote).collect::<Vec<_>>(), [Vote::UNKNOWN]);
+    assert_eq!(late.machine.windows(), 2);
 }
 
 proptest! {
@@ -112,8 +113,11 @@ proptest! {
         }
         late.stand(turns);
         quick.stand(turns);
-        prop_assert_eq!(quick.told_of(object), late.told_of(object));
-        prop_assert_eq!(quick.machine.windows(), late.machine.windows());
+        // What the second beam alone has seen may come while another is being judged.
+        if !second {
+            prop_assert_eq!(quick.told_of(object), late.told_of(object));
+            prop_assert_eq!(quick.machine.windows(), late.machine.windows());
+        }
         prop_assert_eq!(quick.machine.state(), late.machine.state());
     }
 }

@@ -14,12 +14,12 @@ impl<const CLASSES: usize> Ballot<CLASSES> {
     /// Nobody has voted.
     pub(crate) const EMPTY: Self = Self { votes: [0; CLASSES], unknown: false };
 
-    /// One votes for its class.
+    /// So many vote for their class.
     #[inline]
-    pub(crate) fn vote(&mut self, label: u8) {
+    pub(crate) fn vote(&mut self, label: u8, voters: u8) {
         match self.votes.get_mut(usize::from(label)) {
-            Some(votes) => *votes = votes.wrapping_add(1),
-            None => self.unknown = true,
+            Some(votes) => *votes = votes.wrapping_add(voters.into()),
+            None => self.unknown |= voters > 0,
         }
     }
 
@@ -27,7 +27,7 @@ impl<const CLASSES: usize> Ballot<CLASSES> {
     #[inline(always)]
     pub(crate) fn count(&mut self, voters: &[Neighbour]) {
         let [zeros, ones] = self.votes.as_mut_slice() else {
-            return voters.iter().for_each(|voter| self.vote(voter.label()));
+            return voters.iter().for_each(|voter| self.vote(voter.label(), 1));
         };
         // Of two classes, the labels' sum is the second one's votes: an 8-bit processor adds a label in fewer cycles than it finds
         // the votes of its class.

@@ -78,11 +78,8 @@ impl<const CLASSES: usize> Nearest<CLASSES> {
     }
 
     /// So many examples of a label have found no place although they are as far as the farthest is now.
-    #[inline(never)]
     pub fn are_level(&mut self, label: u8, examples: u8) {
-        for _ in 0..examples {
-            self.vote_level(label);
-        }
+        self.vote_level(label, examples);
     }
 
     /// An example takes its place, where it is not too far for that.
@@ -120,18 +117,19 @@ impl<const CLASSES: usize> Nearest<CLASSES> {
         if let Some(farthest) = self.places.first()
             && farthest.is_as_far_as(&out)
         {
-            self.vote_level(out.label());
+            self.vote_level(out.label(), 1);
         }
     }
 
-    /// One votes that is as far as the farthest.
-    fn vote_level(&mut self, label: u8) {
+    /// So many vote that are as far as the farthest.
+    #[inline(never)]
+    fn vote_level(&mut self, label: u8, votes: u8) {
         if let Some(&farthest) = self.places.first()
             && !self.as_far.is_as_far_as(&farthest)
         {
             (self.level, self.as_far) = (Ballot::EMPTY, farthest);
         }
-        self.level.vote(label);
+        self.level.vote(label, votes);
     }
 
     /// The class by the vote of all that have joined since the search [began](Self::begin), as [`classify`](crate::classify) says it.

@@ -117,8 +117,12 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// # Errors
     /// [`Refusal::NothingToLabel`], [`Refusal::TakenForPlant`] or [`Refusal::TakenForWeed`], and [`Refusal::ExamplesFull`]; the object has no label then.
     pub fn label(&mut self, label: u8, forced: bool) -> Result<(), Refusal> {
-        self.finish_judging();
-        let object = self.objects.newest().filter(|object| object.label.is_none()).ok_or(Refusal::NothingToLabel)?;
+        let is_judged = !self.is_judging;
+        let object = self
+            .objects
+            .newest()
+            .filter(|object| is_judged && object.label.is_none())
+            .ok_or(Refusal::NothingToLabel)?;
         let features = object.features();
         // A label that is wrong would turn the class of all that come after it, and nobody would see why.
         if !forced {

@@ -35,7 +35,7 @@ pub use self::budget::{Budgets, BudgetsError, BudgetsProblem, Held};
 use self::cycles::{Stretch, Time, Timer, Turns};
 use self::decode::{Instruction, Operation};
 use self::flow::{Entry, Kind, Node, Program, Routine, bytes};
-pub use self::loops::{LoopBound, LoopBounds};
+pub use self::loops::{LoopBound, LoopBounds, records};
 use self::values::Interrupts;
 use crate::elf::{Image, ImageError};
 use serde::{Deserialize, Serialize};
@@ -375,8 +375,8 @@ pub fn prove(elf: &Path, input: Option<&Input>, loops: &LoopBounds) -> Result<Bo
     }
 
     let places = program.routines().flat_map(|routine| &routine.nodes).map(|node| node.place.address);
-    let of_heads = places.filter_map(|place| Some((place, loops.get(&program.name(place))?.passes))).collect();
-    let mut timer = Timer::new(Turns { stated: loops::stated(elf)?, of_heads });
+    let of_heads = places.filter_map(|place| Some((place, loops.get(&program.name(place))?.passes.clone()))).collect();
+    let mut timer = Timer::new(Turns { stated: loops::records(elf)?, of_heads });
     let mut told = Vec::new();
     for (&vector, handler) in &handlers {
         let what = format!("the handler of vector {vector}");

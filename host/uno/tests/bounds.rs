@@ -358,26 +358,29 @@ fn a_record_that_a_turn_can_go_round_bounds_nothing() {
 
 #[test]
 fn what_is_said_of_a_function_holds_for_each_of_its_loops_and_a_record_at_one_goes_before_it() {
-    let cycles = |body: &str, passes: u64| {
+    let cycles = |body: &str, passes: &[u64]| {
         let program = format!("start:\n clr r1\n1: wdr\n rcall waits\n rjmp 1b\nwaits:\n ldi r24, 8\n{body} ret");
-        let bound = LoopBound { passes, because: "it counts".into() };
+        let bound = LoopBound { passes: passes.into(), because: "it counts".into() };
         let bounds = try_to_prove_with(&program, None, &[("waits".into(), bound)].into()).expect("it has bounds");
         bounds.turn.expect("the watchdog is fed").cycles
     };
     // wdr 1, rcall 3, ldi 1, so many turns and the way out, ret 4, rjmp 2.
-    assert_eq!(cycles("3: dec r24\n brne 3b\n", 9), Some(11 + 9 * 3 + 2));
-    assert_eq!(cycles(&format!("3:\n {} dec r24\n brne 3b\n", at_most(8)), 9), Some(11 + 8 * 3 + 2));
-    // Entered in its middle as well: by the longer way, sbrc 1 and rjmp 2, with nop 1 in each turn.
+    assert_eq!(cycles("3: dec r24\n brne 3b\n", &[9]), Some(11 + 9 * 3 + 2));
+    assert_eq!(cycles(&format!("3:\n {} dec r24\n brne 3b\n", at_most(8)), &[9]), Some(11 + 8 * 3 + 2));
+    // Entered in its middle as well: by the longer way, sbrc 1 and rjmp 2; nine times by either beginning, and three cycles from
+    // one to the other at most.
     let twice = "sbrc r2, 0\n rjmp 4f\n3: nop\n4: dec r24\n brne 3b\n";
-    assert_eq!(cycles(twice, 9), Some(11 + 3 + 9 * 4 + 2));
+    assert_eq!(cycles(twice, &[9]), Some(11 + 3 + 2 * 9 * 3 + 2));
     // Nine turns of ldi 1, of the inner loop's nine with their way out, and of dec 1 and brne 2; the last way out is 1 shorter.
     let nested = "2: ldi r25, 3\n3: dec r25\n brne 3b\n dec r24\n brne 2b\n";
-    assert_eq!(cycles(nested, 9), Some(11 + 9 * (1 + 29 + 3) + (1 + 29 + 2)));
+    assert_eq!(cycles(nested, &[9]), Some(11 + 9 * (1 + 29 + 3) + (1 + 29 + 2)));
+    // The same, with another number for the loop within: three of its turns with their way out.
+    assert_eq!(cycles(nested, &[9, 3]), Some(11 + 9 * (1 + 11 + 3) + (1 + 11 + 2)));
 }
 
 #[test]
 fn a_bound_for_the_loops_of_a_function_that_is_gone_is_refused() {
-    let bound = LoopBound { passes: 3, because: "it counted".into() };
+    let bound = LoopBound { passes: vec![3], because: "it counted".into() };
     let loops = LoopBounds::from([("gone".to_owned(), bound)]);
     let error = try_to_prove_with("start: rjmp start", None, &loops).expect_err("it has no such function").to_string();
     assert!(error.contains("no function of the firmware is called gone"), "{error}");

@@ -53,16 +53,13 @@ fn longer(one: Option<Time>, other: Option<Time>) -> Option<Time> {
     }
 }
 
-/// How often the program comes by an address inside a loop at most, each time that the loop is come to.
-pub(super) type Stated = BTreeMap<u32, u64>;
-
 /// What has been said of how often loops turn.
 #[derive(Default)]
 pub(super) struct Turns {
-    /// By addresses in loops.
-    pub(super) stated: Stated,
-    /// By addresses at which loops may begin.
-    pub(super) of_heads: Stated,
+    /// By addresses in loops: how often the program comes by them at most, each time that the loop is come to.
+    pub(super) stated: BTreeMap<u32, u64>,
+    /// By addresses at which loops may begin, for the outermost of a function and for each depth within it.
+    pub(super) of_heads: BTreeMap<u32, Vec<u64>>,
 }
 
 /// What is meant by a stretch without interrupts.
@@ -295,7 +292,7 @@ impl Timer {
         }
         let address = |node: usize| nodes[node].place.address;
         let all = (0..nodes.len()).filter(|&node| within(node)).collect();
-        Paths { ways: &ways, turns: &self.turns, address: &address }.fill(all, None, &mut times);
+        Paths { ways: &ways, turns: &self.turns, address: &address }.fill(all, &BTreeSet::new(), 0, &mut times);
         times
     }
 }
@@ -332,13 +329,14 @@ struct Paths<'a> {
 }
 
 impl Paths<'_> {
-    /// Carries the times of the places where paths begin on to all others of a set; ways back to `head` are left out.
-    fn fill(&self, set: BTreeSet<usize>, head: Option<usize>, times: &mut [Option<Time>]) {
-        let ways = |node: usize| self.ways[node].iter().filter(|(to, _)| set.contains(to) && Some(*to) != head);
+    /// Carries the times of the places where paths begin on to all others of a set, which lies in so many loops; ways back to `heads` are
+    /// left out.
+    fn fill(&self, set: BTreeSet<usize>, heads: &BTreeSet<usize>, depth: usize, times: &mut [Option<Time>]) {
+        let ways = |node: usize| self.ways[node].iter().filter(|(to, _)| set.contains(to) && !heads.contains(to));
         for circle in circles(&set, &|node| ways(node).map(|(to, _)| *to).collect()) {
             let is_loop = circle.len() > 1 || circle.iter().any(|&node| ways(node).any(|(to, _)| *to == node));
             if is_loop {
-                self.turn(&circle, times);
+                self.turn(&circle, depth, times);
             }
             for &node in &circle {
                 let Some(time) = times[node].clone() else { continue };
@@ -350,36 +348,38 @@ impl Paths<'_> {
     }
 
     /// Carries the times at which a loop is entered on to all of its places.
-    fn turn(&self, circle: &BTreeSet<usize>, times: &mut [Option<Time>]) {
-        // A loop that can be entered at several places is taken at each; what one place in it says is no word for all of them.
-        let heads: Vec<usize> = circle.iter().copied().filter(|&node| times[node].is_some()).collect();
-        let mut all: BTreeMap<usize, Time> = BTreeMap::new();
+    fn turn(&self, circle: &BTreeSet<usize>, depth: usize, times: &mut [Option<Time>]) {
+        // Of a loop that can be entered at several places, a turn is the way from one of them to the next, and it turns as often as the
+        // program comes by any of them; what one place in it says is no word for all of them.
+        let heads: BTreeSet<usize> = circle.iter().copied().filter(|&node| times[node].is_some()).collect();
+        let mut passes = Some(0);
+        let mut entered: Option<Time> = None;
+        let mut inside = vec![None; times.len()];
         for &head in &heads {
-            let Some(entered) = times[head].clone() else { continue };
-            let mut inside = vec![None; times.len()];
+            let stated = if heads.len() == 1 { self.stated(circle, head) } else { None };
+            let stated = stated.or_else(|| {
+                let by_depth = self.turns.of_heads.get(&(self.address)(head))?;
+                by_depth.get(depth).or(by_depth.last()).copied()
+            });
+            passes = passes.zip(stated).map(|(passes, stated)| passes + stated);
+            entered = longer(entered, times[head].clone());
             inside[head] = Some(Time::default());
-            self.fill(circle.clone(), Some(head), &mut inside);
-            let mut turn = Time::default();
-            for &node in circle {
-                for (_, own) in self.ways[node].iter().filter(|(to, _)| *to == head) {
-                    turn = inside[node].as_ref().map_or(turn.clone(), |time| turn.or(&time.and(own)));
-                }
-            }
-            let stated = self.stated(circle, head).filter(|_| heads.len() == 1);
-            let stated = stated.or_else(|| self.turns.of_heads.get(&(self.address)(head)).copied());
-            let mut before_last = Time { cycles: turn.cycles * stated.unwrap_or(1), unbounded: turn.unbounded };
-            if stated.is_none() {
-                before_last.unbounded.insert((self.address)(head));
-            }
-            let entered = entered.and(&before_last);
-            for (&node, time) in circle.iter().filter_map(|node| Some((node, inside[*node].as_ref()?))) {
-                let time = entered.and(time);
-                let longest = all.get(&node).map_or(time.clone(), |other| other.or(&time));
-                all.insert(node, longest);
+        }
+        let (Some(entered), Some(&first)) = (entered, heads.first()) else { return };
+        self.fill(circle.clone(), &heads, depth + 1, &mut inside);
+        let mut turn = Time::default();
+        for &node in circle {
+            for (_, own) in self.ways[node].iter().filter(|(to, _)| heads.contains(to)) {
+                turn = inside[node].as_ref().map_or(turn.clone(), |time| turn.or(&time.and(own)));
             }
         }
-        for (node, time) in all {
-            times[node] = Some(time);
+        let mut before_last = Time { cycles: turn.cycles * passes.unwrap_or(1), unbounded: turn.unbounded };
+        if passes.is_none() {
+            before_last.unbounded.insert((self.address)(first));
+        }
+        let entered = entered.and(&before_last);
+        for &node in circle {
+            times[node] = inside[node].as_ref().map(|time| entered.and(time));
         }
     }
 

@@ -15,14 +15,13 @@
 //! bounds nothing.
 //!
 //! Where a source cannot write assembly, or is a library's, a table names the function, by its path without types, and says how often the
-//! program comes by the beginning of any loop in it at most ([`LoopBound`]), or by each of its beginnings where it can be entered at
-//! several places. Of several loops it is the one that turns most that
-//! counts, since the order in which a compiler lays them out is nobody's business. A record at a loop goes before the table.
+//! program comes by the beginning of a loop in it at most ([`LoopBound`]), or by each of its beginnings where it can be entered at
+//! several places: of the outermost loops, of those within them, and so on. Of several loops side by side it is the one that turns most
+//! that counts, since the order in which a compiler lays them out is nobody's business. A record at a loop goes before the table.
 //!
 //! That a number is right is the source's word, or the table's, which a run in the simulator can refute.
 
 use super::BoundsError;
-use super::cycles::Stated;
 use crate::elf::ImageError;
 use object::read::elf::ElfFile32;
 use object::{LittleEndian, Object, ObjectSection};
@@ -37,22 +36,41 @@ const SECTION: &str = ".loop_bounds";
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LoopBound {
-    /// How often the program comes by the beginning of a loop at most, each time that the loop is come to.
-    pub passes: u64,
+    /// How often the program comes by the beginning of a loop at most, each time that the loop is come to: of the outermost, of those
+    /// within them, and so on; the last number is that of all that are deeper.
+    #[serde(deserialize_with = "one_or_several")]
+    pub passes: Vec<u64>,
     /// Why it does not do so more often.
     pub because: String,
+}
+
+/// A number that holds at every depth may stand alone.
+fn one_or_several<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Vec<u64>, D::Error> {
+    #[derive(Deserialize)]
+    #[serde(untagged, expecting = "a number, or one for each depth, the outermost loop's first")]
+    enum Passes {
+        One(u64),
+        Several(Vec<u64>),
+    }
+    match Passes::deserialize(deserializer)? {
+        Passes::One(passes) => Ok(vec![passes]),
+        Passes::Several(passes) => Ok(passes),
+    }
 }
 
 /// Those of functions, by their paths without types.
 pub type LoopBounds = BTreeMap<String, LoopBound>;
 
-/// The records of an ELF.
-pub(super) fn stated(elf: &Path) -> Result<Stated, BoundsError> {
+/// The records of an ELF: an address, and how often the program comes by it at most each time that it comes to the loop around it.
+///
+/// # Errors
+/// Where the ELF cannot be read.
+pub fn records(elf: &Path) -> Result<BTreeMap<u32, u64>, BoundsError> {
     let bytes = std::fs::read(elf).map_err(|source| ImageError::Read { path: elf.into(), source })?;
     let not_elf = |reason| ImageError::NotElf { path: elf.into(), reason };
     let file: ElfFile32<LittleEndian> = ElfFile32::parse(&*bytes).map_err(not_elf)?;
-    let Some(section) = file.section_by_name(SECTION) else { return Ok(Stated::new()) };
-    let mut turns = Stated::new();
+    let Some(section) = file.section_by_name(SECTION) else { return Ok(BTreeMap::new()) };
+    let mut turns = BTreeMap::new();
     for record in section.data().map_err(not_elf)?.chunks_exact(8) {
         let word = |at: usize| record[at..].first_chunk().map_or(0, |bytes| u32::from_le_bytes(*bytes));
         let (address, stated) = (word(0), u64::from(word(4)));
