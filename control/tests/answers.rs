@@ -261,7 +261,7 @@ fn settings_are_saved_in_hold_only() {
 
 #[test]
 fn a_machine_without_saved_settings_says_so_and_does_not_start_until_that_is_cleared() {
-    let mut machine = Controller::new(ByWidth, Volatile::new(), woken_up(Cause::BrownOut));
+    let mut machine = Controller::new(ByWidth::late_by(0), Volatile::new(), woken_up(Cause::BrownOut));
     assert_eq!(machine.state(), State::Alarm(Alarm::SettingsLost));
     assert_eq!(ask(&mut machine, "start"), ["error: an alarm is latched, see status, then clear it"]);
     assert_eq!(ask(&mut machine, "clear"), ["ok"]);

@@ -4,7 +4,7 @@
 //! therefore take a millisecond, in which a machine at 5 km/h rolls 1.4 mm, and what takes longer is done over several. It is
 //! counted in cycles from one reset of the watchdog to the next, what interrupts take of it included.
 
-use crate::common::{Run, ask, run_for_ms, steady, trial, woken_up};
+use crate::common::{Run, run_for_ms, steady, trial, woken_up};
 use control::ground::field_examples;
 use control::say::command::{LINE_LENGTH, Word};
 use control::settings::Setting;

@@ -117,6 +117,10 @@ impl<M: Memory> FieldExamples<M> {
         if !self.write_next_byte() {
             return false;
         }
+        // In nearly every turn there is none.
+        if self.pending == [0; CAPACITY as usize / 8] {
+            return true;
+        }
         let Some(number) = (0..CAPACITY).find(|&number| *self.pending(number) & bit(number) != 0) else {
             return true;
         };
