@@ -111,6 +111,7 @@ impl Ground {
     }
 
     /// Whether another slip was measured than the distances are corrected by.
+    #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn is_to_be_corrected(&self) -> bool {
         self.corrected_by != self.second_beam.slip().excess()
     }
@@ -154,6 +155,7 @@ impl Ground {
     }
 
     /// The machine has rolled to a position; returns the object that this completes.
+    #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn roll_to(&mut self, position: Position) -> Option<Object> {
         let had_left = self.schedule.has_left(self.tool());
         self.beam = self.geometry.grain.place(position);
@@ -247,6 +249,7 @@ impl Ground {
     /// # Errors
     /// [`ScheduleFull`], as for a plant that was seen.
     #[cfg_attr(target_arch = "avr", inline(never))]
+    #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn guard(&mut self) -> Option<Result<Place, ScheduleFull>> {
         // What is in the beam, or being judged, may be the plant.
         let seen_to = self.open().unwrap_or(self.watch.frontier());
@@ -286,11 +289,13 @@ impl Ground {
     }
 
     /// Whether there is a second beam.
+    #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn has_second_beam(&self) -> bool {
         self.geometry.second_beam > Length::ZERO
     }
 
     /// Whether the second beam is broken, as far as is known.
+    #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn second_is_broken(&self) -> bool {
         self.second_beam.is_broken()
     }
@@ -301,12 +306,14 @@ impl Ground {
     }
 
     /// Whether the beam has been broken over more ground than a canopy covers.
+    #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn is_blocked(&self) -> bool {
         let too_wide = |leading| self.watch.frontier() - leading > self.geometry.max_width;
         self.watch.is_broken() && self.watch.open().is_some_and(too_wide)
     }
 
     /// Whether the tool has just come to ground that had to be left behind.
+    #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn rolled_back_too_far(&self) -> bool {
         self.rolled_back_too_far
     }
@@ -330,17 +337,20 @@ impl Ground {
     }
 
     /// Whether closed ground comes up before the tool could be out of the row, or in its place again.
+    #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn must_be_out(&self, tool_out: bool) -> bool {
         let (from, to) = self.leads.stretch(tool_out);
         self.is_closed(from, to) || self.outruns_the_beam(tool_out)
     }
 
     /// Whether the tool is at closed ground.
+    #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn is_closed_at_tool(&self) -> bool {
         self.is_closed(Length::ZERO, Length::ZERO)
     }
 
     /// Whether the machine is so fast that a plant just behind the beam would be reached before the tool is out.
+    #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn outruns_the_beam(&self, tool_out: bool) -> bool {
         let out = self.leads.out;
         // Slowing down by an eighth is what it takes to be trusted again.
@@ -350,6 +360,7 @@ impl Ground {
 
     /// Whether any of the ground between two distances from the tool is closed: unknown, or within the margin of a canopy, the
     /// one that is still being seen or judged and the one that is due included.
+    #[cfg_attr(not(target_arch = "avr"), inline)]
     fn is_closed(&self, one: Length, other: Length) -> bool {
         let margin = self.geometry.margin;
         let (near, far) = (self.tool() + one.min(other), self.tool() + one.max(other));
@@ -361,6 +372,7 @@ impl Ground {
     }
 
     /// Where the first object begins of which it is not known yet where it ends, or what it is.
+    #[cfg_attr(not(target_arch = "avr"), inline)]
     fn open(&self) -> Option<Place> {
         if let Unjudged::Seen(object) = self.unjudged { Some(object.leading) } else { self.watch.open() }
     }

@@ -220,8 +220,7 @@ impl Run {
     /// Rolls on until the machine first comes to a place.
     #[track_caller]
     pub fn roll_to(&mut self, place_mm: f64) {
-        let passings = self.trial.motion.passings(place_mm);
-        let passing = passings.first().expect("the machine comes to the place");
+        let passing = self.trial.motion.passings(place_mm).next().expect("the machine comes to the place");
         self.uno.run_until(cycle_at(self.start_cycle, passing.time_s)).expect("the firmware runs");
     }
 

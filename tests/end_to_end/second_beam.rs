@@ -66,7 +66,7 @@ fn the_slip_is_told_plant_by_plant_and_dropped_by_an_alarm() {
 /// Seven plants at 2 km/h, with a beam whose wire is torn where the machine comes to a place: its pin stays on the pull-up.
 fn with_torn_wire(pin: Pin, torn_mm: f64) -> Run {
     let trial = slipping(2.0, SECOND_BEAM_MM, || 0.0);
-    let torn_s = trial.motion.passings(torn_mm).first().expect("the machine comes there").time_s;
+    let torn_s = trial.motion.passings(torn_mm).next().expect("the machine comes there").time_s;
     Run::begin_altered(trial, &[], |start_cycle, mut changes| {
         let torn = cycle_at(start_cycle, torn_s);
         changes.retain(|change| change.pin != pin || change.cycle < torn);

@@ -23,7 +23,7 @@ fn plants() -> Row {
 /// A run at work at 2 km/h whose pins `alter` changes from the fault's cycle on.
 fn with_fault(row: Row, length_mm: f64, alter: impl FnOnce(u64, Vec<PinChange>) -> Vec<PinChange>) -> Run {
     let trial = Trial { start: Start::Now, ..trial(row, steady(mm_s(2.0), length_mm)) };
-    let time_s = trial.motion.passings(FAULT_MM).first().expect("the machine comes there").time_s;
+    let time_s = trial.motion.passings(FAULT_MM).next().expect("the machine comes there").time_s;
     Run::begin_altered(trial, &[], |start_cycle, changes| alter(cycle_at(start_cycle, time_s), changes))
 }
 
@@ -64,7 +64,7 @@ fn an_encoder_that_falls_silent_harms_no_plant_and_is_an_alarm() {
 /// Drops the encoder's edges while `is_lost` says so, given the time in seconds since the machine was at a place.
 fn losing_edges(row: Row, speed_km_h: f64, from_mm: f64, length_mm: f64, is_lost: impl Fn(f64) -> bool) -> Run {
     let trial = Trial { start: Start::Now, ..trial(row, steady(mm_s(speed_km_h), length_mm)) };
-    let from_s = trial.motion.passings(from_mm).first().expect("the machine comes there").time_s;
+    let from_s = trial.motion.passings(from_mm).next().expect("the machine comes there").time_s;
     Run::begin_altered(trial, &[], |start_cycle, mut changes| {
         let from = cycle_at(start_cycle, from_s);
         let since_s = |cycle: u64| (cycle - from) as f64 / CYCLES_PER_SECOND as f64;

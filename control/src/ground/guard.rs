@@ -44,6 +44,7 @@ impl Guard {
 
     /// The ground that is to be guarded now that the beam has seen what stands up to a place: where a plant was due.
     #[cfg_attr(target_arch = "avr", inline(never))]
+    #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn pass(&mut self, seen_to: Place, geometry: &Geometry) -> Option<Object> {
         let (due, scatter) = (self.due, geometry.guard_scatter);
         if self.left == 0 || !seen_to.is_ahead_of(due + scatter) {
@@ -55,6 +56,7 @@ impl Guard {
     }
 
     /// Where the ground begins on which a plant may stand that has not been seen yet, if the beam has come to it.
+    #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn awaited(&self, frontier: Place, geometry: &Geometry) -> Option<Place> {
         let from = self.due - geometry.guard_scatter;
         (self.left > 0 && frontier.is_ahead_of(from)).then_some(from)

@@ -115,6 +115,7 @@ impl Leads {
     ///
     /// What keeps a tool in the row is a part of what lets it in, and less by a fifth at both ends. So at a steady speed it goes
     /// out once for a window and comes in once behind it, although the measured speed wavers.
+    #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn stretch(&self, tool_out: bool) -> (Length, Length) {
         let (out, back) = (self.out.0.unsigned_abs(), self.back.0.unsigned_abs());
         // What lies farther than the lead out is not asked for yet.

@@ -55,6 +55,7 @@ impl Schedule {
     }
 
     /// Whether a place lies so far behind that the ground there, although it was seen, had to be forgotten.
+    #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn has_left(&self, place: Place) -> bool {
         self.behind == Behind::Left && self.known_from.is_ahead_of(place)
     }
@@ -96,6 +97,7 @@ impl Schedule {
     }
 
     /// Forgets what ends at a place or behind it: the machine has left it behind.
+    #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn leave(&mut self, place: Place) {
         if !place.is_ahead_of(self.known_from) {
             return;
@@ -108,6 +110,7 @@ impl Schedule {
     }
 
     /// Whether any of the ground between two places is closed: unknown, or within `margin` of a canopy.
+    #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn is_closed(&self, near: Place, far: Place, margin: Length) -> bool {
         let open_from = if self.behind == Behind::Unseen { self.known_from } else { self.known_from + margin };
         if open_from.is_ahead_of(near) {

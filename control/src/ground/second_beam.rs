@@ -150,6 +150,7 @@ impl SecondBeam {
     }
 
     /// As [`open`](Self::open), if nothing is awaited that it could be.
+    #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn open_alone(&self) -> Option<Place> {
         self.open().filter(|_| self.awaited == 0)
     }

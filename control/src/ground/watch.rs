@@ -58,6 +58,7 @@ impl Watch {
     }
 
     /// Where the object began whose end has not been seen yet.
+    #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn open(&self) -> Option<Place> {
         self.object.filter(|object| self.broken_at_frontier || !object.is_nothing()).map(|object| object.leading)
     }
@@ -73,6 +74,7 @@ impl Watch {
     }
 
     /// The machine has rolled to a place without an edge; returns the object that this completes.
+    #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn roll_to(&mut self, place: Place, merge_gap: Length) -> Option<Object> {
         if !place.is_ahead_of(self.frontier) {
             return None;
@@ -86,6 +88,7 @@ impl Watch {
     }
 
     /// Takes the beam's level at the frontier for what is seen there.
+    #[cfg_attr(not(target_arch = "avr"), inline)]
     fn turn(&mut self) {
         if self.broken == self.broken_at_frontier {
             return;

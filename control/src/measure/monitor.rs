@@ -145,6 +145,7 @@ impl EncoderMonitor {
     /// is a whole cycle of both channels, over which it does not matter that an encoder spaces its edges unevenly, and more
     /// than a wheel makes that trembles on an edge, or one dead channel.
     #[cfg_attr(target_arch = "avr", inline(never))]
+    #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn read(&mut self, now: Instant, position: Position, doubted: u8, progress: u8) -> Option<Alarm> {
         let now = now.coarse();
         let place = position.count() as u16;

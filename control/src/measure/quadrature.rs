@@ -100,6 +100,7 @@ impl Odometer {
     /// that are not believed. None is doubted of a wheel that
     /// `is_fast`.
     #[cfg_attr(target_arch = "avr", inline(never))]
+    #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn read(&mut self, counted: Position, jumps: u16, is_fast: bool) -> u8 {
         let counted = counted.count() as u16;
         let moved = counted.wrapping_sub(self.counted).cast_signed();
@@ -117,6 +118,7 @@ impl Odometer {
 
     /// The place that a count stands for.
     #[cfg_attr(target_arch = "avr", inline(never))]
+    #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn place(&self, counted: Position) -> Position {
         counted - self.surplus
     }

@@ -66,6 +66,7 @@ impl SpeedMeter {
     /// Takes a reading; returns the new speed where it changed.
     ///
     /// To be called at least every few milliseconds.
+    #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn read(&mut self, now: Instant, position: Position) -> Option<TicksPerSecond> {
         let before = self.speed;
         let reading = Sample { place: position.count() as u16, time: now.coarse() };

@@ -27,6 +27,7 @@ impl Switch {
     }
 
     /// Takes the switch's level; returns its new position when it was thrown.
+    #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn read(&mut self, now: Instant, on: bool) -> Option<bool> {
         if on == self.on {
             self.differs_since = None;

@@ -50,6 +50,7 @@ impl Bench {
 
     /// Carries on with what is being tried, with a tool that is `out` or not; returns whether it has the tool out, if it says, and
     /// how swings ended, if they did.
+    #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn carry_on(&mut self, now: Instant, end_switch_on: bool, out: bool) -> (Option<bool>, Option<Outcome>) {
         let (out, outcome) = match self {
             Self::Idle | Self::ByHand(_) => return (None, None),

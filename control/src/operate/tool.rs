@@ -37,6 +37,7 @@ impl Tool {
     }
 
     /// Gives the servo a pulse.
+    #[cfg_attr(not(target_arch = "avr"), inline)]
     pub const fn order(&mut self, pulse: HalfMicros, now: Instant) {
         if pulse != self.pulse {
             (self.pulse, self.since) = (pulse, now);

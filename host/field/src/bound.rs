@@ -40,8 +40,10 @@ pub fn undamaged_share(stand: &Stand, machine: &Machine, motion: &Motion, steeri
             }
             let aside = ((across_mm + chord_mm + half_mm) / machine.arm_mm).clamp(0.0, 1.0);
             let before_s = (aside.asin().to_degrees() - line_degrees) / degrees_a_s;
-            let passed = motion.passings(place_mm + machine.beam_to_tool_mm);
-            if let (Some(passing), true) = (passed.first(), before_s > 0.0) {
+            let mut passed = motion.passings(place_mm + machine.beam_to_tool_mm);
+            if before_s > 0.0
+                && let Some(passing) = passed.next()
+            {
                 let ground = motion.stretch_mm(&(passing.time_s - before_s..passing.time_s + before_s));
                 let ground = machine.tool_mm(ground.start)..machine.tool_mm(ground.end);
                 let between_mm = before.as_ref().map_or(ground.start, |before| before.start.min(ground.start));

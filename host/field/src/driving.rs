@@ -73,8 +73,8 @@ pub fn drive(conditions: &Conditions, span_mm: &Range<f64>, speed_km_h: f64, rng
     let slip = |rng: &mut _| (ground.slip_percent + scatter(rng, ground.slip_scatter_percent)) / 100.0;
     let motion = motion.stop_at(end_mm, BRAKING_MM_S2).with_slip(|| slip(rng));
     let passed_s = |place_mm: f64| {
-        let passings = motion.passings(place_mm + machine.beam_to_tool_mm);
-        passings.first().map_or(0.0, |passing| passing.time_s)
+        let mut passings = motion.passings(place_mm + machine.beam_to_tool_mm);
+        passings.next().map_or(0.0, |passing| passing.time_s)
     };
     let row_s = passed_s(span_mm.end) - passed_s(span_mm.start);
     let turn_s = driving.turn_m * 1000.0 / mm_s(speed_km_h) + driving.turn_s * (1.0 + scatter(rng, STOP_SCATTER));

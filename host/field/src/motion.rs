@@ -240,15 +240,14 @@ impl Motion {
     }
 
     /// Every passing of a place, in order of time.
-    pub fn passings(&self, place_mm: f64) -> Vec<Passing> {
+    pub fn passings(&self, place_mm: f64) -> impl Iterator<Item = Passing> + Clone {
         // A place belongs to what lies ahead of it: it is passed forward on arrival and backward on leaving, so that a
         // machine that stops on it exactly and turns has passed it twice, not once.
-        let is_past = |position_mm: f64| position_mm >= place_mm;
+        let is_past = move |position_mm: f64| position_mm >= place_mm;
         self.pieces
             .iter()
-            .filter(|piece| is_past(piece.start_mm) != is_past(piece.end_mm))
-            .map(|piece| Passing { time_s: piece.time_at(place_mm), forward: is_past(piece.end_mm) })
-            .collect()
+            .filter(move |piece| is_past(piece.start_mm) != is_past(piece.end_mm))
+            .map(move |piece| Passing { time_s: piece.time_at(place_mm), forward: is_past(piece.end_mm) })
     }
 
     /// The times during which the position lies within a stretch.
@@ -320,13 +319,23 @@ impl<'a> Course<'a> {
         Self { piece: *to_come.next().unwrap_or(&end), to_come, end }
     }
 
-    /// [`Motion::wheel_mm`] at a time from 0 on, no earlier than the last one asked for.
+    /// Of each of these times, makes [`Motion::wheel_mm`]. They are in ascending order, from 0 and the last one asked for on.
     #[inline]
-    pub fn wheel_mm(&mut self, time_s: f64) -> f64 {
-        while self.piece.end_s <= time_s {
-            self.piece = *self.to_come.next().unwrap_or(&self.end);
+    pub fn roll(&mut self, times_s: &mut [f64]) {
+        let mut rest = times_s;
+        while let Some(&first_s) = rest.first() {
+            while self.piece.end_s <= first_s {
+                self.piece = *self.to_come.next().unwrap_or(&self.end);
+            }
+            let piece = self.piece;
+            // Mostly all of them lie within the piece.
+            let within = rest.partition_point(|&time_s| time_s < piece.end_s);
+            let (now, later) = rest.split_at_mut(within);
+            for time_s in now {
+                *time_s = piece.wheel_mm(piece.position_mm(*time_s));
+            }
+            rest = later;
         }
-        self.piece.wheel_mm(self.piece.position_mm(time_s))
     }
 }
 
@@ -414,8 +423,8 @@ mod tests {
 
     #[test]
     fn rolling_back_passes_a_place_three_times() {
-        let passings = to_and_fro().passings(1800.0);
-        let directions: Vec<bool> = passings.iter().map(|passing| passing.forward).collect();
+        let motion = to_and_fro();
+        let directions: Vec<bool> = motion.passings(1800.0).map(|passing| passing.forward).collect();
         assert_eq!(directions, [true, false, true]);
     }
 
@@ -427,7 +436,7 @@ mod tests {
             .change_speed(-100.0, 100.0)
             .roll_to(100.0);
         assert_eq!(motion.position_mm(3.0), 200.0);
-        let directions: Vec<bool> = motion.passings(200.0).iter().map(|passing| passing.forward).collect();
+        let directions: Vec<bool> = motion.passings(200.0).map(|passing| passing.forward).collect();
         assert_eq!(directions, [true, false]);
     }
 
@@ -445,8 +454,8 @@ mod tests {
         let motion = to_and_fro();
         let stretch = motion.stretch_mm(&(0.0..motion.duration_s()));
         assert!((stretch.start - -100.0).abs() < 1e-9 && (stretch.end - 3000.0).abs() < 1e-9);
-        let passings = motion.passings(1900.0);
-        let turn = motion.stretch_mm(&(passings[0].time_s..passings[1].time_s));
+        let times_s: Vec<f64> = motion.passings(1900.0).map(|passing| passing.time_s).collect();
+        let turn = motion.stretch_mm(&(times_s[0]..times_s[1]));
         assert!((turn.start - 1900.0).abs() < 1e-6 && (turn.end - 2000.0).abs() < 1e-6);
     }
 }

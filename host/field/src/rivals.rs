@@ -80,7 +80,7 @@ pub fn all_knowing(trial: &Trial, stems: &[Stem]) -> Vec<Pulse> {
     let wait_s = (out_us / 1000.0 + f64::from(SERVO_GAP_MS)) / 1000.0 + 2.0 * TURN_S;
     let slowest_s = machine.servo.slowest_s() + wait_s;
     let quickest_s = ((dead_time_ms - scatter.dead_time_ms) / 1000.0).max(0.0);
-    let passed_s = |place_mm: f64| Some(motion.passings(place_mm + machine.beam_to_tool_mm).first()?.time_s);
+    let passed_s = |place_mm: f64| Some(motion.passings(place_mm + machine.beam_to_tool_mm).next()?.time_s);
     let zones =
         union(stems.iter().map(|stem| stem.along_mm - stem.protected_mm..stem.along_mm + stem.protected_mm).collect());
     let windows: Vec<Range<f64>> = zones

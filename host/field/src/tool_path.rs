@@ -214,7 +214,7 @@ impl Tools<'_> {
         let passings = || self.motion.passings(weed.along_mm + self.machine.beam_to_tool_mm);
         let across_mm = self.across_mm(weed.along_mm, weed.across_mm);
         swept_mm.contains(&across_mm.abs())
-            || passings().iter().any(|passing| self.covered_mm(passing.time_s).contains(&across_mm))
+            || passings().any(|passing| self.covered_mm(passing.time_s).contains(&across_mm))
     }
 }
 
@@ -247,7 +247,7 @@ mod tests {
         let machine = Machine::default();
         let motion = Motion::steady(-500.0, 1e6, 1000.0, 3000.0);
         let pulse = |tool_mm: f64, width_us: u64| {
-            let passing = motion.passings(tool_mm + machine.beam_to_tool_mm)[0];
+            let passing = motion.passings(tool_mm + machine.beam_to_tool_mm).next().unwrap();
             let rise = (passing.time_s * CYCLES_PER_SECOND as f64) as u64;
             Pulse { rise, fall: rise + width_us * 16 }
         };

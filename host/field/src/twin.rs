@@ -80,6 +80,7 @@ impl ServoLine {
     }
 
     /// Commands a width, to be called each turn of the loop as the firmware's is (`src/servo.rs`).
+    #[inline]
     pub fn command(&mut self, width: HalfMicros, time_s: f64) {
         if width == self.width {
             return;
@@ -197,16 +198,22 @@ impl<'a> Sensors<'a> {
     fn look_ahead(&mut self) {
         let Self { motion, course, encoder, turn_s, turn, counts, edges, counted, .. } = self;
         // All of a clean encoder's first: they do not depend on each other, and the computer works on several at once.
-        for (count, turn) in counts.iter_mut().zip(*turn..) {
-            *count = encoder.clean_ticks(course.wheel_mm(f64::from(turn) * *turn_s));
+        let mut times_s = [0.0; AHEAD];
+        for (time_s, turn) in times_s.iter_mut().zip(*turn..) {
+            *time_s = f64::from(turn) * *turn_s;
         }
-        for (count, turn) in counts.iter_mut().zip(*turn..) {
-            let time_s = f64::from(turn) * *turn_s;
-            while let Some(edge) = edges.get_mut(*counted).filter(|edge| edge.time_s <= time_s) {
-                edge.position = encoder.count(encoder.clean_ticks(motion.wheel_mm(edge.time_s)));
-                *counted += 1;
-            }
+        let mut wheel_mm = times_s;
+        course.roll(&mut wheel_mm);
+        for (count, wheel_mm) in counts.iter_mut().zip(wheel_mm) {
+            *count = encoder.clean_ticks(wheel_mm);
+        }
+        for count in counts {
             *count = encoder.count(*count);
+        }
+        let [.., last_s] = times_s;
+        while let Some(edge) = edges.get_mut(*counted).filter(|edge| edge.time_s <= last_s) {
+            edge.position = encoder.count(encoder.clean_ticks(motion.wheel_mm(edge.time_s)));
+            *counted += 1;
         }
     }
 }
@@ -241,7 +248,7 @@ impl<'a> Encoder<'a> {
         marks(wheel_mm - self.start_mm, self.tick_mm)
     }
 
-    /// The count where a clean encoder's is `ticks`; asked for in the order of time.
+    /// The count where a clean encoder's is `ticks`; the nearer to the last one asked for, the sooner.
     #[inline(always)]
     fn count(&mut self, ticks: i64) -> i64 {
         let pulse = self.machine.pulse(ticks);

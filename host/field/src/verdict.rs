@@ -155,8 +155,8 @@ pub fn weedable_share(row: &Row, machine: &Machine, motion: &Motion, timing: Tim
     let lost = row.plants().map(|plant| {
         let span = plant.span_mm();
         let swing_mm = |ground_mm: f64| {
-            let first = motion.passings(ground_mm + machine.beam_to_tool_mm);
-            first.first().map_or(0.0, |passing| motion.speed_mm_s(passing.time_s).abs()) * swing_s
+            let first = motion.passings(ground_mm + machine.beam_to_tool_mm).next();
+            first.map_or(0.0, |passing| motion.speed_mm_s(passing.time_s).abs()) * swing_s
         };
         let (start_mm, end_mm) = (span.start - margin_mm, span.end + margin_mm);
         start_mm - swing_mm(start_mm)..end_mm + swing_mm(end_mm)
@@ -326,10 +326,10 @@ fn plant_outcome(plant: &Thing, closed: &[Range<f64>], machine: &Machine, timing
 }
 
 fn weed_outcome(weed: &Thing, machine: &Machine, motion: &Motion, stroke: &Stroke) -> WeedOutcome {
-    let passings = motion.passings(weed.position_mm + machine.beam_to_tool_mm);
+    let mut passings = motion.passings(weed.position_mm + machine.beam_to_tool_mm);
     WeedOutcome {
         weed: weed.clone(),
-        cut: passings.iter().any(|passing| stroke.degrees(passing.time_s) < machine.line_degrees()),
+        cut: passings.any(|passing| stroke.degrees(passing.time_s) < machine.line_degrees()),
     }
 }
 
@@ -374,7 +374,7 @@ mod tests {
     /// Frames 20 ms apart that restart where the width changes: out at power-up, in at the first place (of the machine),
     /// out at the second, and so on.
     fn pulses(motion: &Motion, changes_mm: &[f64]) -> Vec<Pulse> {
-        let times_s = changes_mm.iter().map(|&mm| motion.passings(mm)[0].time_s);
+        let times_s = changes_mm.iter().map(|&mm| motion.passings(mm).next().unwrap().time_s);
         let mut edges = vec![0];
         edges.extend(times_s.map(|time_s| cycle_at(START_CYCLE, time_s)));
         edges.push(cycle_at(START_CYCLE, motion.duration_s()));
