@@ -145,6 +145,7 @@ impl SecondBeam {
     }
 
     /// Where the object begins that is in it.
+    #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn open(&self) -> Option<Place> {
         self.watch.open()
     }

@@ -79,6 +79,7 @@ impl SpeedMeter {
     }
 
     #[cfg_attr(target_arch = "avr", inline(never))]
+    #[cfg_attr(not(target_arch = "avr"), inline)]
     fn moved(&mut self, reading: Sample) {
         self.last = reading;
         if self.count == 0 {
@@ -108,6 +109,7 @@ impl SpeedMeter {
         self.count = (self.count + 1).min(SAMPLES);
     }
 
+    #[cfg_attr(not(target_arch = "avr"), inline)]
     fn silent(&mut self, silence: u16) {
         if silence < self.patience {
             return;

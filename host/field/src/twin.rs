@@ -126,6 +126,8 @@ pub struct Sensors<'a> {
     edges: Vec<Seen>,
     counted: usize,
     told: usize,
+    /// When the next comes that has not been told.
+    next_s: f64,
 }
 
 /// Turns of which the counts are worked out at once.
@@ -174,6 +176,7 @@ impl<'a> Sensors<'a> {
             edges: edges.collect(),
             counted: 0,
             told: 0,
+            next_s: 0.0,
         }
     }
 
@@ -186,11 +189,20 @@ impl<'a> Sensors<'a> {
         }
         let time_s = f64::from(self.turn) * self.turn_s;
         self.turn += 1;
+        let position = self.counts[ahead];
+        // In most turns there is none.
+        let edges = if self.next_s <= time_s { self.edges_until(time_s) } else { &[] };
+        Turn { time_s, position, edges }
+    }
+
+    /// The edges that have not been told, up to a time.
+    fn edges_until(&mut self, time_s: f64) -> &[Seen] {
         let first = self.told;
         while self.edges.get(self.told).is_some_and(|edge| edge.time_s <= time_s) {
             self.told += 1;
         }
-        Turn { time_s, position: self.counts[ahead], edges: &self.edges[first..self.told] }
+        self.next_s = self.edges.get(self.told).map_or(f64::INFINITY, |edge| edge.time_s);
+        &self.edges[first..self.told]
     }
 
     /// Works out the counts of the next turns, and of the edges until then.
@@ -260,7 +272,7 @@ impl<'a> Encoder<'a> {
     }
 
     /// Counts what dirt hides on the way to a pulse. What is lost on the way there comes back on the way back.
-    #[inline(never)]
+    #[inline]
     fn roll_to(&mut self, pulse: i64) {
         let step = (pulse - self.pulse).signum();
         while self.pulse != pulse {
