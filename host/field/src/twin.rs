@@ -208,29 +208,29 @@ impl<'a> Sensors<'a> {
     /// Works out the counts of the next turns, and of the edges until then.
     #[inline(never)]
     fn look_ahead(&mut self) {
-        let Self { motion, course, encoder, turn_s, turn, counts, edges, counted, .. } = self;
+        let mut encoder = self.encoder;
         // All of a clean encoder's first: they do not depend on each other, and the computer works on several at once.
         let mut times_s = [0.0; AHEAD];
-        for (time_s, turn) in times_s.iter_mut().zip(*turn..) {
-            *time_s = f64::from(turn) * *turn_s;
+        for (time_s, turn) in times_s.iter_mut().zip(self.turn..) {
+            *time_s = f64::from(turn) * self.turn_s;
         }
         let mut wheel_mm = times_s;
-        course.roll(&mut wheel_mm);
-        for (count, wheel_mm) in counts.iter_mut().zip(wheel_mm) {
-            *count = encoder.clean_ticks(wheel_mm);
-        }
-        for count in counts {
+        self.course.roll(&mut wheel_mm);
+        let mut counts = wheel_mm.map(|wheel_mm| encoder.clean_ticks(wheel_mm));
+        for count in &mut counts {
             *count = encoder.count(*count);
         }
         let [.., last_s] = times_s;
-        while let Some(edge) = edges.get_mut(*counted).filter(|edge| edge.time_s <= last_s) {
-            edge.position = encoder.count(encoder.clean_ticks(motion.wheel_mm(edge.time_s)));
-            *counted += 1;
+        while let Some(edge) = self.edges.get_mut(self.counted).filter(|edge| edge.time_s <= last_s) {
+            edge.position = encoder.count(encoder.clean_ticks(self.motion.wheel_mm(edge.time_s)));
+            self.counted += 1;
         }
+        (self.counts, self.encoder) = (counts, encoder);
     }
 }
 
 /// The encoder's count, as the wheel turns.
+#[derive(Clone, Copy)]
 struct Encoder<'a> {
     machine: &'a Machine,
     start_mm: f64,
@@ -272,7 +272,7 @@ impl<'a> Encoder<'a> {
     }
 
     /// Counts what dirt hides on the way to a pulse. What is lost on the way there comes back on the way back.
-    #[inline]
+    #[inline(always)]
     fn roll_to(&mut self, pulse: i64) {
         let step = (pulse - self.pulse).signum();
         while self.pulse != pulse {
