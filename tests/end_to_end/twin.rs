@@ -7,7 +7,7 @@ use field::conditions::{Conditions, presets};
 use field::driving::drive;
 use field::stand::Stand;
 use field::trial::{Start, Trial};
-use field::twin;
+use field::twin::{self, Sensors};
 use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -46,7 +46,7 @@ fn the_native_twin_swings_as_the_firmware_does_on_fifty_random_rows() {
             let trial = random_row(seed);
             let servo = trial.machine.servo;
             let on_the_uno = trial::run(&trial, &elf, |_| ()).unwrap();
-            let by_the_twin = twin::weed(&trial).unwrap();
+            let by_the_twin = twin::weed(&trial, &Sensors::new(&trial, twin::TURN_S)).unwrap();
             let real = servo.commands(&on_the_uno.pulses);
             let native = servo.commands(&by_the_twin.pulses);
             assert_eq!(real.len(), native.len(), "row {seed}: {real:?} {native:?}");

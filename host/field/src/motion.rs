@@ -398,10 +398,18 @@ mod tests {
     fn who_goes_along_finds_the_wheel_where_a_search_does() {
         let mut slip = [0.02, 0.1, 0.0].into_iter().cycle();
         let motion = to_and_fro().with_slip(|| slip.next().unwrap_or(0.0));
-        let mut course = Course::along(&motion);
-        for step in 0..(1000.0 * motion.duration_s()) as u32 + 500 {
-            let time_s = f64::from(step) / 1000.0;
-            assert_eq!(course.wheel_mm(time_s), motion.wheel_mm(time_s), "at {time_s} s");
+        let times_s: Vec<f64> =
+            (0..(1000.0 * motion.duration_s()) as u32 + 500).map(|step| f64::from(step) / 1000.0).collect();
+        // One by one, within a piece, and over several of them.
+        for at_once in [1, 64, 2000] {
+            let mut course = Course::along(&motion);
+            for times_s in times_s.chunks(at_once) {
+                let mut wheel_mm = times_s.to_vec();
+                course.roll(&mut wheel_mm);
+                for (wheel_mm, &time_s) in wheel_mm.into_iter().zip(times_s) {
+                    assert_eq!(wheel_mm, motion.wheel_mm(time_s), "at {time_s} s");
+                }
+            }
         }
     }
 

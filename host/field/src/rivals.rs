@@ -46,12 +46,13 @@ pub fn as_in_the_paper(trial: &Trial) -> Vec<Pulse> {
     let tick_mm = trial.machine.tick_mm();
     let ticks = |mm: f64| (mm / tick_mm).round() as i64;
     let (delay, hold) = (ticks(beam_to_tool_mm - PAPER_MARGIN_MM), ticks(2.0 * PAPER_MARGIN_MM));
-    let mut sensors = Sensors::new(trial, PAPER_TURN_S);
+    let sensors = Sensors::new(trial, PAPER_TURN_S);
+    let mut turns = sensors.turns();
     let Levels { mut broken, .. } = Levels::before(trial);
     let mut canopy: Option<Range<i64>> = None;
     let mut slot: Option<Range<i64>> = None;
     swing(trial, servo, PAPER_TURN_S, 0, |time_s| {
-        let Turn { position, edges, .. } = sensors.read();
+        let Some(Turn { position, edges, .. }) = turns.next() else { return (false, time_s) };
         if let Some(last) = edges.last() {
             broken = last.levels.broken;
         }

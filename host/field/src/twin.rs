@@ -33,7 +33,7 @@ use thiserror::Error;
 type Weeder = Controller<Nearest<&'static [knn::Example<{ features::COUNT }>], Volatile>, Volatile>;
 
 /// A turn of the loop.
-const TURN_S: f64 = 0.001;
+pub const TURN_S: f64 = 0.001;
 const STEPS_A_TURN: u32 = Interval::STEPS_PER_SECOND / 1000;
 
 /// How long the machine stands before it rolls, so that the clock is not at its beginning: 0.1 s.
@@ -113,25 +113,16 @@ impl ServoLine {
 
 /// What the machine's sensors say, turn by turn of a loop: the encoder's count, and the beams' edges since the turn before.
 ///
-/// None of it depends on what the firmware does. So counts are worked out some turns ahead, that no decision has to wait for them.
-pub struct Sensors<'a> {
-    motion: &'a Motion,
-    course: Course<'a>,
-    encoder: Encoder<'a>,
+/// None of it depends on what the firmware does: whoever weeds the same row with the same machine and motion is told the same.
+pub struct Sensors {
     turn_s: f64,
-    /// The next turn, and the counts of some from a multiple of their number on.
-    turn: u32,
-    counts: [i64; AHEAD],
-    /// Every edge of the beams: of so many of them the count is known, and so many have been told.
+    /// The encoder's count in each turn.
+    counts: Vec<i32>,
     edges: Vec<Seen>,
-    counted: usize,
-    told: usize,
-    /// When the next comes that has not been told.
-    next_s: f64,
 }
 
 /// Turns of which the counts are worked out at once.
-const AHEAD: usize = 64;
+const AT_ONCE: usize = 64;
 
 /// What the sensors say in a turn.
 pub struct Turn<'a> {
@@ -154,9 +145,9 @@ pub struct Seen {
     pub levels: Levels,
 }
 
-impl<'a> Sensors<'a> {
+impl Sensors {
     /// Those of a trial, whose motion begins at time 0, for a loop whose turns begin so far apart.
-    pub fn new(trial: &'a Trial, turn_s: f64) -> Self {
+    pub fn new(trial: &Trial, turn_s: f64) -> Self {
         let Trial { machine, motion, row, .. } = trial;
         let mut edges = machine.beam_changes(row, motion, 0);
         edges.extend(machine.second_beam_changes(row, motion, 0));
@@ -166,66 +157,42 @@ impl<'a> Sensors<'a> {
             levels = levels.behind(edge);
             Seen { time_s: time_at_s(0, edge.cycle), position: 0, levels }
         });
-        Self {
-            motion,
-            course: Course::along(motion),
-            encoder: Encoder::of(machine, motion),
-            turn_s,
-            turn: 0,
-            counts: [0; AHEAD],
-            edges: edges.collect(),
-            counted: 0,
-            told: 0,
-            next_s: 0.0,
+        let mut edges: Vec<Seen> = edges.collect();
+        let mut to_come = edges.iter_mut().peekable();
+        let (mut course, mut encoder) = (Course::along(motion), Encoder::of(machine, motion));
+        let turns = 0..=turns(trial, turn_s);
+        let mut counts = Vec::with_capacity(turns.clone().count() + AT_ONCE);
+        for first in turns.step_by(AT_ONCE) {
+            let mut times_s = [0.0; AT_ONCE];
+            for (time_s, turn) in times_s.iter_mut().zip(first..) {
+                *time_s = f64::from(turn) * turn_s;
+            }
+            let mut wheel_mm = times_s;
+            course.roll(&mut wheel_mm);
+            // All of a clean encoder's first: they do not depend on each other, and the computer works on several at once.
+            let ticks = wheel_mm.map(|wheel_mm| encoder.clean_ticks(wheel_mm));
+            counts.extend(ticks.map(|ticks| encoder.count(ticks) as i32));
+            let [.., last_s] = times_s;
+            while let Some(edge) = to_come.next_if(|edge| edge.time_s <= last_s) {
+                edge.position = encoder.count(encoder.clean_ticks(motion.wheel_mm(edge.time_s)));
+            }
         }
+        Self { turn_s, counts, edges }
     }
 
-    /// What they say in the next turn.
+    /// What they say, from the first turn to some behind the end of the motion.
     #[inline]
-    pub fn read(&mut self) -> Turn<'_> {
-        let ahead = self.turn as usize % AHEAD;
-        if ahead == 0 {
-            self.look_ahead();
-        }
-        let time_s = f64::from(self.turn) * self.turn_s;
-        self.turn += 1;
-        let position = self.counts[ahead];
-        // In most turns there is none.
-        let edges = if self.next_s <= time_s { self.edges_until(time_s) } else { &[] };
-        Turn { time_s, position, edges }
-    }
-
-    /// The edges that have not been told, up to a time.
-    fn edges_until(&mut self, time_s: f64) -> &[Seen] {
-        let first = self.told;
-        while self.edges.get(self.told).is_some_and(|edge| edge.time_s <= time_s) {
-            self.told += 1;
-        }
-        self.next_s = self.edges.get(self.told).map_or(f64::INFINITY, |edge| edge.time_s);
-        &self.edges[first..self.told]
-    }
-
-    /// Works out the counts of the next turns, and of the edges until then.
-    #[inline(never)]
-    fn look_ahead(&mut self) {
-        let mut encoder = self.encoder;
-        // All of a clean encoder's first: they do not depend on each other, and the computer works on several at once.
-        let mut times_s = [0.0; AHEAD];
-        for (time_s, turn) in times_s.iter_mut().zip(self.turn..) {
-            *time_s = f64::from(turn) * self.turn_s;
-        }
-        let mut wheel_mm = times_s;
-        self.course.roll(&mut wheel_mm);
-        let mut counts = wheel_mm.map(|wheel_mm| encoder.clean_ticks(wheel_mm));
-        for count in &mut counts {
-            *count = encoder.count(*count);
-        }
-        let [.., last_s] = times_s;
-        while let Some(edge) = self.edges.get_mut(self.counted).filter(|edge| edge.time_s <= last_s) {
-            edge.position = encoder.count(encoder.clean_ticks(self.motion.wheel_mm(edge.time_s)));
-            self.counted += 1;
-        }
-        (self.counts, self.encoder) = (counts, encoder);
+    pub fn turns(&self) -> impl Iterator<Item = Turn<'_>> {
+        let mut to_come = &self.edges[..];
+        self.counts.iter().zip(0..).map(move |(&position, turn)| {
+            let time_s = f64::from(turn) * self.turn_s;
+            let mut edges = &to_come[..0];
+            // In most turns there is none.
+            if to_come.first().is_some_and(|edge| edge.time_s <= time_s) {
+                (edges, to_come) = to_come.split_at(to_come.partition_point(|edge| edge.time_s <= time_s));
+            }
+            Turn { time_s, position: position.into(), edges }
+        })
     }
 }
 
@@ -311,11 +278,12 @@ impl Levels {
     }
 }
 
-/// Has the decisions weed the trial's row. The motion begins at time and cycle 0.
+/// Has the decisions weed the trial's row. The motion begins at time and cycle 0; the sensors are those of its row, machine and
+/// motion in turns of [`TURN_S`].
 ///
 /// # Errors
 /// Where they refuse a setting, or to start.
-pub fn weed(trial: &Trial) -> Result<Weeded, Refused> {
+pub fn weed(trial: &Trial, sensors: &Sensors) -> Result<Weeded, Refused> {
     let Levels { broken, .. } = Levels::before(trial);
     let readings = Readings::new(instant(0), Position::new(0));
     let wake_up = WakeUp { readings, beam_broken: broken, cause: Cause::PowerOn };
@@ -333,9 +301,7 @@ pub fn weed(trial: &Trial) -> Result<Weeded, Refused> {
 
     let orders = weeder.orders();
     let mut line = ServoLine::new(orders.pulse, orders.gap_ms);
-    let mut sensors = Sensors::new(trial, TURN_S);
-    for turn in 0..=turns(trial, TURN_S) {
-        let Turn { time_s, position, edges } = sensors.read();
+    for (turn, Turn { time_s, position, edges }) in (0..=turns(trial, TURN_S)).zip(sensors.turns()) {
         let edges = edges.iter().map(|&Seen { position, levels: Levels { broken, second_broken }, .. }| Edge::Seen {
             position: Position::new(position as i32),
             broken,
@@ -393,7 +359,7 @@ mod tests {
     }
 
     #[test]
-    fn counts_that_are_worked_out_ahead_are_those_of_each_turn_and_each_edge_by_itself() {
+    fn counts_that_are_worked_out_together_are_those_of_each_turn_and_each_edge_by_itself() {
         for seed in 0..8 {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
             let row =
@@ -412,10 +378,8 @@ mod tests {
                 .roll_to(3500.0)
                 .with_slip(|| rng.random_range(-0.05..0.1));
             let trial = Trial { motion, ..Trial::at_speed(row, machine, Timing::default(), speed_mm_s) };
-            let mut sensors = Sensors::new(&trial, TURN_S);
             let mut told = 0;
-            for _ in 0..=turns(&trial, TURN_S) {
-                let Turn { time_s, position, edges } = sensors.read();
+            for Turn { time_s, position, edges } in Sensors::new(&trial, TURN_S).turns() {
                 assert_eq!(position, count_at(&trial, time_s), "seed {seed} at {time_s} s");
                 for edge in edges {
                     assert!(time_s - TURN_S < edge.time_s && edge.time_s <= time_s, "seed {seed} at {time_s} s");

@@ -24,7 +24,7 @@ use field::row::{MAX_WIDTH_MM, Problem, Row};
 use field::stand::Stand;
 use field::tool_path::{Effect, effect};
 use field::trial::{Start, Trial};
-use field::twin::{self, Refused};
+use field::twin::{self, Refused, Sensors};
 use field::verdict::{Judgement, Timing, Verdict, judge};
 use knn::Example;
 use rand::{RngExt, SeedableRng};
@@ -32,6 +32,7 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use signal::Pulse;
+use std::cell::LazyCell;
 use std::ops::AddAssign;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -283,7 +284,7 @@ impl Experiment {
         let fastest = self.plots().into_iter().reduce(|a, b| if b.speed_km_h > a.speed_km_h { b } else { a });
         let Some(plot) = fastest else { return Ok(None) };
         let (stand, _, trial) = self.grow(&plot, 0)?;
-        let weeded = weed(&trial, &stand, Controller::Firmware, engine)?;
+        let weeded = weed(&trial, &sensors(&trial), &stand, Controller::Firmware, engine)?;
         let Trial { row, machine, motion, timing, .. } = &trial;
         let judgement = judge(row, machine, motion, *timing, &weeded.pulses, weeded.start_cycle);
         Ok(row.beginning(DRAWN_MM).map(|beginning| (beginning, judgement)))
@@ -350,9 +351,10 @@ impl Experiment {
     /// What every controller does in the same row.
     fn weed_row(&self, plot: &Plot, row: u32, engine: &Engine) -> Result<Vec<RowOutcome>, ExperimentError> {
         let (stand, drive, trial) = self.grow(plot, row)?;
+        let sensors = sensors(&trial);
         let undamaged_share = undamaged_share(&stand, &trial.machine, &drive.motion, &drive.steering);
         let outcome = |&controller: &Controller| {
-            let weeded = weed(&trial, &stand, controller, engine)?;
+            let weeded = weed(&trial, &sensors, &stand, controller, engine)?;
             let Trial { row, machine, motion, timing, .. } = &trial;
             let (pulses, start_cycle) = (&weeded.pulses, weeded.start_cycle);
             let judgement = judge(row, machine, motion, *timing, pulses, start_cycle);
@@ -416,11 +418,22 @@ struct Weeded {
     alarm: bool,
 }
 
+/// What a trial's sensors tell the twin, whatever it is set to; worked out where somebody asks.
+fn sensors(trial: &Trial) -> LazyCell<Sensors, impl FnOnce() -> Sensors> {
+    LazyCell::new(|| Sensors::new(trial, twin::TURN_S))
+}
+
 /// Has a controller weed a row.
-fn weed(trial: &Trial, stand: &Stand, controller: Controller, engine: &Engine) -> Result<Weeded, ExperimentError> {
+fn weed(
+    trial: &Trial,
+    sensors: &LazyCell<Sensors, impl FnOnce() -> Sensors>,
+    stand: &Stand,
+    controller: Controller,
+    engine: &Engine,
+) -> Result<Weeded, ExperimentError> {
     let firmware = |trial: &Trial| match engine {
         Engine::Twin => {
-            let weeded = twin::weed(trial)?;
+            let weeded = twin::weed(trial, sensors)?;
             Ok(Weeded { pulses: weeded.pulses, start_cycle: 0, alarm: weeded.state != State::Work })
         }
         Engine::Uno(elf) => {
