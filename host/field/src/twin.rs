@@ -3,7 +3,7 @@
 //! [`weed`] does what `src/main.rs` does with the same [`control`] code and the same examples: a turn of the loop reads clock
 //! and encoder, takes the beam's edges with the position at which each came, and commands the servo. Turns come every
 //! millisecond, not as fast as a chip can; nothing else is simplified: motion, beam, encoder and servo are those that
-//! the virtual Uno is given. It is some ten thousand times faster than real time, for studies of many rows.
+//! the virtual Uno is given. It is some twenty thousand times faster than real time, for studies of many rows.
 //!
 //! Console, EEPROM, interrupts and cycles are not in it: for those there is the virtual Uno.
 
