@@ -81,13 +81,8 @@ impl Rolling {
         }
     }
 
-    /// Stands for so many turns of the loop.
-    pub fn stand(&mut self, turns: u16) {
-        (0..turns).for_each(|_| self.turn(0.0));
-    }
-
     /// Rolls by so much in a turn of the loop.
-    fn turn(&mut self, step_mm: f64) {
+    pub fn turn(&mut self, step_mm: f64) {
         self.place_mm += step_mm;
         self.wheel_mm += step_mm * self.turns;
         self.time_us += TURN_US;

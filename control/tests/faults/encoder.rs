@@ -251,7 +251,7 @@ fn jumps_are_an_alarm_by_the_way_on_which_they_come() {
         for speed_m_s in [0.3, 1.2] {
             let mut wake_up = woken_up(Cause::PowerOn);
             wake_up.readings.jumps = u16::MAX - 10;
-            let mut machine = Controller::new(ByWidth, Volatile::new(), wake_up);
+            let mut machine = Controller::new(ByWidth::late_by(0), Volatile::new(), wake_up);
             machine.clear();
             let mut drive = Drive { machine, time_us: 0, place: 0.0, readings: wake_up.readings, edges: Vec::new() };
             for _ in 0..200 {

@@ -175,7 +175,7 @@ fn nothing_happens_where_time_and_place_wrap() {
         let place = |now: Readings| if wraps { moved(now) } else { now };
         let mut wake_up = woken_up(Cause::PowerOn);
         wake_up.readings = place(readings(0, 0));
-        let mut machine = Controller::new(ByWidth, Volatile::new(), wake_up);
+        let mut machine = Controller::new(ByWidth::late_by(0), Volatile::new(), wake_up);
         machine.clear();
         machine.start(false).unwrap();
         let (mut swings, mut was_out) = (Vec::new(), true);

@@ -18,7 +18,7 @@ use control::{
 fn saved_settings_are_in_use_after_a_restart() {
     let mut settings = Settings::new();
     settings.set(Setting::K, 7).unwrap();
-    let machine = Controller::new(ByWidth, saved(&settings), woken_up(Cause::PowerOn));
+    let machine = Controller::new(ByWidth::late_by(0), saved(&settings), woken_up(Cause::PowerOn));
     assert_eq!((machine.state(), machine.settings()), (State::Hold, &settings));
 }
 
@@ -34,7 +34,7 @@ fn saved(settings: &Settings) -> Volatile {
 fn a_test_row_that_contradicting_settings_refuse_leaves_what_stands_in_the_beam() {
     let mut settings = Settings::new();
     settings.set(Setting::ServoInUs, 2000).unwrap();
-    let mut machine = Controller::new(ByWidth, saved(&settings), woken_up(Cause::PowerOn));
+    let mut machine = Controller::new(ByWidth::late_by(0), saved(&settings), woken_up(Cause::PowerOn));
     machine.clear();
     machine.turn(readings(0, 0), []);
     machine.turn(readings(1000, 0), [Edge::Seen { position: Position::new(0), broken: true, second_broken: false }]);
@@ -48,7 +48,7 @@ fn saved_settings_that_contradict_each_other_are_an_alarm_and_do_not_start() {
     let mut settings = Settings::new();
     settings.set(Setting::ServoInUs, 2000).unwrap();
     settings.set(Setting::BeamToToolMm, 200).unwrap();
-    let mut machine = Controller::new(ByWidth, saved(&settings), woken_up(Cause::PowerOn));
+    let mut machine = Controller::new(ByWidth::late_by(0), saved(&settings), woken_up(Cause::PowerOn));
     assert_eq!(machine.state(), State::Alarm(Alarm::SettingsContradict));
     machine.clear();
     assert_eq!(machine.start(false), Err(Refusal::PulsesEqual));
