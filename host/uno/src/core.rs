@@ -1,4 +1,5 @@
-//! The ATmega328P on simavr: the one place that calls C. What C calls back is in [`super::recorder`].
+//! The ATmega328P on simavr: the one place that makes a chip and runs it. What C calls back is in [`super::recorder`], and in
+//! [`super::timer`] and [`super::eeprom`] for writes of their registers.
 //!
 //! [`Core`] owns a simavr instance and the [`Recorder`] that simavr's callbacks write to, and offers the rest of
 //! [`super`] safe calls: one step, levels in, edges and bytes out. It knows pins by port and bit, cycles and bytes, and
@@ -7,10 +8,10 @@
 //! # Memory
 //!
 //! Two allocations exist a chip: simavr's `avr_t`, made by `avr_make_mcu_by_name`, and the recorder, a leaked box. Both are
-//! freed by `Drop` and by nothing else. simavr holds the recorder's address as its callbacks' parameter, and calls them only
-//! from inside the functions that this file calls; none of those calls is made while a reference into the recorder or
-//! into `avr_t` is alive. simavr keeps no state outside `avr_t` but its logger, which is never replaced here, so
-//! chips in several threads do not meet.
+//! freed by `Drop` and by nothing else. simavr holds the recorder's address, or that of its timer or EEPROM, as its callbacks'
+//! parameter, and calls them only from inside the functions that this file calls; none of those calls is made while a
+//! reference into the recorder or into `avr_t` is alive. simavr keeps no state outside `avr_t` but its logger, which is never
+//! replaced here, so chips in several threads do not meet.
 
 use std::ffi::{CStr, c_void};
 use std::ptr::{self, NonNull};
@@ -19,10 +20,12 @@ use simavr_ffi as simavr;
 
 use super::eeprom::{self, Eeprom};
 use super::interrupts::{InterruptRecorder, InterruptStatistics, Place};
-use super::recorder::{Recorder, cycles_per_byte, on_interrupt, on_output, on_reset, on_timer_output, on_transmit};
+use super::recorder::{
+    OUTPUTS, Recorder, Reset, ResetCause, is_output, on_interrupt, on_output, on_reset, on_timer_output, on_transmit,
+};
 use super::timer::{self, Timer1};
 use super::turns::{TurnRecorder, Turns};
-use super::{Reset, ResetCause};
+use super::uart;
 use crate::elf::{EEPROM_BYTES, FLASH_BYTES};
 use signal::{CYCLES_PER_SECOND, Pin};
 
@@ -48,23 +51,11 @@ const SRAM_END: u16 = 0x08FF;
 /// catches those who count on it, and shows how deep the stack has been.
 const SRAM_AT_POWER_UP: u8 = 0xC5;
 
-/// Complete bytes that the receiver keeps: two in its buffer and one in the shift register (data sheet, USART0, receiver error flags).
-const RECEIVER_BYTES: u16 = 3;
-
-// Registers by their address in the data space (data sheet, register summary).
+/// The register of a reset's cause, by its address in the data space (data sheet, register summary).
 const MCUSR: u16 = 0x54;
-pub(super) const UCSR0A: u16 = 0xC0;
-pub(super) const UCSR0B: u16 = 0xC1;
-
 /// MCUSR: the cause was the reset pin, or too low a supply voltage (data sheet, 11.9.1).
 const EXTRF: u8 = 1 << 1;
 const BORF: u8 = 1 << 2;
-/// UCSR0A: a byte waits.
-const RXC0: u8 = 1 << 7;
-/// UCSR0A: bytes were lost.
-const DOR0: u8 = 1 << 3;
-/// UCSR0B: the receiver is on.
-const RXEN0: u8 = 1 << 4;
 
 /// The instruction `wdr`, which feeds the watchdog.
 const WDR: u16 = 0x95A8;
@@ -137,7 +128,8 @@ impl Core {
             (*avr).cycle = cycle;
         }
 
-        let uart = find_uart(chip);
+        // SAFETY: `avr` was initialised above.
+        let uart = unsafe { uart::find(avr) };
         let recorder = NonNull::from(Box::leak(Box::new(Recorder {
             chip: avr,
             uart: uart.as_ptr(),
@@ -163,14 +155,14 @@ impl Core {
             (*avr).custom.data = parameter;
             (*avr).reset = Some(on_reset);
             (*uart.as_ptr()).flags = 0;
-            for pin in super::OUTPUTS {
+            for pin in OUTPUTS {
                 let irq = pin_irq(avr, pin);
                 simavr::avr_irq_register_notify(irq, Some(on_output), parameter);
             }
             let output_a = simavr::avr_io_getirq(avr, request(b"tmr1"), simavr::TIMER_IRQ_OUT_COMP as i32);
             simavr::avr_irq_register_notify(output_a, Some(on_timer_output), parameter);
-            timer::take_over_writes(recorder);
-            eeprom::take_over_writes(recorder);
+            timer::take_over_writes(avr, &raw mut (*recorder.as_ptr()).timer);
+            eeprom::take_over_writes(avr, &raw mut (*recorder.as_ptr()).eeprom);
             for vector in 1..=LAST_VECTOR {
                 let irq = simavr::avr_get_interrupt_irq(avr, vector);
                 if !irq.is_null() {
@@ -274,7 +266,7 @@ impl Core {
             if self.asleep && (*avr).state as u32 == simavr::cpu_Running {
                 (*avr).cycle += WAKE_UP_CYCLES;
             }
-            hand_over_received(avr, uart);
+            uart::hand_over_received(avr, uart);
             if (*avr).interrupt_state != 0 {
                 simavr::avr_service_interrupts(avr);
             }
@@ -400,7 +392,7 @@ impl Core {
 
     /// Puts the levels that the inputs are held at on a chip that has just started.
     fn hold_inputs(&mut self) {
-        for pin in Pin::ALL.into_iter().filter(|&pin| !super::is_output(pin)) {
+        for pin in Pin::ALL.into_iter().filter(|&pin| !is_output(pin)) {
             let (port, bit) = pin.port_and_bit();
             let held = self.held[port_index(port)];
             if held.mask & (1 << bit) != 0 {
@@ -437,22 +429,8 @@ impl Core {
     /// Gives the receiver a byte whose stop bit has just ended. Returns whether it had room.
     pub(super) fn receive(&mut self, byte: u8) -> bool {
         let uart = self.recorder().uart;
-        let avr = self.chip.as_ptr();
-        // SAFETY: as in `step`; `uart` is part of the chip, and the registers are addresses inside `data`.
-        unsafe {
-            let fifo = &(*uart).input;
-            let waiting = fifo.write.wrapping_sub(fifo.read) % fifo.buffer.len() as u16;
-            let on = *(*avr).data.add(UCSR0B.into()) & RXEN0 != 0;
-            if on && waiting >= RECEIVER_BYTES {
-                *(*avr).data.add(UCSR0A.into()) |= DOR0;
-                return false;
-            }
-            // simavr would raise the flag a whole byte later; it is due now.
-            (*uart).cycles_per_byte = 1;
-            simavr::avr_raise_irq(self.input.as_ptr(), byte.into());
-            (*uart).cycles_per_byte = cycles_per_byte(avr);
-        }
-        true
+        // SAFETY: as in `step`; `uart` and `input` are parts of the chip.
+        unsafe { uart::receive(self.chip.as_ptr(), uart, self.input.as_ptr(), byte) }
     }
 
     /// Gives the receiver a byte without regard to the line's pace or the receiver's room.
@@ -483,7 +461,7 @@ impl Core {
     /// Cycles of a byte on the serial line, as the chip's UART is set up.
     pub(super) fn byte_cycles(&self) -> u64 {
         // SAFETY: as in `cycle`.
-        unsafe { cycles_per_byte(self.chip.as_ptr()) }
+        unsafe { uart::cycles_per_byte(self.chip.as_ptr()) }
     }
 
     fn set_eeprom(&mut self, content: &[u8]) {
@@ -554,35 +532,4 @@ unsafe fn pin_irq(avr: *mut simavr::avr_t, pin: Pin) -> *mut simavr::avr_irq_t {
 
 fn port_index(port: char) -> usize {
     usize::from(port == 'D')
-}
-
-/// The UART in the chip's list of peripherals.
-fn find_uart(chip: NonNull<simavr::avr_t>) -> NonNull<simavr::avr_uart_t> {
-    // SAFETY: the chip is initialised: its peripherals form a list that ends in null, each with a C string for its kind.
-    // Every peripheral begins with its `avr_io_t`, and only the UART is called so.
-    unsafe {
-        let mut peripheral = (*chip.as_ptr()).io_port;
-        while !peripheral.is_null() && CStr::from_ptr((*peripheral).kind) != c"uart" {
-            peripheral = (*peripheral).next;
-        }
-        NonNull::new(peripheral.cast()).expect("the ATmega328P has a UART")
-    }
-}
-
-/// Keeps the receiver's interrupt asked for while bytes wait in it, as the chip does; simavr asks once a byte's time, and
-/// holds back a firmware that reads faster.
-///
-/// # Safety
-///
-/// `avr` must be an initialised chip, and `uart` its UART.
-unsafe fn hand_over_received(avr: *mut simavr::avr_t, uart: *mut simavr::avr_uart_t) {
-    // SAFETY: the caller vouches for both; UCSR0A is an address inside `data`.
-    unsafe {
-        if (*uart).input.read != (*uart).input.write {
-            (*uart).rx_cnt = 0;
-            if *(*avr).data.add(UCSR0A.into()) & RXC0 != 0 && (*uart).rxc.pending() == 0 {
-                simavr::avr_raise_interrupt(avr, &raw mut (*uart).rxc);
-            }
-        }
-    }
 }

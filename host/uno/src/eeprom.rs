@@ -7,12 +7,10 @@
 //! Only writes that erase first are timed (EEPM 00), and the core is not halted for the few cycles after an order.
 
 use std::ffi::c_void;
-use std::ptr::NonNull;
 
 use simavr_ffi as simavr;
 
-use super::recorder::Recorder;
-use super::timer::{FIRST_IO, Writer};
+use super::io_register::Writer;
 use signal::CYCLES_PER_SECOND;
 
 /// Cycles of a write (data sheet, table 8-1): the first half erases the byte, the second writes it.
@@ -81,22 +79,19 @@ impl Eeprom {
 ///
 /// # Safety
 ///
-/// The recorder's chip must be initialised, and call nothing once the recorder is gone.
-pub(super) unsafe fn take_over_writes(recorder: NonNull<Recorder>) {
-    // SAFETY: the caller vouches for the recorder and its chip; the address is that of an I/O register.
-    unsafe {
-        let writer = &mut (*recorder.as_ref().chip).io[usize::from(EECR - FIRST_IO)].w;
-        writer.c = Some(on_control_write);
-        writer.param = recorder.as_ptr().cast();
-    }
+/// `avr` must be an initialised chip and `eeprom` its own, which stays where it is for as long as the chip runs, and of which no
+/// reference is alive while it does.
+pub(super) unsafe fn take_over_writes(avr: *mut simavr::avr_t, eeprom: *mut Eeprom) {
+    // SAFETY: the caller vouches for both; the address is that of an I/O register.
+    unsafe { Writer::replace(avr, EECR, on_control_write, eeprom.cast()) };
 }
 
 /// simavr's callback for a write of EECR.
-unsafe extern "C" fn on_control_write(avr: *mut simavr::avr_t, register: u16, value: u8, recorder: *mut c_void) {
-    // SAFETY: `recorder` is what `take_over_writes` registered, alive and not borrowed, and `avr` its chip; the registers are
+unsafe extern "C" fn on_control_write(avr: *mut simavr::avr_t, register: u16, value: u8, parameter: *mut c_void) {
+    // SAFETY: `parameter` is what `take_over_writes` registered, alive and not borrowed, and `avr` its chip; the registers are
     // addresses inside `data`.
     unsafe {
-        let eeprom = &raw mut (*recorder.cast::<Recorder>()).eeprom;
+        let eeprom = parameter.cast::<Eeprom>();
         let control = (*avr).data.add(register.into());
         if (*eeprom).write.is_some() {
             *control = value & !(EERE | EEMPE) | EEPE;
@@ -109,16 +104,16 @@ unsafe extern "C" fn on_control_write(avr: *mut simavr::avr_t, register: u16, va
             let address = u16::from_le_bytes([*(*avr).data.add(EEARL.into()), *(*avr).data.add(EEARH.into())]);
             (*eeprom).write = Some(Write { address: address.into(), begun: (*avr).cycle });
             *control |= EEPE;
-            simavr::avr_cycle_timer_register(avr, WRITE_CYCLES, Some(on_written), recorder);
+            simavr::avr_cycle_timer_register(avr, WRITE_CYCLES, Some(on_written), parameter);
         }
     }
 }
 
 /// simavr's callback at the end of a write.
-unsafe extern "C" fn on_written(avr: *mut simavr::avr_t, _: u64, recorder: *mut c_void) -> u64 {
+unsafe extern "C" fn on_written(avr: *mut simavr::avr_t, _: u64, parameter: *mut c_void) -> u64 {
     // SAFETY: as in `on_control_write`.
     unsafe {
-        (*recorder.cast::<Recorder>()).eeprom.write = None;
+        (*parameter.cast::<Eeprom>()).write = None;
         *(*avr).data.add(EECR.into()) &= !EEPE;
     }
     // No second time.

@@ -51,6 +51,12 @@
 //! - Self-programming takes no time: a page of flash is erased or written within its instruction. Lock bits are not kept.
 //!
 //! The firmware is tested on avr8js as well, and what that one does otherwise stands in docs/simulators.md.
+//!
+//! # Who knows whom
+//!
+//! Imports run one way. The chip: `io_register` -> `timer`, `eeprom`, and `uart`, `interrupts`, `turns` beside them -> `recorder`,
+//! which owns what simavr calls back with -> `core`, which runs it -> `terminal` -> this file. The files: `elf` -> `hex`, `bounds`,
+//! `core` -> this file. `capture`, `waveform` and `pty` know none of these.
 
 pub mod bounds;
 pub mod capture;
@@ -60,15 +66,18 @@ pub mod elf;
 mod error;
 pub mod hex;
 mod interrupts;
+mod io_register;
 pub mod pty;
 mod recorder;
 mod terminal;
 mod timer;
 mod turns;
+mod uart;
 pub mod waveform;
 
 pub use self::error::UnoError;
 pub use self::interrupts::{HandlerCycles, InterruptStatistics, Place};
+pub use self::recorder::{ReceivedByte, Reset, ResetCause};
 pub use self::terminal::{BAUD, SENT_BYTE_CYCLES};
 pub use self::turns::Turns;
 pub use signal::{CYCLES_PER_SECOND, Pin, PinChange, Pulse, Wire};
@@ -76,42 +85,12 @@ pub use signal::{CYCLES_PER_SECOND, Pin, PinChange, Pulse, Wire};
 use self::core::{Core, Stop};
 use self::elf::{EEPROM_BYTES, Image, Size, Variable};
 use self::hex::Bootloader;
+use self::recorder::is_output;
 use self::terminal::Terminal;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::collections::VecDeque;
 use std::path::Path;
-
-/// Why the chip started anew.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ResetCause {
-    /// Power came back ([`Uno::power_cycle`]).
-    PowerOn,
-    /// The reset pin was pulled ([`Uno::reset`]).
-    External,
-    /// The supply sagged ([`Uno::brown_out`]).
-    BrownOut,
-    /// The watchdog ran out.
-    Watchdog,
-}
-
-/// A reset after the first power-up.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Reset {
-    /// When.
-    pub cycle: u64,
-    /// Why.
-    pub cause: ResetCause,
-}
-
-/// A byte from the firmware.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ReceivedByte {
-    /// When the firmware handed it to the transmitter.
-    pub cycle: u64,
-    /// The byte.
-    pub byte: u8,
-}
 
 /// An Arduino Uno with a firmware in it.
 pub struct Uno {
@@ -505,14 +484,6 @@ impl Uno {
     pub fn deepest_stack(&self) -> usize {
         self.core.deepest_stack(self.image.size.sram as u16)
     }
-}
-
-/// The pins that are recorded as outputs: Timer1's output A, and the board's LED.
-const OUTPUTS: [Pin; 2] = [Pin::D9, Pin::D13];
-
-/// Whether the firmware drives the pin.
-fn is_output(pin: Pin) -> bool {
-    OUTPUTS.contains(&pin)
 }
 
 fn to_bytes(received: &[ReceivedByte]) -> Vec<u8> {

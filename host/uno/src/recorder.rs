@@ -8,12 +8,11 @@ use std::ffi::c_void;
 
 use simavr_ffi as simavr;
 
-use super::core::{UCSR0A, UCSR0B};
 use super::eeprom::Eeprom;
 use super::interrupts::InterruptRecorder;
 use super::timer::Timer1;
 use super::turns::TurnRecorder;
-use super::{ReceivedByte, Reset};
+use super::uart;
 use signal::{Pin, PinChange};
 
 /// Cycles from the end of an instruction to the first one of the vector (data sheet, section 7.7.1).
@@ -22,17 +21,44 @@ const INTERRUPT_ENTRY_CYCLES: u64 = 4;
 /// Cycles of `reti`; its end is the end of the handler.
 const RETURN_CYCLES: u64 = 4;
 
-// Registers by their address in the data space (data sheet, register summary).
-const UCSR0C: u16 = 0xC2;
-const UBRR0L: u16 = 0xC4;
-const UBRR0H: u16 = 0xC5;
+/// Why the chip started anew.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ResetCause {
+    /// Power came back ([`Uno::power_cycle`](crate::Uno::power_cycle)).
+    PowerOn,
+    /// The reset pin was pulled ([`Uno::reset`](crate::Uno::reset)).
+    External,
+    /// The supply sagged ([`Uno::brown_out`](crate::Uno::brown_out)).
+    BrownOut,
+    /// The watchdog ran out.
+    Watchdog,
+}
 
-/// UCSR0A: double speed.
-const U2X0: u8 = 1 << 1;
-/// UCSR0C: two stop bits.
-const USBS0: u8 = 1 << 3;
-/// UCSR0C: parity is on.
-const UPM01: u8 = 1 << 5;
+/// A reset after the first power-up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Reset {
+    /// When.
+    pub cycle: u64,
+    /// Why.
+    pub cause: ResetCause,
+}
+
+/// A byte from the firmware.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ReceivedByte {
+    /// When the firmware handed it to the transmitter.
+    pub cycle: u64,
+    /// The byte.
+    pub byte: u8,
+}
+
+/// The pins that are recorded as outputs: Timer1's output A, and the board's LED.
+pub(super) const OUTPUTS: [Pin; 2] = [Pin::D9, Pin::D13];
+
+/// Whether the firmware drives the pin.
+pub(super) fn is_output(pin: Pin) -> bool {
+    OUTPUTS.contains(&pin)
+}
 
 /// What simavr's callbacks have seen.
 pub(super) struct Recorder {
@@ -67,29 +93,6 @@ impl Recorder {
             self.changes.push(PinChange { cycle, pin, high });
         }
     }
-}
-
-/// Cycles of a byte on the serial line, as the UART's registers stand (data sheet, USART0, clock generation and frame formats).
-///
-/// # Safety
-///
-/// `avr` must be an initialised chip.
-pub(super) unsafe fn cycles_per_byte(avr: *mut simavr::avr_t) -> u64 {
-    // SAFETY: the registers are addresses inside `data`, and the caller vouches for `avr`.
-    let register = |address: u16| unsafe { *(*avr).data.add(address.into()) };
-    let divisor = u64::from(u16::from_le_bytes([register(UBRR0L), register(UBRR0H) & 0x0F])) + 1;
-    let cycles_per_bit = match register(UCSR0A) & U2X0 {
-        0 => 16 * divisor,
-        _ => 8 * divisor,
-    };
-    let format = register(UCSR0C);
-    let data_bits = match (register(UCSR0B) & 0b100) | (format >> 1 & 0b11) {
-        size @ 0..=3 => 5 + u64::from(size),
-        _ => 9,
-    };
-    let parity_bits = u64::from(format & UPM01 != 0);
-    let stop_bits = 1 + u64::from(format & USBS0 != 0);
-    cycles_per_bit * (1 + data_bits + parity_bits + stop_bits)
 }
 
 /// When the peripheral that simavr is serving was due. It serves one at the end of the instruction in which it falls due, up
@@ -168,7 +171,7 @@ pub(super) unsafe extern "C" fn on_transmit(_: *mut simavr::avr_irq_t, byte: u32
     // SAFETY: as in `on_output`; the UART is part of the chip.
     unsafe {
         let recorder = &mut *recorder.cast::<Recorder>();
-        (*recorder.uart).cycles_per_byte = cycles_per_byte(recorder.chip);
+        (*recorder.uart).cycles_per_byte = uart::cycles_per_byte(recorder.chip);
         recorder.received.push(ReceivedByte { cycle: (*recorder.chip).cycle, byte: byte as u8 });
     }
 }

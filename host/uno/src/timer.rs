@@ -14,7 +14,7 @@ use std::ptr::NonNull;
 
 use simavr_ffi as simavr;
 
-use super::recorder::Recorder;
+use super::io_register::Writer;
 use signal::Pin;
 
 // Registers by their address in the data space (data sheet, register summary).
@@ -33,37 +33,6 @@ const COM1: u8 = 0b1111 << 4;
 /// TCCR1B: the clock; 0 is none, and above [`LAST_PRESCALER`] it comes from a pin.
 const CS1: u8 = 0b111;
 const LAST_PRESCALER: u8 = 5;
-
-/// Address of the first I/O register, from which simavr counts them.
-pub(super) const FIRST_IO: u16 = 0x20;
-
-/// simavr's function for writes of a register, and its parameter.
-#[derive(Clone, Copy)]
-pub(super) struct Writer {
-    function: simavr::avr_io_write_t,
-    parameter: *mut c_void,
-}
-
-impl Writer {
-    /// # Safety
-    ///
-    /// `avr` must be an initialised chip, and `register` an I/O register.
-    pub(super) unsafe fn of(avr: *mut simavr::avr_t, register: u16) -> Writer {
-        // SAFETY: the caller vouches for both.
-        let write = unsafe { &(*avr).io[usize::from(register - FIRST_IO)].w };
-        Writer { function: write.c, parameter: write.param }
-    }
-
-    /// # Safety
-    ///
-    /// `avr` must be the chip that this writer is of.
-    pub(super) unsafe fn write(self, avr: *mut simavr::avr_t, register: u16, value: u8) {
-        if let Some(function) = self.function {
-            // SAFETY: the caller vouches for `avr`; function and parameter are simavr's own pair.
-            unsafe { function(avr, register, value, self.parameter) };
-        }
-    }
-}
 
 /// Timer1 of a chip.
 pub(super) struct Timer1 {
@@ -86,7 +55,7 @@ impl Timer1 {
         let (compare_writer, counter_writer) = unsafe { (Writer::of(avr, OCR1AL), Writer::of(avr, TCNT1L)) };
         Timer1 {
             // The parameter of simavr's writer of TCNT1 is the timer.
-            timer: NonNull::new(counter_writer.parameter.cast()).expect("the ATmega328P has a Timer1"),
+            timer: NonNull::new(counter_writer.parameter().cast()).expect("the ATmega328P has a Timer1"),
             compare_writer,
             counter_writer,
             output_high: false,
@@ -146,31 +115,29 @@ impl Timer1 {
 ///
 /// # Safety
 ///
-/// The recorder's chip must be initialised, and call nothing once the recorder is gone.
-pub(super) unsafe fn take_over_writes(recorder: NonNull<Recorder>) {
-    // SAFETY: the caller vouches for the recorder and its chip; the addresses are those of I/O registers.
+/// `avr` must be an initialised chip and `timer` its own, which stays where it is for as long as the chip runs, and of which no
+/// reference is alive while it does.
+pub(super) unsafe fn take_over_writes(avr: *mut simavr::avr_t, timer: *mut Timer1) {
+    // SAFETY: the caller vouches for both; the addresses are those of I/O registers.
     unsafe {
-        let io = &mut (*recorder.as_ref().chip).io;
-        io[usize::from(OCR1AL - FIRST_IO)].w.c = Some(on_compare_write);
-        io[usize::from(OCR1AL - FIRST_IO)].w.param = recorder.as_ptr().cast();
-        io[usize::from(TCNT1L - FIRST_IO)].w.c = Some(on_counter_write);
-        io[usize::from(TCNT1L - FIRST_IO)].w.param = recorder.as_ptr().cast();
+        Writer::replace(avr, OCR1AL, on_compare_write, timer.cast());
+        Writer::replace(avr, TCNT1L, on_counter_write, timer.cast());
     }
 }
 
 /// simavr's callback for a write of OCR1A's low byte; the high byte is in its register.
-unsafe extern "C" fn on_compare_write(avr: *mut simavr::avr_t, register: u16, low: u8, recorder: *mut c_void) {
-    // SAFETY: `recorder` is what `take_over_writes` registered, alive and not borrowed, and `avr` its chip. simavr's writer may
-    // call back, so no reference into the recorder is kept over the call.
+unsafe extern "C" fn on_compare_write(avr: *mut simavr::avr_t, register: u16, low: u8, timer1: *mut c_void) {
+    // SAFETY: `timer1` is what `take_over_writes` registered, alive and not borrowed, and `avr` its chip. simavr's writer may
+    // call back, so no reference into it is kept over the call.
     unsafe {
-        let recorder = recorder.cast::<Recorder>();
-        if !(*recorder).timer.is_buffered(avr) {
-            let writer = (*recorder).timer.compare_writer;
+        let timer1 = timer1.cast::<Timer1>();
+        if !(*timer1).is_buffered(avr) {
+            let writer = (*timer1).compare_writer;
             return writer.write(avr, register, low);
         }
         *(*avr).data.add(register.into()) = low;
         let compare = u16::from_le_bytes([low, *(*avr).data.add(OCR1AH.into())]);
-        let timer = (*recorder).timer.timer.as_mut();
+        let timer = (*timer1).timer.as_mut();
         // The match of the running period is planned already; this is what the next bottom plans by.
         timer.comp[0].comp_cycles = match compare <= timer.tov_top {
             true => u64::from(timer.cs_div_value) * (u64::from(compare) + 1),
@@ -180,15 +147,15 @@ unsafe extern "C" fn on_compare_write(avr: *mut simavr::avr_t, register: u16, lo
 }
 
 /// simavr's callback for a write of TCNT1's low byte; the high byte is in its register.
-unsafe extern "C" fn on_counter_write(avr: *mut simavr::avr_t, register: u16, low: u8, recorder: *mut c_void) {
+unsafe extern "C" fn on_counter_write(avr: *mut simavr::avr_t, register: u16, low: u8, timer1: *mut c_void) {
     // SAFETY: as in `on_compare_write`.
     unsafe {
-        let recorder = recorder.cast::<Recorder>();
-        let writer = (*recorder).timer.counter_writer;
-        if !(*recorder).timer.is_buffered(avr) {
+        let timer1 = timer1.cast::<Timer1>();
+        let writer = (*timer1).counter_writer;
+        if !(*timer1).is_buffered(avr) {
             return writer.write(avr, register, low);
         }
-        let timer = (*recorder).timer.timer.as_ptr();
+        let timer = (*timer1).timer.as_ptr();
         let control = (*avr).data.add(TCCR1A.into());
         let counter = u16::from_le_bytes([low, *(*avr).data.add(TCNT1H.into())]);
         let prescaler = u64::from((*timer).cs_div_value);
@@ -201,7 +168,7 @@ unsafe extern "C" fn on_counter_write(avr: *mut simavr::avr_t, register: u16, lo
         // simavr divides the period by the top, which is a clock short of it.
         (*timer).tov_top = top.saturating_add(1);
         // A match in the clock after the write is blocked (data sheet, 16.7.2), and a lower one is past.
-        let running = (*recorder).timer.running_compare_cycles;
+        let running = (*timer1).running_compare_cycles;
         let is_ahead = running > prescaler * (u64::from(counter) + 1);
         (*timer).comp[0].comp_cycles = if is_ahead { running } else { 0 };
         *control = connections & !COM1;

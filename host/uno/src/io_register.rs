@@ -1,0 +1,65 @@
+//! What simavr does when the firmware writes an I/O register, and how another writer takes its place.
+//!
+//! simavr has a function and its parameter a register, and calls it with the byte that is written. A peripheral that is set right
+//! keeps simavr's own writer, puts one of its own there, and calls simavr's where it does what the chip does.
+
+use std::ffi::c_void;
+
+use simavr_ffi as simavr;
+
+/// Address of the first I/O register in the data space, from which simavr counts them.
+const FIRST_IO: u16 = 0x20;
+
+/// simavr's function for writes of a register, and its parameter.
+#[derive(Clone, Copy)]
+pub(super) struct Writer {
+    function: simavr::avr_io_write_t,
+    parameter: *mut c_void,
+}
+
+impl Writer {
+    /// The writer of a register, by its address in the data space.
+    ///
+    /// # Safety
+    ///
+    /// `avr` must be an initialised chip, and `register` an I/O register.
+    pub(super) unsafe fn of(avr: *mut simavr::avr_t, register: u16) -> Writer {
+        // SAFETY: the caller vouches for both.
+        let write = unsafe { &(*avr).io[usize::from(register - FIRST_IO)].w };
+        Writer { function: write.c, parameter: write.param }
+    }
+
+    /// Puts `function` in the place of a register's writer, to be called with `parameter`.
+    ///
+    /// # Safety
+    ///
+    /// As [`Writer::of`], and `function` must be sound with `parameter` at every write that the chip makes.
+    pub(super) unsafe fn replace(
+        avr: *mut simavr::avr_t,
+        register: u16,
+        function: unsafe extern "C" fn(*mut simavr::avr_t, u16, u8, *mut c_void),
+        parameter: *mut c_void,
+    ) {
+        // SAFETY: the caller vouches for both.
+        let write = unsafe { &mut (*avr).io[usize::from(register - FIRST_IO)].w };
+        write.c = Some(function);
+        write.param = parameter;
+    }
+
+    /// What simavr calls the function with: the peripheral that the register is of.
+    pub(super) fn parameter(self) -> *mut c_void {
+        self.parameter
+    }
+
+    /// Has the register written.
+    ///
+    /// # Safety
+    ///
+    /// `avr` must be the chip that this writer is of.
+    pub(super) unsafe fn write(self, avr: *mut simavr::avr_t, register: u16, value: u8) {
+        if let Some(function) = self.function {
+            // SAFETY: the caller vouches for `avr`; function and parameter are simavr's own pair.
+            unsafe { function(avr, register, value, self.parameter) };
+        }
+    }
+}
