@@ -7,7 +7,8 @@
 //! out. Whatever is typed, the loop turns on.
 //!
 //! All that is said lies in flash ([`packed`]), the words for alarms, settings and the like among it. Nothing below imports
-//! any of this.
+//! any of this, and here imports run `words` -> `texts` -> `packed` -> `names`, `line` -> [`command`], and the lines that are
+//! put together -> `answer` -> `execute` -> this file.
 
 mod answer;
 pub mod command;
@@ -21,7 +22,7 @@ mod status;
 mod texts;
 mod words;
 
-pub use self::{answer::Answer, events::write_event, execute::execute, status::write_plot};
+pub use self::{answer::Answer, events::write_event, execute::execute, status::write_plot, texts::Text};
 
 use self::{
     command::{Command, Mistake},

@@ -280,7 +280,7 @@ fn lines_that_are_not_understood_are_counted() {
 #[test]
 fn the_table_of_faults_names_every_alarm_with_its_code_and_every_warning_and_cause() {
     let table = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/faults.md")).unwrap();
-    let name = |text: control::say::packed::Text| String::from_utf8(text.bytes().collect()).unwrap();
+    let name = |text: control::say::Text| String::from_utf8(text.bytes().collect()).unwrap();
     for alarm in (0..).map_while(Alarm::from_index) {
         let row = format!("| {}-{} | `{}` |", alarm.code() / 10, alarm.code() % 10, name(alarm.text()));
         assert!(table.lines().any(|line| line.starts_with(&row)), "{row}");

@@ -135,7 +135,7 @@ fn loops_are_said_to_turn_as_often_as_the_constants_behind_them_have_it() {
     for function in ["schedule::Schedule::leave", "Ground::is_closed", "Ground::windows"] {
         assert_eq!(passes(&format!("control::ground::{function}")), schedule::CAPACITY + 1, "{function}");
     }
-    for function in ["say::packed::Text::find", "say::command::split_word", "say::command::number"] {
+    for function in ["say::packed::find", "say::command::split_word", "say::command::number"] {
         assert_eq!(passes(&format!("control::{function}")), LINE_LENGTH + 1, "{function}");
     }
     // A save writes each byte, and the first twice.

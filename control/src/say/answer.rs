@@ -1,12 +1,12 @@
 //! Answers, a line at a time.
 
 use super::{
-    command::{Command, Mistake, Word},
+    command::{Command, Mistake},
     errors::{write_mistake, write_refusal},
     line::Line,
-    packed::Text,
     status::{write_counts, write_example, write_object, write_setting, write_state, write_status},
-    texts,
+    texts::{self, Text},
+    words::Word,
 };
 use crate::{
     ground::class::Classifier, memory::Memory, operate::refusal::Refusal, settings::Setting, weeder::Controller,

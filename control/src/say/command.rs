@@ -7,59 +7,13 @@
 use crate::{ground::class::label, operate::plot::Plot, settings::Setting};
 use heapless::Vec;
 
+pub use super::words::{Argument, Word};
+
 /// Characters that a line may have.
 pub const LINE_LENGTH: usize = 80;
 
 /// What stands in the stream of bytes where some were lost: ASCII's own character for it, SUB.
 pub const GAP_MARK: u8 = 0x1A;
-
-/// The first word of a command.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Word {
-    /// Lists the commands, or explains a setting.
-    Help,
-    /// One line of figures.
-    Status,
-    /// Shows one setting or all.
-    Get,
-    /// Changes a setting.
-    Set,
-    /// Keeps the settings.
-    Save,
-    /// Goes back to the saved settings.
-    Revert,
-    /// Goes back to the settings of a new machine.
-    Defaults,
-    /// Measures the wheel or the servo.
-    Calibrate,
-    /// Moves the tool by hand.
-    Servo,
-    /// Swings the tool as for a row.
-    Test,
-    /// Goes to work.
-    Start,
-    /// Takes the tool out.
-    Hold,
-    /// Clears an alarm.
-    Clear,
-    /// Tells what happens, or stops telling.
-    Events,
-    /// Draws curves on a plotter.
-    Plot,
-    /// Says what the last object was, and teaches it.
-    Label,
-    /// Tells a feature of an example, and teaches it.
-    Teach,
-    /// Lists the examples.
-    Examples,
-    /// Forgets examples from the field.
-    Forget,
-    /// Lists the last objects.
-    Dump,
-    /// Names the firmware.
-    Version,
-}
 
 /// A line that was understood.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -160,38 +114,6 @@ pub enum Mistake {
     UnknownSetting,
     /// The setting takes a whole number within its range.
     Value(Setting),
-}
-
-/// A word that a command may take.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Argument {
-    /// Of `start`.
-    Now,
-    /// Of `events`, and of settings that are switched.
-    On,
-    /// As `on`.
-    Off,
-    /// Of `forget`.
-    All,
-    /// Of `calibrate`.
-    Start,
-    /// Of `calibrate`.
-    Servo,
-    /// Of `calibrate` and `label`.
-    Force,
-    /// Of `servo`.
-    In,
-    /// Of `servo`.
-    Out,
-    /// Of `test`.
-    Row,
-    /// Of `plot`.
-    Teleplot,
-    /// Of `label`.
-    Plant,
-    /// Of `label`.
-    Weed,
 }
 
 /// Reads a line.

@@ -6,9 +6,10 @@ use crate::{
     memory::Memory,
     operate::refusal::Refusal,
     say::{
-        command::{Argument, Mistake, Word},
+        command::Mistake,
         line::Line,
         texts,
+        words::{Argument, Word},
     },
     settings::Setting,
     weeder::Controller,

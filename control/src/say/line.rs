@@ -3,7 +3,7 @@
 //! A line is put together at once, so that what it tells belongs together, and goes out a character at a time, as the main
 //! loop has time for no more: a text is unpacked and a number divided into its digits only as far as the next character.
 
-use crate::say::packed::{Characters, Text};
+use crate::say::{packed::Characters, texts::Text};
 use ufmt::{Formatter, uDisplay, uWrite};
 
 /// Texts that a line may have; one that shows a setting has ten. A power of two, for short arithmetic.

@@ -1,14 +1,51 @@
-//! What things are called.
+//! What things are called: the text of each of the machine's [words](crate::say::words), and which of them was typed.
 
 use crate::{
+    alarm::{Alarm, Warning},
     ground::class::{Class, label},
+    measure::reset::Cause,
     operate::state::State,
     say::{
-        command::{Argument, Word},
-        packed::Text,
-        texts,
+        packed,
+        texts::{self, Text},
+        words::{Argument, Word},
     },
+    settings::{self, Setting},
+    weeder::Reason,
 };
+
+/// Has an enum write and read its words, `WORDS`.
+macro_rules! written {
+    ($($Name:ident)*) => {$(
+        impl $Name {
+            const FIRST: Text = Text::first_of(Self::WORDS);
+
+            /// The word for it.
+            pub const fn text(self) -> Text {
+                Self::FIRST.plus(self as u8)
+            }
+
+            /// The one that `word` stands for.
+            pub fn find(word: &[u8]) -> Option<Self> {
+                Self::from_index(packed::find(Self::FIRST, Self::COUNT, word))
+            }
+        }
+    )*};
+}
+
+written! { Setting Word Argument Alarm Warning Reason Cause }
+
+impl Setting {
+    /// What it is, for the operator.
+    pub fn help(self) -> Text {
+        const { Text::first_of(settings::HELPS) }.plus(self as u8)
+    }
+
+    /// Its unit behind a blank, or nothing where it is a count or switched.
+    pub fn unit(self) -> Text {
+        const { Text::first_of(settings::UNITS) }.plus(self as u8)
+    }
+}
 
 pub(super) fn state_name(state: State) -> Text {
     match state {

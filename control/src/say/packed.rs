@@ -1,14 +1,13 @@
-//! Text that lies in flash.
+//! All that the machine says, packed into one table in flash, and read from there.
 //!
-//! An AVR keeps Rust's string literals in SRAM, of which there are 2 KiB. So all that the machine says lies in flash, in one
-//! table, and a [`Text`] is no more than its number there: one byte. What is said stands in `texts`, and the words for
-//! the machine's alarms, settings and the like in `words`.
+//! An AVR keeps Rust's string literals in SRAM, of which there are 2 KiB. So the table lies in flash, and a [`Text`] is no more
+//! than its number there: one byte. What the table is made of stands in `texts`.
 //!
 //! The texts are packed: `FRAGMENTS` that come again and again are one byte each. A fragment is a pair of bytes, each of
 //! which is a character or stands for another fragment, so that nothing is searched where one is unpacked. The compiler
 //! packs, and [`Characters`] unpacks.
 
-use crate::say::texts::GROUPS;
+use crate::say::texts::{COUNT, GROUPS, Text};
 
 /// Fragments of what is said, sorted, each of which stands for itself as a byte from 0x80 on. They come from joining the most
 /// frequent pair again and again; any others would do that can be split into two.
@@ -41,7 +40,7 @@ const LENGTH: u8 = 0x3F;
 
 /// Where the index begins in the table, behind the fragments, and where the texts do.
 const INDEX: usize = 2 * FRAGMENTS.len();
-const TEXTS: usize = INDEX + 2 * (count() as usize).div_ceil(STRIDE as usize);
+const TEXTS: usize = INDEX + 2 * (COUNT as usize).div_ceil(STRIDE as usize);
 
 avr_progmem::progmem! {
     static progmem TABLE: [u8; table::<4096>().1] = table().0;
@@ -53,69 +52,47 @@ fn byte(place: usize) -> u8 {
     flash::byte(&TABLE, place)
 }
 
-/// A text in flash, by its number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Text(u8);
-
 impl Text {
-    /// The table's first.
-    pub(crate) const FIRST: Self = Self(0);
-
-    /// The first text of a group.
-    pub(crate) const fn first_of(group: &[&str]) -> Self {
-        let (mut first, mut place) = (0, 0);
-        while !is_same_group(GROUPS[place], group) {
-            first += GROUPS[place].len() as u8;
-            place += 1;
-        }
-        Self(first)
-    }
-
-    /// The text that stands so many places behind this one.
-    pub(crate) const fn plus(self, places: u8) -> Self {
-        Self(self.0 + places)
-    }
-
     /// The characters, ASCII.
     pub fn bytes(self) -> Characters {
         let mut characters = Characters::NONE;
         characters.begin(self);
         characters
     }
+}
 
-    /// Which of `count` texts from this one on reads as `word`; `count` where none does.
-    #[inline(never)]
-    pub(crate) fn find(self, count: u8, word: &[u8]) -> u8 {
-        if word.is_empty() {
-            return count;
-        }
-        let mark = mark(word);
-        let mut start = self.start();
-        let mut characters = Characters::NONE;
-        for place in 0..count {
-            let header = byte(start);
-            if header & !LENGTH == mark {
-                characters.begin_at(start);
-                if word.iter().all(|&character| characters.next() == Some(character)) && characters.next().is_none() {
-                    return place;
-                }
+/// Which of `count` texts from `first` on reads as `word`; `count` where none does.
+#[inline(never)]
+pub(crate) fn find(first: Text, count: u8, word: &[u8]) -> u8 {
+    if word.is_empty() {
+        return count;
+    }
+    let mark = mark(word);
+    let mut start = start(first);
+    let mut characters = Characters::NONE;
+    for place in 0..count {
+        let header = byte(start);
+        if header & !LENGTH == mark {
+            characters.begin_at(start);
+            if word.iter().all(|&character| characters.next() == Some(character)) && characters.next().is_none() {
+                return place;
             }
-            // The texts lie one behind the other.
-            start += 1 + usize::from(header & LENGTH);
         }
-        count
+        // The texts lie one behind the other.
+        start += 1 + usize::from(header & LENGTH);
     }
+    count
+}
 
-    /// Where it begins in the table.
-    #[inline(never)]
-    fn start(self) -> usize {
-        let entry = INDEX + 2 * usize::from(self.0 / STRIDE);
-        let mut start = usize::from(u16::from_le_bytes([byte(entry), byte(entry + 1)]));
-        for _ in 0..self.0 % STRIDE {
-            start += 1 + usize::from(byte(start) & LENGTH);
-        }
-        start
+/// Where a text begins in the table.
+#[inline(never)]
+fn start(text: Text) -> usize {
+    let entry = INDEX + 2 * usize::from(text.number() / STRIDE);
+    let mut start = usize::from(u16::from_le_bytes([byte(entry), byte(entry + 1)]));
+    for _ in 0..text.number() % STRIDE {
+        start += 1 + usize::from(byte(start) & LENGTH);
     }
+    start
 }
 
 /// Off the chip, where there is room for `core::fmt`.
@@ -143,7 +120,7 @@ impl Characters {
 
     /// Begins a text; what is left of another is dropped.
     pub(crate) fn begin(&mut self, text: Text) {
-        self.begin_at(text.start());
+        self.begin_at(start(text));
     }
 
     /// Inserts a number before what is left of the text.
@@ -211,17 +188,6 @@ const fn mark(word: &[u8]) -> u8 {
         Some(&last) => last.wrapping_add(word.len() as u8) << LENGTH.count_ones(),
         None => 0,
     }
-}
-
-/// How many texts there are.
-const fn count() -> u8 {
-    let (mut count, mut group) = (0, 0);
-    while group < GROUPS.len() {
-        count += GROUPS[group].len();
-        group += 1;
-    }
-    assert!(count <= u8::MAX as usize, "a byte numbers the texts");
-    count as u8
 }
 
 /// The table and its length: the fragments, the index, and the texts, each behind a byte with its mark and packed length.
@@ -347,18 +313,6 @@ const fn begins(text: &[u8], part: &[u8]) -> bool {
     same == part.len()
 }
 
-const fn is_same_group(one: &[&str], other: &[&str]) -> bool {
-    let mut same = 0;
-    while same < one.len() && same < other.len() {
-        let (one, other) = (one[same].as_bytes(), other[same].as_bytes());
-        if one.len() != other.len() || !begins(one, other) {
-            return false;
-        }
-        same += 1;
-    }
-    one.len() == other.len()
-}
-
 #[cfg(test)]
 mod tests {
     extern crate std;
@@ -367,12 +321,12 @@ mod tests {
 
     #[test]
     fn every_text_reads_as_it_was_written() {
-        let mut text = Text(0);
+        let mut text = Text::FIRST;
         for written in GROUPS.iter().copied().flatten() {
             assert_eq!(String::from_utf8(text.bytes().collect()).expect("ASCII"), **written);
             text = text.plus(1);
         }
-        assert_eq!(text.0, count());
+        assert_eq!(text.number(), COUNT);
     }
 
     #[test]
@@ -386,10 +340,10 @@ mod tests {
         let group = GROUPS.last().expect("there are groups");
         let first = Text::first_of(group);
         for (place, word) in (0..).zip(*group) {
-            assert_eq!(first.find(group.len() as u8, word.as_bytes()), place);
-            assert_eq!(first.find(place, word.as_bytes()), place, "the group ends before it");
+            assert_eq!(find(first, group.len() as u8, word.as_bytes()), place);
+            assert_eq!(find(first, place, word.as_bytes()), place, "the group ends before it");
             for no_word in [&word.as_bytes()[1..], &[word.as_bytes(), b"_"].concat()] {
-                assert_eq!(first.find(group.len() as u8, no_word), group.len() as u8);
+                assert_eq!(find(first, group.len() as u8, no_word), group.len() as u8);
             }
         }
     }

@@ -6,7 +6,11 @@ use crate::{
     ground::class::{Classifier, Listed},
     memory::Memory,
     operate::{objects::Judged, plot::Plot, state::State},
-    say::{command::Argument, line::Line, packed::Text, texts},
+    say::{
+        line::Line,
+        texts::{self, Text},
+        words::Argument,
+    },
     settings::Setting,
     weeder::Controller,
 };

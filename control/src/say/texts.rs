@@ -1,16 +1,13 @@
-//! Everything that the machine says, but for what its settings' table has of them and for the [words](crate::say::words) that it also
-//! reads.
+//! Everything that the machine says, and the number that each of it has: a [`Text`].
 //!
-//! A `#` in a text stands for a number of its line.
+//! What its settings' table says of them stands there, and the words that the machine also reads in [`words`](crate::say::words).
+//! A `#` in a text stands for a number of its line. How the texts lie in flash, and how one is read, is `packed`'s.
 
 use crate::{
     alarm::{Alarm, Warning},
     measure::reset::Cause,
     operate::refusal::Refusal,
-    say::{
-        command::{Argument, Word},
-        packed::Text,
-    },
+    say::words::{Argument, Word},
     settings::{self, Setting},
     weeder::Reason,
 };
@@ -31,6 +28,62 @@ pub(crate) const GROUPS: &[&[&str]] = &[
     Reason::WORDS,
     Cause::WORDS,
 ];
+
+/// How many texts there are.
+pub(crate) const COUNT: u8 = {
+    let (mut count, mut group) = (0, 0);
+    while group < GROUPS.len() {
+        count += GROUPS[group].len();
+        group += 1;
+    }
+    assert!(count <= u8::MAX as usize, "a byte numbers the texts");
+    count as u8
+};
+
+/// A text in flash, by its number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Text(u8);
+
+impl Text {
+    /// The table's first.
+    pub(crate) const FIRST: Self = Self(0);
+
+    /// The first text of a group.
+    pub(crate) const fn first_of(group: &[&str]) -> Self {
+        let (mut first, mut place) = (0, 0);
+        while !is_same_group(GROUPS[place], group) {
+            first += GROUPS[place].len() as u8;
+            place += 1;
+        }
+        Self(first)
+    }
+
+    /// The text that stands so many places behind this one.
+    pub(crate) const fn plus(self, places: u8) -> Self {
+        Self(self.0 + places)
+    }
+
+    /// How many texts stand before it.
+    pub(crate) const fn number(self) -> u8 {
+        self.0
+    }
+}
+
+const fn is_same_group(one: &[&str], other: &[&str]) -> bool {
+    let mut same = 0;
+    while same < one.len() && same < other.len() && is_same_text(one[same].as_bytes(), other[same].as_bytes()) {
+        same += 1;
+    }
+    same == one.len() && same == other.len()
+}
+
+const fn is_same_text(one: &[u8], other: &[u8]) -> bool {
+    let mut same = 0;
+    while same < one.len() && same < other.len() && one[same] == other[same] {
+        same += 1;
+    }
+    same == one.len() && same == other.len()
+}
 
 /// Names for texts.
 macro_rules! said {

@@ -1,36 +1,92 @@
 //! The words for what the machine tells apart: its alarms, its settings, what was typed.
 //!
-//! Such a thing is a plain enum wherever it stands. Here it gets a word for each of its variants, to be written and to be read;
-//! the words lie in flash with all the other [texts](crate::say::packed).
+//! Such a thing is a plain enum wherever it stands. Here it gets a word for each of its variants; `names` has it write and
+//! read them.
 
 use crate::{
     alarm::{Alarm, Warning},
     measure::reset::Cause,
-    say::{
-        command::{Argument, Word},
-        packed::Text,
-    },
-    settings::{self, Setting},
     weeder::Reason,
 };
 
-/// Has an enum write and read its words, `WORDS`.
-macro_rules! written {
-    ($Name:ident) => {
-        impl $Name {
-            const FIRST: Text = Text::first_of(Self::WORDS);
+/// The first word of a command.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Word {
+    /// Lists the commands, or explains a setting.
+    Help,
+    /// One line of figures.
+    Status,
+    /// Shows one setting or all.
+    Get,
+    /// Changes a setting.
+    Set,
+    /// Keeps the settings.
+    Save,
+    /// Goes back to the saved settings.
+    Revert,
+    /// Goes back to the settings of a new machine.
+    Defaults,
+    /// Measures the wheel or the servo.
+    Calibrate,
+    /// Moves the tool by hand.
+    Servo,
+    /// Swings the tool as for a row.
+    Test,
+    /// Goes to work.
+    Start,
+    /// Takes the tool out.
+    Hold,
+    /// Clears an alarm.
+    Clear,
+    /// Tells what happens, or stops telling.
+    Events,
+    /// Draws curves on a plotter.
+    Plot,
+    /// Says what the last object was, and teaches it.
+    Label,
+    /// Tells a feature of an example, and teaches it.
+    Teach,
+    /// Lists the examples.
+    Examples,
+    /// Forgets examples from the field.
+    Forget,
+    /// Lists the last objects.
+    Dump,
+    /// Names the firmware.
+    Version,
+}
 
-            /// The word for it.
-            pub const fn text(self) -> Text {
-                Self::FIRST.plus(self as u8)
-            }
-
-            /// The one that `word` stands for.
-            pub fn find(word: &[u8]) -> Option<Self> {
-                Self::from_index(Self::FIRST.find(Self::COUNT, word))
-            }
-        }
-    };
+/// A word that a command may take.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Argument {
+    /// Of `start`.
+    Now,
+    /// Of `events`, and of settings that are switched.
+    On,
+    /// As `on`.
+    Off,
+    /// Of `forget`.
+    All,
+    /// Of `calibrate`.
+    Start,
+    /// Of `calibrate`.
+    Servo,
+    /// Of `calibrate` and `label`.
+    Force,
+    /// Of `servo`.
+    In,
+    /// Of `servo`.
+    Out,
+    /// Of `test`.
+    Row,
+    /// Of `plot`.
+    Teleplot,
+    /// Of `label`.
+    Plant,
+    /// Of `label`.
+    Weed,
 }
 
 /// The words for the variants of enums, in the order of declaration.
@@ -52,8 +108,6 @@ macro_rules! words {
             }
         }
 
-        written!($Name);
-
         const _: () = {
             let _every_variant_has_a_word: fn($Name) = |variant| match variant {
                 $($Name::$Variant => {})*
@@ -66,20 +120,6 @@ macro_rules! words {
             assert!(place == $Name::COUNT);
         };
     )*};
-}
-
-written!(Setting);
-
-impl Setting {
-    /// What it is, for the operator.
-    pub fn help(self) -> Text {
-        const { Text::first_of(settings::HELPS) }.plus(self as u8)
-    }
-
-    /// Its unit behind a blank, or nothing where it is a count or switched.
-    pub fn unit(self) -> Text {
-        const { Text::first_of(settings::UNITS) }.plus(self as u8)
-    }
 }
 
 words! {
