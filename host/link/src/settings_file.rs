@@ -16,7 +16,7 @@ const HEAD: &str = "\
 # What is not named here is left as it is.
 ";
 
-/// How files of before 0.2 name `merge_gap_mm`, which was in ticks of the encoder.
+/// How files of 0.1.0 name `merge_gap_mm`, which was in ticks of the encoder.
 const OLD_MERGE_GAP: &str = "merge_gap_ticks";
 
 /// Reads a file's settings, each within its range.

@@ -6,7 +6,7 @@ import type { Setting } from "./grammar.ts";
 /** What is wrong with a settings file, and what would be right. */
 export class SettingsFileError extends Error {}
 
-/** How files of before 0.2 name `merge_gap_mm`, which was in ticks of the encoder. */
+/** How files of 0.1.0 name `merge_gap_mm`, which was in ticks of the encoder. */
 const OLD_MERGE_GAP = "merge_gap_ticks";
 
 /** What a setting may be. */
