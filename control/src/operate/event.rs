@@ -92,7 +92,7 @@ impl Events {
         }
     }
 
-    /// The next one to be told.
+    /// The next one to be told. The few behind it are moved up: a deque of heapless takes 116 bytes of flash more, and 4 of SRAM.
     #[inline(never)]
     pub fn take(&mut self) -> Option<Event> {
         (!self.waiting.is_empty()).then(|| self.waiting.remove(0))
