@@ -4,6 +4,8 @@
 //! to one of them, and [`Written`] lists the units that a kind of quantity may be written in. Numbers without a unit,
 //! such as a number of teeth, are read by the same way. It knows nothing of what a value is for: ranges are the
 //! machine's.
+//!
+//! Texts are read by hand because `uom` knows neither `kg cm` nor `ha/h`, and does not say which units would be right.
 
 use serde::Deserializer;
 use serde::de::Visitor;

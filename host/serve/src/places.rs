@@ -1,4 +1,6 @@
 //! How many connections there may be at once, so that nobody takes them all: of all together, and of one address.
+//!
+//! It is by hand because the limits of `tower` are of requests, and of all addresses together.
 
 use std::collections::HashMap;
 use std::net::IpAddr;

@@ -4,7 +4,9 @@
 //!
 //! The model is R's `lm(response ~ speed + spacing)`, the binomial one R's `glm(..., family = binomial)`, the analysis R's
 //! `anova(lm(response ~ factor(block) + factor(speed) * factor(spacing)))`. Least squares come from linregress and nalgebra, distributions
-//! from statrs. What the plots cannot tell is said in words, as [`NoModel`] or as a [`Remark`]: no figure here is infinite or not a number.
+//! from statrs. The rest is by hand: no kept crate has this analysis of variance, and the one for the binomial model (ndarray-glm)
+//! wants a LAPACK of the system's. What the plots cannot tell is said in words, as [`NoModel`] or as a [`Remark`]: no figure here is
+//! infinite or not a number.
 
 mod binomial;
 mod checks;

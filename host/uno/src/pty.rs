@@ -6,6 +6,9 @@
 //!
 //! The other side is held open here as well, so that the terminal outlives the programs; inotify tells of theirs. It has no
 //! baud rate: bytes pass at the pace at which they are written and read. It needs Linux.
+//!
+//! The system's calls are rustix's. Crates for pseudo terminals (portable-pty, pty-process) start a program behind one and
+//! do not tell who opens it.
 
 use rustix::fd::OwnedFd;
 use rustix::fs::{OFlags, fcntl_setfl, inotify};

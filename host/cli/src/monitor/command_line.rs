@@ -1,4 +1,7 @@
 //! The line in which commands are typed: editing, history, completion.
+//!
+//! It is by hand because crates with all three (rustyline, reedline) want the terminal for themselves, and those for ratatui
+//! (tui-input) have only the editing, which is the least of it, and no limit of characters.
 
 use link::COMMAND_LENGTH;
 use link::completion::{common, complete};
