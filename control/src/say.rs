@@ -51,9 +51,9 @@ impl Console {
         self.answer.is_done() && self.line.is_done()
     }
 
-    /// Takes what a line said, to carry it out in a later turn.
-    pub fn take(&mut self, said: Result<Command, Mistake>) {
-        self.answer = Answer::Said(said);
+    /// Takes a line that was typed, to carry it out in a later turn.
+    pub fn take(&mut self, line: Result<Command, Mistake>) {
+        self.answer = Answer::Typed(line);
     }
 
     /// The next byte of the line that is being written.
@@ -68,8 +68,8 @@ impl Console {
         if !self.line.is_done() || !controller.carry_on() {
             return;
         }
-        if let Answer::Said(said) = self.answer {
-            self.answer = execute(said, controller);
+        if let Answer::Typed(line) = self.answer {
+            self.answer = execute(line, controller);
         } else if !self.answer.is_done() {
             self.answer.write_line(controller, &mut self.line);
         } else if let Some(event) = controller.next_event() {

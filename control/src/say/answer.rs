@@ -22,8 +22,8 @@ pub enum Answer {
     /// Nothing.
     #[default]
     Done,
-    /// Whatever answers this, which has not been carried out yet.
-    Said(Result<Command, Mistake>),
+    /// Whatever answers this line, which has not been carried out yet.
+    Typed(Result<Command, Mistake>),
     /// The commands, from the one at this place on.
     Help(u8),
     /// What a setting is.
@@ -62,7 +62,7 @@ impl Answer {
     #[inline(never)]
     pub fn write_line<C: Classifier, M: Memory>(&mut self, controller: &Controller<C, M>, line: &mut Line) {
         *self = match *self {
-            Self::Done | Self::Said(_) => return,
+            Self::Done | Self::Typed(_) => return,
             Self::Greeting => {
                 line.say(texts::WEEDER);
                 line.say(texts::RESET_BY);

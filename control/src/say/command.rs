@@ -146,7 +146,7 @@ pub fn parse(line: &[u8]) -> Result<Command, Mistake> {
     // What is refused because it looks wrong can be insisted on.
     let force = Argument::find(second) == Some(Argument::Force);
     let command = if first.is_empty() || argument.is_some() {
-        let Some(command) = said(word, argument) else { return usage };
+        let Some(command) = of_words(word, argument) else { return usage };
         command
     } else {
         match (word, number(first)) {
@@ -169,8 +169,8 @@ pub fn parse(line: &[u8]) -> Result<Command, Mistake> {
     }
 }
 
-/// What a word and the one behind it say, if anything.
-fn said(word: Word, argument: Option<Argument>) -> Option<Command> {
+/// The command that a word and the one behind it stand for, if there is one.
+fn of_words(word: Word, argument: Option<Argument>) -> Option<Command> {
     let words = [word as u8, argument_number(argument)];
     let place = (0..ROWS).map(usize::from).find(|&place| WORDS.load_at(place) == words)?;
     Some(COMMANDS.load_at(place))
@@ -299,13 +299,13 @@ impl LineBuffer {
     }
 
     fn end(&mut self) -> Option<Result<Command, Mistake>> {
-        let said = match self.mistake.take() {
+        let line = match self.mistake.take() {
             Some(mistake) => Some(Err(mistake)),
             None if split_word(&self.characters).0.is_empty() => None,
             None => Some(parse(&self.characters)),
         };
         self.characters.clear();
-        said
+        line
     }
 }
 

@@ -1,7 +1,7 @@
 //! Which rows a command talks to: those at the ports that are named, the only Uno, or all.
 //!
 //! A port is a path, such as /dev/ttyACM0, or the name that `weeder rows` has given to a board, wherever that is plugged in now. What has
-//! a name is told under it.
+//! a name is said under it.
 
 use crate::output::tell;
 use anyhow::{Context, Result, bail, ensure};
@@ -99,7 +99,7 @@ fn named(text: &str) -> Result<Named, String> {
 pub struct Chosen {
     /// The rows, at least one.
     pub rows: Vec<Row>,
-    /// Whether there may be several: what is told names the row then.
+    /// Whether there may be several: what is said names the row then.
     pub are_several: bool,
 }
 
@@ -211,8 +211,8 @@ impl Chosen {
         folder.join(format!("{}.{ending}", row.name))
     }
 
-    /// What is told of a row, under its name where there may be several.
-    pub fn told(&self, row: usize, text: &str) -> String {
+    /// What is said of a row, under its name where there may be several.
+    pub fn under_name(&self, row: usize, text: &str) -> String {
         match self.rows.get(row) {
             Some(row) if self.are_several => format!("{}: {text}", row.name),
             _ => text.to_owned(),
@@ -271,9 +271,9 @@ mod tests {
             boards,
             [("left", &Board::SerialNumber("A1".to_owned())), ("left2", &port("./left2")), ("hedge", &port("right"))]
         );
-        assert_eq!(chosen.told(0, "lost"), "left: lost");
+        assert_eq!(chosen.under_name(0, "lost"), "left: lost");
         let one = ports(&["./left"]).choose().unwrap();
-        assert_eq!((one.rows[0].board.clone(), one.told(0, "lost")), (port("./left"), "lost".to_owned()));
+        assert_eq!((one.rows[0].board.clone(), one.under_name(0, "lost")), (port("./left"), "lost".to_owned()));
     }
 
     #[test]

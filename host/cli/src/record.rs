@@ -75,7 +75,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         let What::Happened(happening) = heard.what else { continue };
         if let Err(error) = logs.write(heard.row, &happening) {
             // The other rows' logs are still written.
-            tell!("error: {}", chosen.told(heard.row, &format!("{:#}", anyhow::Error::from(error))));
+            tell!("error: {}", chosen.under_name(heard.row, &format!("{:#}", anyhow::Error::from(error))));
             ensure!(logs.are_any_written(), "no log can be written any more");
         }
         if let Some(gps) = &mut gps {
@@ -83,9 +83,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         }
         match happening {
             Happening::Connected { version, .. } => {
-                tell!("{}", chosen.told(heard.row, &format!("weeder {version} is there")));
+                tell!("{}", chosen.under_name(heard.row, &format!("weeder {version} is there")));
             }
-            Happening::Lost(why) => tell!("{}", chosen.told(heard.row, &why)),
+            Happening::Lost(why) => tell!("{}", chosen.under_name(heard.row, &why)),
             _ => {}
         }
     }
@@ -112,7 +112,7 @@ pub fn open(chosen: &Chosen) -> Result<(Rows, Vec<bool>)> {
         return Err(why.into());
     }
     for (row, why) in missing {
-        tell!("{}", chosen.told(row, &format!("{:#}", anyhow::Error::from(why))));
+        tell!("{}", chosen.under_name(row, &format!("{:#}", anyhow::Error::from(why))));
     }
     bail!("none of the {} rows is there", rows.count());
 }

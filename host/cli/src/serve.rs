@@ -82,9 +82,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 }
 
 /// Where the page is: as it was said, beside this command, as in a release, or where the repository's build puts it.
-fn page_folder(said: Option<&Path>) -> PathBuf {
-    if let Some(said) = said {
-        return said.to_owned();
+fn page_folder(named: Option<&Path>) -> PathBuf {
+    if let Some(named) = named {
+        return named.to_owned();
     }
     let beside = env::current_exe().ok().and_then(|command| Some(command.parent()?.join("page")));
     match beside {

@@ -127,7 +127,7 @@ fn pull(file: Option<&FileName>, json: bool, chosen: &Chosen) -> Result<Finding>
                 settings_file::write(&path, &settings)?;
                 if !json {
                     let text = format!("The machine's settings are in {}", path.display());
-                    say!("{}", chosen.told(place, &text))?;
+                    say!("{}", chosen.under_name(place, &text))?;
                 }
             }
             Ok(settings)
@@ -154,12 +154,12 @@ fn push(file: &Path, save: bool, json: bool, chosen: &Chosen) -> Result<Finding>
             [] => "The machine has these settings already".to_owned(),
             set => format!("Set: {}", set.join(", ")),
         };
-        say!("{}", chosen.told(place, &text))?;
+        say!("{}", chosen.under_name(place, &text))?;
         let saved = match save {
             true => "All settings are saved",
             false => "Not saved: the next reset takes them back, and on most Unos opening the port is one",
         };
-        say!("{}", chosen.told(place, saved))?;
+        say!("{}", chosen.under_name(place, saved))?;
     }
     chosen.check(pushed)?;
     Ok(Finding::Good)
@@ -176,11 +176,11 @@ fn diff(file: &Path, json: bool, chosen: &Chosen) -> Result<Finding> {
         match differences {
             Ok(differences) if differences.is_empty() => {
                 let text = format!("The machine has the settings of {}", chosen.file_of(place, file).display());
-                say!("{}", chosen.told(place, &text))?;
+                say!("{}", chosen.under_name(place, &text))?;
             }
             Ok(differences) if chosen.are_several => {
                 let file = chosen.file_of(place, file);
-                say!("{}\n{}", chosen.told(place, &format!("not as in {}", file.display())), table(differences))?;
+                say!("{}\n{}", chosen.under_name(place, &format!("not as in {}", file.display())), table(differences))?;
             }
             Ok(differences) => say!("{}", table(differences))?,
             Err(_) => {}

@@ -165,7 +165,7 @@ pub trait Port: Read + Write {}
 impl<T: Read + Write + ?Sized> Port for T {}
 
 /// Something from the port.
-enum Heard {
+enum Received {
     Line(String),
     Bytes(usize),
     Nothing,
@@ -239,15 +239,15 @@ impl Link {
         let mut answer: Vec<String> = Vec::new();
         while silent_reads < SILENT_READS && bytes < ANSWER_BYTES && Instant::now() < deadline {
             let line = match self.hear()? {
-                Heard::Nothing => {
+                Received::Nothing => {
                     silent_reads += 1;
                     continue;
                 }
-                Heard::Bytes(count) => {
+                Received::Bytes(count) => {
                     bytes += count;
                     continue;
                 }
-                Heard::Line(line) => line,
+                Received::Line(line) => line,
             };
             match Said::parse(&line) {
                 Said::Done => return Ok(answer),
@@ -288,10 +288,10 @@ impl Link {
             return Ok(Some(line));
         }
         match self.hear()? {
-            Heard::Line(line) => Ok(Some(line)),
+            Received::Line(line) => Ok(Some(line)),
             // The line that these bytes complete is there at once.
-            Heard::Bytes(_) => Ok(self.lines.next_line()),
-            Heard::Nothing => Ok(None),
+            Received::Bytes(_) => Ok(self.lines.next_line()),
+            Received::Nothing => Ok(None),
         }
     }
 
@@ -302,25 +302,25 @@ impl Link {
     }
 
     /// A line that is there already, or one read.
-    fn hear(&mut self) -> Result<Heard, LinkError> {
+    fn hear(&mut self) -> Result<Received, LinkError> {
         if let Some(line) = self.lines.next_line() {
-            return Ok(Heard::Line(line));
+            return Ok(Received::Line(line));
         }
         let mut bytes = [0; 256];
         match self.port.read(&mut bytes) {
             Ok(0) => Err(LinkError::Gone(io::ErrorKind::UnexpectedEof.into())),
             Ok(count) => {
                 self.lines.take(&bytes[..count]);
-                Ok(Heard::Bytes(count))
+                Ok(Received::Bytes(count))
             }
-            Err(error) if is_nothing(&error) => Ok(Heard::Nothing),
+            Err(error) if is_nothing(&error) => Ok(Received::Nothing),
             Err(error) => Err(LinkError::Gone(error)),
         }
     }
 
     fn wait_for_greeting(&mut self, reads: usize) -> Result<(), LinkError> {
         for _ in 0..reads {
-            if let Heard::Line(line) = self.hear()?
+            if let Received::Line(line) = self.hear()?
                 && is_greeting(&line)
             {
                 return Ok(());
@@ -334,7 +334,7 @@ impl Link {
         let deadline = Instant::now() + Duration::from_secs(1);
         let mut quiet_reads = 0;
         while quiet_reads < 2 && Instant::now() < deadline {
-            quiet_reads = if let Heard::Nothing = self.hear()? { quiet_reads + 1 } else { 0 };
+            quiet_reads = if let Received::Nothing = self.hear()? { quiet_reads + 1 } else { 0 };
         }
         Ok(())
     }

@@ -94,7 +94,7 @@ pub struct Thing {
     pub line: u64,
     /// As it stands there.
     pub text: String,
-    /// When it was told, by the record's clock.
+    /// When it was recorded, by the record's clock.
     pub time_ms: u64,
     /// Metres by the wheel since the stretch began.
     pub way_m: f64,
@@ -296,8 +296,8 @@ impl Job {
         // Where its least delay is known better, a later one may come out as an earlier.
         fixes.sort_by(|(_, one), (_, other)| one.time_ms.total_cmp(&other.time_ms));
         let track = Track::through(&fixes, self.antenna.error_m(), wanted.longest_outage_m);
-        let find = |way_m: f64, told_ms: u64, offset: Offset| match &track {
-            Some(track) => track.find(way_m, told_ms as f64, offset),
+        let find = |way_m: f64, recorded_ms: u64, offset: Offset| match &track {
+            Some(track) => track.find(way_m, recorded_ms as f64, offset),
             None => Err(Missing::NoFixBefore),
         };
         let beam_to_tool_mm = read.settings.as_ref().map_or(0.0, |to| f64::from(to.get(Setting::BeamToToolMm)));

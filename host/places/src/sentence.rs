@@ -93,13 +93,13 @@ impl Line {
         Self::Report(match nmea::parse_str(line) {
             Ok(ParseResult::RMC(said)) => {
                 // By NMEA 2.3 and later; before, the status alone says whether there is a fix.
-                let told = said.faa_mode.map(|mode| quality(mode.into()));
-                let is_valid = said.status_of_fix != RmcStatusOfFix::Invalid && told != Some(None);
+                let of_mode = said.faa_mode.map(|mode| quality(mode.into()));
+                let is_valid = said.status_of_fix != RmcStatusOfFix::Invalid && of_mode != Some(None);
                 Report {
                     time_ms: said.fix_time.map(milliseconds),
                     day: said.fix_date.map(|date| i64::from(date.num_days_from_ce()) - EPOCH_DAY),
                     place: place(said.lat, said.lon).filter(|_| is_valid),
-                    quality: told.flatten(),
+                    quality: of_mode.flatten(),
                 }
             }
             Ok(ParseResult::GGA(said)) => {

@@ -4,7 +4,7 @@
 //! of it.
 //!
 //! - **The antenna's place** there lies between two fixes, at the wheel's share of the way. The machine may have rolled
-//!   over the same distance several times: the last time counts before the thing was told. What is fixed several times
+//!   over the same distance several times: the last time counts before the thing was recorded. What is fixed several times
 //!   while the wheel stands is fixed at the mean.
 //! - **The heading** is that of the straight line that fits so many fixes around there, by least squares over the
 //!   wheel's distance, that its error is [`HEADING_ERROR`]; [`LONGEST_CHORD_M`] are fitted at the most. It is the
@@ -28,12 +28,12 @@ const NO_HEADING: f64 = 0.5;
 /// Fixes that follow each other are not farther apart than so many of the receiver's intervals.
 const INTERVALS: f64 = 1.5;
 
-/// How far behind the farthest place a machine rolls back and forth, in metres: what was told is sought so far back.
+/// How far behind the farthest place a machine rolls back and forth, in metres: what was recorded is sought so far back.
 const ROLLED_BACK_M: f64 = 50.0;
 
-/// How much later than it was told something may have happened, in ms: the record has a status, a fix and what was told
+/// How much later than it was recorded something may have happened, in ms: the record has a status, a fix and an event
 /// each with a delay of its own.
-const TOLD_EARLY_MS: f64 = 1000.0;
+const RECORDED_EARLY_MS: f64 = 1000.0;
 
 /// The wheel stands while it rolls less, in metres.
 const STANDING_M: f64 = 0.005;
@@ -160,13 +160,13 @@ impl Track {
         Some(Self { plane, stations, interval_ms, longest_outage_m })
     }
 
-    /// The place of something that stands so beside the antenna, where the wheel had rolled so far, and that was told
+    /// The place of something that stands so beside the antenna, where the wheel had rolled so far, and that was recorded
     /// at that time of the record's clock.
     ///
     /// # Errors
     /// Why it has none.
-    pub fn find(&self, way_m: f64, told_ms: f64, offset: Offset) -> Result<Found, Missing> {
-        let first = self.passed(way_m, told_ms)?;
+    pub fn find(&self, way_m: f64, recorded_ms: f64, offset: Offset) -> Result<Found, Missing> {
+        let first = self.passed(way_m, recorded_ms)?;
         let (from, to) = (&self.stations[first], &self.stations[first + 1]);
         if from.track != to.track {
             return Err(Missing::Jumped);
@@ -192,9 +192,9 @@ impl Track {
     }
 
     /// The first of the two fixes between which the wheel rolled over this distance for the last time before something
-    /// was told.
-    fn passed(&self, way_m: f64, told_ms: f64) -> Result<usize, Missing> {
-        let before = self.stations.partition_point(|station| station.time_ms <= told_ms + TOLD_EARLY_MS);
+    /// was recorded.
+    fn passed(&self, way_m: f64, recorded_ms: f64) -> Result<usize, Missing> {
+        let before = self.stations.partition_point(|station| station.time_ms <= recorded_ms + RECORDED_EARLY_MS);
         for first in (0..before).rev() {
             let from_m = self.stations[first].way_m;
             let Some(to) = self.stations.get(first + 1) else { continue };
@@ -206,7 +206,7 @@ impl Track {
                 break;
             }
         }
-        // It was told before the next fix, or in front of all.
+        // It was recorded before the next fix, or in front of all.
         let farthest = self.stations[..before].iter().map(|station| station.way_m).fold(f64::NEG_INFINITY, f64::max);
         Err(if way_m > farthest && before > 0 { Missing::NoFixBehind } else { Missing::NoFixBefore })
     }

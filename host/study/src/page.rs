@@ -1,18 +1,18 @@
-//! A trial's report as a page for a browser: one file with its plots and tables, that needs nothing beside it.
+//! A trial's report as a page for a browser: one file with its charts and tables, that needs nothing beside it.
 //!
-//! [`Page`] says what is on it. The plots are SVG within the page, and its colours follow the reader's choice of light
+//! [`Page`] says what is on it. The charts are SVG within the page, and its colours follow the reader's choice of light
 //! or dark. It holds no script, asks no network, and comes out the same for the same trial: there is no clock in it. The
 //! words and their order are in `templates/page.html`, its looks in `templates/page.css`.
 
+mod chart;
 mod figure;
-mod plot;
 mod response;
 mod table;
 
 use crate::evaluation::{Analysis, Performance, PlotRecord, Response};
 use askama::Template;
+use chart::DrawingError;
 use figure::Figure;
-use plot::DrawingError;
 use response::Chapter;
 use table::{Table, fixed, short};
 use thiserror::Error;
@@ -90,8 +90,8 @@ pub enum PageError {
         /// What it is.
         value: f64,
     },
-    /// A plot.
-    #[error("a plot cannot be drawn")]
+    /// A chart.
+    #[error("a chart cannot be drawn")]
     Drawing(#[from] DrawingError),
     /// The page itself.
     #[error("the page cannot be put together")]
@@ -139,7 +139,7 @@ struct Sheet<'a> {
     parameters: Table,
 }
 
-/// The controllers side by side, as plots and as tables.
+/// The controllers side by side, as charts and as tables.
 struct Headline {
     figures: [Figure; 3],
     tables: [Table; 3],

@@ -84,16 +84,16 @@ pub struct SimulatedReceiver {
     setup: ReceiverSetup,
     plane: Plane,
     noise: ChaCha8Rng,
-    /// Fixes that were told.
-    told: u64,
+    /// Fixes so far.
+    fixes: u64,
 }
 
 impl SimulatedReceiver {
-    /// One that has told nothing.
+    /// One that has had no fix yet.
     pub fn new(setup: ReceiverSetup) -> Self {
         let plane = Plane::around(setup.from);
         let noise = ChaCha8Rng::seed_from_u64(setup.seed);
-        Self { setup, plane, noise, told: 0 }
+        Self { setup, plane, noise, fixes: 0 }
     }
 
     /// Where something stands that the beam reaches when the machine has rolled so far, and that is so far beside the
@@ -113,11 +113,11 @@ impl SimulatedReceiver {
     pub fn bytes_until(&mut self, time_s: f64, way_m: impl Fn(f64) -> f64) -> Vec<u8> {
         let mut bytes = Vec::new();
         loop {
-            let moment_s = self.told as f64 / self.setup.rate_hz;
+            let moment_s = self.fixes as f64 / self.setup.rate_hz;
             if moment_s + self.setup.delay_ms / 1000.0 > time_s {
                 return bytes;
             }
-            self.told += 1;
+            self.fixes += 1;
             for line in self.sentences(moment_s, way_m(moment_s)) {
                 bytes.extend(self.sent(line));
             }

@@ -32,7 +32,7 @@ mod registers;
 mod values;
 
 pub use self::budget::{Budgets, BudgetsError, BudgetsProblem, Held};
-use self::cycles::{Stretch, Time, Timer, Turns};
+use self::cycles::{Passes, Stretch, Time, Timer};
 use self::decode::{Instruction, Operation};
 use self::flow::{Entry, Kind, Node, Program, Routine, bytes};
 pub use self::loops::{LoopBound, LoopBounds, records};
@@ -376,12 +376,12 @@ pub fn prove(elf: &Path, input: Option<&Input>, loops: &LoopBounds) -> Result<Bo
 
     let places = program.routines().flat_map(|routine| &routine.nodes).map(|node| node.place.address);
     let of_heads = places.filter_map(|place| Some((place, loops.get(&program.name(place))?.passes.clone()))).collect();
-    let mut timer = Timer::new(Turns { stated: loops::records(elf)?, of_heads });
-    let mut told = Vec::new();
+    let mut timer = Timer::new(Passes { stated: loops::records(elf)?, of_heads });
+    let mut of_handlers = Vec::new();
     for (&vector, handler) in &handlers {
         let what = format!("the handler of vector {vector}");
         let longest = timer.longest(handler).map(|time| time.bound(&what, &program));
-        told.push(Handler {
+        of_handlers.push(Handler {
             vector,
             function: program.name_of(handler.entry),
             cycles: longest.transpose()?.map(|cycles| RESPONSE_CYCLES + cycles),
@@ -396,7 +396,7 @@ pub fn prove(elf: &Path, input: Option<&Input>, loops: &LoopBounds) -> Result<Bo
     let critical_section_cycles = longest_stretch(Stretch::FlagClear)?;
     let closed_cycles = longest_stretch(Stretch::Closed)?;
 
-    let edges = input.map(|input| watch(input, &program, &handlers, &told, &mut timer, closed_cycles)).transpose()?;
+    let edges = input.map(|input| watch(input, &program, &handlers, &of_handlers, &mut timer, closed_cycles)).transpose()?;
 
     let feeds = |node: &Node| {
         program.instruction(node.place.address).is_ok_and(|instruction| instruction.operation == Operation::Wdr)
@@ -413,7 +413,7 @@ pub fn prove(elf: &Path, input: Option<&Input>, loops: &LoopBounds) -> Result<Bo
     Ok(Bounds {
         stack_bytes: bytes(&stack),
         stack,
-        handlers: told,
+        handlers: of_handlers,
         critical_section_cycles,
         closed_cycles,
         edges,
@@ -422,12 +422,12 @@ pub fn prove(elf: &Path, input: Option<&Input>, loops: &LoopBounds) -> Result<Bo
     })
 }
 
-/// How long an edge of an input waits for a look, and how fast its edges may come. `told` are all handlers with their times.
+/// How long an edge of an input waits for a look, and how fast its edges may come. `of_handlers` are all handlers with their times.
 fn watch(
     input: &Input,
     program: &Program,
     handlers: &BTreeMap<u8, Rc<Routine>>,
-    told: &[Handler],
+    of_handlers: &[Handler],
     timer: &mut Timer,
     closed_cycles: u64,
 ) -> Result<EdgeBounds, BoundsError> {
@@ -445,7 +445,7 @@ fn watch(
         to_look = to_look.max(RESPONSE_CYCLES + to.bound("the way to a look", program)?);
         busy = busy.max(behind.bound("the way from a look", program)?);
     }
-    let others = told.iter().filter(|handler| !input.vectors.contains(&handler.vector));
+    let others = of_handlers.iter().filter(|handler| !input.vectors.contains(&handler.vector));
     let busy = others.filter_map(|handler| handler.cycles).fold(busy, u64::max);
     let wait_cycles = SYNCHRONISER_CYCLES + busy + closed_cycles + to_look;
     Ok(EdgeBounds { wait_cycles, never_lost_per_s: input.edges_between_looks * CYCLES_PER_SECOND / wait_cycles })

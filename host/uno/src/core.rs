@@ -86,7 +86,7 @@ pub(super) struct Core {
     recorder: NonNull<Recorder>,
     input: NonNull<simavr::avr_irq_t>,
     /// Levels that the inputs are held at from outside, by port (B, D) and bit.
-    held: [Held; 2],
+    held: [HeldLevels; 2],
     /// The last step left the chip asleep.
     asleep: bool,
     /// Address in flash at which the main program loops for ever.
@@ -94,7 +94,7 @@ pub(super) struct Core {
 }
 
 #[derive(Clone, Copy, Default)]
-struct Held {
+struct HeldLevels {
     mask: u8,
     levels: u8,
 }
@@ -179,7 +179,7 @@ impl Core {
             chip,
             recorder,
             input: NonNull::new(input).expect("the ATmega328P has a UART"),
-            held: [Held::default(); 2],
+            held: [HeldLevels::default(); 2],
             asleep: false,
             stalled_at: None,
         };

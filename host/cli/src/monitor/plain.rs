@@ -119,7 +119,7 @@ impl Talk<'_> {
             let standing = &mut self.standing[row];
             if !standing.is_there {
                 standing.has_failed = true;
-                writeln!(output, "{}", self.chosen.told(row, "error: the row is not there"))?;
+                writeln!(output, "{}", self.chosen.under_name(row, "error: the row is not there"))?;
                 if command == "hold" {
                     self.rows.hold(row);
                 }
@@ -158,12 +158,12 @@ impl Talk<'_> {
                 standing.has_failed |= !was_idle;
                 (standing.is_there, standing.unanswered) = (false, 0);
                 ensure!(self.chosen.are_several || was_idle && !ended, "{why}");
-                tell!("{}", self.chosen.told(row, why));
+                tell!("{}", self.chosen.under_name(row, why));
             }
-            What::Happened(Happening::Event(_, line)) => writeln!(output, "{}", self.chosen.told(row, line))?,
+            What::Happened(Happening::Event(_, line)) => writeln!(output, "{}", self.chosen.under_name(row, line))?,
             What::Happened(Happening::Answer(line)) => {
                 standing.statuses = 0;
-                writeln!(output, "{}", self.chosen.told(row, line))?;
+                writeln!(output, "{}", self.chosen.under_name(row, line))?;
             }
             What::Answered { refusal, .. } => {
                 standing.unanswered = standing.unanswered.saturating_sub(1);
@@ -174,7 +174,11 @@ impl Talk<'_> {
             What::NotTyped { command, why } => {
                 standing.unanswered = standing.unanswered.saturating_sub(1);
                 standing.has_failed = true;
-                writeln!(output, "{}", self.chosen.told(row, &format!("error: `{command}` was not typed: {why}")))?;
+                writeln!(
+                    output,
+                    "{}",
+                    self.chosen.under_name(row, &format!("error: `{command}` was not typed: {why}"))
+                )?;
             }
         }
         if let Some(hold) = &mut self.hold {

@@ -1,7 +1,7 @@
-//! The page's plots: lines with markers over speed, and clouds of points, as SVG that stands within a page.
+//! The page's charts: lines with markers over speed, and clouds of points, as SVG that stands within a page.
 //!
 //! Series differ in colour, marker and dashes. The colours in here are those of light paper, and at the same time names:
-//! the page's style sheet puts others in their place for dark paper, and dashes the lines. Plots are drawn at twice the
+//! the page's style sheet puts others in their place for dark paper, and dashes the lines. Charts are drawn at twice the
 //! size at which they are usually shown, because plotters works in whole pixels. Legends and titles are the page's.
 
 use plotters::coord::Shift;
@@ -13,8 +13,8 @@ use std::ops::Range;
 /// What plotters says where it cannot draw.
 pub type DrawingError = DrawingAreaErrorKind<io::Error>;
 
-/// Size of a plot, and of a series' mark in a legend, in pixels.
-const PLOT_SIZE: (u32, u32) = (840, 572);
+/// Size of a chart, and of a series' mark in a legend, in pixels.
+const CHART_SIZE: (u32, u32) = (840, 572);
 const KEY_SIZE: (u32, u32) = (88, 36);
 
 /// Ink for words, for axes, for the mesh, and for limits.
@@ -71,8 +71,8 @@ pub struct Series {
     pub cloud: Vec<(f64, f64)>,
 }
 
-/// A plot: what is in it, and which part of the plane it shows.
-pub struct Plot<'a> {
+/// A chart: what is in it, and which part of the plane it shows.
+pub struct Chart<'a> {
     /// What is to the right, with its unit.
     pub x_label: &'a str,
     /// The part of the plane.
@@ -85,13 +85,13 @@ pub struct Plot<'a> {
     pub limit: &'a [(f64, f64)],
 }
 
-impl Plot<'_> {
+impl Chart<'_> {
     /// Draws it.
     ///
     /// # Errors
     /// Where plotters cannot draw it, as for a range without extent.
     pub fn svg(&self) -> Result<String, DrawingError> {
-        svg(PLOT_SIZE, |area| {
+        svg(CHART_SIZE, |area| {
             let mut chart = ChartBuilder::on(area)
                 .margin(6)
                 .margin_top(14)

@@ -1,22 +1,22 @@
-//! The page's figures: which plot shows what, its legend, and the same in words for those who cannot see it.
+//! The page's figures: which chart shows what, its legend, and the same in words for those who cannot see it.
 
-use super::plot::{DrawingError, Look, Plot, Series, key, range_of};
+use super::chart::{Chart, DrawingError, Look, Series, key, range_of};
 use super::table::{fixed, short};
 use super::{Comparison, ControllerPoint};
 use crate::evaluation::{Analysis, Response, ResponseAnalysis};
 use crate::statistics::LinearModel;
 
-/// A plot with all that belongs to it.
+/// A chart with all that belongs to it.
 pub struct Figure {
     /// What it shows.
     pub title: String,
     /// The unit of what is upwards, or what it is a share of.
     pub unit: String,
-    /// The plot.
+    /// The chart.
     pub svg: String,
     /// What the lines and markers mean.
     pub legend: Vec<Key>,
-    /// The plot in words.
+    /// The chart in words.
     pub words: String,
     /// What else has to be known.
     pub caption: String,
@@ -81,14 +81,14 @@ fn curves(
     // The first is drawn last: it is the one to be seen where lines meet.
     series.reverse();
     let points = || series.iter().flat_map(|series| &series.line).chain(limit);
-    let plot = Plot {
+    let chart = Chart {
         x_label: SPEED,
         x: range_of(points().map(|point| point.0), false),
         y: range_of(points().map(|point| point.1), true),
         series: &series,
         limit,
     };
-    Ok(Figure { title: title.into(), unit: unit.into(), svg: plot.svg()?, legend, words, caption: caption.into() })
+    Ok(Figure { title: title.into(), unit: unit.into(), svg: chart.svg()?, legend, words, caption: caption.into() })
 }
 
 /// One measure of a trial against speed, a line a spacing through the means, with the plots around them.
@@ -119,7 +119,7 @@ pub fn response(analysis: &Analysis, response: Response) -> Result<Figure, Drawi
         series.push(Series { look, line: line.into_iter().map(moved).collect(), cloud });
     }
     let points = || series.iter().flat_map(|series| &series.cloud);
-    let plot = Plot {
+    let chart = Chart {
         x_label: SPEED,
         x,
         y: range_of(points().map(|point| point.1), response == Response::PlantDamage),
@@ -129,7 +129,7 @@ pub fn response(analysis: &Analysis, response: Response) -> Result<Figure, Drawi
     Ok(Figure {
         title: response.title().into(),
         unit: response.unit().into(),
-        svg: plot.svg()?,
+        svg: chart.svg()?,
         legend,
         words,
         caption: format!("The paper's Fig. {}.", paper_figure(response)),
@@ -151,11 +151,11 @@ pub fn residuals(analysis: &Analysis, of: &ResponseAnalysis, model: &LinearModel
     let farthest = model.residuals.iter().fold(0.0, |farthest: f64, residual| farthest.max(residual.abs()));
     let unit = of.response.unit();
     let label = format!("by the model, {unit}");
-    let plot = Plot { x_label: &label, x, y: range_of([-farthest, farthest], false), series: &series, limit: &[] };
+    let chart = Chart { x_label: &label, x, y: range_of([-farthest, farthest], false), series: &series, limit: &[] };
     Ok(Figure {
         title: "Residuals".into(),
         unit: unit.into(),
-        svg: plot.svg()?,
+        svg: chart.svg()?,
         legend,
         words: format!(
             "Residuals of the {} plots against what the model says of them; the farthest is {} {unit} off.",

@@ -1,7 +1,7 @@
 //! A chapter of the page: what the plots together say of one measure, with what the paper printed of it beside.
 
+use super::chart::DrawingError;
 use super::figure::{Figure, residuals};
-use super::plot::DrawingError;
 use super::table::{NOTHING, Table, fixed, optional, probability, short, significant};
 use crate::evaluation::published::{Coefficients, Published};
 use crate::evaluation::{Analysis, ResponseAnalysis};

@@ -142,8 +142,8 @@ struct Field {
     blind_until_turn: u64,
     /// What went wrong last, and at which turn.
     last_fault: (&'static str, u64),
-    /// How long the tool has been told where it is, and whether it was fully out before.
-    told_turns: u64,
+    /// Turns since the tool's last order, and whether it was fully out before that.
+    order_turns: u64,
     was_clear: bool,
     tool_out: bool,
     /// Plants of the row that were mistaken or reached blindly.
@@ -207,7 +207,7 @@ impl Field {
             lost_ticks: 0,
             blind_until_turn: 0,
             last_fault: ("nothing", 0),
-            told_turns: 0,
+            order_turns: 0,
             was_clear: true,
             tool_out: true,
             excused: Vec::new(),
@@ -394,17 +394,17 @@ impl Field {
             self.tally.violated(self.time_s(), format_args!("the tool is in the row in {:?}", self.weeder.state()));
         }
         let (dead, swing) = (self.machine.servo.dead_time_ms, self.swing_ms());
-        let told_ms = self.told_turns as f64;
+        let order_ms = self.order_turns as f64;
         let clear = if self.tool_out {
-            told_ms >= swing || (self.was_clear && told_ms < swing)
+            order_ms >= swing || (self.was_clear && order_ms < swing)
         } else {
-            self.was_clear && told_ms < dead
+            self.was_clear && order_ms < dead
         };
         if out != self.tool_out {
             // A tool that had not begun to move is still where it was.
-            (self.was_clear, self.tool_out, self.told_turns) = (clear, out, 0);
+            (self.was_clear, self.tool_out, self.order_turns) = (clear, out, 0);
         } else {
-            self.told_turns += 1;
+            self.order_turns += 1;
         }
         let first = ground.plants.partition_point(|plant| plant.end <= tool);
         let Some((plant, excuse)) = ground.plants.get(first).zip(self.excused.get_mut(first)) else { return };
@@ -421,13 +421,13 @@ impl Field {
         excuse.blind |= out && self.weeder.unseen_mm() > 0;
         if !excuse.mistaken && !excuse.blind {
             let state = self.weeder.state();
-            let (time_s, told, row) = (self.time_s(), self.told_turns, self.tally.rows);
+            let (time_s, order_ms, row) = (self.time_s(), self.order_turns, self.tally.rows);
             let (fault, fault_turn) = self.last_fault;
             let ago_s = (self.turns - fault_turn) as f64 * TURN_S;
             self.tally.violated(
                 time_s,
                 format_args!(
-                    "a plant was harmed at tick {tool} of row {row}, in {state:?}, {told} ms after the last order, \
+                    "a plant was harmed at tick {tool} of row {row}, in {state:?}, {order_ms} ms after the last order, \
                      {ago_s:.3} s after {fault}"
                 ),
             );

@@ -53,9 +53,9 @@ fn longer(one: Option<Time>, other: Option<Time>) -> Option<Time> {
     }
 }
 
-/// What has been said of how often loops turn.
+/// What has been said of how often loops are passed through.
 #[derive(Default)]
-pub(super) struct Turns {
+pub(super) struct Passes {
     /// By addresses in loops: how often the program comes by them at most, each time that the loop is come to.
     pub(super) stated: BTreeMap<u32, u64>,
     /// By addresses at which loops may begin, for the outermost of a function and for each depth within it.
@@ -87,14 +87,14 @@ struct Stretches {
 /// Times routines, each once.
 #[derive(Default)]
 pub(super) struct Timer {
-    turns: Turns,
+    passes: Passes,
     longest: BTreeMap<*const Routine, Option<Time>>,
     stretches: BTreeMap<(*const Routine, Stretch), Stretches>,
 }
 
 impl Timer {
-    pub(super) fn new(turns: Turns) -> Timer {
-        Timer { turns, ..Timer::default() }
+    pub(super) fn new(passes: Passes) -> Timer {
+        Timer { passes, ..Timer::default() }
     }
 
     /// The longest path from a routine's entry to the end of a return; `None` where it never returns.
@@ -292,7 +292,7 @@ impl Timer {
         }
         let address = |node: usize| nodes[node].place.address;
         let all = (0..nodes.len()).filter(|&node| within(node)).collect();
-        Paths { ways: &ways, turns: &self.turns, address: &address }.fill(all, &BTreeSet::new(), 0, &mut times);
+        Paths { ways: &ways, passes: &self.passes, address: &address }.fill(all, &BTreeSet::new(), 0, &mut times);
         times
     }
 }
@@ -324,7 +324,7 @@ fn reaching(nodes: &[Node], is_end: impl Fn(usize) -> bool) -> Vec<bool> {
 /// Longest paths over places and ways.
 struct Paths<'a> {
     ways: &'a [Vec<(usize, Time)>],
-    turns: &'a Turns,
+    passes: &'a Passes,
     address: &'a dyn Fn(usize) -> u32,
 }
 
@@ -358,7 +358,7 @@ impl Paths<'_> {
         for &head in &heads {
             let stated = if heads.len() == 1 { self.stated(circle, head) } else { None };
             let stated = stated.or_else(|| {
-                let by_depth = self.turns.of_heads.get(&(self.address)(head))?;
+                let by_depth = self.passes.of_heads.get(&(self.address)(head))?;
                 by_depth.get(depth).or(by_depth.last()).copied()
             });
             passes = passes.zip(stated).map(|(passes, stated)| passes + stated);
@@ -385,7 +385,7 @@ impl Paths<'_> {
 
     /// How often a loop turns at most, where a place that is in no loop within it says so, and no turn goes round that place.
     fn stated(&self, circle: &BTreeSet<usize>, head: usize) -> Option<u64> {
-        let saying = |node: usize| self.turns.stated.get(&(self.address)(node)).map(|turns| (node, *turns));
+        let saying = |node: usize| self.passes.stated.get(&(self.address)(node)).map(|passes| (node, *passes));
         let within = |node: usize, set: &BTreeSet<usize>| -> Vec<usize> {
             self.ways[node].iter().map(|(to, _)| *to).filter(|to| set.contains(to)).collect()
         };
@@ -403,7 +403,7 @@ impl Paths<'_> {
                     .any(|rest| rest.contains(&head) && (rest.len() > 1 || within(head, rest).contains(&head)))
         };
         let stated = circle.iter().filter_map(|&node| saying(node));
-        stated.filter(|&(node, _)| !is_inner(node) && !goes_round(node)).map(|(_, turns)| turns).min()
+        stated.filter(|&(node, _)| !is_inner(node) && !goes_round(node)).map(|(_, passes)| passes).min()
     }
 }
 

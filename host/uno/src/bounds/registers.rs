@@ -64,7 +64,7 @@ const SPL: u16 = 0x5D;
 
 /// What a register holds, as far as it matters here.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Held {
+enum Content {
     Unknown,
     Zero,
     /// What this register held at the entry.
@@ -76,23 +76,23 @@ enum Held {
 /// What is held where at a place.
 #[derive(Clone, Debug, PartialEq)]
 struct Keeping {
-    registers: [Held; 32],
+    registers: [Content; 32],
     /// The flags, of which these are as they were at the entry.
     flags: Registers,
     /// The register that has just been counted down, while the flag says whether it has come to zero.
     counted: Option<usize>,
     /// The general purpose I/O registers, in which some handlers keep the flags.
-    gpior: [Held; 3],
-    stack: Vec<Held>,
+    gpior: [Content; 3],
+    stack: Vec<Content>,
 }
 
 impl Keeping {
     fn at_entry(kind: Kind) -> Keeping {
-        let mut registers = std::array::from_fn(Held::Register);
+        let mut registers = std::array::from_fn(Content::Register);
         if kind == Kind::Function {
-            registers[ZERO] = Held::Zero;
+            registers[ZERO] = Content::Zero;
         }
-        Keeping { registers, flags: Registers::FLAGS, counted: None, gpior: [Held::Unknown; 3], stack: Vec::new() }
+        Keeping { registers, flags: Registers::FLAGS, counted: None, gpior: [Content::Unknown; 3], stack: Vec::new() }
     }
 
     /// Leaves what both know; whether that is less than before.
@@ -105,8 +105,8 @@ impl Keeping {
             .chain(self.gpior.iter_mut().zip(&other.gpior))
             .chain(self.stack.iter_mut().zip(&other.stack));
         for (mine, theirs) in pairs {
-            if mine != theirs && *mine != Held::Unknown {
-                *mine = Held::Unknown;
+            if mine != theirs && *mine != Content::Unknown {
+                *mine = Content::Unknown;
                 is_less = true;
             }
         }
@@ -122,36 +122,36 @@ impl Keeping {
                 self.stack.push(self.registers[r]);
                 return;
             }
-            Pop => self.stack.pop().unwrap_or(Held::Unknown),
+            Pop => self.stack.pop().unwrap_or(Content::Unknown),
             Mov => self.registers[r],
             Movw => {
                 self.registers[d + 1] = self.registers[r + 1];
                 self.registers[d] = self.registers[r];
                 return;
             }
-            Ldi if instruction.constant() == 0 => Held::Zero,
-            Eor | Sub if d == r => Held::Zero,
+            Ldi if instruction.constant() == 0 => Content::Zero,
+            Eor | Sub if d == r => Content::Zero,
             In | Lds if instruction.is_of_status() => {
                 if self.flags == Registers::FLAGS {
-                    Held::Flags
+                    Content::Flags
                 } else {
-                    Held::Unknown
+                    Content::Unknown
                 }
             }
-            In | Lds => gpior.map_or(Held::Unknown, |gpior| self.gpior[gpior]),
+            In | Lds => gpior.map_or(Content::Unknown, |gpior| self.gpior[gpior]),
             Out | Sts if instruction.is_of_status() => {
-                self.flags = if self.registers[r] == Held::Flags { Registers::FLAGS } else { Registers::NONE };
+                self.flags = if self.registers[r] == Content::Flags { Registers::FLAGS } else { Registers::NONE };
                 self.counted = None;
                 return;
             }
             Out | Sts | Sbi | Cbi => {
                 if let Some(gpior) = gpior {
                     let is_whole = matches!(instruction.operation, Out | Sts);
-                    self.gpior[gpior] = if is_whole { self.registers[r] } else { Held::Unknown };
+                    self.gpior[gpior] = if is_whole { self.registers[r] } else { Content::Unknown };
                 }
                 return;
             }
-            _ => Held::Unknown,
+            _ => Content::Unknown,
         };
         let changes = instruction.effects().changes;
         self.spoil(changes);
@@ -167,7 +167,7 @@ impl Keeping {
     fn spoil(&mut self, changed: Registers) {
         for (register, held) in self.registers.iter_mut().enumerate() {
             if changed.contains(register) {
-                *held = Held::Unknown;
+                *held = Content::Unknown;
             }
         }
         self.flags = self.flags - changed;
@@ -283,12 +283,12 @@ impl Survey<'_> {
             let Some(mut keeping) = known[number].clone() else { continue };
             if node.place.interrupts == Interrupts::On {
                 // Any handler that comes in can change these.
-                keeping.gpior = [Held::Unknown; 3];
+                keeping.gpior = [Content::Unknown; 3];
             }
             if node.returns.is_some() {
                 let holds = |register: usize| match keeping.registers[register] {
-                    Held::Register(held) => held == register,
-                    Held::Zero => register == ZERO && routine.entry.kind == Kind::Function,
+                    Content::Register(held) => held == register,
+                    Content::Zero => register == ZERO && routine.entry.kind == Kind::Function,
                     _ => false,
                 };
                 keeps = keeps & (Registers::which(holds) | keeping.flags);
@@ -299,14 +299,14 @@ impl Survey<'_> {
                 let mut behind = keeping.clone();
                 if let Some(called) = &way.through {
                     behind.spoil(Registers::ALL - self.of(called).keeps);
-                    behind.gpior = [Held::Unknown; 3];
+                    behind.gpior = [Content::Unknown; 3];
                 }
                 if let Some(counted) =
                     keeping.counted.filter(|_| is_way_of_zero(&instruction, nodes[way.to].place.address))
                 {
-                    behind.registers[counted] = Held::Zero;
+                    behind.registers[counted] = Content::Zero;
                 }
-                behind.stack.resize(nodes[way.to].place.depth, Held::Unknown);
+                behind.stack.resize(nodes[way.to].place.depth, Content::Unknown);
                 let is_less = match &mut known[way.to] {
                     Some(before) => before.meet(&behind),
                     new @ None => {
@@ -319,7 +319,8 @@ impl Survey<'_> {
                 }
             }
         }
-        let is_zero = |known: &Option<Keeping>| known.as_ref().is_some_and(|known| known.registers[ZERO] == Held::Zero);
+        let is_zero =
+            |known: &Option<Keeping>| known.as_ref().is_some_and(|known| known.registers[ZERO] == Content::Zero);
         Ok((keeps, known.iter().map(is_zero).collect()))
     }
 
