@@ -2,6 +2,7 @@
 //!
 //! Each figure is calculated twice: from the inputs that the paper prints for it, its own earlier results among them,
 //! and all through, from the machine alone. So a slip is told from what merely follows from an earlier one.
+//! `weeder design --against-paper` shows them.
 
 use crate::design::Design;
 use crate::figure::{digits, written};
