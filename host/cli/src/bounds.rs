@@ -1,6 +1,6 @@
 //! `weeder bounds`: what the firmware can need at most, proved from its ELF, beside what it may need.
 
-use crate::Finding;
+use crate::finding::Finding;
 use crate::output::{print, say};
 use anyhow::Result;
 use clap::Args;

@@ -2,7 +2,7 @@
 //!
 //! The built-in examples, the scale and the radius are those of the firmware, and so is the code that searches them.
 
-use crate::Finding;
+use crate::finding::Finding;
 use crate::numbers::whole_within;
 use crate::output::say;
 use crate::source;

@@ -1,7 +1,7 @@
 //! `weeder examples`: what a machine was taught in the field as a table that can be kept, learned from, and taught to another.
 
-use crate::Finding;
 use crate::destination::FileName;
+use crate::finding::Finding;
 use crate::output::{say, tell};
 use crate::settings::Port;
 use crate::source;

@@ -4,7 +4,7 @@
 //! The command is run, and what it prints becomes the block: that is the same on every machine. How long it took is told on standard
 //! error, which is left out.
 
-use crate::Finding;
+use crate::finding::Finding;
 use crate::output::{say, tell};
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;

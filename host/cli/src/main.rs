@@ -17,6 +17,7 @@ mod destination;
 mod evaluate;
 mod examples;
 mod figures;
+mod finding;
 mod flash;
 mod gps;
 mod hex;
@@ -42,6 +43,7 @@ mod train;
 mod trial;
 mod virtual_uno;
 
+use crate::finding::Finding;
 use clap::builder::StyledStr;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
@@ -115,15 +117,6 @@ enum Command {
     Figures(figures::Arguments),
     /// Print what a shell needs to complete this command's words.
     Completions(completions::Arguments),
-}
-
-/// What a command found out, for scripts that ask by its status.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Finding {
-    /// No plant was damaged, nothing differs.
-    Good,
-    /// A plant was damaged, something differs, or a bound is over its budget.
-    Bad,
 }
 
 /// The commands with all their arguments.

@@ -2,7 +2,8 @@
 //!
 //! It computes nothing anew: the parts hold all outcomes, which go to the code that shows those of an undivided study.
 
-use crate::{Finding, part, soak, sweep, trial};
+use crate::finding::Finding;
+use crate::{part, soak, sweep, trial};
 use anyhow::{Context, Result, bail, ensure};
 use clap::{Args, builder::PossibleValuesParser};
 use serde::de::DeserializeOwned;

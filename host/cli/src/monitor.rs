@@ -9,7 +9,7 @@ mod plain;
 mod terminal;
 mod view;
 
-use crate::Finding;
+use crate::finding::Finding;
 use crate::ports::Ports;
 use crate::record::{self, Logs};
 use anyhow::Result;

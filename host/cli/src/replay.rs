@@ -1,6 +1,6 @@
 //! `weeder replay`: a log's swings, decided anew on the host.
 
-use crate::Finding;
+use crate::finding::Finding;
 use crate::output::say;
 use crate::source;
 use anyhow::{Context, Result};

@@ -1,7 +1,7 @@
 //! `weeder settings`: the machine's settings as a file that can be kept, compared, and given to the next machine.
 
-use crate::Finding;
 use crate::destination::{FileName, FolderName};
+use crate::finding::Finding;
 use crate::output::say;
 use crate::ports::{Chosen, Ports};
 use crate::source;

@@ -1,8 +1,8 @@
 //! `weeder sim`: the real firmware on a virtual Uno, on a simulated row or on a recording of a real encoder.
 
-use crate::Finding;
 use crate::course::CourseArguments;
 use crate::destination::{FileName, FolderName, OutFile, OutFolder};
+use crate::finding::Finding;
 use crate::output::{print, say};
 use crate::progress::Progress;
 use crate::source;

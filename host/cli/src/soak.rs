@@ -1,7 +1,7 @@
 //! `weeder soak`: hours of the decisions and minutes of the real firmware, with everything going wrong now and then.
 
-use crate::Finding;
 use crate::destination::FileName;
+use crate::finding::Finding;
 use crate::numbers::whole_within;
 use crate::output::{say, tell};
 use crate::part::{self, Part};

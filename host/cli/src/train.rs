@@ -1,7 +1,7 @@
 //! `weeder train`: makes an example table of labelled objects, and says how well it tells plants from weeds.
 
-use crate::Finding;
 use crate::destination::{FileName, OutFile};
+use crate::finding::Finding;
 use crate::numbers::whole_within;
 use crate::output::{say, tell};
 use crate::source;

@@ -1,8 +1,8 @@
 //! `weeder trial`: the paper's experiment in a simulated field, with its report.
 
-use crate::Finding;
 use crate::destination::{FileName, FolderName, OutFolder};
 use crate::examples;
+use crate::finding::Finding;
 use crate::numbers::{number_within, whole_within};
 use crate::output::{say, tell};
 use crate::part::{self, Part};

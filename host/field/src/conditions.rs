@@ -8,6 +8,7 @@
 
 mod errors;
 mod parameters;
+mod presets;
 
 use crate::machine::{Dirt, Machine};
 use crate::servo::{Scatter, Servo};
@@ -16,29 +17,10 @@ use control::settings::{SECOND_BEAM_LEAST_MM, SLIPPING_BEAM_TO_TOOL_MM, Setting}
 pub use errors::{ConditionsError, WrongValue};
 use errors::{explain, line, line_at};
 pub use parameters::{Conditions, Crop, Driving, Ground, Mechanism, PARAMETERS, Parameter, Plot, Sensors, Weeds};
+use presets::PRESETS;
+pub use presets::presets;
 use std::io;
 use std::path::Path;
-
-/// The presets: a name, and a file that says what differs from the default.
-const PRESETS: &[(&str, &str)] = &[
-    ("transplanted", ""),
-    ("even-stand", include_str!("../presets/even-stand.toml")),
-    ("direct-sown", include_str!("../presets/direct-sown.toml")),
-    ("weedy", include_str!("../presets/weedy.toml")),
-    ("soft-ground", include_str!("../presets/soft-ground.toml")),
-    ("heavy-soil", include_str!("../presets/heavy-soil.toml")),
-    ("dusty", include_str!("../presets/dusty.toml")),
-    ("hand-steered", include_str!("../presets/hand-steered.toml")),
-    ("set-up", include_str!("../presets/set-up.toml")),
-    ("chilli", include_str!("../presets/chilli.toml")),
-    ("broccoli", include_str!("../presets/broccoli.toml")),
-    ("maize", include_str!("../presets/maize.toml")),
-];
-
-/// The presets' names.
-pub fn presets() -> impl Iterator<Item = &'static str> {
-    PRESETS.iter().map(|(preset, _)| *preset)
-}
 
 impl Conditions {
     /// Those of a preset, or of a file, whose text `read` gives.

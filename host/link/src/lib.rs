@@ -14,6 +14,7 @@
 
 pub mod advice;
 pub mod completion;
+mod error;
 mod event_line;
 pub mod examples;
 mod lines;
@@ -31,6 +32,7 @@ pub mod set_up;
 pub mod settings;
 pub mod settings_file;
 
+pub use self::error::LinkError;
 pub use self::event_line::{EventLine, Mode, Status, Timed, Values};
 pub use self::lines::LineReader;
 #[cfg(not(target_arch = "wasm32"))]
@@ -41,7 +43,6 @@ pub use control::ground::class::Class;
 use std::collections::VecDeque;
 use std::io::{self, Read, Write};
 use std::time::{Duration, Instant};
-use thiserror::Error;
 
 /// Characters that the firmware takes in a line.
 pub const COMMAND_LENGTH: usize = control::say::command::LINE_LENGTH;
@@ -61,100 +62,6 @@ const BOOT_READS: usize = 150;
 
 /// Times that the version is asked for again.
 const RETRIES: usize = 2;
-
-/// Why there is no link, or no good answer.
-#[derive(Debug, Error)]
-pub enum LinkError {
-    /// The system has no list of its serial ports.
-    #[cfg(not(target_arch = "wasm32"))]
-    #[error("the serial ports cannot be listed: name the Uno's by --port")]
-    NoList(#[source] serialport::Error),
-    /// No port looks like an Uno.
-    #[error(
-        "there is no Uno at any USB port{}: plug it in with a cable that carries data, or name its port by --port",
-        others(.0)
-    )]
-    NoUno(Vec<String>),
-    /// Several do.
-    #[error("there are several Unos: choose one by --port, of {}", .0.join(", "))]
-    SeveralUnos(Vec<String>),
-    /// A row's board is not there.
-    #[error(
-        "the board with the serial number {0} is not plugged in: plug it in, or name the row's board anew by `weeder rows name`"
-    )]
-    Unplugged(String),
-    /// Several boards say that they are the row's.
-    #[error(
-        "{} are both of the serial number {number}: name the rows anew by `weeder rows name`, which knows them by their ports then",
-        .ports.join(" and ")
-    )]
-    Twins {
-        /// The serial number.
-        number: String,
-        /// Their ports.
-        ports: Vec<String>,
-    },
-    /// There is no such port.
-    #[error("there is no port {0}: plug the Uno in, or leave --port out to have it found")]
-    Absent(String),
-    /// Somebody else has the port.
-    #[error("{0} is in use: close the serial monitor or whatever else has it open")]
-    Busy(String),
-    /// The user may not open the port.
-    #[error(
-        "{0} may not be opened: add yourself to the port's group (on Debian and Ubuntu `sudo usermod -aG dialout $USER`) \
-         and log in anew"
-    )]
-    Forbidden(String),
-    /// The port cannot be opened for another reason.
-    #[cfg(not(target_arch = "wasm32"))]
-    #[error("{port} cannot be opened as a serial port")]
-    NotOpened {
-        /// Its name.
-        port: String,
-        /// What the system says.
-        source: serialport::Error,
-    },
-    /// The port went away.
-    #[error("the port is gone: plug the Uno in again")]
-    Gone(#[source] io::Error),
-    /// The firmware did not finish its answer.
-    #[error(
-        "nothing finishes the answer to `{command}`: press the Uno's reset, and see that the weeder's firmware is on it \
-         (`weeder flash`); it sent {received:?}"
-    )]
-    Silent {
-        /// The command.
-        command: String,
-        /// The end of what came.
-        received: String,
-    },
-    /// What comes is not text.
-    #[error("what comes from the port is no text: see that nothing else is wired to D0 and D1, and flash the Uno anew")]
-    Noise,
-    /// Something else answers.
-    #[error("it is not the weeder's firmware that answers, but {0:?}: put it on the Uno by `weeder flash`")]
-    NotTheWeeder(String),
-    /// The firmware started anew while it was asked.
-    #[error("the Uno was reset while it was asked `{0}`: see to its supply, then try again")]
-    Restarted(String),
-    /// The firmware refused.
-    #[error("the firmware answers `{command}` with `{answer}`")]
-    Refused {
-        /// The command.
-        command: String,
-        /// The line that begins with `error:`.
-        answer: String,
-    },
-    /// This cannot be typed into the console.
-    #[error("{0:?} is no command: it has to be one line of at most {COMMAND_LENGTH} printable ASCII characters")]
-    NoCommand(String),
-}
-
-/// What other ports there are, for the message that none is an Uno's.
-fn others(ports: &[String]) -> String {
-    if ports.is_empty() { String::new() } else { format!(" (there is {})", ports.join(", ")) }
-}
 
 /// A line of bytes, both ways.
 ///

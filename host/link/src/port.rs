@@ -2,7 +2,7 @@
 //!
 //! What else a link can be over is a [`Port`](crate::Port) too. This module is left out where there is no serial port: in a browser.
 
-use super::LinkError;
+use super::error::LinkError;
 use serialport::{ErrorKind, SerialPort, SerialPortInfo, SerialPortType, UsbPortInfo};
 use std::io::{self, Read};
 use std::time::Duration;

@@ -39,10 +39,8 @@ use tokio::runtime::{self, Runtime};
 use tokio::time::sleep;
 use tokio_io_timeout::TimeoutStream;
 
+pub use self::machine::Tell;
 pub use link::rows::Opener;
-
-/// Says something to the operator at this computer.
-pub type Tell = Arc<dyn Fn(&str) + Send + Sync>;
 
 /// Time in which a request's head has to come, the time before it included.
 const HEAD_TIME: Duration = Duration::from_secs(10);

@@ -2,8 +2,8 @@
 //! answers back, and has the hub tell all else. It decides nothing: what may be typed is decided before.
 
 use super::hub::Hub;
-use super::{Opener, Tell};
 use link::Said;
+use link::rows::Opener;
 use link::session::{Happening, Session};
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -11,6 +11,9 @@ use std::thread;
 use std::time::Instant;
 use tokio::sync::mpsc::error::TryRecvError;
 use tokio::sync::{mpsc, oneshot};
+
+/// Says something to the operator at this computer.
+pub type Tell = Arc<dyn Fn(&str) + Send + Sync>;
 
 /// Commands that wait to be typed at the most, and as many that wait to hold.
 const WAITING: usize = 64;

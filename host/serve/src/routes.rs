@@ -14,11 +14,11 @@
 
 use super::door::{Door, Knock};
 use super::hub::{Hub, Message};
-use super::machine::{Machine, Typed};
+use super::machine::{Machine, Tell, Typed};
 use super::page::{File, Page, form};
 use super::pairing::{Pairing, TOKEN_LENGTH, Token, Try, hexadecimal};
 use super::rules::{self, Forbidden, Order, Reach};
-use super::{Extension, Tell};
+use axum::Extension;
 use axum::Router;
 use axum::body::{Body, to_bytes};
 use axum::extract::{Path, Request, State};

@@ -26,22 +26,24 @@ mod budget;
 mod cycles;
 mod decode;
 mod effects;
+mod error;
 mod flow;
 mod loops;
+mod proved;
 mod registers;
 mod values;
 
 pub use self::budget::{Budgets, BudgetsError, BudgetsProblem, Held};
 use self::cycles::{Passes, Stretch, Time, Timer};
 use self::decode::{Instruction, Operation};
+pub use self::error::{BoundsError, Spoilt};
 use self::flow::{Entry, Kind, Node, Program, Routine, bytes};
 pub use self::loops::{LoopBound, LoopBounds, records};
+pub use self::proved::{Bounds, EdgeBounds, Frame, Handler, Input, Lasting, TurnBound};
 use self::values::Interrupts;
-use crate::elf::{Image, ImageError};
-use serde::{Deserialize, Serialize};
+use crate::elf::Image;
 use signal::CYCLES_PER_SECOND;
 use std::collections::{BTreeMap, BTreeSet};
-use std::fmt;
 use std::path::Path;
 use std::rc::Rc;
 
@@ -63,286 +65,6 @@ const VECTOR_BYTES: u32 = 4;
 /// no instruction of the ATmega328P stands.
 pub fn instruction_at(flash: &[u8], address: u32) -> Option<(u32, String)> {
     Instruction::at(flash, address).map(|found| (found.bytes(), found.mnemonic()))
-}
-
-/// Why nothing could be proved.
-#[derive(Debug, thiserror::Error)]
-pub enum BoundsError {
-    /// The ELF cannot be read.
-    #[error(transparent)]
-    Image(#[from] ImageError),
-    /// It is said how often loops turn of functions that the program does not have.
-    #[error(
-        "no function of the firmware is called {}: say how often loops turn by the names of the functions that have them",
-        names.join(" or ")
-    )]
-    NoSuchFunction {
-        /// What they are said to be called.
-        names: Vec<String>,
-    },
-    /// A word that is no instruction.
-    #[error("{function} comes to {address:#06x}, where there is no instruction of the ATmega328P")]
-    NoInstruction {
-        /// Where, in bytes of flash.
-        address: u32,
-        /// In which function.
-        function: String,
-    },
-    /// A call or a jump to an address that is worked out.
-    #[error(
-        "{function} calls or jumps to an address that it works out, at {address:#06x}: call functions by their names"
-    )]
-    Indirect {
-        /// Where.
-        address: u32,
-        /// In which function.
-        function: String,
-    },
-    /// Functions that call each other in a circle.
-    #[error("there is recursion, which has no deepest stack: {} calls itself", circle.join(", which calls "))]
-    Recursion {
-        /// The functions, the first once more at the end.
-        circle: Vec<String>,
-    },
-    /// A handler that lets others come in.
-    #[error(
-        "the handler of vector {vector} turns interrupts on at {address:#06x}, in {function}: handlers could nest without an end"
-    )]
-    HandlerEnables {
-        /// The vector.
-        vector: u8,
-        /// Where.
-        address: u32,
-        /// In which function.
-        function: String,
-    },
-    /// The status register gets a value that is not known.
-    #[error("{function} sets the interrupt flag by a value that is not a saved SREG, at {address:#06x}")]
-    UnknownStatus {
-        /// Where.
-        address: u32,
-        /// In which function.
-        function: String,
-    },
-    /// The stack pointer gets a value that is not known.
-    #[error(
-        "{function} sets the stack pointer to what cannot be followed, at {address:#06x}: arrays of unknown length have no bound"
-    )]
-    UnknownStack {
-        /// Where.
-        address: u32,
-        /// In which function.
-        function: String,
-    },
-    /// An interrupt could come between the two halves of the stack pointer.
-    #[error("{function} lets an interrupt come in between the two halves of the stack pointer, at {address:#06x}")]
-    HalfAStackPointer {
-        /// Where.
-        address: u32,
-        /// In which function.
-        function: String,
-    },
-    /// A stack that grows without an end.
-    #[error("{function} puts more onto the stack in every turn of a loop, at {address:#06x}")]
-    GrowsForEver {
-        /// Where.
-        address: u32,
-        /// In which function.
-        function: String,
-    },
-    /// A function that takes what is not its own from the stack.
-    #[error("{function} takes more from the stack than it has put there, at {address:#06x}")]
-    TakesTooMuch {
-        /// Where.
-        address: u32,
-        /// In which function.
-        function: String,
-    },
-    /// A return to an address that the function has put onto the stack.
-    #[error("{function} returns with a stack that is not as it found it, at {address:#06x}")]
-    ReturnsElsewhere {
-        /// Where.
-        address: u32,
-        /// In which function.
-        function: String,
-    },
-    /// `ret` in a handler, or `reti` elsewhere.
-    #[error("{function} ends a handler by `ret`, or a function by `reti`, or the program, at {address:#06x}")]
-    WrongReturn {
-        /// Where.
-        address: u32,
-        /// In which function.
-        function: String,
-    },
-    /// An instruction whose time is not known.
-    #[error("{function} has `{what}` at {address:#06x}, which has no fixed time")]
-    NoTime {
-        /// The instruction.
-        what: String,
-        /// Where.
-        address: u32,
-        /// In which function.
-        function: String,
-    },
-    /// A loop where time has to have a bound.
-    #[error(
-        "{what} has a loop without a bound, at {address:#06x} in {function}: say how often it turns, by a record in .loop_bounds or for the function"
-    )]
-    Unbounded {
-        /// What has no bound.
-        what: String,
-        /// Where the loop begins.
-        address: u32,
-        /// In which function.
-        function: String,
-    },
-    /// Functions change registers that are needed behind their calls.
-    #[error("a value is needed behind a call that spoils it:{}", all.iter().map(Spoilt::to_string).collect::<String>())]
-    Spoilt {
-        /// Every call that does.
-        all: Vec<Spoilt>,
-    },
-    /// A handler leaves something else in registers or flags than it found there.
-    #[error("the handler of vector {vector}, {function}, does not put back what it found in {registers}")]
-    HandlerSpoils {
-        /// The vector.
-        vector: u8,
-        /// The handler.
-        function: String,
-        /// The registers and flags.
-        registers: String,
-    },
-    /// The watched vectors do not come before all others.
-    #[error(
-        "vector {other} goes before vector {vector} and is not among those whose edges are watched, so their longest wait is not bounded"
-    )]
-    NotFirst {
-        /// One that is watched.
-        vector: u8,
-        /// The one before it.
-        other: u8,
-    },
-    /// A watched vector has no handler, or one that does not look once.
-    #[error(
-        "the handler of vector {vector} does not read the port at {port:#04x} exactly once on every path, or there is none"
-    )]
-    DoesNotLook {
-        /// The vector.
-        vector: u8,
-        /// The port's address in the data space.
-        port: u16,
-    },
-}
-
-/// A call behind which registers are needed that the function changes.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Spoilt {
-    /// The call's address.
-    pub address: u32,
-    /// The function that calls.
-    pub function: String,
-    /// The function that is called.
-    pub called: String,
-    /// The registers.
-    pub registers: String,
-}
-
-impl fmt::Display for Spoilt {
-    fn fmt(&self, to: &mut fmt::Formatter) -> fmt::Result {
-        let Spoilt { address, function, called, registers } = self;
-        write!(to, "\n  {address:#06x} {function} calls {called}, which spoils {registers}")
-    }
-}
-
-/// Bytes of the stack that a function holds at its deepest.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Frame {
-    /// The function, as in its source, without the types that it is made for.
-    pub function: String,
-    /// What it has put onto the stack when it calls the next of them, the address that it is returned to from there included; the
-    /// last one, at its deepest.
-    pub bytes: usize,
-}
-
-/// A handler.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Handler {
-    /// Its vector, counted from 0 (reset).
-    pub vector: u8,
-    /// Its name.
-    pub function: String,
-    /// The longest time from the interrupt's response to the end of its return; `None` for one that never returns.
-    pub cycles: Option<u64>,
-    /// The most that it puts onto the stack, the address it returns to included, and where it does not return as well.
-    pub stack_bytes: usize,
-}
-
-/// An input whose edges ask for interrupts.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Input {
-    /// The vectors that its edges ask for.
-    pub vectors: BTreeSet<u8>,
-    /// The register that their handlers look at, by its address in the data space: PINB 0x23, PINC 0x26, PIND 0x29.
-    pub port: u16,
-    /// Edges between two looks that the handlers can still tell apart.
-    pub edges_between_looks: u64,
-}
-
-/// How fast an input's edges may come.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct EdgeBounds {
-    /// The longest time from an edge until a handler looks, in cycles.
-    pub wait_cycles: u64,
-    /// Evenly spaced edges in a second of which none is ever lost.
-    pub never_lost_per_s: u64,
-}
-
-/// A turn of the main program's loop.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct TurnBound {
-    /// The longest from one `wdr` to the next, in cycles, without the handlers that come in; `None` where a loop has no bound.
-    pub cycles: Option<u64>,
-    /// Loops in it of which nobody has said how often they turn: the address and the function of each.
-    pub without_bound: Vec<(u32, String)>,
-}
-
-/// Values in registers that last over calls, each of which was found to be left alone or put back.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-pub struct Lasting {
-    /// Places that call a function.
-    pub calls: usize,
-    /// Bytes in registers that are needed behind them, of all calls together.
-    pub bytes: usize,
-}
-
-/// All that was proved.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Bounds {
-    /// The deepest stack in bytes: the main program, and the deepest handler where it comes in.
-    pub stack_bytes: usize,
-    /// Whose frames those are, from the reset on.
-    pub stack: Vec<Frame>,
-    /// Every handler, by its vector.
-    pub handlers: Vec<Handler>,
-    /// The longest stretch of the main program with the interrupt flag clear: from behind the instruction that clears it to behind
-    /// the one that sets it, in cycles; 0 where it never clears it. Before interrupts are first turned on does not count.
-    pub critical_section_cycles: u64,
-    /// The longest time from one moment at which the main program lets interrupts in to the next, in cycles.
-    pub closed_cycles: u64,
-    /// The watched input.
-    pub edges: Option<EdgeBounds>,
-    /// The main program's loop; `None` where no loop feeds the watchdog.
-    pub turn: Option<TurnBound>,
-    /// What lasts in registers.
-    pub lasting: Lasting,
-}
-
-impl Bounds {
-    /// The longest of the handlers, in cycles; 0 without one.
-    pub fn longest_handler_cycles(&self) -> u64 {
-        self.handlers.iter().filter_map(|handler| handler.cycles).max().unwrap_or_default()
-    }
 }
 
 /// Proves what the firmware at `elf` needs at most, and how fast the edges of `input` may come, if one is asked for. `loops` says how
@@ -396,7 +118,8 @@ pub fn prove(elf: &Path, input: Option<&Input>, loops: &LoopBounds) -> Result<Bo
     let critical_section_cycles = longest_stretch(Stretch::FlagClear)?;
     let closed_cycles = longest_stretch(Stretch::Closed)?;
 
-    let edges = input.map(|input| watch(input, &program, &handlers, &of_handlers, &mut timer, closed_cycles)).transpose()?;
+    let edges =
+        input.map(|input| watch(input, &program, &handlers, &of_handlers, &mut timer, closed_cycles)).transpose()?;
 
     let feeds = |node: &Node| {
         program.instruction(node.place.address).is_ok_and(|instruction| instruction.operation == Operation::Wdr)

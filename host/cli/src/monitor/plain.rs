@@ -3,7 +3,7 @@
 //! With several rows a command goes to one of them behind its name and a colon, or to all; what they say stands behind their names. A
 //! `hold` to all goes to them at the same moment, and how long the last one took is said.
 
-use crate::Finding;
+use crate::finding::Finding;
 use crate::output::tell;
 use crate::ports::Chosen;
 use crate::record::Logs;

@@ -1,6 +1,7 @@
 //! What can be wrong with a field's conditions, where in the file it stands, and what would be right.
 
-use super::{PARAMETERS, presets};
+use super::parameters::PARAMETERS;
+use super::presets::presets;
 use control::settings::Setting;
 use std::io;
 use std::path::PathBuf;

@@ -7,7 +7,7 @@
 //! Plots of one field differ by more than the counting does. [`BinomialModel::dispersion`] says by how much, and where it is
 //! above 1 standard errors are as much too small as its root says; they are left as R's binomial family has them.
 
-use super::{Column, Design, NoModel, Remark};
+use super::design::{Column, Design, NoModel, Remark};
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, Normal};

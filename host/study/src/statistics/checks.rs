@@ -9,7 +9,8 @@
 //!
 //! Whether the residuals are normal is not asked: with a few dozen plots no test could tell, and means forgive it.
 
-use super::{Design, LinearModel, varies};
+use super::design::{Design, is_zero, scatter, varies};
+use super::linear::LinearModel;
 use nalgebra::DMatrix;
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, StudentsT};
@@ -90,10 +91,10 @@ fn lack_of_fit(design: &Design, values: &[f64], model: &LinearModel) -> Option<f
         let treatment = (design.speeds_km_h[plot].to_bits(), design.spacings_cm[plot].to_bits());
         of_treatments.entry(treatment).or_default().push(*value);
     }
-    let pure: f64 = of_treatments.values().map(|values| super::scatter(values)).sum();
+    let pure: f64 = of_treatments.values().map(|values| scatter(values)).sum();
     let pure_freedom = values.len().checked_sub(of_treatments.len()).filter(|freedom| *freedom > 0)?;
     let lack_freedom = of_treatments.len().checked_sub(model.terms.len()).filter(|freedom| *freedom > 0)?;
-    if super::is_zero(pure, values) {
+    if is_zero(pure, values) {
         return None;
     }
     let residual: f64 = model.residuals.iter().map(|residual| residual * residual).sum();

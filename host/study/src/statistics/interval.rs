@@ -5,6 +5,7 @@
 //! 5 % lie on the one side that is left (R's `alternative = "less"` or `"greater"`), so that none of `n` says "below about
 //! `3 / n`". A mean's interval is Student's, as R's `t.test` has it, over replications that are taken for independent.
 
+use super::design::{mean, scatter};
 use serde::Serialize;
 use statrs::distribution::{Beta, ContinuousCDF, Normal, StudentsT};
 use std::fmt::{self, Display, Formatter};
@@ -105,9 +106,9 @@ impl Mean {
             let distribution = StudentsT::new(0.0, 1.0, count - 1.0).ok()?;
             Some(distribution.inverse_cdf(1.0 - (1.0 - CONFIDENCE) / 2.0))
         };
-        let error = || (super::scatter(values) / (count - 1.0) / count).sqrt();
+        let error = || (scatter(values) / (count - 1.0) / count).sqrt();
         Self {
-            mean: super::mean(values),
+            mean: mean(values),
             within: (values.len() > 1).then(quantile).flatten().map(|quantile| quantile * error()),
         }
     }

@@ -1,6 +1,6 @@
 //! The linear model of a response on speed and spacing, by least squares.
 
-use super::{Column, Design, NoModel, Remark, is_zero, mean, scatter};
+use super::design::{Column, Design, NoModel, Remark, is_zero, mean, scatter};
 use linregress::fit_low_level_regression_model;
 use serde::Serialize;
 

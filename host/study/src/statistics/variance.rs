@@ -5,7 +5,7 @@
 //! speed and spacing, those of block and treatment. A source's sum of squares is what its model leaves less than the one before.
 //! Without blocks the first of them falls away.
 
-use super::{Design, NoModel, Remark, is_zero, mean, scatter, varies};
+use super::design::{Design, NoModel, Remark, is_zero, mean, scatter, varies};
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};

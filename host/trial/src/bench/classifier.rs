@@ -4,7 +4,7 @@
 //! exact. It also compares every answer of the search in flash with a plain search's, and no figure is given where
 //! they differ.
 
-use super::BenchError;
+use super::error::BenchError;
 use field::wiring;
 use knn_bench::{QUERIES, Task};
 use signal::CYCLES_PER_SECOND;

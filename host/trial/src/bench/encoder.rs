@@ -17,7 +17,7 @@
 //! The firmware is in HOLD. What weeding adds is less than [`Load::Telemetry`], which asks for more than the serial line can
 //! carry and has the beam flicker as fast as its sensor can.
 
-use super::BenchError;
+use super::error::BenchError;
 use super::load::{EDGE_CYCLES, Telemetry, flicker};
 use crate::console::{ConsoleError, Status, ask};
 use crate::run;

@@ -1,6 +1,6 @@
 //! The servo's jitter: how much its pulses and its frames differ while the firmware has all hands full.
 
-use super::BenchError;
+use super::error::BenchError;
 use super::load::{Telemetry, flicker};
 use crate::run;
 use field::wiring;

@@ -3,7 +3,7 @@
 //! Each row is a trial of its own, from power-up: the real ELF weeds it, and [`field::verdict`] holds each rising edge with a new
 //! width against the place where the swing was due. Rows run in parallel.
 
-use super::BenchError;
+use super::error::BenchError;
 use crate::run::run;
 use field::machine::Machine;
 use field::motion::mm_s;

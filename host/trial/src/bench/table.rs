@@ -4,10 +4,11 @@
 //! a serial line of ten bits a byte: Arduino core 1.8.7 with avr-gcc 5.4 -Os, the Encoder library of PJRC, and encoder
 //! handlers and classifiers written in assembly by hand.
 
+use super::classifier::ClassifierCosts;
 use super::encoder::{Direction, JITTER, Load, Rate, Turning};
 use super::servo::{COUNTS_PER_S, Jitter};
 use super::swings::Lateness;
-use super::{ClassifierCosts, FirmwareCosts};
+use super::weeding::FirmwareCosts;
 use comfy_table::{CellAlignment, Table, presets};
 use knn_bench::Task;
 use signal::CYCLES_PER_SECOND;

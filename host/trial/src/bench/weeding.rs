@@ -1,6 +1,6 @@
 //! The firmware at work: cycles of its interrupts and of its loop's turns, and the memory it takes, while it weeds a row.
 
-use super::BenchError;
+use super::error::BenchError;
 use super::load::Telemetry;
 use crate::console::{Status, ask};
 use crate::run;

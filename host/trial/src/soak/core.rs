@@ -2,7 +2,7 @@
 //!
 //! Clock and count go on over resets, unlike on the chip, and begin shortly before their ends, so that in each hour both run over them.
 
-use super::{Plan, SoakError, Tally, chance, count, total};
+use super::tally::{Plan, SoakError, Tally, chance, count, total};
 use control::{
     ground::{class::Class, examples::EXAMPLES, nearest::Nearest},
     measure::{

@@ -3,7 +3,7 @@
 //! After a reset the firmware is in HOLD, and the operator lets it roll to the end of the row: from there on nothing may be
 //! harmed. Rows whose encoder was made to lie are held only against their alarms.
 
-use super::{Plan, SoakError, Tally, chance, count, total};
+use super::tally::{Plan, SoakError, Tally, chance, count, total};
 use crate::console::ask;
 use crate::run::{TrialError, boot, set_up};
 use field::machine::{Machine, cycle_at, time_at_s};

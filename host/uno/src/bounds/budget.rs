@@ -1,6 +1,7 @@
 //! What a firmware may need at most, as a file says it, and whether it keeps to that.
 
-use super::{Bounds, Input, LoopBounds};
+use super::loops::LoopBounds;
+use super::proved::{Bounds, Input};
 use serde::{Deserialize, Serialize};
 use std::io;
 use std::path::{Path, PathBuf};

@@ -14,8 +14,9 @@
 
 use super::decode::Instruction;
 use super::decode::Operation::*;
+use super::error::BoundsError;
+use super::proved::Frame;
 use super::values::{DEEPEST, Doubt, INTERRUPT_FLAG, Interrupts, Known, Value};
-use super::{BoundsError, Frame};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::rc::Rc;
 

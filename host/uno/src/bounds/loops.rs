@@ -21,7 +21,7 @@
 //!
 //! That a number is right is the source's word, or the table's, which a run in the simulator can refute.
 
-use super::BoundsError;
+use super::error::BoundsError;
 use crate::elf::ImageError;
 use object::read::elf::ElfFile32;
 use object::{LittleEndian, Object, ObjectSection};

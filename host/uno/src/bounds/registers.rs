@@ -40,9 +40,10 @@
 use super::decode::Instruction;
 use super::decode::Operation::*;
 use super::effects::Registers;
+use super::error::{BoundsError, Spoilt};
 use super::flow::{Kind, Node, Place, Program, Routine};
+use super::proved::Lasting;
 use super::values::Interrupts;
-use super::{BoundsError, Lasting, Spoilt};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::RangeInclusive;
 use std::rc::Rc;

@@ -1,0 +1,22 @@
+//! The presets: fields that are usual, each by what differs from the default.
+
+/// The presets: a name, and a file that says what differs from the default.
+pub(super) const PRESETS: &[(&str, &str)] = &[
+    ("transplanted", ""),
+    ("even-stand", include_str!("../../presets/even-stand.toml")),
+    ("direct-sown", include_str!("../../presets/direct-sown.toml")),
+    ("weedy", include_str!("../../presets/weedy.toml")),
+    ("soft-ground", include_str!("../../presets/soft-ground.toml")),
+    ("heavy-soil", include_str!("../../presets/heavy-soil.toml")),
+    ("dusty", include_str!("../../presets/dusty.toml")),
+    ("hand-steered", include_str!("../../presets/hand-steered.toml")),
+    ("set-up", include_str!("../../presets/set-up.toml")),
+    ("chilli", include_str!("../../presets/chilli.toml")),
+    ("broccoli", include_str!("../../presets/broccoli.toml")),
+    ("maize", include_str!("../../presets/maize.toml")),
+];
+
+/// The presets' names.
+pub fn presets() -> impl Iterator<Item = &'static str> {
+    PRESETS.iter().map(|(preset, _)| *preset)
+}

@@ -1,0 +1,164 @@
+//! The design of a trial: where each plot stands, what of it makes the columns of a model, and why there may be none.
+
+use serde::Serialize;
+use thiserror::Error;
+
+/// Where each plot stands in the trial.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Design {
+    pub(super) speeds_km_h: Vec<f64>,
+    pub(super) spacings_cm: Vec<f64>,
+    /// The block in which each plot lies; empty where there are none.
+    pub(super) blocks: Vec<u32>,
+}
+
+impl Design {
+    /// The speed in km/h and the spacing in cm of each plot; all are finite.
+    pub fn new(plots: impl IntoIterator<Item = (f64, f64)>) -> Self {
+        let (speeds_km_h, spacings_cm) = plots.into_iter().unzip();
+        Self { speeds_km_h, spacings_cm, blocks: Vec::new() }
+    }
+
+    /// The same plots, each in its block: what differs from block to block is no chance to the analysis of variance.
+    ///
+    /// # Panics
+    /// Where there are more or fewer blocks than plots.
+    pub fn in_blocks(self, blocks: Vec<u32>) -> Self {
+        assert_eq!(blocks.len(), self.plots(), "each plot lies in a block");
+        Self { blocks, ..self }
+    }
+
+    /// How many plots there are.
+    pub fn plots(&self) -> usize {
+        self.speeds_km_h.len()
+    }
+
+    /// The columns of a model with all factors that vary, and a remark on each that does not.
+    ///
+    /// # Errors
+    /// Where the plots carry none.
+    pub(super) fn columns(&self) -> Result<(Vec<Column>, Vec<Remark>), NoModel> {
+        let mut columns = vec![("constant", vec![1.0; self.plots()])];
+        let mut remarks = Vec::new();
+        let factors =
+            [("speed", &self.speeds_km_h, Remark::OneSpeed), ("spacing", &self.spacings_cm, Remark::OneSpacing)];
+        for (name, levels, constant) in factors {
+            if varies(levels) {
+                columns.push((name, levels.clone()));
+            } else {
+                remarks.push(constant);
+            }
+        }
+        match columns.as_slice() {
+            [_] => Err(NoModel::OneTreatment),
+            [_, (_, speeds), (_, spacings)] if is_collinear(speeds, spacings) => Err(NoModel::Inseparable),
+            _ if self.plots() <= columns.len() => {
+                Err(NoModel::TooFewPlots { plots: self.plots(), parameters: columns.len() })
+            }
+            _ => Ok((columns, remarks)),
+        }
+    }
+}
+
+/// A model's column: its name, and its value in each plot.
+pub(super) type Column = (&'static str, Vec<f64>);
+
+/// The plots carry no model.
+#[derive(Clone, Copy, Debug, Error, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum NoModel {
+    /// The response does not vary.
+    #[error("it is {value} in every plot: there is nothing that speed or spacing could explain")]
+    Constant {
+        /// Its value everywhere.
+        value: f64,
+    },
+    /// No factor varies.
+    #[error("all plots have the same speed and spacing: a model needs two levels of one of them")]
+    OneTreatment,
+    /// Nothing is left to tell an effect from chance.
+    #[error("plots: {plots}, parameters: {parameters}: it takes at least one plot more than parameters")]
+    TooFewPlots {
+        /// The plots that there are.
+        plots: usize,
+        /// The parameters that have to be found.
+        parameters: usize,
+    },
+    /// Speed and spacing go together.
+    #[error("speed and spacing change together, so that their effects cannot be told apart")]
+    Inseparable,
+    /// A binomial model's slope has no end.
+    #[error(
+        "all that was counted lies on one side of the speeds or spacings, so that the odds have no slope that could be named"
+    )]
+    OneSided,
+}
+
+/// What a reader has to know of a table of figures.
+#[derive(Clone, Copy, Debug, Error, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Remark {
+    /// Speed is no term.
+    #[error("all plots have the same speed, so that it is left out")]
+    OneSpeed,
+    /// Spacing is no term.
+    #[error("all plots have the same spacing, so that it is left out")]
+    OneSpacing,
+    /// The interaction would use up all plots.
+    #[error(
+        "no treatment was repeated, so that the interaction cannot be told from chance: it is part of the residual"
+    )]
+    NoReplication,
+    /// The treatments differ in their number of plots.
+    #[error(
+        "the treatments differ in their number of plots: sums of squares are sequential (type I), speed first, then spacing, then both"
+    )]
+    Unbalanced,
+    /// Too few plots for blocks.
+    #[error("the replications are no blocks here: with them no plot would be left to tell an effect from chance")]
+    NoBlocks,
+    /// Plots differ by more than counting makes them.
+    #[error(
+        "plots differ by more than the counting does: take these standard errors times {factor:.2}, and p for too small"
+    )]
+    Overdispersed {
+        /// The root of the dispersion.
+        factor: f64,
+    },
+    /// The residual is zero.
+    #[error("the plots lie on the model exactly: without scatter there are no test statistics")]
+    NoScatter,
+}
+
+/// Sums of squares below this share of the response's own are what rounding leaves of zero.
+const ROUNDING: f64 = 1e-24;
+
+/// Whether a sum of squares of deviations is zero but for rounding.
+pub(super) fn is_zero(sum_of_squares: f64, values: &[f64]) -> bool {
+    sum_of_squares <= ROUNDING * values.iter().map(|value| value * value).sum::<f64>()
+}
+
+/// The mean; of no values, zero.
+pub(super) fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len().max(1) as f64
+}
+
+/// The sum of squared deviations from the mean.
+pub(super) fn scatter(values: &[f64]) -> f64 {
+    let mean = mean(values);
+    values.iter().map(|value| (value - mean).powi(2)).sum()
+}
+
+/// Whether values differ at all.
+pub(super) fn varies(values: &[f64]) -> bool {
+    values.windows(2).any(|pair| pair[0] != pair[1])
+}
+
+/// Whether one column follows from the other.
+fn is_collinear(a: &[f64], b: &[f64]) -> bool {
+    /// Share of a column that the other leaves unexplained, below which the coefficients are all rounding.
+    const TOLERANCE: f64 = 1e-9;
+    let (mean_a, mean_b) = (mean(a), mean(b));
+    let together: f64 = a.iter().zip(b).map(|(a, b)| (a - mean_a) * (b - mean_b)).sum();
+    1.0 - together * together / (scatter(a) * scatter(b)) < TOLERANCE
+}

@@ -1,0 +1,139 @@
+//! What a soak is to be and what it has shown, hour by hour or row by row, and all of it together.
+
+use crate::run::TrialError;
+use field::planting::PlantingError;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::fmt;
+use std::ops::AddAssign;
+use thiserror::Error;
+
+/// What a soak is to be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plan {
+    /// Which of all the possible ones.
+    pub seed: u64,
+    /// Faults in an hour, on average.
+    pub faults_an_hour: f64,
+}
+
+/// Why a soak had no result.
+#[derive(Debug, Error)]
+pub enum SoakError {
+    /// A row did not grow.
+    #[error(transparent)]
+    Planting(#[from] PlantingError),
+    /// The virtual Uno or its console failed.
+    #[error(transparent)]
+    Trial(#[from] TrialError),
+}
+
+/// What a soak has shown.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Tally {
+    /// Simulated seconds.
+    pub seconds: f64,
+    /// Distance rolled, forward and back, in metres.
+    pub metres: f64,
+    /// Rows worked.
+    pub rows: u64,
+    /// Plants that the tool came to.
+    pub plants: u64,
+    /// Distance rolled with the tool in the row, in metres.
+    pub weeded_metres: f64,
+    /// Plants that were harmed although the firmware could know of them.
+    pub harmed: u64,
+    /// Plants that were harmed because they were taken for weeds.
+    pub mistaken: u64,
+    /// Plants that were harmed while the firmware could not know where it was.
+    pub blind: u64,
+    /// Faults injected, alarms latched, resets and warnings, by name.
+    pub faults: BTreeMap<String, u64>,
+    /// Alarms by name.
+    pub alarms: BTreeMap<String, u64>,
+    /// Resets by cause.
+    pub resets: BTreeMap<String, u64>,
+    /// Warnings by name.
+    pub warnings: BTreeMap<String, u64>,
+    /// What must not be, each with its hour or row and the time in it.
+    pub violations: Vec<String>,
+}
+
+impl Tally {
+    /// Notes what must not be.
+    pub(super) fn violated(&mut self, time_s: f64, what: impl fmt::Display) {
+        self.violations.push(format!("at {time_s:.3} s: {what}"));
+    }
+}
+
+impl AddAssign for Tally {
+    fn add_assign(&mut self, other: Self) {
+        self.seconds += other.seconds;
+        self.metres += other.metres;
+        self.rows += other.rows;
+        self.plants += other.plants;
+        self.weeded_metres += other.weeded_metres;
+        self.harmed += other.harmed;
+        self.mistaken += other.mistaken;
+        self.blind += other.blind;
+        for (names, others) in [
+            (&mut self.faults, other.faults),
+            (&mut self.alarms, other.alarms),
+            (&mut self.resets, other.resets),
+            (&mut self.warnings, other.warnings),
+        ] {
+            for (name, times) in others {
+                *names.entry(name).or_default() += times;
+            }
+        }
+        self.violations.extend(other.violations);
+    }
+}
+
+/// All hours or rows of a soak, up to the first in which something must not have been: nothing behind it is asked for.
+///
+/// # Errors
+/// The first that one has.
+pub fn total<E>(tallies: impl IntoIterator<Item = Result<Tally, E>>) -> Result<Tally, E> {
+    let mut total = Tally::default();
+    for tally in tallies {
+        total += tally?;
+        if !total.violations.is_empty() {
+            break;
+        }
+    }
+    Ok(total)
+}
+
+/// The chance of an hour or a row.
+pub(super) fn chance(plan: Plan, number: u64) -> ChaCha8Rng {
+    let mut rng = ChaCha8Rng::seed_from_u64(plan.seed);
+    rng.set_stream(number);
+    rng
+}
+
+/// Counts a name.
+pub(super) fn count(names: &mut BTreeMap<String, u64>, name: &str) {
+    *names.entry(name.to_owned()).or_default() += 1;
+}
+
+impl fmt::Display for Tally {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "Worked      {:.2} h, {:.2} km, {} rows", self.seconds / 3600.0, self.metres / 1000.0, self.rows)?;
+        writeln!(f, "Weeded      {:.0} % of the way", 100.0 * self.weeded_metres / self.metres.max(1.0))?;
+        writeln!(
+            f,
+            "Plants      {} passed, {} harmed; excused: {} taken for weeds, {} reached while the firmware could not know",
+            self.plants, self.harmed, self.mistaken, self.blind
+        )?;
+        for (title, names) in
+            [("Faults", &self.faults), ("Alarms", &self.alarms), ("Resets", &self.resets), ("Warnings", &self.warnings)]
+        {
+            let names: Vec<String> = names.iter().map(|(name, times)| format!("{name} {times}")).collect();
+            writeln!(f, "{title:11} {}", if names.is_empty() { "none".to_owned() } else { names.join(", ") })?;
+        }
+        self.violations.iter().try_for_each(|violation| writeln!(f, "VIOLATED    {violation}"))
+    }
+}
