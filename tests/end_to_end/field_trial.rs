@@ -1,7 +1,7 @@
 //! The paper's experiment with the real firmware on the virtual Uno.
 
 use field::conditions::Conditions;
-use study::experiment::{Controller, Engine, Experiment};
+use study::experiment::{Engine, Experiment, Treatment};
 use trial::firmware;
 
 /// Over all plots, in-row weeding may fall short of what the servo allows by this share of the ground. A single plot may
@@ -15,7 +15,7 @@ fn the_firmware_damages_no_plant_at_any_of_the_papers_speeds_and_spacings_and_we
     conditions.set("plot.row_m", 8.0).unwrap();
     let experiment = Experiment {
         replications: 1,
-        controllers: vec![Controller::Firmware],
+        controllers: vec![Treatment::Firmware],
         ..Experiment::as_in_the_paper(conditions, 2)
     };
     let outcomes = experiment.run(&Engine::Uno(firmware::build().unwrap()), |_| ()).unwrap();

@@ -14,7 +14,7 @@ use link::settings::{self, Setting};
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
 use std::fs;
-use study::experiment::{Controller, PlotOutcome};
+use study::experiment::{PlotOutcome, Treatment};
 use study::shard::Shard;
 use study::sweep::{Axis, Point, Results, SPACINGS_CM, SPEEDS_KM_H, Sweep};
 
@@ -105,7 +105,7 @@ enum ControllerName {
     AllKnowing,
 }
 
-impl From<ControllerName> for Controller {
+impl From<ControllerName> for Treatment {
     fn from(name: ControllerName) -> Self {
         match name {
             ControllerName::Firmware => Self::Firmware,

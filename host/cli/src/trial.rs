@@ -19,7 +19,7 @@ use std::fs;
 use std::path::PathBuf;
 use std::time::Instant;
 use study::evaluation::{Analysis, published};
-use study::experiment::{self, Controller, Engine, Experiment, PlotOutcome, Total};
+use study::experiment::{self, Engine, Experiment, PlotOutcome, Total, Treatment};
 use study::page::{Page, RowPicture};
 use study::shard::{Numbered, Shard};
 use study::statistics::Share;
@@ -111,14 +111,14 @@ enum Rival {
 
 impl Arguments {
     /// The firmware and its rivals, in the order in which they are shown.
-    fn controllers(&self) -> Vec<Controller> {
-        let takes_part = |controller: &Controller| match controller {
-            Controller::Firmware => true,
-            Controller::WithoutLookAhead => self.rivals.contains(&Rival::Queue),
-            Controller::Paper => self.rivals.contains(&Rival::Paper),
-            Controller::AllKnowing => self.rivals.contains(&Rival::AllKnowing),
+    fn controllers(&self) -> Vec<Treatment> {
+        let takes_part = |controller: &Treatment| match controller {
+            Treatment::Firmware => true,
+            Treatment::WithoutLookAhead => self.rivals.contains(&Rival::Queue),
+            Treatment::Paper => self.rivals.contains(&Rival::Paper),
+            Treatment::AllKnowing => self.rivals.contains(&Rival::AllKnowing),
         };
-        Controller::ALL.into_iter().filter(takes_part).collect()
+        Treatment::ALL.into_iter().filter(takes_part).collect()
     }
 
     /// The command that gives the same result: what of it is not so by itself, always in one order.
@@ -274,7 +274,7 @@ fn show(
 ) -> Result<Finding> {
     let &Shown { json, brief, .. } = shown;
     let totals = experiment::totals(outcomes);
-    let analysis = Analysis::of(experiment::records(outcomes, Controller::Firmware))?;
+    let analysis = Analysis::of(experiment::records(outcomes, Treatment::Firmware))?;
     let mut summary = summary(&study.experiment, &totals);
     summary.extend(against_the_paper(outcomes));
     let printed = if json {
@@ -284,8 +284,8 @@ fn show(
     } else {
         say!("{}\n\n{}", by_speed(&totals, false), summary.join("\n"))
     };
-    let alarms: u32 = of(&totals, Controller::Firmware).map(|total| total.alarms).sum();
-    let damaged: u32 = of(&totals, Controller::Firmware).map(|total| total.effect.injured()).sum();
+    let alarms: u32 = of(&totals, Treatment::Firmware).map(|total| total.alarms).sum();
+    let damaged: u32 = of(&totals, Treatment::Firmware).map(|total| total.effect.injured()).sum();
     if let Some(folder) = folder {
         let findings = Findings { outcomes, totals, analysis, summary };
         write_report(folder, study, picture()?, &findings)?;
@@ -300,7 +300,7 @@ fn show(
 /// Where the paper's controller does here what the paper did not find of it, at the paper's speeds.
 fn against_the_paper(outcomes: &[PlotOutcome]) -> Vec<String> {
     let (slowest, fastest) = published::SPEEDS_KM_H;
-    let mut records = experiment::records(outcomes, Controller::Paper);
+    let mut records = experiment::records(outcomes, Treatment::Paper);
     records.retain(|record| (slowest..=fastest).contains(&record.speed_km_h));
     let said = Analysis::of(records).map(|analysis| analysis.against_the_paper()).unwrap_or_default();
     said.into_iter().map(|said| format!("The paper's controller at {slowest} to {fastest} km/h: {said}")).collect()
@@ -323,7 +323,7 @@ fn ascending(levels: &[f64]) -> Vec<f64> {
 }
 
 /// What one controller did, by speed.
-fn of(totals: &[Total], controller: Controller) -> impl Iterator<Item = &Total> {
+fn of(totals: &[Total], controller: Treatment) -> impl Iterator<Item = &Total> {
     totals.iter().filter(move |total| total.controller == controller)
 }
 
@@ -373,21 +373,21 @@ fn gone(weeds: WeedCount) -> String {
 fn summary(experiment: &Experiment, totals: &[Total]) -> Vec<String> {
     let mut sentences: Vec<String> =
         experiment.controllers.iter().map(|&controller| damage(totals, controller)).collect();
-    let alarms: u32 = of(totals, Controller::Firmware).map(|total| total.alarms).sum();
+    let alarms: u32 = of(totals, Treatment::Firmware).map(|total| total.alarms).sum();
     if alarms > 0 {
         sentences.push(format!(
             "In {alarms} of {} rows an alarm took the firmware's tool out for the rest of the row: its figures are no good there.",
             experiment.rows()
         ));
     }
-    let short_of_bound = of(totals, Controller::Firmware).map(|total| total.weedable_share - total.weeded_share);
+    let short_of_bound = of(totals, Treatment::Firmware).map(|total| total.weedable_share - total.weeded_share);
     sentences.push(format!(
         "With every canopy and its margin kept, this servo could weed at most {:.1} points more of the row's ground than the \
          firmware did.",
         100.0 * short_of_bound.fold(0.0, f64::max)
     ));
     let mut weeds = Effect::default();
-    of(totals, Controller::Firmware).for_each(|total| weeds += total.effect);
+    of(totals, Treatment::Firmware).for_each(|total| weeds += total.effect);
     let Effect { swept, neighbours, .. } = weeds;
     if swept + neighbours > 0 {
         sentences.push(format!(
@@ -418,7 +418,7 @@ fn summary(experiment: &Experiment, totals: &[Total]) -> Vec<String> {
 }
 
 /// How many plants a controller damaged, and where most of them.
-fn damage(totals: &[Total], controller: Controller) -> String {
+fn damage(totals: &[Total], controller: Treatment) -> String {
     let name = controller.title();
     let (damaged, plants) = of(totals, controller)
         .fold((0, 0), |(damaged, plants), total| (damaged + total.effect.injured(), plants + total.effect.plants));
@@ -467,7 +467,7 @@ fn write_report(folder: &OutFolder, study: &Study, picture: Option<String>, find
     };
     let html = page.html()?;
     folder.write("report.html", |to| to.write_all(html.as_bytes()))?;
-    folder.write("trial.csv", |to| experiment::write_csv(findings.outcomes, &[Controller::Firmware], to))?;
+    folder.write("trial.csv", |to| experiment::write_csv(findings.outcomes, &[Treatment::Firmware], to))?;
     folder.write("controllers.csv", |to| experiment::write_csv(findings.outcomes, &experiment.controllers, to))
 }
 

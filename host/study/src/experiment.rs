@@ -51,10 +51,10 @@ pub enum Engine {
     Uno(PathBuf),
 }
 
-/// Who swings the tool.
+/// Who swings the tool: what the plots of an experiment are given to compare.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Controller {
+pub enum Treatment {
     /// The firmware with its leads.
     Firmware,
     /// The firmware with both leads at 0: a queue of windows, without look-ahead.
@@ -65,7 +65,7 @@ pub enum Controller {
     AllKnowing,
 }
 
-impl Controller {
+impl Treatment {
     /// All, the firmware first.
     pub const ALL: [Self; 4] = [Self::Firmware, Self::WithoutLookAhead, Self::Paper, Self::AllKnowing];
 
@@ -90,7 +90,7 @@ pub struct Experiment {
     /// How often each speed and spacing is tried.
     pub replications: u32,
     /// Who weeds.
-    pub controllers: Vec<Controller>,
+    pub controllers: Vec<Treatment>,
     /// Where.
     pub conditions: Conditions,
     /// What the firmware is taught beforehand.
@@ -104,7 +104,7 @@ pub struct Experiment {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlotOutcome {
     /// Who weeded it.
-    pub controller: Controller,
+    pub controller: Treatment,
     /// What is written down.
     pub record: PlotRecord,
     /// Plants and weeds, counted.
@@ -210,7 +210,7 @@ impl Experiment {
             speeds_km_h: vec![1.0, 1.5, 2.0, 2.5],
             spacings_cm: vec![50.0, 60.0],
             replications: 3,
-            controllers: Controller::ALL.to_vec(),
+            controllers: Treatment::ALL.to_vec(),
             conditions,
             examples: Vec::new(),
             seed,
@@ -284,7 +284,7 @@ impl Experiment {
         let fastest = self.plots().into_iter().reduce(|a, b| if b.speed_km_h > a.speed_km_h { b } else { a });
         let Some(plot) = fastest else { return Ok(None) };
         let (stand, _, trial) = self.grow(&plot, 0)?;
-        let weeded = weed(&trial, &sensors(&trial), &stand, Controller::Firmware, engine)?;
+        let weeded = weed(&trial, &sensors(&trial), &stand, Treatment::Firmware, engine)?;
         let Trial { row, machine, motion, timing, .. } = &trial;
         let judgement = judge(row, machine, motion, *timing, &weeded.pulses, weeded.start_cycle);
         Ok(row.beginning(DRAWN_MM).map(|beginning| (beginning, judgement)))
@@ -319,7 +319,7 @@ impl Experiment {
     }
 
     /// A plot that nobody has weeded yet.
-    fn untouched(&self, plot: &Plot, controller: Controller) -> PlotOutcome {
+    fn untouched(&self, plot: &Plot, controller: Treatment) -> PlotOutcome {
         let Conditions { plot: area, machine, .. } = &self.conditions;
         let width_m = area.row_spacing_mm / 1000.0;
         let record = PlotRecord {
@@ -353,7 +353,7 @@ impl Experiment {
         let (stand, drive, trial) = self.grow(plot, row)?;
         let sensors = sensors(&trial);
         let undamaged_share = undamaged_share(&stand, &trial.machine, &drive.motion, &drive.steering);
-        let outcome = |&controller: &Controller| {
+        let outcome = |&controller: &Treatment| {
             let weeded = weed(&trial, &sensors, &stand, controller, engine)?;
             let Trial { row, machine, motion, timing, .. } = &trial;
             let (pulses, start_cycle) = (&weeded.pulses, weeded.start_cycle);
@@ -428,7 +428,7 @@ fn weed(
     trial: &Trial,
     sensors: &LazyCell<Sensors, impl FnOnce() -> Sensors>,
     stand: &Stand,
-    controller: Controller,
+    controller: Treatment,
     engine: &Engine,
 ) -> Result<Weeded, ExperimentError> {
     let firmware = |trial: &Trial| match engine {
@@ -444,13 +444,13 @@ fn weed(
     };
     let rival = |pulses| Ok(Weeded { pulses, start_cycle: 0, alarm: false });
     match controller {
-        Controller::Firmware => firmware(trial),
-        Controller::WithoutLookAhead => {
+        Treatment::Firmware => firmware(trial),
+        Treatment::WithoutLookAhead => {
             let timing = Timing { lead_out_ms: 0, lead_in_ms: 0, ..trial.timing };
             firmware(&Trial { timing, ..trial.clone() })
         }
-        Controller::Paper => rival(rivals::as_in_the_paper(trial)),
-        Controller::AllKnowing => rival(rivals::all_knowing(trial, &stand.stems)),
+        Treatment::Paper => rival(rivals::as_in_the_paper(trial)),
+        Treatment::AllKnowing => rival(rivals::all_knowing(trial, &stand.stems)),
     }
 }
 
@@ -481,7 +481,7 @@ impl PlotOutcome {
 }
 
 /// The records of what one controller did.
-pub fn records(outcomes: &[PlotOutcome], controller: Controller) -> Vec<PlotRecord> {
+pub fn records(outcomes: &[PlotOutcome], controller: Treatment) -> Vec<PlotRecord> {
     outcomes.iter().filter(|outcome| outcome.controller == controller).map(|outcome| outcome.record).collect()
 }
 

@@ -18,5 +18,5 @@ pub mod sweep;
 pub mod training;
 
 pub use evaluation::{Analysis, PlotRecord};
-pub use experiment::{Controller, Engine, Experiment};
+pub use experiment::{Engine, Experiment, Treatment};
 pub use sweep::Sweep;

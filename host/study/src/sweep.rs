@@ -3,7 +3,7 @@
 //! An axis is a speed, a plant spacing, a parameter of the conditions or a setting of the firmware, with its values
 //! ([`Axis`]). At each point the firmware's native twin weeds a plot, always the same ground for the same conditions.
 
-use crate::experiment::{Controller, Engine, Experiment, ExperimentError, PlotOutcome};
+use crate::experiment::{Engine, Experiment, ExperimentError, PlotOutcome, Treatment};
 use crate::shard::{Numbered, Shard};
 use field::conditions::{Conditions, WrongValue};
 use rayon::prelude::*;
@@ -135,7 +135,7 @@ pub struct Sweep {
     /// The second axis, if there is one.
     pub y: Option<Axis>,
     /// Who weeds.
-    pub controller: Controller,
+    pub controller: Treatment,
     /// What does not vary.
     pub conditions: Conditions,
     /// Speed where no axis has it, km/h.
@@ -306,7 +306,7 @@ mod tests {
         Sweep {
             x: x.parse().unwrap(),
             y: y.map(|y| y.parse().unwrap()),
-            controller: Controller::Firmware,
+            controller: Treatment::Firmware,
             conditions,
             speed_km_h: 2.5,
             spacing_cm: 50.0,

@@ -1,6 +1,6 @@
 //! An experiment's plots as a CSV table.
 
-use super::{Controller, PlotOutcome};
+use super::{PlotOutcome, Treatment};
 use crate::evaluation::PlotRecord;
 use serde::Serialize;
 use std::io;
@@ -39,7 +39,7 @@ struct Line {
 ///
 /// # Errors
 /// Those of the writer.
-pub fn write_csv(outcomes: &[PlotOutcome], controllers: &[Controller], to: impl io::Write) -> Result<(), csv::Error> {
+pub fn write_csv(outcomes: &[PlotOutcome], controllers: &[Treatment], to: impl io::Write) -> Result<(), csv::Error> {
     let mut writer = csv::Writer::from_writer(to);
     for outcome in outcomes.iter().filter(|outcome| controllers.contains(&outcome.controller)) {
         let PlotRecord { replication, speed_km_h, spacing_cm, weeds_before, weeds_after, plants, damaged, .. } =

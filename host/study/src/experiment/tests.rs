@@ -26,8 +26,8 @@ fn the_result_does_not_depend_on_the_number_of_threads() {
 #[test]
 fn a_controller_finds_the_same_field_whoever_else_takes_part() {
     let all = experiment(&[1.5], "transplanted");
-    let alone = Experiment { controllers: vec![Controller::Firmware], ..all.clone() };
-    assert_eq!(records(&run(&all), Controller::Firmware), records(&run(&alone), Controller::Firmware));
+    let alone = Experiment { controllers: vec![Treatment::Firmware], ..all.clone() };
+    assert_eq!(records(&run(&all), Treatment::Firmware), records(&run(&alone), Treatment::Firmware));
 }
 
 #[test]
@@ -36,12 +36,12 @@ fn the_firmware_damages_no_plant_and_weeds_up_to_the_bound_where_the_papers_dama
         let experiment = Experiment { seed, ..experiment(&[1.0, 1.5, 2.0, 2.5, 3.0, 3.5], "transplanted") };
         let totals = totals(&run(&experiment));
         let of = |controller| totals.iter().filter(move |total| total.controller == controller);
-        for total in of(Controller::Firmware) {
+        for total in of(Treatment::Firmware) {
             assert_eq!((total.effect.damaged, total.canopies.reached, total.alarms), (0, 0, 0), "{total:?}");
             assert!(total.weedable_share - total.weeded_share < 0.05, "{total:?}");
         }
-        assert!(of(Controller::AllKnowing).all(|total| total.effect.damaged == 0));
-        let damage: Vec<f64> = of(Controller::Paper).map(Total::plant_damage_percent).collect();
+        assert!(of(Treatment::AllKnowing).all(|total| total.effect.damaged == 0));
+        let damage: Vec<f64> = of(Treatment::Paper).map(Total::plant_damage_percent).collect();
         // A weed as wide as a plant takes its one slot at any speed; what comes too late grows with it.
         let (slow, fast) = damage.split_at(3);
         assert!(slow.iter().all(|percent| *percent < 1.0) && fast[0] > 1.0, "{damage:?}");
@@ -53,9 +53,9 @@ fn the_firmware_damages_no_plant_and_weeds_up_to_the_bound_where_the_papers_dama
 fn whoever_knows_every_plant_damages_none_in_any_field_and_weeds_more_than_the_firmware() {
     for preset in presets() {
         let totals = totals(&run(&experiment(&[1.0, 2.5], preset)));
-        for pair in totals.chunks(Controller::ALL.len()) {
+        for pair in totals.chunks(Treatment::ALL.len()) {
             let (firmware, all_knowing) = (pair[0], pair[3]);
-            assert_eq!((firmware.controller, all_knowing.controller), (Controller::Firmware, Controller::AllKnowing));
+            assert_eq!((firmware.controller, all_knowing.controller), (Treatment::Firmware, Treatment::AllKnowing));
             assert_eq!(all_knowing.effect.damaged, 0, "{preset}");
             assert!(all_knowing.weeded_share > firmware.weeded_share, "{preset}");
         }
@@ -97,7 +97,7 @@ fn a_shorter_stroke_that_the_firmware_is_told_weeds_more_and_reaches_no_canopy()
 #[test]
 fn field_efficiency_falls_with_speed_as_the_paper_s_equation_has_it() {
     let outcomes = run(&Experiment { replications: 6, ..experiment(&[1.0, 1.5, 2.0, 2.5], "transplanted") });
-    let analysis = Analysis::of(records(&outcomes, Controller::Firmware)).unwrap();
+    let analysis = Analysis::of(records(&outcomes, Treatment::Firmware)).unwrap();
     let slope = analysis.responses[3].model.as_ref().unwrap().term("speed").unwrap().clone();
     assert!((slope.estimate - -2.06).abs() < 3.0 * slope.standard_error + 0.5, "{slope:?}");
     for treatment in analysis.treatments() {
@@ -151,7 +151,7 @@ fn no_parameter_at_an_end_of_its_range_upsets_a_trial() {
 #[test]
 fn every_plot_can_be_judged_like_a_real_one() {
     let outcomes = run(&experiment(&[1.0, 2.5], "weedy"));
-    let analysis = Analysis::of(records(&outcomes, Controller::Firmware)).unwrap();
+    let analysis = Analysis::of(records(&outcomes, Treatment::Firmware)).unwrap();
     assert_eq!(analysis.records.len(), 4);
     assert!(analysis.performances.iter().all(|plot| plot.field_efficiency_percent < 100.0));
 }

@@ -1,6 +1,6 @@
 //! What each controller did at each speed, all plots together, and the controllers side by side.
 
-use super::{Canopies, Controller, PlotOutcome};
+use super::{Canopies, PlotOutcome, Treatment};
 use crate::page::{Comparison, ControllerCurve, ControllerPoint};
 use crate::statistics::{Mean, Share};
 use field::tool_path::Effect;
@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Total {
     /// Who weeded them.
-    pub controller: Controller,
+    pub controller: Treatment,
     /// The speed, km/h.
     pub speed_km_h: f64,
     /// Plants and weeds, counted.
@@ -118,14 +118,14 @@ pub fn compare(totals: &[Total]) -> Comparison {
         over_canopy_percent: total.canopies_reached_percent(),
         in_row_weeding_percent: 100.0 * total.weeded_share,
     };
-    let of = |controller: Controller| totals.iter().filter(move |total| total.controller == controller);
-    let curve = |controller: Controller| ControllerCurve {
+    let of = |controller: Treatment| totals.iter().filter(move |total| total.controller == controller);
+    let curve = |controller: Treatment| ControllerCurve {
         name: controller.title().to_owned(),
         points: of(controller).map(point).collect(),
     };
-    let first = totals.first().map_or(Controller::Firmware, |total| total.controller);
+    let first = totals.first().map_or(Treatment::Firmware, |total| total.controller);
     Comparison {
-        controllers: Controller::ALL.into_iter().filter(|&one| of(one).next().is_some()).map(curve).collect(),
+        controllers: Treatment::ALL.into_iter().filter(|&one| of(one).next().is_some()).map(curve).collect(),
         bound: of(first).map(|total| (total.speed_km_h, 100.0 * total.weedable_share)).collect(),
     }
 }
