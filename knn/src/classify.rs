@@ -6,7 +6,7 @@ use crate::{Answer, ClassifyError, Examples, MAX_K, Nearest, Neighbour};
 ///
 /// - All examples that are as far as the k-th nearest vote, so that the order of the examples never matters.
 /// - Each vote counts one, near or far; the class with the most votes wins (see [`Answer::label`] for ties).
-/// - `radius` is a squared distance: an answer whose nearest example is farther is a [`Kind::Stranger`], whatever the
+/// - `radius` is a squared distance: an answer whose nearest example is farther is a [`Kind::Stranger`](crate::Kind::Stranger), whatever the
 ///   votes. `u32::MAX` knows no strangers.
 ///
 /// ```

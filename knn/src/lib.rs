@@ -43,24 +43,25 @@
 //! | `[Example<F>; n]` | n (F + 1) | |
 //! | [`Table<F, N>`](Table) | N (F + 1) + 2 | `add_example` O(1), `remove` O(n) |
 //! | [`Scale<F>`](Scale) | 7 F | `quantise`: F subtractions, shifts and multiplications |
+//! | [`Nearest`] for k, which may be kept | 4 k + 7 + 2 C | |
 //! | [`classify`] | about 130 + 2 C of stack | n F multiplications of 8 x 8 bits; k steps an example within reach; k + C to vote |
 //!
-//! In cycles of an ATmega328P, for F = 5, C = 2 and k = 3, the examples in flash behind a store whose
+//! In cycles of an ATmega328P, for F = 5, C = 2 and k = 3, by a machine that keeps its [`Nearest`], the examples in flash behind a store whose
 //! [`Examples::keep_nearest`] is written in assembly, compiled for size (`opt-level = "z"`), over 256 random queries:
 //!
 //! | n | fewest | mean | most |
 //! |---|---|---|---|
-//! | 8 | 1,468 | 1,787 | 2,026 |
-//! | 16 | 1,803 | 2,287 | 2,779 |
-//! | 32 | 2,506 | 3,194 | 3,878 |
-//! | 64 | 3,719 | 4,668 | 5,701 |
-//! | 128 | 5,904 | 7,122 | 8,875 |
+//! | 8 | 1,090 | 1,412 | 1,643 |
+//! | 16 | 1,412 | 1,903 | 2,396 |
+//! | 32 | 2,114 | 2,798 | 3,485 |
+//! | 64 | 3,294 | 4,246 | 5,307 |
+//! | 128 | 5,400 | 6,636 | 8,384 |
 //!
-//! That is about 800 for the call and the vote, 40 for each example, and 110 for each that was among the k nearest when
+//! That is about 500 for the calls and the vote, 40 for each example, and 110 for each that was among the k nearest when
 //! it was met: about k (1 + ln(n / k)) of n in random order, and up to all of them where one example lies a little nearer than
-//! the one before it. Searched by the plain [`Examples::keep_nearest`], an example costs about 200 instead of 40.
-//! [`Scale::quantise`] takes 1,444 cycles. `cargo bench-uno`, in the weeder's workspace, measures all of this anew in the
-//! simulator simavr.
+//! the one before it. [`classify`] clears its places first, and takes some 330 more. Searched by the plain [`Examples::keep_nearest`], an
+//! example costs about 200 instead of 40. [`Scale::quantise`] takes 1,400 cycles. `cargo bench-uno`, in the weeder's workspace, measures all
+//! of this anew in the simulator simavr.
 //!
 //! # What it does not do
 //!

@@ -36,7 +36,7 @@ pub struct Nearest<const CLASSES: usize, Places: ?Sized = [Neighbour]> {
 }
 
 impl<const CLASSES: usize, const PLACES: usize> Nearest<CLASSES, [Neighbour; PLACES]> {
-    /// Nobody yet, and so many places, whoever stands there. None of them is to be taken before a search has [begun](Nearest::begin).
+    /// Nobody yet, and so many places, whoever stands there. None of them is to be taken before a search has begun.
     #[inline]
     #[must_use]
     pub const fn new(places: [Neighbour; PLACES]) -> Self {

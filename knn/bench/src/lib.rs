@@ -23,9 +23,9 @@ pub const CLASSES: usize = 2;
 pub enum Task {
     /// `Scale::quantise`: the five features to bytes.
     Quantise,
-    /// `knn::classify` among so many random examples in flash.
+    /// A search and its vote among so many random examples in flash.
     Classify(u8),
-    /// `knn::classify` of objects of a row among the firmware's own examples.
+    /// The same for objects of a row among the firmware's own examples.
     ClassifyObjects,
 }
 
