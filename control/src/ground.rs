@@ -57,7 +57,7 @@ pub struct Ground {
 
 /// The object that was seen in full, and of which nobody knows yet what it is.
 ///
-/// It begins with what is told apart, so that none is all zeros: a machine that has not woken up takes no flash.
+/// With its kind in front and none of them as 0, ground of which nobody knows anything is all zeros, which takes no flash.
 #[derive(Clone, Copy, Debug)]
 #[repr(u8)]
 enum Unjudged {

@@ -295,7 +295,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// Begins to judge a complete object, which takes some turns more. What is dust is only counted.
     fn judge(&mut self, object: Object) {
-        // One that is seen so soon after another is no plant beside a plant; where nobody knows, it is kept.
+        // The one before it, a few millimetres off, is not judged yet. Like all of which nobody knows what it is, it is kept.
         if self.is_judging {
             self.decide(Some(Vote::UNKNOWN));
         }

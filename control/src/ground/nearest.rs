@@ -15,8 +15,7 @@ use crate::{
 };
 use knn::{Answer, ClassifyError, Example, Examples, Kind, MAX_K, Neighbour};
 
-/// Examples from the field that are asked in a turn of the loop. Where each comes nearer than all before it and has 15 move up,
-/// a millisecond is enough for 32.
+/// Examples from the field that are asked in a turn of the loop, which takes half a millisecond where each is nearer than all before it.
 pub const AT_ONCE: usize = 16;
 
 /// What is kept of the nearest examples while they are searched.
