@@ -45,7 +45,7 @@ Examples:
   weeder trial --replications 1000 --shard 2/4 --out 2.part    the second of four parts, for `weeder merge`
 The status is 1 where the firmware damaged a plant, or an alarm stopped it; with --shard, `weeder merge` says so.")]
 pub struct Arguments {
-    /// What runs the firmware: its code compiled for this computer, or the ELF on the virtual Uno, some 500 times slower.
+    /// What runs the firmware: its code compiled for this computer, or the ELF on the virtual Uno, hundreds of times slower.
     #[arg(long, value_enum, default_value = "twin")]
     engine: EngineName,
     /// Plots of each speed and spacing, 1 to 1000.
