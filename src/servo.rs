@@ -15,7 +15,8 @@ use control::operate::servo::{self, Action, FRAME, HalfMicros};
 use core::convert::Infallible;
 use embedded_hal::pwm::{ErrorType, SetDutyCycle};
 
-/// So close to its end a frame ends by itself: 5 us, more than setting the counter takes from reading it.
+/// So close to its end a frame ends by itself: 5 us, more than setting the counter takes from reading it. A width that is written then
+/// may come behind the bottom, and would not be on the line before the next.
 const TOO_LATE: HalfMicros = FRAME - 10;
 
 /// The servo's signal.
@@ -52,27 +53,28 @@ impl Servo {
         if action == Action::Wait {
             return;
         }
-        if change(&self.timer, since_rise, compare(width), action == Action::Restart) {
+        let left = TOO_LATE.saturating_sub(since_rise);
+        if change(&self.timer, since_rise, left, compare(width), action == Action::Restart) {
             self.width = width;
         }
     }
 }
 
 /// Has the timer compare with another value from the frame's end on, and has the frame end at once where it is to start anew.
-/// Returns whether it did: not where the frame has ended since `since_rise` was read. The line then shows a new pulse, and
-/// the command waits for that one.
+/// Returns whether it did: not where the frame has ended since `since_rise` was read, `left` before it is too late for that, or is
+/// about to. The line then shows a new pulse, and the command waits for that one.
 ///
 /// No interrupt may come between reading the counter and setting it. The encoder waits for that, so it is a function of its own:
-/// what it is given was worked out before. At most 24 cycles are without interrupts.
+/// what it is given was worked out before. At most 22 cycles are without interrupts.
 #[inline(never)]
-fn change(timer: &TC1, since_rise: HalfMicros, compare: u16, restart: bool) -> bool {
+fn change(timer: &TC1, since_rise: HalfMicros, left: HalfMicros, compare: u16, restart: bool) -> bool {
     interrupt::free(|_| {
-        let now = timer.tcnt1().read().bits();
-        if now < since_rise {
+        // A new frame counts from 0: less than the last one had by far.
+        if timer.tcnt1().read().bits().wrapping_sub(since_rise) >= left {
             return false;
         }
         timer.ocr1a().write(|w| w.set(compare));
-        if restart && now < TOO_LATE {
+        if restart {
             timer.tcnt1().write(|w| w.set(FRAME - 2));
         }
         true
