@@ -61,8 +61,8 @@ impl Servo {
 }
 
 /// Has the timer compare with another value from the frame's end on, and has the frame end at once where it is to start anew.
-/// Returns whether it did: not where the frame has ended since `since_rise` was read, `left` before it is too late for that, or is
-/// about to. The line then shows a new pulse, and the command waits for that one.
+/// Returns whether it did: not where `left` has passed since `since_rise` was read. The frame has ended then, or is about to, and
+/// the command waits for the next pulse.
 ///
 /// No interrupt may come between reading the counter and setting it. The encoder waits for that, so it is a function of its own:
 /// what it is given was worked out before. At most 22 cycles are without interrupts.

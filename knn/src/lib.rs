@@ -59,7 +59,7 @@
 //!
 //! That is about 500 for the calls and the vote, 40 for each example, and 110 for each that was among the k nearest when
 //! it was met: about k (1 + ln(n / k)) of n in random order, and up to all of them where one example lies a little nearer than
-//! the one before it. [`classify`] clears its places first, and takes some 330 more. Searched by the plain [`Examples::keep_nearest`], an
+//! the one before it. [`classify`] clears its places first. Searched by the plain [`Examples::keep_nearest`], an
 //! example costs about 200 instead of 40. [`Scale::quantise`] takes 1,400 cycles. `cargo bench-uno`, in the weeder's workspace, measures all
 //! of this anew in the simulator simavr.
 //!
