@@ -295,20 +295,19 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// Begins to judge a complete object, which takes some turns more. What is dust is only counted.
     fn judge(&mut self, object: Object) {
-        // The one before it, a few millimetres off, is not judged yet. Like all of which nobody knows what it is, it is kept.
-        if self.is_judging {
-            self.decide(Some(Vote::UNKNOWN));
-        }
         self.is_enough = true;
-        let position = self.sensors.readings.position;
-        let spacing = self.ground.spacing(&object);
-        let speed_class_mm_s = features::speed_class(self.speed_mm_s());
-        let (spacing_mm, width_mm) =
-            (self.ground.millimetres(spacing), self.ground.millimetres(self.ground.ticks(object.width())));
+        let width_mm = self.ground.millimetres(self.ground.ticks(object.width()));
         if !object.cut && (width_mm as u16) < self.configuration.get(Setting::MinWidthMm) {
             count(&mut self.dust);
             return;
         }
+        // The one before it, a few millimetres off, is not judged yet. Like all of which nobody knows what it is, it is kept.
+        if self.is_judging {
+            self.decide(Some(Vote::UNKNOWN));
+        }
+        let position = self.sensors.readings.position;
+        let spacing_mm = self.ground.millimetres(self.ground.spacing(&object));
+        let speed_class_mm_s = features::speed_class(self.speed_mm_s());
         self.no_plants = NoPlants::since(position);
         let judged = Judged { speed_class_mm_s, spacing_mm, width_mm, vote: Vote::UNKNOWN, label: None };
         self.objects.remember(judged);

@@ -10,7 +10,7 @@ mod rolling;
 use common::{ByWidth, machine_that_judges};
 use control::{
     alarm::Alarm,
-    ground::class::Vote,
+    ground::class::{Class, Vote},
     operate::{event::Event, state::State},
     settings::Setting,
     units::{Position, Ticks},
@@ -67,6 +67,15 @@ fn what_is_still_being_judged_when_the_next_object_comes_is_kept() {
     late.roll_to(710.0, 1000.0);
     assert_eq!(late.told_of(object).iter().map(|&(vote, ..)| vote).collect::<Vec<_>>(), [Vote::UNKNOWN]);
     assert_eq!(late.machine.windows(), 2);
+}
+
+#[test]
+fn dust_leaves_what_is_being_judged_alone() {
+    let settings = [(Setting::MinWidthMm, 5)];
+    let mut late = rolling(100, &[(600.0, 620.0), (660.0, 663.0)], usize::MAX, &settings);
+    late.roll_to(800.0, 1000.0);
+    assert_eq!(late.machine.dust(), 1);
+    assert_eq!(late.told_of(object).iter().map(|(vote, ..)| vote.class).collect::<Vec<_>>(), [Class::Weed]);
 }
 
 proptest! {
