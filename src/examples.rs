@@ -4,11 +4,12 @@
 //! brings one feature after the other, and an example is left as soon as it is known to be too far. For that the sum
 //! does not begin at 0 but at 2^24 - 1 less the farthest neighbour's distance, so that the carry out of its 24 bits says that the
 //! example is beyond it. An example costs 7 cycles and 12 for each feature that is looked at: 19 to 67. One that is near enough
-//! moves those that are farther up by a place, 24 cycles each, and takes its own, some 60 cycles. Those that find no place although
+//! moves those that are farther up by a place, 24 cycles each, and takes its own, some 50 cycles. Those that find no place although
 //! they are as far as the farthest are counted.
 //!
-//! How many find a place, and so what a search takes, is up to the order in which it meets them. So a table may be sorted by its
-//! first feature, and is searched from the query's own on to its end, and then from its beginning.
+//! A table in flash is sorted by its first feature. The search begins at the query's own and goes on to the table's end, and then from
+//! there back to its beginning: the nearest come first, and where the first feature alone is too far, nothing nearer follows in that
+//! direction.
 
 use avr_progmem::{raw::read_byte, wrapper::ProgMem};
 use control::ground::{examples, features};
@@ -28,7 +29,7 @@ pub struct BuiltIn;
 impl BuiltIn {
     /// Where they lie.
     pub fn table() -> InFlash {
-        InFlash::sorted(&BUILT_IN)
+        InFlash::new(&BUILT_IN)
     }
 }
 
@@ -58,22 +59,23 @@ impl Examples<{ features::COUNT }> for BuiltIn {
     }
 }
 
-/// Examples as rows, for a table in flash.
+/// Examples as rows, for a table in flash. Those that are not sorted by their first feature do not compile.
 pub const fn rows<const N: usize>(examples: &[Example<{ features::COUNT }>; N]) -> [Row; N] {
     let mut rows = [[0; features::COUNT + 1]; N];
     let mut index = 0;
     while index < N {
         let Example { features: [a, b, c, d, e], label } = examples[index];
         assert!(label < 2, "the search counts the votes of two classes");
+        assert!(index == 0 || rows[index - 1][0] <= a, "the search begins at the query's own first feature");
         rows[index] = [a, b, c, d, e, label];
         index += 1;
     }
     rows
 }
 
-/// A feature: its difference, squared, joins the sum. Out of reach, the next example has its turn.
+/// A feature: its difference, squared, joins the sum. Out of reach, the search goes on elsewhere.
 macro_rules! feature {
-    ($load:literal, $query:literal) => {
+    ($load:literal, $query:literal, $out_of_reach:literal) => {
         concat!(
             $load,
             "  {byte}, Z+\n",
@@ -87,19 +89,21 @@ macro_rules! feature {
             "add  {low}, r0\n",
             "adc  r16, r1\n",
             "adc  r17, {zero}\n",
-            "brcs 2b",
+            "brcs ",
+            $out_of_reach,
         )
     };
 }
 
-/// Has so many rows join the nearest, from an address on, from which an instruction loads a byte. A line of assembly passes over a row
-/// that is none, whose label is known there.
+/// Has rows join the nearest: so many from an address on, and then so many before it, the last one first. They lie where an instruction
+/// loads a byte from. One whose first feature alone is out of reach is passed over, `2b`, or ends its direction, `3b`. A line of
+/// assembly passes over a row that is none, whose label is known there.
 ///
 /// # Safety
 ///
-/// So many rows lie there, 254 at most, where the instruction loads from.
+/// So many rows lie there, 254 at most on either side of the address, where the instruction loads from.
 macro_rules! keep_nearest {
-    ($nearest:ident, $query:ident, $rows:expr, $count:expr, $load:literal, $vacant:literal) => {{
+    ($nearest:ident, $query:ident, $rows:expr, $count:expr, $before:expr, $load:literal, $first_is_out:literal, $vacant:literal) => {{
         let (places, free) = $nearest.places();
         if places.is_empty() {
             return;
@@ -112,20 +116,24 @@ macro_rules! keep_nearest {
             // The sum has its upper bytes in R17 and R16, what it begins with in R19 and R18: MOVW wants pairs that begin with
             // an even register, which the compiler's own choice of a pair need not be.
             // R1, which is 0 elsewhere, takes the products: the carry is added by a register of its own.
+            // The stack keeps where the other direction begins and how many rows it has, and one more.
+            "push {next:l}",
+            "push {next:h}",
+            "push {byte}",
             "ld   {a}, Z+",
             "ld   {b}, Z+",
             "ld   {c}, Z+",
             "ld   {d}, Z+",
             "ld   {e}, Z+",
             "clr  {zero}",
-            "clr  {level}",
             "clr  {ones}",
             // A sum begins with the complement of how far the farthest is, or with 0 while places are free. T says that none is.
             "clr  {start_low}",
             "clr  r18",
             "clr  r19",
             "clt",
-            "cp   r26, {first}",
+            // As long as places are free, no example is level, and the register tells the first place.
+            "cp   r26, {level}",
             "brne 2f",
             "rjmp 22f",
             "3:",
@@ -134,19 +142,16 @@ macro_rules! keep_nearest {
             "dec  {left}",
             "breq 3b",
             "movw r30, {next:l}",
-            "adiw {next:l}, {row}",
+            "add  {next:l}, {step:l}",
+            "adc  {next:h}, {step:h}",
             "mov  {low}, {start_low}",
             "movw r16, r18",
-            feature!($load, "a"),
-            feature!($load, "b"),
-            feature!($load, "c"),
-            feature!($load, "d"),
-            feature!($load, "e"),
-            // Within reach. The sum is all ones where the example is as far as the farthest.
-            "mov  {byte}, {low}",
-            "and  {byte}, r16",
-            "and  {byte}, r17",
-            // The distance is what the sum has grown by.
+            feature!($load, "a", $first_is_out),
+            feature!($load, "b", "2b"),
+            feature!($load, "c", "2b"),
+            feature!($load, "d", "2b"),
+            feature!($load, "e", "2b"),
+            // Within reach. The distance is what the sum has grown by.
             "sub  {low}, {start_low}",
             "sbc  r16, r18",
             "sbc  r17, r19",
@@ -157,23 +162,9 @@ macro_rules! keep_nearest {
             "sbiw r26, {place}",
             "3:",
             "movw r30, r26",
+            // The farthest loses its place. Its label is kept.
             "ld   r0, Z",
-            "inc  {byte}",
-            "brne 6f",
-            // The smaller label has the place, the other one is level.
-            "cp   {label}, r0",
-            "brcs 6f",
-            "rjmp 5f",
-            // The reach has not changed: the one that lost its place is level.
-            "4:",
-            "mov  {label}, r0",
-            "5:",
-            "inc  {level}",
-            "add  {ones}, {label}",
-            "8:",
-            "rjmp 2b",
-            // Those that are farther than it move up.
-            "6:",
+            // Those that are farther than the example move up.
             "cp   r30, {last}",
             "breq 7f",
             "26:",
@@ -199,8 +190,8 @@ macro_rules! keep_nearest {
             "std  Z+3, r17",
             // Where no place is free any more, the reach is where the farthest is now.
             "brts 7f",
-            "cp   r26, {first}",
-            "brne 8b",
+            "cp   r26, {level}",
+            "brne 8f",
             "22:",
             "set",
             "7:",
@@ -216,15 +207,47 @@ macro_rules! keep_nearest {
             "cpc  r17, r19",
             "mov  {start_low}, {low}",
             "movw r18, r16",
-            "breq 4b",
+            "breq 4f",
             "clr  {level}",
             "clr  {ones}",
             "rjmp 2b",
+            // The reach has not changed: the one that lost its place is level. Of two that are as far, the smaller label has the place.
+            "4:",
+            "ld   {label}, Z",
+            "cp   r0, {label}",
+            "brcc 5f",
+            "st   Z, r0",
+            "mov  r0, {label}",
+            "5:",
+            "inc  {level}",
+            "add  {ones}, r0",
+            "8:",
+            "rjmp 2b",
+            // A direction is done. Rows are passed downwards in the second one.
             "9:",
+            "sbrc {step:h}, 7",
+            "rjmp 9f",
+            "in   r30, 0x3d",
+            "in   r31, 0x3e",
+            "ldd  {left}, Z+1",
+            "ldd  {next:h}, Z+2",
+            "ldd  {next:l}, Z+3",
+            "neg  {step:l}",
+            "com  {step:h}",
+            "add  {next:l}, {step:l}",
+            "adc  {next:h}, {step:h}",
+            "rjmp 2b",
+            "9:",
+            "pop  r1",
+            "pop  r1",
+            "pop  r1",
+            "brts 3f",
+            "clr  {level}",
+            "3:",
             "clr  r1",
-            row = const size_of::<Row>(),
             place = const size_of::<Neighbour>(),
-            next = inout(reg_iw) $rows => _,
+            step = inout(reg_pair) size_of::<Row>() as u16 => _,
+            next = inout(reg_pair) $rows => _,
             left = inout(reg) $count + 1 => _,
             start_low = out(reg) _,
             out("r18") _,
@@ -236,18 +259,16 @@ macro_rules! keep_nearest {
             e = out(reg) _,
             zero = out(reg) _,
             inout("X") front,
-            first = in(reg) first as u8,
             last = in(reg) end as u8 - size_of::<Neighbour>() as u8,
             label = out(reg) _,
             low = out(reg) _,
             out("r16") _,
             out("r17") _,
-            byte = out(reg) _,
+            byte = inout(reg) $before + 1 => _,
             third = out(reg_pair) _,
-            level = out(reg) level,
+            level = inout(reg) first as u8 => level,
             ones = out(reg) ones,
             inout("Z") $query.as_ptr() => _,
-            options(nostack),
         );
         $nearest.have_joined(usize::from(front - first) / size_of::<Neighbour>());
         if level > 0 {
@@ -259,39 +280,31 @@ macro_rules! keep_nearest {
 
 /// Examples in flash, 254 at most.
 pub struct InFlash {
-    /// Its rows, of which there are so many.
+    /// Its rows, of which there are so many, sorted by their first feature.
     rows: *const Row,
     count: u8,
-    /// Whether the rows are sorted by their first feature.
-    is_sorted: bool,
 }
 
 impl InFlash {
     /// The examples of a table.
     pub fn new<const N: usize>(table: &ProgMem<[Row; N]>) -> Self {
         const { assert!(N < u8::MAX as usize, "a byte counts the rows, and one more") };
-        Self { rows: table.as_ptr().cast(), count: N as u8, is_sorted: false }
+        Self { rows: table.as_ptr().cast(), count: N as u8 }
     }
 
-    /// The examples of a table whose rows are sorted by their first feature.
-    pub fn sorted<const N: usize>(table: &ProgMem<[Row; N]>) -> Self {
-        Self { is_sorted: true, ..Self::new(table) }
-    }
-
-    /// The rows with which a search begins, from there to the table's end: in a sorted table, those whose first feature is what the
-    /// query's is, or more. What is near comes first then, and the others are left after a feature or two.
+    /// The first row whose first feature is that, or more, and how many rows there are from it on.
     #[inline(always)]
-    fn begin(&self, first: u8) -> (*const Row, u8) {
-        /// Rows that are passed at once.
-        const STEP: u8 = 4;
+    fn from(&self, first: u8) -> (*const Row, u8) {
+        /// Rows that are passed at once, as long as there are so many.
+        const STEP: u8 = 8;
+        // SAFETY: the row is one of the table's, so it lies in flash.
+        let is_less = |row: *const Row| unsafe { read_byte(row.cast()) } < first;
         let (mut rows, mut count) = (self.rows, self.count);
-        while self.is_sorted && count > STEP {
-            let passed = rows.wrapping_add(STEP.into());
-            // SAFETY: the row is one of the table's, so it lies in flash.
-            if unsafe { read_byte(passed.cast()) } >= first {
-                break;
-            }
-            (rows, count) = (passed, count - STEP);
+        while count >= STEP && is_less(rows.wrapping_add(usize::from(STEP) - 1)) {
+            (rows, count) = (rows.wrapping_add(STEP.into()), count - STEP);
+        }
+        while count > 0 && is_less(rows) {
+            (rows, count) = (rows.wrapping_add(1), count - 1);
         }
         (rows, count)
     }
@@ -312,19 +325,13 @@ impl Examples<{ features::COUNT }> for InFlash {
 
     #[inline(always)]
     fn keep_nearest<const CLASSES: usize>(&self, query: &[u8; features::COUNT], nearest: &mut Nearest<CLASSES>) {
-        let (mut rows, mut count) = self.begin(query[0]);
-        let mut before = self.count - count;
-        loop {
-            // SAFETY: the loop reads flash from a row of the table on, as many rows as there are from there, and nothing else. Of SRAM
-            // it reads the query and reads and writes the places, of which there is a first one: it begins at one of them or,
-            // where some are free, behind one, and stops at the last. An address's lower byte tells the last, and the
-            // first, as none is met twice before. R0 is free for use, and R1 is 0 again at the end.
-            unsafe { keep_nearest!(nearest, query, rows, count, "lpm", "") };
-            if before == 0 {
-                return;
-            }
-            (rows, count, before) = (self.rows, before, 0);
-        }
+        let (rows, count) = self.from(query[0]);
+        // SAFETY: the loop reads flash from a row of the table on, as many rows as there are from there and before it, and nothing
+        // else. Of SRAM it reads the query and reads and writes the places, of which there is a first one: it begins at one of them
+        // or, where some are free, behind one, and stops at the last. An address's lower byte tells the last, and the
+        // first, as none is met twice before. It takes from the stack what it has put there. R0 is
+        // free for use, and R1 is 0 again at the end.
+        unsafe { keep_nearest!(nearest, query, rows, count, self.count - count, "lpm", "3b", "") };
     }
 
     #[inline(always)]
@@ -338,6 +345,6 @@ impl Examples<{ features::COUNT }> for InFlash {
         // A byte counts them, and one more.
         let count = others.len().min(usize::from(u8::MAX) - 1) as u8;
         // SAFETY: as above, but for the rows, which are examples in SRAM: their features, and then the label.
-        unsafe { keep_nearest!(nearest, query, others.as_ptr(), count, "ld", "sbrc {label}, 7\nrjmp 2b") };
+        unsafe { keep_nearest!(nearest, query, others.as_ptr(), count, 0_u8, "ld", "2b", "sbrc {label}, 7\nrjmp 2b") };
     }
 }

@@ -63,25 +63,38 @@ pub const COUNT: usize = table::TRAINED.len();
 
 const _: () = assert!(COUNT <= CAPACITY, "too many examples for the flash budget");
 
-/// The table, but in another order: sorted by speed, so that a search can begin with the examples of the object's own speed, which are the
-/// nearest to it. Within a speed, where trained ones lie beside their likes, a search would come ever nearer, and each of them would
-/// find a place among the nearest for a while: so each is as many places behind the one before it as `STEP` says.
+/// The table, but in another order: [sorted by speed](sorted_by_first_feature). Within a speed, where trained ones lie beside their likes,
+/// a search would come ever nearer, and each of them would find a place among the nearest for a while: so each is as many places
+/// behind the one before it as `STEP` says.
 pub const EXAMPLES: [Example<{ features::COUNT }>; COUNT] = {
     let mut examples = [Example::new([0; features::COUNT], 0); COUNT];
     let mut index = 0;
     while index < COUNT {
         let (features, label) = &table::TRAINED[index * STEP % COUNT];
-        let example = Example::new(SCALE.quantise(features), *label);
-        let mut place = index;
+        examples[index] = Example::new(SCALE.quantise(features), *label);
+        index += 1;
+    }
+    sorted_by_first_feature(examples)
+};
+
+/// Examples as a search in flash expects them: it begins with those whose first feature is the query's, which are the nearest to it.
+/// Those that are alike in it stay in their order.
+pub const fn sorted_by_first_feature<const N: usize>(
+    mut examples: [Example<{ features::COUNT }>; N],
+) -> [Example<{ features::COUNT }>; N] {
+    let mut sorted = 1;
+    while sorted < N {
+        let example = examples[sorted];
+        let mut place = sorted;
         while place > 0 && examples[place - 1].features[0] > example.features[0] {
             examples[place] = examples[place - 1];
             place -= 1;
         }
         examples[place] = example;
-        index += 1;
+        sorted += 1;
     }
     examples
-};
+}
 
 /// Some five eighths of the table, and without a divisor in common with its length, so that none is left out.
 const STEP: usize = {
@@ -192,7 +205,7 @@ mod tests {
             };
             let own_speed = EXAMPLES.partition_point(|example| example.features[0] < query[0]);
             let (slower, others) = EXAMPLES.split_at(own_speed);
-            others.iter().chain(slower).filter(finds_a_place).count()
+            others.iter().chain(slower.iter().rev()).filter(finds_a_place).count()
         };
         for speed in SPEED_CLASSES_MM_S {
             for width_mm in (12..=20).chain(95..=190).step_by(4) {
