@@ -15,6 +15,7 @@ use field::planting::Planting;
 use field::trial::Trial;
 use field::verdict::Timing;
 use knn::MAX_K;
+use rayon::prelude::*;
 use std::path::Path;
 use std::process::Command;
 use trial::firmware::workspace_root;
@@ -189,25 +190,29 @@ fn a_function_that_writes_to_what_its_callers_need_is_found() {
     // The code lies in the file as it lies in flash.
     let start = file.windows(64).position(|window| *window == image.flash[..64]).expect("flash is in the file");
     assert_eq!(file[start..start + 0x4000], image.flash[..0x4000]);
-    let broken = Path::new(env!("CARGO_TARGET_TMPDIR")).join("spoils-a-register.elf");
-    let (mut found, mut unnoticed) = (0, 0);
-    for (name, &at) in &image.functions {
+    // Whether the write was found; `None` where it could not be made.
+    let is_found = |(name, &at): (&String, &u32)| {
         // One register a function. The frame's pointer is left alone: without it the stack could not be followed.
         let register = if at & 2 == 0 { 16 } else { 14 };
-        let Some(flash) = with_a_write(&image.flash, at as usize, register) else { continue };
+        let flash = with_a_write(&image.flash, at as usize, register)?;
         let mut file = file.clone();
         file[start..start + flash.len()].copy_from_slice(&flash);
+        let broken = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("spoils-a-register-{at}.elf"));
         std::fs::write(&broken, file).expect("it can be written");
-        match bounds::prove(&broken, None, &LoopBounds::new()) {
-            Ok(_) => unnoticed += 1,
+        let proved = bounds::prove(&broken, None, &LoopBounds::new());
+        std::fs::remove_file(&broken).expect("it is there");
+        match proved {
+            Ok(_) => Some(false),
+            // What its first instruction wrote is missing now as well, which callers can seem to have needed.
             Err(bounds::BoundsError::Spoilt { all }) => {
-                // What its first instruction wrote is missing now as well, which callers can seem to have needed.
-                let is_told = |spoilt: &bounds::Spoilt| spoilt.registers.contains(&format!("r{register}"));
-                *if all.iter().any(is_told) { &mut found } else { &mut unnoticed } += 1;
+                Some(all.iter().any(|spoilt| spoilt.registers.contains(&format!("r{register}"))))
             }
             Err(other) => panic!("{name} with a write to r{register}: {other}"),
         }
-    }
+    };
+    let (found, unnoticed): (Vec<bool>, Vec<bool>) =
+        image.functions.par_iter().filter_map(is_found).partition(|is_found| *is_found);
+    let (found, unnoticed) = (found.len(), unnoticed.len());
     // The others' callers need nothing there, or nobody calls them.
     println!("{found} were found, {unnoticed} went unnoticed");
     assert!(found > 10, "{found} were found");

@@ -10,6 +10,7 @@ use link::session::{Happening, Session};
 use link::{Link, LinkError, Status};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
 use signal::CYCLES_PER_SECOND;
 use std::io::{self, Read, Write};
 use std::sync::Arc;
@@ -208,34 +209,38 @@ fn a_row_with_changes_of_speed_and_a_stop_is_decided_the_same_on_the_host() {
 /// busy with something else now and then.
 #[test]
 fn rows_by_chance_are_decided_the_same_on_the_host_whatever_is_typed_and_whenever_it_is_read() {
-    let (mut objects, mut swings) = (0, 0);
-    for seed in 0..ROWS {
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let planting = Planting {
-            plants: 6,
-            spacing_mm: rng.random_range(300.0..600.0),
-            canopy_mm: rng.random_range(80.0..160.0),
-            weeds: rng.random_range(0..4),
-            ragged: rng.random(),
-            ..Planting::default()
-        };
-        let row = planting.grow_with_room(seed).expect("there is room");
-        let edge = [347.5, 486.5, 625.5][rng.random_range(0..3)] + rng.random_range(-6.0..6.0);
-        let speed_mm_s = if rng.random() { edge } else { rng.random_range(250.0..900.0) };
-        let start_mm = rng.random_range(-250.0..100.0);
-        let end_mm = row.span_mm().end + 900.0;
-        let motion = Motion::steady(start_mm, 800.0, speed_mm_s, end_mm).change_speed(0.0, 1500.0);
-        let commands: &[&str] = [&["start"][..], &["start now"], &["clear", "start now"]][rng.random_range(0..3)];
+    let replayed: Vec<Replayed> = (0..ROWS)
+        .into_par_iter()
+        .map(|seed| {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let planting = Planting {
+                plants: 6,
+                spacing_mm: rng.random_range(300.0..600.0),
+                canopy_mm: rng.random_range(80.0..160.0),
+                weeds: rng.random_range(0..4),
+                ragged: rng.random(),
+                ..Planting::default()
+            };
+            let row = planting.grow_with_room(seed).expect("there is room");
+            let edge = [347.5, 486.5, 625.5][rng.random_range(0..3)] + rng.random_range(-6.0..6.0);
+            let speed_mm_s = if rng.random() { edge } else { rng.random_range(250.0..900.0) };
+            let start_mm = rng.random_range(-250.0..100.0);
+            let end_mm = row.span_mm().end + 900.0;
+            let motion = Motion::steady(start_mm, 800.0, speed_mm_s, end_mm).change_speed(0.0, 1500.0);
+            let commands: &[&str] = [&["start"][..], &["start now"], &["clear", "start now"]][rng.random_range(0..3)];
 
-        let (mut port, end) = port_along(&row, &motion, rng.random_range(0..24_000_000));
-        port.busy = (seed % 2 == 0).then(|| ChaCha8Rng::from_rng(&mut rng));
-        let typed = (seed % 4 < 3).then(|| ChaCha8Rng::from_rng(&mut rng));
-        let log = logged_at(port, typed, commands, end);
-        let replayed = replay(&log).expect("the log can be replayed");
-        assert_eq!(replayed.difference, None, "seed {seed}, {commands:?}: {replayed:#?}\n{log:#?}");
-        (objects, swings) = (objects + replayed.objects, swings + replayed.swings);
-    }
-    assert!(objects as u64 > 4 * ROWS && swings as u64 > 4 * ROWS, "{objects}, {swings}");
+            let (mut port, end) = port_along(&row, &motion, rng.random_range(0..24_000_000));
+            port.busy = (seed % 2 == 0).then(|| ChaCha8Rng::from_rng(&mut rng));
+            let typed = (seed % 4 < 3).then(|| ChaCha8Rng::from_rng(&mut rng));
+            let log = logged_at(port, typed, commands, end);
+            let replayed = replay(&log).expect("the log can be replayed");
+            assert_eq!(replayed.difference, None, "seed {seed}, {commands:?}: {replayed:#?}\n{log:#?}");
+            replayed
+        })
+        .collect();
+    let objects: u64 = replayed.iter().map(|replayed| replayed.objects as u64).sum();
+    let swings: u64 = replayed.iter().map(|replayed| replayed.swings as u64).sum();
+    assert!(objects > 4 * ROWS && swings > 4 * ROWS, "{objects}, {swings}");
 }
 
 /// How many rows by chance are rolled along.
