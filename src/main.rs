@@ -106,8 +106,10 @@ fn run(typed: &mut LineBuffer) -> ! {
             } else if console.listens()
                 && let Ok(byte) = serial.read()
             {
-                if let Some(said) = typed.take(byte) {
-                    console.take(said);
+                if typed.collect(byte) {
+                    if let Some(said) = typed.read() {
+                        console.take(said);
+                    }
                     break;
                 }
             } else {

@@ -9,7 +9,7 @@ use crate::{
 use heapless::Vec;
 
 /// Events that wait to be told. They are short-lived: a plant gives three in half a second.
-const CAPACITY: usize = 6;
+pub const CAPACITY: usize = 6;
 
 /// Something that happened.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

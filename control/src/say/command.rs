@@ -276,10 +276,15 @@ impl LineBuffer {
     }
 
     /// Takes a byte. At a line's end, returns what the line says; an empty line says nothing.
-    #[inline(never)]
     pub fn take(&mut self, byte: u8) -> Option<Result<Command, Mistake>> {
+        if self.collect(byte) { self.read() } else { None }
+    }
+
+    /// Takes a byte, the first half of [`take`](Self::take); whether it ends the line, which is to be [read](Self::read) then.
+    #[inline(never)]
+    pub fn collect(&mut self, byte: u8) -> bool {
         match byte {
-            b'\r' | b'\n' => return self.end(),
+            b'\r' | b'\n' => return true,
             0x08 | 0x7F => {
                 self.characters.pop();
             }
@@ -291,14 +296,12 @@ impl LineBuffer {
             GAP_MARK => self.spoil(Mistake::CharactersLost),
             _ => self.spoil(Mistake::NotText),
         }
-        None
+        false
     }
 
-    fn spoil(&mut self, mistake: Mistake) {
-        self.mistake.get_or_insert(mistake);
-    }
-
-    fn end(&mut self) -> Option<Result<Command, Mistake>> {
+    /// Reads a line that has ended, the second half of [`take`](Self::take), which takes far longer than a byte does; the next line begins.
+    #[inline(never)]
+    pub fn read(&mut self) -> Option<Result<Command, Mistake>> {
         let line = match self.mistake.take() {
             Some(mistake) => Some(Err(mistake)),
             None if split_word(&self.characters).0.is_empty() => None,
@@ -306,6 +309,10 @@ impl LineBuffer {
         };
         self.characters.clear();
         line
+    }
+
+    fn spoil(&mut self, mistake: Mistake) {
+        self.mistake.get_or_insert(mistake);
     }
 }
 

@@ -7,7 +7,7 @@ use crate::say::{packed::Characters, texts::Text};
 use ufmt::{Formatter, uDisplay, uWrite};
 
 /// Texts that a line may have; one that shows a setting has ten. A power of two, for short arithmetic.
-const TEXTS: usize = 16;
+pub const TEXTS: usize = 16;
 
 /// Numbers that it may have; one that shows an object has six. A power of two as well.
 const NUMBERS: usize = 8;
@@ -80,6 +80,8 @@ impl Iterator for Line {
                     let number = self.number[usize::from(self.numbers_begun) % NUMBERS];
                     self.numbers_begun += 1;
                     self.characters.insert(number);
+                    // A number has a digit at least.
+                    return self.characters.next();
                 }
                 Some(character) => return Some(character),
                 None if self.texts_begun == self.texts => break,

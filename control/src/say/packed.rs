@@ -31,6 +31,9 @@ const WAITING: usize = 16;
 /// Of these, the longest number may have so many.
 const DIGITS: usize = "-2147483648".len();
 
+/// How often a byte is halved at most until its first half is a character.
+pub const HALVINGS: usize = 4;
+
 /// Texts from one entry of the index to the next; from there on, a text is found by the lengths of those before it.
 const STRIDE: u8 = 16;
 
@@ -198,6 +201,7 @@ const fn table<const SIZE: usize>() -> ([u8; SIZE], usize) {
         let [first, second] = split(FRAGMENTS[place].as_bytes());
         (table[2 * place], table[2 * place + 1]) = (first, second);
         assert!(waiting(first) + DIGITS < WAITING && waiting(second) + DIGITS <= WAITING);
+        assert!(halvings(first) < HALVINGS);
         place += 1;
     }
     let (mut number, mut end, mut group) = (0, TEXTS, 0);
@@ -283,6 +287,15 @@ const fn waiting(code: u8) -> usize {
     let [first, second] = split(FRAGMENTS[(code - FIRST_FRAGMENT) as usize].as_bytes());
     let (first, second) = (waiting(first) + 1, waiting(second));
     if first > second { first } else { second }
+}
+
+/// How often a byte is halved until its first half is a character.
+const fn halvings(code: u8) -> usize {
+    if code < FIRST_FRAGMENT {
+        return 0;
+    }
+    let [first, _] = split(FRAGMENTS[(code - FIRST_FRAGMENT) as usize].as_bytes());
+    1 + halvings(first)
 }
 
 /// Where the fragments stand that begin with a character: the first one's place, and the place behind the last one.

@@ -96,9 +96,12 @@ pub fn prove(elf: &Path, input: Option<&Input>, loops: &LoopBounds) -> Result<Bo
         }
     }
 
+    let functions = image.functions.iter();
+    let by_length = functions.filter(|(name, _)| loops.get(&without_types(name)).is_some_and(|bound| bound.by_length));
+    let by_length = by_length.map(|(_, address)| *address).collect();
     let places = program.routines().flat_map(|routine| &routine.nodes).map(|node| node.place.address);
     let of_heads = places.filter_map(|place| Some((place, loops.get(&program.name(place))?.passes.clone()))).collect();
-    let mut timer = Timer::new(Passes { stated: loops::records(elf)?, of_heads });
+    let mut timer = Timer::new(Passes { stated: loops::records(elf)?, of_heads, by_length });
     let mut of_handlers = Vec::new();
     for (&vector, handler) in &handlers {
         let what = format!("the handler of vector {vector}");

@@ -360,7 +360,7 @@ fn a_record_that_a_turn_can_go_round_bounds_nothing() {
 fn what_is_said_of_a_function_holds_for_each_of_its_loops_and_a_record_at_one_goes_before_it() {
     let cycles = |body: &str, passes: &[u64]| {
         let program = format!("start:\n clr r1\n1: wdr\n rcall waits\n rjmp 1b\nwaits:\n ldi r24, 8\n{body} ret");
-        let bound = LoopBound { passes: passes.into(), because: "it counts".into() };
+        let bound = LoopBound { passes: passes.into(), by_length: false, because: "it counts".into() };
         let bounds = try_to_prove_with(&program, None, &[("waits".into(), bound)].into()).expect("it has bounds");
         bounds.turn.expect("the watchdog is fed").cycles
     };
@@ -379,8 +379,25 @@ fn what_is_said_of_a_function_holds_for_each_of_its_loops_and_a_record_at_one_go
 }
 
 #[test]
+fn a_function_that_goes_over_as_many_bytes_as_its_caller_says_does_so_where_that_is_a_constant() {
+    let cycles = |length: &str| {
+        let program = format!(
+            "start:\n clr r1\n1: wdr\n {length}\n rcall fills\n rjmp 1b\n\
+             fills:\n rjmp 3f\n2: st X+, r22\n3: subi r20, 1\n sbci r21, 0\n brcc 2b\n ret"
+        );
+        let bound = LoopBound { passes: vec![100], by_length: true, because: "a byte a turn".into() };
+        let bounds = try_to_prove_with(&program, None, &[("fills".into(), bound)].into()).expect("it has bounds");
+        bounds.turn.expect("the watchdog is fed").cycles.expect("every loop has a bound")
+    };
+    // A byte more is a turn more: st 2, subi 1, sbci 1, brcc 2.
+    assert_eq!(cycles("ldi r20, 8\n ldi r21, 0") - cycles("ldi r20, 7\n ldi r21, 0"), 6);
+    assert_eq!(cycles("ldi r20, 99\n ldi r21, 0"), cycles("mov r20, r2\n ldi r21, 0"), "the number of the table");
+    assert!(cycles("ldi r20, 0\n ldi r21, 1") > cycles("ldi r20, 255\n ldi r21, 0"));
+}
+
+#[test]
 fn a_bound_for_the_loops_of_a_function_that_is_gone_is_refused() {
-    let bound = LoopBound { passes: vec![3], because: "it counted".into() };
+    let bound = LoopBound { passes: vec![3], by_length: false, because: "it counted".into() };
     let loops = LoopBounds::from([("gone".to_owned(), bound)]);
     let error = try_to_prove_with("start: rjmp start", None, &loops).expect_err("it has no such function").to_string();
     assert!(error.contains("no function of the firmware is called gone"), "{error}");
@@ -520,7 +537,7 @@ fn a_bound_over_its_budget_is_told_and_so_is_a_rate_under_it() {
     let budgets = |stack: u64, rate: u64| {
         let file = tempfile::NamedTempFile::new().expect("there is room for a file");
         let text = format!(
-            "stack_bytes = {stack}\nhandler_cycles = 14\ncritical_section_cycles = 0\nloops_without_bound = 0\n\
+            "stack_bytes = {stack}\nhandler_cycles = 14\ncritical_section_cycles = 0\nloops_without_bound = 0\nturn_cycles = 7\n\
              never_lost_per_s = {rate}\n[input]\nvectors = [1]\nport = 0x29\nedges_between_looks = 2\n"
         );
         std::fs::write(file.path(), text).expect("it can be written");

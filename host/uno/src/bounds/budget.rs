@@ -18,6 +18,8 @@ pub struct Budgets {
     pub critical_section_cycles: u64,
     /// Loops in a turn of the main program's loop of which nothing says how often they turn.
     pub loops_without_bound: u64,
+    /// The longest turn of that loop, without the handlers that come in.
+    pub turn_cycles: u64,
     /// Edges of the input in a second of which none is lost: at least so many.
     pub never_lost_per_s: u64,
     /// The input whose edges are watched.
@@ -76,12 +78,14 @@ impl Budgets {
         let at_most = |name, proved, budget| Held { name, proved, budget, keeps: proved <= budget };
         // A main program whose turn is not found has bounded nothing.
         let loops = bounds.turn.as_ref().map_or(u64::MAX, |turn| turn.without_bound.len() as u64);
+        let turn = bounds.turn.as_ref().and_then(|turn| turn.cycles).unwrap_or(u64::MAX);
         let rate = bounds.edges.as_ref().map_or(0, |edges| edges.never_lost_per_s);
         vec![
             at_most("stack_bytes", bounds.stack_bytes as u64, self.stack_bytes),
             at_most("handler_cycles", bounds.longest_handler_cycles(), self.handler_cycles),
             at_most("critical_section_cycles", bounds.critical_section_cycles, self.critical_section_cycles),
             at_most("loops_without_bound", loops, self.loops_without_bound),
+            at_most("turn_cycles", turn, self.turn_cycles),
             Held {
                 name: "never_lost_per_s",
                 proved: rate,

@@ -60,6 +60,8 @@ pub(super) struct Passes {
     pub(super) stated: BTreeMap<u32, u64>,
     /// By addresses at which loops may begin, for the outermost of a function and for each depth within it.
     pub(super) of_heads: BTreeMap<u32, Vec<u64>>,
+    /// Entries of functions whose only loop is passed once for each byte of a length, and once more.
+    pub(super) by_length: BTreeSet<u32>,
 }
 
 /// What is meant by a stretch without interrupts.
@@ -263,7 +265,10 @@ impl Timer {
     fn time_of(&mut self, way: &Way, stretch: Option<Stretch>) -> Option<Time> {
         let called = match (&way.through, stretch) {
             (None, _) => Time::default(),
-            (Some(called), None) => self.longest(called)?,
+            (Some(called), None) => match way.length {
+                Some(length) if self.passes.by_length.contains(&called.entry.address) => of_length(called, length)?,
+                _ => self.longest(called)?,
+            },
             (Some(called), Some(kind)) => self.stretches(called, kind).through?,
         };
         Some(called.and_cycles(way.cycles))
@@ -295,6 +300,13 @@ impl Timer {
         Paths { ways: &ways, passes: &self.passes, address: &address }.fill(all, &BTreeSet::new(), 0, &mut times);
         times
     }
+}
+
+/// The longest path through a function that goes over so many bytes.
+fn of_length(routine: &Routine, length: u16) -> Option<Time> {
+    let passes = vec![u64::from(length) + 1];
+    let of_heads = routine.nodes.iter().map(|node| (node.place.address, passes.clone())).collect();
+    Timer::new(Passes { of_heads, ..Passes::default() }).longest(routine)
 }
 
 /// The longest time to the end of a return.

@@ -65,6 +65,8 @@ pub(super) struct Way {
     pub(super) cycles: u32,
     /// The routine that is run through on this way.
     pub(super) through: Option<Rc<Routine>>,
+    /// The number in R21 and R20 where the way begins, if it is known: how many bytes a call of `memcpy` and its like is about.
+    pub(super) length: Option<u16>,
 }
 
 /// An instruction at a place, and where it leads.
@@ -222,8 +224,13 @@ impl<'p, 'a> Follower<'p, 'a> {
         let numbers: HashMap<Place, usize> = places.iter().copied().zip(0..).collect();
         let node = |place: &Place| {
             let Step { next, returns, ends_in } = &steps[place];
-            let way =
-                |next: &Next| Way { to: numbers[&next.place], cycles: next.cycles, through: next.through.clone() };
+            let length = self.known[place].length();
+            let way = |next: &Next| Way {
+                to: numbers[&next.place],
+                cycles: next.cycles,
+                through: next.through.clone(),
+                length,
+            };
             Node { place: *place, ways: next.iter().map(way).collect(), returns: *returns, ends_in: ends_in.clone() }
         };
         let nodes: Vec<Node> = places.iter().map(node).collect();

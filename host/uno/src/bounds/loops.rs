@@ -17,7 +17,8 @@
 //! Where a source cannot write assembly, or is a library's, a table names the function, by its path without types, and says how often the
 //! program comes by the beginning of a loop in it at most ([`LoopBound`]), or by each of its beginnings where it can be entered at
 //! several places: of the outermost loops, of those within them, and so on. Of several loops side by side it is the one that turns most
-//! that counts, since the order in which a compiler lays them out is nobody's business. A record at a loop goes before the table.
+//! that counts, since the order in which a compiler lays them out is nobody's business. A record at a loop goes before the table. A function
+//! that goes over as many bytes as its third argument says is taken to do so wherever a caller gives a constant.
 //!
 //! That a number is right is the source's word, or the table's, which a run in the simulator can refute.
 
@@ -40,6 +41,9 @@ pub struct LoopBound {
     /// within them, and so on; the last number is that of all that are deeper.
     #[serde(deserialize_with = "one_or_several")]
     pub passes: Vec<u64>,
+    /// Whether it is once for each byte of the length that the caller gives, and once more: where that is a constant, it stands for `passes`.
+    #[serde(default)]
+    pub by_length: bool,
     /// Why it does not do so more often.
     pub because: String,
 }

@@ -74,6 +74,14 @@ impl Known {
         }
     }
 
+    /// The number in R21 and R20, a function's third argument where each has 16 bits.
+    pub(super) fn length(&self) -> Option<u16> {
+        match (self.registers[20], self.registers[21]) {
+            (Value::Constant(low), Value::Constant(high)) => Some(u16::from_le_bytes([low, high])),
+            _ => None,
+        }
+    }
+
     /// Leaves what both know; whether that is less than before.
     pub(super) fn meet(&mut self, other: &Known) -> bool {
         let before = self.clone();
