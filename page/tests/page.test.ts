@@ -38,12 +38,14 @@ async function pass(page: Page, seconds: number): Promise<void> {
     await page.evaluate((seconds) => globalThis.trial.advance(seconds, Number.POSITIVE_INFINITY), seconds);
 }
 
-/** Types a command and waits for what the machine says to it. */
+/** Types a command and waits for what the machine says to it: an answer like this behind the command itself, which is shown anew. */
 async function type(page: Page, command: string, answer: RegExp): Promise<void> {
+    const typed = part(page, "said").locator("div", { hasText: new RegExp(`^> ${command}$`) });
+    const before = await typed.count();
     await part(page, "typed").fill(command);
     await page.locator("#try-panel").getByRole("button", { name: "Send" }).click();
     await pass(page, 0.2);
-    await part(page, "said").locator("div", { hasText: answer }).last().waitFor();
+    await typed.nth(before).locator("xpath=following-sibling::div").filter({ hasText: answer }).first().waitFor();
 }
 
 test("the page weeds a row with the real firmware, no plant is damaged, and it says so", async () => {

@@ -18,6 +18,8 @@ class Connected {
     /** Time in which the page slept, and the machine's answers lay unread. */
     sleptMs = 0;
     readonly #operator = wokenUp();
+    /** What had happened when it was reset. */
+    #resetAt = Number.POSITIVE_INFINITY;
 
     /** `dropped` says which of the lines, counted from 0, others have dropped on their way, where they share the machine. */
     constructor(dropped?: (line: number) => boolean) {
@@ -54,6 +56,15 @@ class Connected {
         return this.happened.some((happening) => happening.is === is);
     }
 
+    sag(): void {
+        this.#resetAt = this.happened.length;
+        this.#operator.uno.reset("brown-out");
+    }
+
+    hasAfterReset(is: Happening["is"]): boolean {
+        return this.happened.slice(this.#resetAt).some((happening) => happening.is === is);
+    }
+
     /** The machine's state as it was last told. */
     get mode(): string | undefined {
         return this.happened.flatMap((happening) => (happening.is === "status" ? [happening.status.mode] : [])).at(-1);
@@ -88,6 +99,18 @@ test("a page that sleeps at any moment of a session loses no machine that answer
             }
             assert(machine.has("help") && !machine.has("lost"), `${sleptMs} ms at every ${every}. turn`);
         }
+});
+
+test("a supply that sags at any moment of a session, in the midst of a line too, loses no machine", async () => {
+    // The status, which comes ten times a second, takes a good part of that time.
+    for (const at of [40, 97, 101, 103, 106, 108, 202, 204, 207, 209]) {
+        const machine = new Connected();
+        for (let turn = 0; turn < 2 * TURNS && !machine.hasAfterReset("connected"); turn++) {
+            await machine.turn();
+            if (turn === at) machine.sag();
+        }
+        assert(machine.hasAfterReset("connected"), `a machine whose supply sags in turn ${at} is connected again`);
+    }
 });
 
 test("a HOLD of others, who share the machine, drops no question of the page's own for good", async () => {

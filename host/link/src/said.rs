@@ -75,6 +75,10 @@ const NAME: &str = "weeder ";
 impl Said {
     /// Reads a line.
     pub fn parse(line: &str) -> Self {
+        // Before all others, as it may stand behind the beginning of any of them.
+        if let Some(greeting) = greeting(line) {
+            return greeting;
+        }
         if line == "ok" {
             return Self::Done;
         }
@@ -86,7 +90,7 @@ impl Said {
         let shown = || Shown::parse(line).map(Self::Setting);
         by_itself()
             .or_else(answer)
-            .or_else(|| firmware(line))
+            .or_else(|| version(line))
             .or_else(|| example(line))
             .or_else(shown)
             .or_else(|| help(line))
@@ -94,14 +98,17 @@ impl Said {
     }
 }
 
-/// `weeder VERSION`, and in the greeting `, reset by CAUSE` behind it.
-fn firmware(line: &str) -> Option<Said> {
-    let rest = line.strip_prefix(NAME)?;
-    let Some((version, rest)) = rest.split_once(", reset by ") else {
-        return (is_word(rest)).then(|| Said::Version(rest.to_owned()));
-    };
-    let cause = rest.split(|character| !is_of_a_name(character)).next().filter(|cause| !cause.is_empty())?;
+/// `weeder VERSION, reset by CAUSE`, behind whatever line the reset has cut.
+fn greeting(line: &str) -> Option<Said> {
+    let (before, behind) = line.split_once(", reset by ")?;
+    let version = before.get(before.rfind(NAME)? + NAME.len()..)?;
+    let cause = behind.split(|character| !is_of_a_name(character)).next().filter(|cause| !cause.is_empty())?;
     is_word(version).then(|| Said::Greeting { version: version.to_owned(), cause: cause.to_owned() })
+}
+
+/// `weeder VERSION`.
+fn version(line: &str) -> Option<Said> {
+    line.strip_prefix(NAME).filter(|version| is_word(version)).map(|version| Said::Version(version.to_owned()))
 }
 
 /// `field|built_in NUMBER LABEL FEATURES`.
@@ -232,6 +239,10 @@ mod tests {
         let greeting = Said::Greeting { version: "0.1.0".to_owned(), cause: "brown_out".to_owned() };
         assert_eq!(Said::parse("weeder 0.1.0, reset by brown_out, state alarm settings_lost, tool out"), greeting);
         assert_eq!(Said::parse("weeder 0.1.0"), Said::Version("0.1.0".to_owned()));
+        for cut in ["o", "status pos=123 to", "error: no such com", "state is=ho", "weeder 0.1"] {
+            let line = format!("{cut}weeder 0.1.0, reset by brown_out, state hold, tool out; help lists the commands");
+            assert_eq!(Said::parse(&line), greeting, "{line}");
+        }
     }
 
     #[test]
