@@ -47,20 +47,20 @@
 //! | [`classify`] | about 130 + 2 C of stack | n F multiplications of 8 x 8 bits; k steps an example within reach; k + C to vote |
 //!
 //! In cycles of an ATmega328P, for F = 5, C = 2 and k = 3, by a machine that keeps its [`Nearest`], the examples in flash behind a store whose
-//! [`Examples::keep_nearest`] is written in assembly, compiled for size (`opt-level = "z"`), over 256 random queries:
+//! [`Examples::keep_nearest`] is in assembly and begins at the query's own first feature, compiled for size, over 256 random queries:
 //!
 //! | n | fewest | mean | most |
 //! |---|---|---|---|
-//! | 8 | 1,090 | 1,412 | 1,643 |
-//! | 16 | 1,412 | 1,903 | 2,396 |
-//! | 32 | 2,114 | 2,798 | 3,485 |
-//! | 64 | 3,294 | 4,246 | 5,307 |
-//! | 128 | 5,400 | 6,636 | 8,384 |
+//! | 8 | 1,023 | 1,356 | 1,686 |
+//! | 16 | 1,371 | 1,880 | 2,368 |
+//! | 32 | 1,596 | 2,576 | 3,294 |
+//! | 64 | 2,011 | 3,584 | 5,157 |
+//! | 128 | 3,045 | 5,307 | 8,665 |
 //!
-//! That is about 500 for the calls and the vote, 40 for each example, and 110 for each that was among the k nearest when
-//! it was met: about k (1 + ln(n / k)) of n in random order, and up to all of them where one example lies a little nearer than
-//! the one before it. [`classify`] clears its places first. Searched by the plain [`Examples::keep_nearest`], an
-//! example costs about 200 instead of 40. [`Scale::quantise`] takes 1,400 cycles. `cargo bench-uno`, in the weeder's workspace, measures all
+//! That is about 500 for the calls and the vote, 19 to 67 for each example that is looked at, and some 75 more for each that was among
+//! the k nearest when it was met: about k (1 + ln(n / k)) of n in random order, and up to all of them where one lies a little nearer
+//! than the one before it. [`classify`] clears its places first. Searched by the plain [`Examples::keep_nearest`], an
+//! example costs about 200 instead. [`Scale::quantise`] takes 1,400 cycles. `cargo bench-uno`, in the weeder's workspace, measures all
 //! of this anew in the simulator simavr.
 //!
 //! # What it does not do
