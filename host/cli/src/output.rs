@@ -2,9 +2,11 @@
 //!
 //! Whoever closes a pipe early has read enough: what else is printed goes nowhere, and the command ends as if it had been read.
 //! Whatever else keeps a result from being printed, such as a full disk, is the command's error. Words beside the result are
-//! for whoever watches: where they cannot be told, nothing is lost.
+//! for whoever watches: where they cannot be told, nothing is lost. They quote files and machines, which may send anything: a terminal
+//! gets no orders from there.
 
 use anyhow::{Context, Result};
+use files::in_a_line;
 use std::env;
 use std::fmt::Arguments;
 use std::io::{self, ErrorKind, Write};
@@ -36,7 +38,7 @@ pub fn print(text: Arguments) -> Result<()> {
 /// Tells a line beside the result, by [`tell!`].
 pub fn tell_line(line: Arguments) {
     // Nobody is left who could be told.
-    let _ = writeln!(io::stderr(), "{line}");
+    let _ = writeln!(io::stderr(), "{}", in_a_line(&line.to_string()));
 }
 
 /// The command as it was typed, for a report that says how to make it again.

@@ -164,6 +164,10 @@ const NUMBERS: [&str; 12] = [
     "99999999999999999999999999999999999999",
 ];
 
+/// What gives a file its shape, and what a terminal obeys.
+const MARKS: [&str; 16] =
+    ["\"", "\"\"\"", "'", "'''", "`", ",", ";", "=", "#", "[", "{", "\n", "\r", "\0", "\u{1b}[2J", "\u{2028}"];
+
 /// What may befall a file.
 #[derive(Clone, Debug)]
 enum Mishap {
@@ -173,6 +177,8 @@ enum Mishap {
     Bytes(prop::sample::Index, Vec<u8>),
     /// A number is another.
     Number(prop::sample::Index, prop::sample::Index),
+    /// A mark stands where none did.
+    Mark(prop::sample::Index, prop::sample::Index),
     /// A part stands there many times.
     Repeat(prop::sample::Index, usize, usize),
     /// A part is gone.
@@ -185,6 +191,7 @@ fn mishap() -> impl Strategy<Value = Mishap> {
         1 => index().prop_map(Mishap::Cut),
         2 => (index(), prop::collection::vec(any::<u8>(), 1..20)).prop_map(|(at, bytes)| Mishap::Bytes(at, bytes)),
         6 => (index(), index()).prop_map(|(at, number)| Mishap::Number(at, number)),
+        6 => (index(), index()).prop_map(|(at, mark)| Mishap::Mark(at, mark)),
         2 => (index(), 1..60_usize, 2..400_usize).prop_map(|(at, length, times)| Mishap::Repeat(at, length, times)),
         2 => (index(), 1..60_usize).prop_map(|(at, length)| Mishap::Gone(at, length)),
     ]
@@ -212,6 +219,10 @@ impl Mishap {
                     file.splice(from..from + length, NUMBERS[number.index(NUMBERS.len())].bytes());
                 }
             }
+            Self::Mark(at, mark) => {
+                let at = at.index(file.len());
+                file.splice(at..at, MARKS[mark.index(MARKS.len())].bytes());
+            }
             Self::Repeat(at, length, times) => {
                 let from = at.index(file.len());
                 let part = file[from..end(from, *length)].repeat(*times);
@@ -225,7 +236,7 @@ impl Mishap {
     }
 }
 
-/// A message in a line, of a length that somebody reads.
+/// A message in a line. What else gives a terminal orders is written out where the command tells it.
 fn assert_is_message(name: &str, error: &dyn Error) {
     let message = error.to_string();
     assert!(!message.is_empty() && message.lines().count() == 1, "{name}: {message:?}");

@@ -40,9 +40,13 @@ impl CsvTable {
         let text = text.trim_end();
         let text = text.strip_suffix("\nok").unwrap_or(text).to_owned() + "\n";
 
-        let mut reader =
-            csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(text.as_bytes());
-        let header = reader.headers().map_err(|error| at(1, explain(&error)))?.clone();
+        // The lengths of lines are looked at below.
+        let mut builder = csv::ReaderBuilder::new();
+        let mut reader = builder.flexible(true).trim(csv::Trim::All).comment(Some(b'#')).from_reader(text.as_bytes());
+        let header = reader.headers().map_err(|error| at(1, error.to_string()))?.clone();
+        if let Some(line) = opened(&text, 0, &header) {
+            return Err(at(line, UNCLOSED.to_owned()));
+        }
         // The reader stands at the line behind the one that it has read; a record's own position may be a comment's.
         let header_line = reader.position().line() - 1;
         if let Some(missing) = columns.iter().find(|&column| !header.iter().any(|name| name == *column)) {
@@ -59,15 +63,21 @@ impl CsvTable {
             ));
         }
         let mut lines = Vec::new();
+        let mut before = header_line;
         let mut record = StringRecord::new();
-        loop {
-            let read = reader.read_record(&mut record);
-            let line = reader.position().line() - 1;
-            match read {
-                Ok(true) => lines.push((line, record.clone())),
-                Ok(false) => break,
-                Err(error) => return Err(at(line, explain(&error))),
+        while reader.read_record(&mut record).map_err(|error| at(before + 1, error.to_string()))? {
+            if let Some(line) = opened(&text, before, &record) {
+                return Err(at(line, UNCLOSED.to_owned()));
             }
+            let line = reader.position().line() - 1;
+            let (found, right) = (record.len(), header.len());
+            if found != right {
+                let problem =
+                    format!("fields: {found}, where the header has {right}: each line has one field a column");
+                return Err(at(line, problem));
+            }
+            lines.push((line, record.clone()));
+            before = line;
         }
         if lines.is_empty() {
             return Err(at(header_line, "nothing stands below the header: at least one line has to".to_owned()));
@@ -79,6 +89,17 @@ impl CsvTable {
     pub fn lines(&self) -> impl Iterator<Item = Line<'_>> {
         self.lines.iter().map(|(number, record)| Line { table: self, number: *number, record })
     }
+}
+
+/// What is wrong with a field that goes on for several lines: it has swallowed those.
+const UNCLOSED: &str = "a quotation mark is opened and not closed: a field ends on its own line";
+
+/// The line behind another on which a quotation mark is opened that this record has not closed there.
+fn opened(text: &str, before: u64, record: &StringRecord) -> Option<u64> {
+    let goes_on = record.iter().any(|field| field.contains('\n'));
+    let mut behind = (1..).zip(text.lines()).skip(before as usize);
+    let is_odd = |line: &str| !line.starts_with('#') && line.matches('"').count() % 2 == 1;
+    goes_on.then(|| behind.find(|(_, line)| is_odd(line)).map_or(before + 1, |(number, _)| number))
 }
 
 /// What stands in a file.
@@ -124,16 +145,6 @@ impl Line<'_> {
     }
 }
 
-/// What a CSV error says about the line, without the record number and byte that nobody asked for.
-fn explain(error: &csv::Error) -> String {
-    match error.kind() {
-        csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
-            format!("fields: {len}, where the header has {expected_len}: each line has one field a column")
-        }
-        _ => error.to_string(),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -174,6 +185,18 @@ mod tests {
         let wrong = "table.csv, line 1: the column `place_mm` stands there twice: each has a name of its own";
         assert_eq!(read("place_mm,width_mm,place_mm\n7,1,8\n"), Err(wrong.to_owned()));
         assert_eq!(read("place_mm,width_mm,width_mm\n7,1,8\n"), Ok(vec![(2, 7)]), "it is not read");
+    }
+
+    #[test]
+    fn a_quotation_mark_that_is_not_closed_is_told_with_its_own_line() {
+        for text in
+            ["place_mm,width_mm\n7,1\n# 5\" pot\n8,\"1\n9,1\n", "place_mm,width_mm\n7,1\n\n8,\"1\n9,1\n10,1\n\"11,1"]
+        {
+            assert_eq!(read(text), Err(format!("table.csv, line 4: {UNCLOSED}")), "{text:?}");
+        }
+        assert_eq!(read("\"place_mm,width_mm\n7,1\n"), Err(format!("table.csv, line 1: {UNCLOSED}")));
+        assert_eq!(read("place_mm,\"width_mm\n7,1\n"), Err(format!("table.csv, line 1: {UNCLOSED}")));
+        assert_eq!(read("place_mm,pot\n7,\"5\"\", clay\"\n8,5\" clay\n"), Ok(vec![(2, 7), (3, 8)]));
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Why a file that people wrote cannot be used: the file itself, or a line of it, with what would be right.
 //!
-//! Each reader says what is wrong with a line in words of its own. This only says where.
+//! Each reader says what is wrong with a line in words of its own. This only says where, and has it in a line: what is quoted may hold
+//! anything.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -20,7 +21,7 @@ pub enum FileError {
         source: io::Error,
     },
     /// A line of it.
-    #[error("{path}, line {line}: {problem}")]
+    #[error("{path}, line {line}: {}", in_a_line(problem))]
     Line {
         /// The file.
         path: PathBuf,
@@ -49,9 +50,25 @@ impl FileError {
     }
 }
 
+/// What a file or a machine says, to be quoted in a message: its control characters are written out, ends of lines among them, so
+/// that it stays in its line and gives a terminal no orders.
+pub fn in_a_line(text: &str) -> String {
+    let shown = |character: char| match character {
+        control if control.is_control() => control.escape_default().to_string(),
+        other => other.to_string(),
+    };
+    text.chars().map(shown).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_quoted_stays_in_its_line_and_gives_a_terminal_no_orders() {
+        let quoted = in_a_line("`left\nright\u{1b}[2J` is no name, `grün` is one");
+        assert_eq!(quoted, r"`left\nright\u{1b}[2J` is no name, `grün` is one");
+    }
 
     #[test]
     fn a_byte_stands_in_the_line_that_its_own_end_closes() {

@@ -9,4 +9,4 @@ mod file_error;
 pub mod whole_file;
 
 pub use csv_table::{CsvTable, Line};
-pub use file_error::FileError;
+pub use file_error::{FileError, in_a_line};

@@ -3,6 +3,7 @@
 use super::parameters::PARAMETERS;
 use super::presets::presets;
 use control::settings::Setting;
+use files::in_a_line;
 use std::io;
 use std::path::PathBuf;
 use thiserror::Error;
@@ -123,7 +124,7 @@ pub(super) fn explain(text: &str, error: &toml::de::Error) -> String {
     let wrong = entries.into_iter().find_map(|(table, key, value): (&str, &str, _)| {
         let is_here = value.contains(&at);
         let (least, greatest, meaning) = range(table, key).filter(|_| is_here)?;
-        let written = &text[value];
+        let written = in_a_line(&text[value]);
         Some(format!("{table}.{key} is {written}, but has to be a number from {least} to {greatest}: {meaning}"))
     });
     wrong.unwrap_or_else(|| error.message().trim().replace('\n', ", "))
