@@ -8,7 +8,7 @@
 
 use super::session::Happening;
 use super::settings::{Setting, name};
-use files::{CsvTable, FileError};
+use files::{CsvTable, FileError, in_a_line};
 use std::fs::{File, OpenOptions};
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
@@ -142,7 +142,6 @@ impl LogWriter {
         // A last line that power has cut off would spoil the next.
         let whole = bytes.iter().rposition(|&byte| byte == b'\n').map_or(0, |end| end + 1);
         file.set_len(whole as u64).and_then(|()| file.seek(SeekFrom::End(0))).map_err(failed)?;
-        // What stands in quotes may have lines of its own, which the firmware's lines never have.
         let found = bytes[..whole].iter().filter(|&&byte| byte == b'\n').count().saturating_sub(1) as u64;
         let mut log =
             Self { path: path.into(), file: csv::Writer::from_writer(file), began: Instant::now(), found, added: 0 };
@@ -209,7 +208,8 @@ impl LogWriter {
 
     fn line(&mut self, time_ms: u64, kind: Kind, line: &str) -> Result<(), LogError> {
         self.added += 1;
-        self.record([time_ms.to_string().as_str(), kind.name(), line])
+        // A table's line is one, whatever the system says of a port that is gone.
+        self.record([time_ms.to_string().as_str(), kind.name(), &in_a_line(line)])
     }
 
     fn record<'a>(&mut self, fields: impl IntoIterator<Item = &'a str>) -> Result<(), LogError> {
@@ -264,10 +264,10 @@ mod tests {
         let mut cut = fs::read(&path).unwrap();
         cut.extend(b"17,sta");
         fs::write(&path, cut).unwrap();
-        LogWriter::open(&path).unwrap().write(&Happening::Lost("unplugged".to_owned())).unwrap();
+        LogWriter::open(&path).unwrap().write(&Happening::Lost("no\nport".to_owned())).unwrap();
         let entries: Vec<(u64, Kind, String)> =
             read(&path).unwrap().into_iter().map(|entry| (entry.number, entry.kind, entry.text)).collect();
-        assert_eq!(entries, [(2, Kind::Answer, answer.to_owned()), (3, Kind::Lost, "unplugged".to_owned())]);
+        assert_eq!(entries, [(2, Kind::Answer, answer.to_owned()), (3, Kind::Lost, r"no\nport".to_owned())]);
     }
 
     #[test]
