@@ -6,6 +6,7 @@ use field::motion::mm_s;
 use field::planting::Planting;
 use field::trial::Trial;
 use field::verdict::Timing;
+use walks::cases;
 
 /// Rows of 8 plants, 480 to 620 mm apart, with canopies of 100 to 180 mm.
 const PLANTING: Planting = Planting {
@@ -21,7 +22,7 @@ const PLANTING: Planting = Planting {
 #[track_caller]
 fn assert_weeds_at(speed_km_h: f64) {
     let machine = Machine::default();
-    for seed in 1..=4 {
+    for seed in 1..=cases(4) {
         let row = PLANTING.grow(seed).expect("the plants have room");
         let outcome = outcome(&Trial::at_speed(row, machine, Timing::default(), mm_s(speed_km_h)));
         assert_all_kept(&outcome.judgement);

@@ -2,6 +2,7 @@
 
 use crate::decisions::Decisions;
 use control::{alarm::Alarm, operate::state::State};
+use rayon::prelude::*;
 use walks::{
     Failure, drive,
     walk::{Happening, Walk},
@@ -113,9 +114,9 @@ fn what_was_saved_is_kept_although_the_servos_swings_end_while_it_is_written() {
 #[test]
 fn leads_near_each_other_give_one_swing_each_way_a_window_at_every_speed() {
     let leads_ms = [0, 40, 100, 150, 180, 220, 300, 500];
-    let mut swings = 0;
-    for mm_s in (100..=1400).step_by(20) {
-        for (lead_out_ms, lead_in_ms) in leads_ms.iter().flat_map(|out| leads_ms.map(|back| (out, back))) {
+    let swings_at = |mm_s: u32| -> u32 {
+        let leads = leads_ms.iter().flat_map(|out| leads_ms.map(|back| (out, back)));
+        let swings = leads.map(|(lead_out_ms, lead_in_ms)| {
             // What the tool's distance does not allow at the top speed is refused, and the lead stays as it was.
             let lines = format!(
                 "set beam_to_tool_mm 1200
@@ -125,9 +126,11 @@ fn leads_near_each_other_give_one_swing_each_way_a_window_at_every_speed() {
                  roll {} mm at {mm_s} mm/s",
                 mm_s * 2 + 2500
             );
-            swings += go(&walk(&[(450, 150), (700, 150), (60, 90)], &lines)).steady_swings();
-        }
-    }
+            go(&walk(&[(450, 150), (700, 150), (60, 90)], &lines)).steady_swings()
+        });
+        swings.sum()
+    };
+    let swings: u32 = (5..=70_u32).into_par_iter().map(|speed| swings_at(20 * speed)).sum();
     assert!(swings > 10_000, "{swings} swings were looked at");
 }
 

@@ -6,7 +6,7 @@
 //! virtual Uno (`tests/end_to_end/random_walks.rs`). What is held is the same for both, as far as it can be seen from outside.
 //!
 //! The walks are the same each time, so that a change is judged by them and not by luck. `WEEDER_SEED` gives others, and
-//! `WEEDER_CASES` as many as asked for.
+//! `WEEDER_CASES` as many as asked for. [`cases`] is for every test that takes its time by trying much.
 
 pub mod drive;
 pub mod machine;
@@ -20,13 +20,14 @@ use proptest::{
     test_runner::{Config, RngSeed, TestError, TestRunner},
 };
 use rayon::prelude::*;
+use std::env;
 use std::sync::atomic::{AtomicU64, Ordering};
 use walk::Walk;
 
 /// How many walks are gone, and how they are shrunk.
 #[derive(Clone, Copy, Debug)]
 pub struct Extent {
-    /// How many walks, unless the environment says another number.
+    /// How many walks, by [`cases`], unless the environment says another number.
     pub walks: u32,
     /// At least so many turns are to be checked in all of them, so that they have not become idle.
     pub least_turns: u64,
@@ -40,7 +41,7 @@ pub struct Extent {
 /// With the first walk that fails, shrunk; where too few turns were checked; and where the environment's numbers are none.
 pub fn go_all(extent: Extent, walks: &BoxedStrategy<Walk>, go: impl Fn(&Walk) -> Result<u64, Failure> + Sync) {
     let asked = number("WEEDER_CASES");
-    let number_of_walks = asked.unwrap_or(extent.walks.into());
+    let number_of_walks = asked.unwrap_or(cases(extent.walks.into()));
     let seed = RngSeed::Fixed(number("WEEDER_SEED").unwrap_or(1));
     let config =
         Config { failure_persistence: None, max_shrink_iters: extent.shrinkings, rng_seed: seed, ..Config::default() };
@@ -70,7 +71,13 @@ pub fn go_all(extent: Extent, walks: &BoxedStrategy<Walk>, go: impl Fn(&Walk) ->
     }
     let turns = turns.into_inner();
     println!("{number_of_walks} walks, {turns} turns");
-    assert!(asked.is_some() || turns >= extent.least_turns, "{turns} turns");
+    assert!(asked.is_some() || turns >= cases(extent.least_turns), "{turns} turns");
+}
+
+/// How many of so many cases a test tries: all of them where the environment has `WEEDER_THOROUGH`, as in the gate, and a fourth where
+/// somebody waits for it.
+pub fn cases(all: u64) -> u64 {
+    if env::var_os("WEEDER_THOROUGH").is_some() { all } else { all.div_ceil(4) }
 }
 
 /// Walks that are drawn before they are gone.
@@ -80,6 +87,6 @@ pub use proptest::test_runner::TestCaseError as Failure;
 
 /// What an environment variable says, if it is there.
 fn number(name: &str) -> Option<u64> {
-    let text = std::env::var(name).ok()?;
+    let text = env::var(name).ok()?;
     Some(text.parse().unwrap_or_else(|_| panic!("{name}={text} is not a whole number")))
 }

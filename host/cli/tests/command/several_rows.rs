@@ -1,8 +1,6 @@
 //! The host's tools with several rows, as a user runs them, with virtual Unos at their ports.
 
-#[path = "common/typed.rs"]
-mod typed;
-
+use crate::typed::{printed, typed};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
@@ -12,7 +10,6 @@ use tempfile::TempDir;
 use trial::firmware;
 use trial::live::rows::{LiveRows, Mishap};
 use trial::live::{Background, Live, Setup};
-use typed::{printed, typed};
 
 /// Rows that stand, their ports linked in a folder as `row0` and so on.
 fn rows(folder: &TempDir, count: usize) -> Background<LiveRows> {

@@ -1,8 +1,6 @@
 //! `weeder plan`, as it is called: what it draws can be filled in by hand, and `weeder evaluate` judges it.
 
-mod common;
-
-use common::{assert_refused, said};
+use crate::common::{assert_refused, said};
 use std::fs;
 use std::path::Path;
 use tempfile::TempDir;

@@ -1,8 +1,6 @@
 //! `--shard` and `weeder merge`: the parts of a study give the bytes of an undivided one, and what is no whole study is refused.
 
-mod common;
-
-use common::{assert_refused, said, weeder};
+use crate::common::{assert_refused, said, weeder};
 use std::fs;
 use std::path::Path;
 use std::process::Command;
@@ -70,9 +68,9 @@ fn a_sweep_in_four_shards_is_the_undivided_sweep_to_the_byte() {
 
 #[test]
 fn a_soak_in_four_shards_is_the_undivided_soak_to_the_byte() {
-    let soak = ["soak", "--hours", "3", "--uno-minutes", "1", "--faults", "900"];
+    let soak = ["soak", "--hours", "1", "--uno-minutes", "1", "--faults", "900"];
     assert_same(&soak, &[], &[]);
-    assert_same(&["soak", "--hours", "2", "--uno-minutes", "0"], &["--json"], &[]);
+    assert_same(&["soak", "--hours", "1", "--uno-minutes", "0"], &["--json"], &[]);
 }
 
 #[test]

@@ -1,8 +1,6 @@
 //! `weeder trial` and `weeder sweep`, as they are called.
 
-mod common;
-
-use common::{assert_refused, said, weeder};
+use crate::common::{assert_refused, said, weeder};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
@@ -117,7 +115,7 @@ fn maize_is_spared_with_its_examples_and_stops_the_machine_without_them() {
 #[test]
 fn maize_is_spared_by_the_real_firmware_that_was_taught_its_examples() {
     let folder = folder();
-    let small = format!("{SMALL}{}", include_str!("../../field/presets/maize.toml"));
+    let small = format!("{SMALL}{}", include_str!("../../../field/presets/maize.toml"));
     fs::write(folder.path().join("maize.toml"), small).unwrap();
     said(folder.path(), &["train", "--synthetic", "--crop", "maize", "--beside", "--out", "maize.csv"]);
     let field =

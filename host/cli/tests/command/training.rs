@@ -1,8 +1,6 @@
 //! `weeder train` and `weeder classify`, as they are called.
 
-mod common;
-
-use common::{assert_refused, said, weeder};
+use crate::common::{assert_refused, said, weeder};
 use std::fs;
 use study::training::MOST_EXAMPLES;
 use tempfile::TempDir;

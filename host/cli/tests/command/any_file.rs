@@ -104,7 +104,7 @@ const READERS: [Reader; 11] = [
             assert!(!analysis.to_string().is_empty());
             Ok(())
         },
-        || include_bytes!("../../../docs/trial-example.csv").to_vec(),
+        || include_bytes!("../../../../docs/trial-example.csv").to_vec(),
     ),
     (
         "my.toml",

@@ -1,8 +1,6 @@
 //! `weeder evaluate`, as it is called: on the manual's example, on trials that carry no model, and on tables that are wrong.
 
-mod common;
-
-use common::{assert_refused, said};
+use crate::common::{assert_refused, said};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;

@@ -1,8 +1,6 @@
 //! `weeder design`, as it is called.
 
-mod common;
-
-use common::{assert_refused, said};
+use crate::common::{assert_refused, said};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;

@@ -18,15 +18,15 @@ use trial::live::{Background, Course, Live, Setup};
 /// Walking pace.
 const SPEED_MM_S: f64 = 700.0;
 
-/// A row of plants of its own.
-fn row(seed: u64) -> Row {
+/// A row of so many plants of its own.
+fn row(plants: usize, seed: u64) -> Row {
     let planting = Planting {
-        plants: 40,
+        plants,
         spacing_mm: 500.0,
         spacing_scatter_mm: 40.0,
         canopy_mm: 150.0,
         canopy_scatter_mm: 20.0,
-        weeds: 5,
+        weeds: plants / 8,
         ragged: false,
     };
     planting.grow_with_room(seed).expect("it is a row")
@@ -129,9 +129,9 @@ impl Laptop {
 #[test]
 fn of_six_rows_in_real_time_one_that_is_lost_reset_or_in_alarm_disturbs_no_other_and_all_hold() {
     let folder = tempfile::tempdir().expect("there is room for links");
-    let mut rows: Vec<Row> = (1..=6).map(row).collect();
+    let mut rows: Vec<Row> = (1..=6).map(|seed| row(40, seed)).collect();
     // The beam of the third is broken over more ground than a plant has.
-    rows[2] = Row::new(vec![Thing::plant(3000.0, 150.0), Thing::plant(4500.0, 900.0)]).expect("it is a row");
+    rows[2] = Row::new(vec![Thing::plant(0.0, 150.0), Thing::plant(1000.0, 900.0)]).expect("it is a row");
     let link = |number| Some(folder.path().join(format!("row{number}")));
     let setups = setups(rows, &product()).into_iter().enumerate();
     let setups = setups.map(|(number, setup)| Setup { link: link(number), ..setup }).collect();
@@ -175,7 +175,7 @@ fn of_six_rows_in_real_time_one_that_is_lost_reset_or_in_alarm_disturbs_no_other
 #[test]
 fn twelve_rows_hold_at_once_however_slow_the_computer_is() {
     let setup = Setup { fast: true, ..product() };
-    let machine = LiveRows::start(setups((1..=12).map(row).collect(), &setup)).expect("they start");
+    let machine = LiveRows::start(setups((1..=12).map(|seed| row(40, seed)).collect(), &setup)).expect("they start");
     let machine = machine.run_in_background();
     let mut laptop = Laptop::open(&machine);
     laptop.set_to_work();
@@ -190,13 +190,13 @@ fn twelve_rows_hold_at_once_however_slow_the_computer_is() {
 #[test]
 fn all_rows_count_the_same_ticks_of_the_wheel_that_they_share_and_each_sees_its_own_plants() {
     let setup = Setup { fast: true, ..product() };
-    let mut machine = LiveRows::start(setups(vec![row(1), row(2), row(3)], &setup)).expect("they start");
-    let ran = machine.run(&AtomicBool::new(false), Some(Duration::from_secs(12)));
+    let mut machine = LiveRows::start(setups((1..=3).map(|seed| row(12, seed)).collect(), &setup)).expect("they start");
+    let ran = machine.run(&AtomicBool::new(false), Some(Duration::from_secs(8)));
     let ran = ran.map_err(|(row, error)| format!("row {row}: {error}")).expect("they run");
-    assert_eq!(ran.simulated, Duration::from_secs(12));
+    assert_eq!(ran.simulated, Duration::from_secs(8));
     let mut unos = machine.into_unos();
     // Each answers in a turn of its own, so that a machine that rolls may be a tick farther: to the row's end, where it stands.
-    unos.iter_mut().for_each(|uno| uno.run_for_ms(40_000).expect("it runs"));
+    unos.iter_mut().for_each(|uno| uno.run_for_ms(8_000).expect("it runs"));
     let mut told = |command: &str| -> Vec<Vec<String>> {
         unos.iter_mut().map(|uno| ask(uno, command).expect("it answers")).collect()
     };

@@ -18,6 +18,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 use trial::{UnoPort, firmware};
 use uno::Uno;
+use walks::cases;
 
 /// Plants and a tall weed.
 fn row() -> Row {
@@ -209,7 +210,8 @@ fn a_row_with_changes_of_speed_and_a_stop_is_decided_the_same_on_the_host() {
 /// busy with something else now and then.
 #[test]
 fn rows_by_chance_are_decided_the_same_on_the_host_whatever_is_typed_and_whenever_it_is_read() {
-    let replayed: Vec<Replayed> = (0..ROWS)
+    let rows = cases(20);
+    let replayed: Vec<Replayed> = (0..rows)
         .into_par_iter()
         .map(|seed| {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -240,11 +242,8 @@ fn rows_by_chance_are_decided_the_same_on_the_host_whatever_is_typed_and_wheneve
         .collect();
     let objects: u64 = replayed.iter().map(|replayed| replayed.objects as u64).sum();
     let swings: u64 = replayed.iter().map(|replayed| replayed.swings as u64).sum();
-    assert!(objects > 4 * ROWS && swings > 4 * ROWS, "{objects}, {swings}");
+    assert!(objects > 4 * rows && swings > 4 * rows, "{objects}, {swings}");
 }
-
-/// How many rows by chance are rolled along.
-const ROWS: u64 = 20;
 
 #[test]
 fn start_now_over_unseen_ground_is_known_from_start() {

@@ -1,8 +1,6 @@
 //! The host's tools over a pseudo terminal, as a user runs them, with the virtual Uno at its other end.
 
-#[path = "common/typed.rs"]
-mod typed;
-
+use crate::typed::{printed, typed};
 use std::fs;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
@@ -11,7 +9,6 @@ use std::thread;
 use std::time::Duration;
 use trial::firmware;
 use trial::live::{Background, Live, LiveUno, Setup};
-use typed::{printed, typed};
 use uno::pty::Pty;
 
 /// How many lines of a kind a log has by now.

@@ -1,7 +1,7 @@
 //! What stands in the manual and follows from the code: the wiring, every setting, what to do about every alarm, and the
 //! simulated field.
 //!
-//! `UPDATE_EXPECT=1 cargo test -p weeder-cli --test tables_of_the_manual` writes it anew.
+//! `UPDATE_EXPECT=1 cargo test -p weeder-cli --test command tables` writes it anew.
 
 use control::alarm::{Alarm, Warning};
 use control::settings::{Description, Setting};
@@ -46,7 +46,7 @@ fn the_wiring_diagram_shows_the_pins_and_pull_ups_of_the_pin_table() {
     /// Contacts are named left of the board's edge; below is the optocoupler, which goes to no other contact.
     const BOARD_EDGE_X: f64 = 250.0;
     const BOARD_END_Y: f64 = 616.0;
-    let texts = texts(&expect_file!["../../../docs/wiring.svg"].data());
+    let texts = texts(&expect_file!["../../../../docs/wiring.svg"].data());
     let on_board = texts.iter().filter(|(x, y, _)| *x < BOARD_EDGE_X && *y < BOARD_END_Y);
     let is_pin = |text: &&String| text.strip_prefix('D').is_some_and(|number| number.parse::<u8>().is_ok());
     let pins: Vec<&String> = on_board.map(|(_, _, text)| text).filter(is_pin).collect();
@@ -61,26 +61,26 @@ fn the_wiring_diagram_shows_the_pins_and_pull_ups_of_the_pin_table() {
 
 #[test]
 fn the_wiring_tables_are_the_pin_table() {
-    for page in [expect_file!["../../../README.md"], expect_file!["../../../docs/build.md"]] {
+    for page in [expect_file!["../../../../README.md"], expect_file!["../../../../docs/build.md"]] {
         page.assert_eq(&with_part(&page, "wiring", &wiring::table()));
     }
 }
 
 #[test]
 fn the_settings_page_is_the_settings_table() {
-    let page = expect_file!["../../../docs/settings.md"];
+    let page = expect_file!["../../../../docs/settings.md"];
     page.assert_eq(&with_part(&page, "settings", &settings()));
 }
 
 #[test]
 fn the_simulated_field_s_page_is_the_table_of_its_parameters() {
-    let page = expect_file!["../../../docs/field.md"];
+    let page = expect_file!["../../../../docs/field.md"];
     page.assert_eq(&with_part(&page, "parameters", &parameters()));
 }
 
 #[test]
 fn the_settings_that_the_readme_names_have_the_defaults_that_it_gives() {
-    let readme = expect_file!["../../../README.md"].data();
+    let readme = expect_file!["../../../../README.md"].data();
     let mut found = 0;
     for line in readme.lines() {
         let mut cells = line.trim_matches('|').split('|').map(str::trim);
@@ -97,7 +97,7 @@ fn the_settings_that_the_readme_names_have_the_defaults_that_it_gives() {
 
 #[test]
 fn the_faults_page_says_what_the_monitor_says_to_do() {
-    let page = expect_file!["../../../docs/faults.md"].data();
+    let page = expect_file!["../../../../docs/faults.md"].data();
     let alarms = (0..).map_while(Alarm::from_index).map(|alarm| {
         let (code, name) = (alarm.code(), alarm.text().bytes().map(char::from).collect::<String>());
         (format!("| {}-{} | `{name}` |", code / 10, code % 10), advice::alarm(alarm))
