@@ -128,13 +128,13 @@ fn lines() -> Vec<String> {
 
 /// A machine on its way along a row at 5 km/h, telling all that it sees.
 fn under_way() -> Run {
-    under_way_after(&["plot on"])
+    under_way_after(&["plot on"], 60)
 }
 
-/// The same, behind commands that it got before.
-fn under_way_after(commands: &[&str]) -> Run {
-    let row = Planting { plants: 60, weeds: 30, spacing_mm: 300.0, ragged: true, ..Planting::default() }.grow(1);
-    let row = row.expect("everything has room");
+/// The same, along so many plants and behind commands that it got before.
+fn under_way_after(commands: &[&str], plants: usize) -> Run {
+    let planting = Planting { plants, weeds: plants / 2, spacing_mm: 300.0, ragged: true, ..Planting::default() };
+    let row = planting.grow(1).expect("everything has room");
     let end_mm = row.span_mm().end;
     Run::begin(trial(row, steady(1000.0, end_mm)), commands)
 }
@@ -180,7 +180,7 @@ fn no_turn_takes_more_than_a_millisecond_where_fifteen_examples_vote_of_as_many_
     for taught in [0, field_examples::CAPACITY] {
         let mut commands: Vec<String> = (0..taught).flat_map(teach).collect();
         commands.extend(["set k 15", "plot on"].map(str::to_owned));
-        let mut run = under_way_after(&commands.iter().map(String::as_str).collect::<Vec<_>>());
+        let mut run = under_way_after(&commands.iter().map(String::as_str).collect::<Vec<_>>(), 24);
         run.uno.measure_turns();
         run.roll_to_the_end();
         let longest = run.uno.turns().expect("they are measured").longest;
