@@ -56,7 +56,10 @@ fn float_distance<const FEATURES: usize>(example: &Example<FEATURES>, query: &[u
     example.features.iter().zip(query).map(|(&left, &right)| (f64::from(left) - f64::from(right)).powi(2)).sum()
 }
 
-fn features<const FEATURES: usize>() -> impl Strategy<Value = [u8; FEATURES]> {
+/// The most features with which something is tried. Whatever takes fewer gets the first of those that are drawn.
+const MOST: usize = 8;
+
+fn features() -> impl Strategy<Value = [u8; MOST]> {
     prop_oneof![
         proptest::array::uniform(any::<u8>()),
         proptest::array::uniform(100_u8..104),
@@ -65,7 +68,7 @@ fn features<const FEATURES: usize>() -> impl Strategy<Value = [u8; FEATURES]> {
 }
 
 /// Examples whose labels are mostly, but not always, below 4.
-fn examples<const FEATURES: usize>() -> impl Strategy<Value = Vec<Example<FEATURES>>> {
+fn examples() -> impl Strategy<Value = Vec<Example<MOST>>> {
     let label = prop_oneof![60 => 0_u8..2, 20 => 0_u8..4, 1 => any::<u8>()];
     proptest::collection::vec((features(), label).prop_map(|(features, label)| Example::new(features, label)), 0..60)
 }
@@ -74,54 +77,87 @@ fn radius() -> impl Strategy<Value = u32> {
     prop_oneof![0_u32..30, 0_u32..600_000, Just(u32::MAX)]
 }
 
-/// The tests that hold for each number of features, as a module each.
-macro_rules! for_features {
-    ($($name:ident: $features:literal),*) => {$(
-        mod $name {
-            use super::*;
-
-            proptest! {
-                #[test]
-                fn the_answer_is_that_of_a_plain_float_classifier(
-                    examples in examples::<$features>(), query in features(), k in 0_u8..18, radius in radius(),
-                ) {
-                    let examples = examples.as_slice();
-                    prop_assert_eq!(classify::<$features, 2>(examples, &query, k, radius), reference(examples, &query, k, radius));
-                    prop_assert_eq!(classify::<$features, 3>(examples, &query, k, radius), reference(examples, &query, k, radius));
-                    prop_assert_eq!(classify::<$features, 4>(examples, &query, k, radius), reference(examples, &query, k, radius));
-                }
-
-                #[test]
-                fn neither_order_nor_store_changes_the_answer(
-                    (first, shuffled) in examples::<$features>()
-                        .prop_flat_map(|examples| (Just(examples.clone()), Just(examples).prop_shuffle())),
-                    split in any::<prop::sample::Index>(), query in features(), k in 1_u8..=MAX_K, radius in radius(),
-                ) {
-                    let answer = classify::<$features, 3>(first.as_slice(), &query, k, radius);
-                    prop_assert_eq!(classify(shuffled.as_slice(), &query, k, radius), answer);
-                    let (left, right) = shuffled.split_at(split.index(shuffled.len() + 1));
-                    prop_assert_eq!(classify(&(left, right), &query, k, radius), answer);
-                    let mut table: Table<$features, 60> = Table::new();
-                    for &example in right {
-                        prop_assert_eq!(table.add_example(example), Ok(()));
-                    }
-                    prop_assert_eq!(classify(&(&table, left), &query, k, radius), answer);
-                    prop_assert_eq!(classify(&OneByOne(&shuffled), &query, k, radius), answer);
-                    prop_assert_eq!(classify(&(AtOnce(left), AtOnce(right)), &query, k, radius), answer);
-                    let nearest: &mut Nearest<3> = &mut Nearest::<3, _>::new([Neighbour::new(99, 1); MAX_K as usize]);
-                    for _ in 0..2 {
-                        prop_assert_eq!(nearest.begin(k), Ok(()));
-                        left.keep_nearest(&query, nearest);
-                        AtOnce(right).keep_nearest(&query, nearest);
-                        prop_assert_eq!(nearest.answer(radius), answer);
-                        prop_assert_eq!(nearest.answer(radius), answer);
-                    }
-                }
-            }
-        }
-    )*};
+fn first<const FEATURES: usize>(features: &[u8; MOST]) -> [u8; FEATURES] {
+    std::array::from_fn(|feature| features[feature])
 }
-for_features!(f1: 1, f2: 2, f3: 3, f4: 4, f5: 5, f6: 6, f7: 7, f8: 8);
+
+fn first_of_all<const FEATURES: usize>(examples: &[Example<MOST>]) -> Vec<Example<FEATURES>> {
+    examples.iter().map(|example| Example::new(first(&example.features), example.label)).collect()
+}
+
+/// What has to hold, for each number of features.
+macro_rules! for_each_number_of_features {
+    ($holds:ident) => {
+        [$holds::<1>, $holds::<2>, $holds::<3>, $holds::<4>, $holds::<5>, $holds::<6>, $holds::<7>, $holds::<8>]
+    };
+}
+
+fn is_that_of_a_plain_classifier<const FEATURES: usize>(
+    examples: &[Example<MOST>],
+    query: &[u8; MOST],
+    k: u8,
+    radius: u32,
+) -> Result<(), TestCaseError> {
+    let (examples, query) = (&first_of_all::<FEATURES>(examples)[..], &first(query));
+    prop_assert_eq!(classify::<FEATURES, 2>(examples, query, k, radius), reference(examples, query, k, radius));
+    prop_assert_eq!(classify::<FEATURES, 3>(examples, query, k, radius), reference(examples, query, k, radius));
+    prop_assert_eq!(classify::<FEATURES, 4>(examples, query, k, radius), reference(examples, query, k, radius));
+    Ok(())
+}
+
+fn is_the_same_by_every_store<const FEATURES: usize>(
+    examples: &[Example<MOST>],
+    shuffled: &[Example<MOST>],
+    split: prop::sample::Index,
+    query: &[u8; MOST],
+    k: u8,
+    radius: u32,
+) -> Result<(), TestCaseError> {
+    let (examples, shuffled) = (first_of_all::<FEATURES>(examples), first_of_all::<FEATURES>(shuffled));
+    let query = first(query);
+    let answer = classify::<FEATURES, 3>(examples.as_slice(), &query, k, radius);
+    prop_assert_eq!(classify(shuffled.as_slice(), &query, k, radius), answer);
+    let (left, right) = shuffled.split_at(split.index(shuffled.len() + 1));
+    prop_assert_eq!(classify(&(left, right), &query, k, radius), answer);
+    let mut table: Table<FEATURES, 60> = Table::new();
+    for &example in right {
+        prop_assert_eq!(table.add_example(example), Ok(()));
+    }
+    prop_assert_eq!(classify(&(&table, left), &query, k, radius), answer);
+    prop_assert_eq!(classify(&OneByOne(&shuffled), &query, k, radius), answer);
+    prop_assert_eq!(classify(&(AtOnce(left), AtOnce(right)), &query, k, radius), answer);
+    let nearest: &mut Nearest<3> = &mut Nearest::<3, _>::new([Neighbour::new(99, 1); MAX_K as usize]);
+    for _ in 0..2 {
+        prop_assert_eq!(nearest.begin(k), Ok(()));
+        left.keep_nearest(&query, nearest);
+        AtOnce(right).keep_nearest(&query, nearest);
+        prop_assert_eq!(nearest.answer(radius), answer);
+        prop_assert_eq!(nearest.answer(radius), answer);
+    }
+    Ok(())
+}
+
+proptest! {
+    #[test]
+    fn the_answer_is_that_of_a_plain_float_classifier(
+        examples in examples(), query in features(), k in 0_u8..18, radius in radius(),
+    ) {
+        for holds in for_each_number_of_features!(is_that_of_a_plain_classifier) {
+            holds(&examples, &query, k, radius)?;
+        }
+    }
+
+    #[test]
+    fn neither_order_nor_store_changes_the_answer(
+        (examples, shuffled) in
+            examples().prop_flat_map(|examples| (Just(examples.clone()), Just(examples).prop_shuffle())),
+        split in any::<prop::sample::Index>(), query in features(), k in 1_u8..=MAX_K, radius in radius(),
+    ) {
+        for holds in for_each_number_of_features!(is_the_same_by_every_store) {
+            holds(&examples, &shuffled, split, &query, k, radius)?;
+        }
+    }
+}
 
 /// A store that only hands examples out, so that the trait's own search is used.
 struct OneByOne<'a, const FEATURES: usize>(&'a [Example<FEATURES>]);
