@@ -4,7 +4,7 @@ use crate::decisions::Decisions;
 use control::{alarm::Alarm, operate::state::State};
 use rayon::prelude::*;
 use walks::{
-    Failure, drive,
+    Failure, cases, drive,
     walk::{Happening, Walk},
 };
 
@@ -130,8 +130,10 @@ fn leads_near_each_other_give_one_swing_each_way_a_window_at_every_speed() {
         });
         swings.sum()
     };
-    let swings: u32 = (5..=70_u32).into_par_iter().map(|speed| swings_at(20 * speed)).sum();
-    assert!(swings > 10_000, "{swings} swings were looked at");
+    let speeds = cases(66) as u32;
+    let mm_s = |place: u32| 100 + 1300 * place / (speeds - 1);
+    let swings: u32 = (0..speeds).into_par_iter().map(|place| swings_at(mm_s(place))).sum();
+    assert!(swings > 150 * speeds, "{swings} swings were looked at");
 }
 
 #[test]
