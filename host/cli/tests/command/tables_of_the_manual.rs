@@ -1,5 +1,5 @@
 //! What stands in the manual and follows from the code: the wiring, every setting, what to do about every alarm, and the
-//! simulated field.
+//! simulated field; and what the classifier's page has of the figures that `weeder figures` writes.
 //!
 //! `UPDATE_EXPECT=1 cargo test -p weeder-cli --test command tables` writes it anew.
 
@@ -110,6 +110,26 @@ fn the_faults_page_says_what_the_monitor_says_to_do() {
         let row = page.lines().find(|line| line.starts_with(&begin)).unwrap_or_else(|| panic!("no row {begin}"));
         assert!(row.ends_with(&format!(" | {advice} |")), "{row}: {advice}");
     }
+}
+
+#[test]
+fn the_classifier_s_page_has_the_figures_of_the_bench() {
+    let page = expect_file!["../../../../knn/README.md"];
+    let table = cycles(&expect_file!["../../../../docs/figures.md"].data());
+    assert_eq!(table.lines().count(), 2 + 5, "{table}");
+    page.assert_eq(&with_part(&page, "cycles", &table));
+}
+
+/// What the page of figures has of the classifier's searches among random examples, as a table in Markdown.
+fn cycles(figures: &str) -> String {
+    let mut table = "| examples | fewest | mean | most |\n| --- | --- | --- | --- |\n".to_owned();
+    for line in figures.lines() {
+        let words: Vec<&str> = line.trim_matches('│').split_whitespace().collect();
+        if let [examples, "random", "examples,", "k", "=", "3", fewest, mean, most] = words.as_slice() {
+            writeln!(table, "| {examples} | {fewest} | {mean} | {most} |").expect("a string takes everything");
+        }
+    }
+    table
 }
 
 /// Every parameter of the simulated field as a table in Markdown.
