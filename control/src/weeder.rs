@@ -10,10 +10,6 @@ mod commands;
 mod faults;
 mod shown;
 
-pub use self::shown::Reason;
-
-use self::commands::Told;
-use self::faults::{Limits, Misfits, NoPlants};
 use crate::{
     alarm::Alarm,
     ground::{
@@ -35,10 +31,14 @@ use crate::{
         calibration::Distance,
         configuration::Configuration,
         event::{Event, Events},
+        limits::Limits,
+        misfits::Misfits,
+        no_plants::NoPlants,
         objects::{Judged, Objects},
         plot::Curves,
         servo::{self, HalfMicros},
         state::State,
+        told_example::ToldExample,
         tool::Tool,
     },
     settings::Setting,
@@ -84,7 +84,7 @@ pub struct Controller<C, M> {
     is_judging: bool,
     no_plants: NoPlants,
     misfits: Misfits,
-    told: Told,
+    told: ToldExample,
     objects: Objects,
     events: Events,
     curves: Curves,
@@ -117,7 +117,7 @@ impl<C: Classifier, M: Memory> Asleep<C, M> {
             is_judging: false,
             no_plants: NoPlants::since(Position::new(0)),
             misfits: Misfits::NONE,
-            told: Told::NONE,
+            told: ToldExample::NONE,
             objects: Objects::NONE,
             events: Events::NONE,
             curves: Curves::NONE,

@@ -1,9 +1,23 @@
-//! The tool, as the servo was told to have it: where, since when, and whether that was in time.
+//! The tool, as the servo was told to have it: where, since when, and whether that was in time; and why it may be out while the machine works.
 
 use crate::{
     operate::servo::HalfMicros,
     units::{Instant, Interval, count},
 };
+
+/// Why the tool is out of the row while the machine works.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Reason {
+    /// A plant is there, or comes up.
+    Plant,
+    /// The beam has not seen the ground.
+    UnseenGround,
+    /// A plant just behind the beam would be reached before the tool is out.
+    TooFast,
+    /// The encoder fell silent while the machine rolled, or the beam broke while it stands.
+    EncoderDoubtful,
+}
 
 /// The tool.
 #[derive(Clone, Debug)]

@@ -4,14 +4,13 @@ use crate::{
     alarm::{Alarm, Warning},
     ground::class::{Class, label},
     measure::reset::Cause,
-    operate::state::State,
+    operate::{state::State, tool::Reason},
     say::{
         packed,
         texts::{self, Text},
         words::{Argument, Word},
     },
     settings::{self, Setting},
-    weeder::Reason,
 };
 
 /// Has an enum write and read its words, `WORDS`.

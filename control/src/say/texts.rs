@@ -6,10 +6,9 @@
 use crate::{
     alarm::{Alarm, Warning},
     measure::reset::Cause,
-    operate::refusal::Refusal,
+    operate::{refusal::Refusal, tool::Reason},
     say::words::{Argument, Word},
     settings::{self, Setting},
-    weeder::Reason,
 };
 
 /// All texts of the machine, from which the table in flash is made.

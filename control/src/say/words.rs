@@ -6,7 +6,7 @@
 use crate::{
     alarm::{Alarm, Warning},
     measure::reset::Cause,
-    weeder::Reason,
+    operate::tool::Reason,
 };
 
 /// The first word of a command.

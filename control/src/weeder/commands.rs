@@ -1,16 +1,13 @@
 //! What the operator may ask of the machine, by switch or console.
 
-use super::{
-    Controller,
-    faults::{Limits, Misfits},
-};
+use super::Controller;
 use crate::{
     ground::{
         class::{Class, Classifier, ExamplesFull, label},
-        features, field_examples,
+        field_examples,
     },
     memory::Memory,
-    operate::{plot::Plot, refusal::Refusal, state::State},
+    operate::{limits::Limits, misfits::Misfits, plot::Plot, refusal::Refusal, state::State},
     settings::Setting,
     units::count,
 };
@@ -189,31 +186,5 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// Counts a line that was not understood.
     pub fn count_mistake(&mut self) {
         count(&mut self.mistakes);
-    }
-}
-
-/// The features of an example that the operator tells, one after the other.
-#[derive(Clone, Debug)]
-pub(super) struct Told {
-    features: [u8; features::COUNT],
-    /// How many were told.
-    count: u8,
-}
-
-impl Told {
-    pub const NONE: Self = Self { features: [0; features::COUNT], count: 0 };
-
-    /// One more than there are is none of any example.
-    fn add(&mut self, feature: u8) {
-        if let Some(next) = self.features.get_mut(usize::from(self.count)) {
-            *next = feature;
-        }
-        self.count = self.count.saturating_add(1);
-    }
-
-    /// The features, if they were told, all and no more. The next example begins anew in any case.
-    fn take(&mut self) -> Option<[u8; features::COUNT]> {
-        let count = core::mem::take(&mut self.count);
-        (usize::from(count) == features::COUNT).then_some(self.features)
     }
 }

@@ -5,24 +5,10 @@ use crate::{
     ground::class::Classifier,
     measure::{quadrature, readings::Readings, reset::Cause},
     memory::Memory,
-    operate::{calibration::Distance, event::Event, lamp, objects::Objects, plot::Plot, state::State},
+    operate::{calibration::Distance, event::Event, lamp, objects::Objects, plot::Plot, state::State, tool::Reason},
     settings::{Setting, Settings},
     units::Ticks,
 };
-
-/// Why the tool is out of the row while the machine works.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Reason {
-    /// A plant is there, or comes up.
-    Plant,
-    /// The beam has not seen the ground.
-    UnseenGround,
-    /// A plant just behind the beam would be reached before the tool is out.
-    TooFast,
-    /// The encoder fell silent while the machine rolled, or the beam broke while it stands.
-    EncoderDoubtful,
-}
 
 impl<C: Classifier, M: Memory> Controller<C, M> {
     /// What the machine is doing.

@@ -17,10 +17,10 @@ use control::{
         readings::{Edge, Readings, WakeUp},
         reset::Cause,
     },
-    operate::{servo, state::State},
+    operate::{servo, state::State, tool::Reason},
     settings::{Setting, Settings},
     units::{Instant, Interval, Position},
-    weeder::{Controller, Orders, Reason},
+    weeder::{Controller, Orders},
 };
 use knn::Example;
 use proptest::prelude::*;

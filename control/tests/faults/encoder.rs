@@ -8,10 +8,10 @@ use control::{
     alarm::Alarm,
     measure::reset::Cause,
     memory::Volatile,
-    operate::event::Event,
+    operate::{event::Event, tool::Reason},
     settings::Setting,
     units::Ticks,
-    weeder::{Controller, Reason},
+    weeder::Controller,
 };
 
 /// How long the encoder may be silent at a speed until that is sudden, in seconds: the time of ten ticks, and three turns.

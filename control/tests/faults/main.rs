@@ -17,10 +17,10 @@ use control::{
         reset::Cause,
     },
     memory::Volatile,
-    operate::{event::Event, state::State},
+    operate::{event::Event, state::State, tool::Reason},
     settings::Setting,
     units::{Instant, Interval, Position, Ticks},
-    weeder::{Controller, Reason},
+    weeder::Controller,
 };
 use drive::{Drive, TURN_US};
 

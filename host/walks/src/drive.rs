@@ -15,7 +15,6 @@ use crate::{
     speeds::Speeds,
     walk::{Beginning, Happening, TICKS_A_MM, Walk},
 };
-use checks::Place;
 use control::{
     alarm::Alarm,
     ground::class::Listed,
@@ -40,6 +39,14 @@ const ASKED_EVERY_US: u64 = 300_000;
 
 /// Edges of dust that are more than the machine can take at once.
 const TOO_MANY: u32 = 40;
+
+/// Where the tool is while the machine rolls between two speeds, in ticks a second.
+#[derive(Clone, Copy, Debug)]
+struct Place {
+    tool: i64,
+    slowest: f64,
+    fastest: f64,
+}
 
 /// The machine on its way, see the module's words.
 #[derive(Debug)]

@@ -5,7 +5,10 @@
 
 use crate::walk::Beginning;
 use control::{
-    ground::class::Listed, measure::reset::Cause, operate::state::State, settings::Settings, weeder::Reason,
+    ground::class::Listed,
+    measure::reset::Cause,
+    operate::{state::State, tool::Reason},
+    settings::Settings,
 };
 use proptest::test_runner::TestCaseError;
 

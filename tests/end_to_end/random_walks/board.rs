@@ -14,9 +14,9 @@ use control::ground::{
 };
 use control::measure::reset::Cause;
 use control::memory::{SIZE, Volatile};
+use control::operate::{state::State, tool::Reason};
 use control::say::command::{Command, parse};
 use control::settings::{Setting, Settings};
-use control::{operate::state::State, weeder::Reason};
 use field::wiring;
 use signal::{CYCLES_PER_SECOND, Pin, PinChange};
 use std::collections::VecDeque;

@@ -1,22 +1,14 @@
 //! The monitor's screen: from what is known to what is drawn, and nothing else.
 //!
 //! State, alarm and the key for HOLD stand at the top, whatever else there is no room for. [`one`] draws one row, [`several`] all rows
-//! of a machine at a glance.
+//! of a machine at a glance, both with the same [`parts`].
 
 mod one;
+mod parts;
 mod several;
 
-use super::model::{Model, RowModel};
-use link::settings::Setting;
-use link::{Class, Mode};
+use super::model::Model;
 use ratatui::Frame;
-use ratatui::layout::{Constraint, Layout, Position, Rect};
-use ratatui::style::{Color, Style, Stylize};
-use ratatui::text::Line;
-use ratatui::widgets::{Block, Paragraph};
-
-/// The key that has every row hold, as the screen says it.
-const HOLD_KEY: &str = "Esc HOLD";
 
 /// Draws all of it.
 pub fn draw(model: &Model, frame: &mut Frame) {
@@ -24,115 +16,6 @@ pub fn draw(model: &Model, frame: &mut Frame) {
         [row] => one::draw(model, row, frame),
         rows => several::draw(model, rows, frame),
     }
-}
-
-/// A line with the key for HOLD at its end, which is there however narrow the screen is.
-fn draw_top(left: Line, frame: &mut Frame, area: Rect) {
-    let width = HOLD_KEY.len() as u16;
-    let [left_area, key] = Layout::horizontal([Constraint::Min(0), Constraint::Length(width)]).areas(area);
-    frame.render_widget(left, left_area);
-    frame.render_widget(Line::raw(HOLD_KEY).style(hold_style()), key);
-}
-
-fn hold_style() -> Style {
-    Style::new().fg(Color::White).bg(Color::Red).bold()
-}
-
-/// The colour of a state.
-fn colour(mode: Mode) -> Color {
-    match mode {
-        Mode::Hold => Color::Yellow,
-        Mode::Work => Color::Green,
-        Mode::Alarm => Color::Red,
-    }
-}
-
-/// What stands at a place of the row: what is drawn farther down here wins.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Ground {
-    Bare,
-    Weed,
-    Margin,
-    Canopy,
-}
-
-/// How far ahead of the tool a column begins, as a column of so many: a quarter of the way from beam to tool stands behind the tool.
-fn column_of(row: &RowModel, columns: usize, ahead_of_tool_mm: f64) -> f64 {
-    let beam_to_tool = f64::from(row.settings.get(Setting::BeamToToolMm));
-    let mm_per_column = 1.25 * beam_to_tool / columns.max(1) as f64;
-    (ahead_of_tool_mm + 0.25 * beam_to_tool) / mm_per_column
-}
-
-/// The column at which the tool is.
-fn tool_column(row: &RowModel, columns: usize) -> usize {
-    column_of(row, columns, 0.0).round() as usize
-}
-
-/// The ground from a little behind the tool to the beam, as the machine rolls to the right.
-fn ground(row: &RowModel, columns: usize) -> String {
-    let beam_to_tool = f64::from(row.settings.get(Setting::BeamToToolMm));
-    let mut ground = vec![Ground::Bare; columns];
-    let margin = f64::from(row.settings.get(Setting::MarginMm));
-    for seen in &row.windows {
-        let from = row.millimetres(seen.leading.wrapping_sub(row.status.position)) + beam_to_tool;
-        let to = from + row.millimetres(seen.width);
-        let mut paint = |from: f64, to: f64, what: Ground| {
-            let (from, to) = (column_of(row, columns, from).round(), column_of(row, columns, to).round());
-            // What is narrower than a column is still drawn, and what lies behind the left edge is not.
-            let to = to.max(from + 1.0).max(0.0) as usize;
-            for place in ground.iter_mut().take(to).skip(from.max(0.0) as usize) {
-                *place = what.max(*place);
-            }
-        };
-        if seen.class == Class::Weed {
-            paint(from, to, Ground::Weed);
-        } else {
-            paint(from - margin, to + margin, Ground::Margin);
-            paint(from, to, Ground::Canopy);
-        }
-    }
-    ground.iter().map(symbol).collect()
-}
-
-fn symbol(ground: &Ground) -> char {
-    match ground {
-        Ground::Bare => '_',
-        Ground::Weed => '\'',
-        Ground::Margin => '░',
-        Ground::Canopy => '█',
-    }
-}
-
-fn draw_said(model: &Model, frame: &mut Frame, area: Rect) {
-    let block = Block::bordered().title(" console ");
-    let room = usize::from(block.inner(area).height);
-    let lines = model.lines.iter().skip(model.lines.len().saturating_sub(room));
-    frame.render_widget(
-        Paragraph::new(lines.map(|line| Line::raw(line.as_str())).collect::<Vec<_>>()).block(block),
-        area,
-    );
-}
-
-/// What is being typed, to whom, and below it what came of HOLD, what the line may become, or which keys there are.
-fn draw_line(model: &Model, to: &str, frame: &mut Frame, area: Rect, hint: Rect) {
-    let prompt = format!("{to}> ");
-    // A line has at most 80 characters.
-    let column = (area.x + (prompt.chars().count() + model.line.cursor()) as u16).min(area.right().saturating_sub(1));
-    frame.render_widget(Line::from(vec![prompt.bold(), model.line.text().into()]), area);
-    frame.set_cursor_position(Position::new(column, area.y));
-    let candidates = model.line.candidates();
-    let text = if !candidates.is_empty() {
-        let last = |line: &String| line.rsplit(' ').next().unwrap_or_default().to_owned();
-        Line::raw(candidates.iter().map(last).collect::<Vec<_>>().join("  ")).dim()
-    } else if let Some(hold) = &model.hold {
-        let colour = if hold.is_obeyed() { Color::Green } else { Color::Red };
-        Line::raw(hold.summary(&model.names())).style(Style::new().fg(colour).bold())
-    } else if model.are_several() {
-        Line::raw("PgUp, PgDn: to whom; Tab completes, Up and Down go through the history, Ctrl-C ends").dim()
-    } else {
-        Line::raw("Tab completes, Up and Down go through the history, Ctrl-C ends").dim()
-    };
-    frame.render_widget(text, hint);
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! What a log tells beside what its replay tells.
 
-use super::{Difference, OBJECT_TICKS, Replayed, SWING_MS, SWING_TICKS};
+use super::replayed::{Difference, OBJECT_TICKS, Replayed, SWING_MS, SWING_TICKS};
 use crate::{Class, EventLine};
 
 /// Farther than any object's hold goes, 5 m at the default wheel.

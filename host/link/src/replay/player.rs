@@ -1,7 +1,9 @@
 //! The decisions, driven along a log: the machine's way, the beam's edges, and what was typed.
 
+use super::compare::Heard;
 use super::judge::{Judge, Seen, Witness};
-use super::{Happened, Heard, OBJECT_TICKS, Stretch};
+use super::replayed::OBJECT_TICKS;
+use super::stretch::{Happened, Stretch};
 use crate::settings::{Setting, steps};
 use crate::{EventLine, Mode, Status};
 use control::alarm::Alarm;

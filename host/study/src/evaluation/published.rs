@@ -10,7 +10,7 @@
 //! with it, from 1.5 to 3.5 hp. So Fig. 10, where the index rises with speed, is what Eq. 27 says of one engine; Eq.
 //! 30, where it falls, is not.
 
-use super::Response;
+use super::response::Response;
 use serde::Serialize;
 
 /// The speeds of its trial, least and greatest, km/h: beyond them its slopes say nothing.

@@ -3,7 +3,7 @@
 //! The columns are the fields of [`PlotRecord`], in any order, with others among them that are not read; lines that begin
 //! with `#` are comments. Every line is checked before anything follows from one.
 
-use super::PlotRecord;
+use super::plot::PlotRecord;
 pub use files::FileError;
 use files::csv_table::{CsvTable, Line};
 use std::io;

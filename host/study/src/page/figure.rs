@@ -1,8 +1,8 @@
 //! The page's figures: which chart shows what, its legend, and the same in words for those who cannot see it.
 
 use super::chart::{Chart, DrawingError, Look, Series, key, range_of};
+use super::comparison::{Comparison, ControllerPoint};
 use super::table::{fixed, short};
-use super::{Comparison, ControllerPoint};
 use crate::evaluation::{Analysis, Response, ResponseAnalysis};
 use crate::statistics::LinearModel;
 

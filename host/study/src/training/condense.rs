@@ -13,7 +13,7 @@
 //!
 //! Where several objects would do, the first in the list does.
 
-use super::{answer_of_others, class_of};
+use super::model::{answer_of_others, class_of};
 use control::ground::{
     class::{Class, label},
     features::COUNT,

@@ -4,7 +4,9 @@
 //! would; the dots are the objects that were learned from, the ringed ones those that were kept as examples. Delay and
 //! actuation follow from the other features, so that nothing is hidden behind the two that are drawn.
 
-use super::{Labelled, Model, Training};
+use super::Training;
+use super::labelled::Labelled;
+use super::model::Model;
 use control::ground::class::Class;
 use control::ground::features::{Features, SPEED_CLASSES_MM_S, speed_class};
 use drawing::{INK, Legend, MARK_SIZE, PALE_INK, document, line, paper, rectangle, swatch, tenth, words};

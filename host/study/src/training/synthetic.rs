@@ -11,7 +11,7 @@
 //! The classifier here only takes notes. It is told the truth about each object, in the order in which they stand, so
 //! that the spacing of the next one is counted from a plant.
 
-use super::Labelled;
+use super::labelled::Labelled;
 use control::ground::class::{Class, Classifier, ExamplesFull, Listed, Vote};
 use control::ground::features::{self, Features, SPEED_CLASSES_MM_S};
 use control::measure::quadrature::{Quadrature, Step};

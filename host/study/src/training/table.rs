@@ -4,7 +4,7 @@
 //! begin with `#` and the `ok` that ends what the console prints. All features are whole numbers. A label is `plant`,
 //! `weed`, or empty where nobody said what it was.
 
-use super::Labelled;
+use super::labelled::Labelled;
 use control::ground::features::Features;
 use field::row::Kind;
 use files::csv_table::{CsvTable, Line};

@@ -2,22 +2,14 @@
 //!
 //! Where the machine may have known something else a moment ago, the model's word does not count, and nothing is checked.
 
-use super::Drive;
+use super::{Drive, Place};
 use crate::machine::{Checked, Machine};
-use control::{settings::Setting, weeder::Reason};
+use control::{operate::tool::Reason, settings::Setting};
 use proptest::prelude::*;
 
 /// At a steady speed, the measured one is right after this time, if it is no slower than this.
 const STEADY_US: u64 = 1_200_000;
 const STEADY_SPEED: f64 = 60.0;
-
-/// Where the tool is while the machine rolls between two speeds, in ticks a second.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Place {
-    pub(super) tool: i64,
-    pub(super) slowest: f64,
-    pub(super) fastest: f64,
-}
 
 impl<M: Machine> Drive<M> {
     /// The tool is in the row, and may be. One that goes over a canopy may be on its way out; and where it does not go, what was known

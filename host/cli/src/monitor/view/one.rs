@@ -1,7 +1,7 @@
 //! One row on the screen: its machine, the ground between beam and tool, its objects, and its console. Where there is no room for all that,
 //! the state and the ground in a few lines.
 
-use super::{HOLD_KEY, colour, draw_line, draw_said, draw_top, ground, hold_style, tool_column};
+use super::parts::{HOLD_KEY, colour, draw_line, draw_said, draw_top, ground, hold_style, tool_column};
 use crate::monitor::model::{Connection, Model, RowModel, Seen};
 use link::Class;
 use ratatui::Frame;

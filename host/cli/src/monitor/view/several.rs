@@ -1,7 +1,7 @@
 //! Several rows at a glance: a line for each, with its name, its state, its alarm or the ground before its tool, and what has become of the
 //! last command. Where there is not room for all of them, those that are lost or in alarm come first, and how the rest is is counted.
 
-use super::{colour, draw_line, draw_said, draw_top, ground};
+use super::parts::{colour, draw_line, draw_said, draw_top, ground};
 use crate::monitor::model::{Answer, Connection, Model, RowModel};
 use link::Mode;
 use ratatui::Frame;

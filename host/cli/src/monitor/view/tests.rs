@@ -1,9 +1,10 @@
 //! Snapshots of the screen, from what happened to a machine.
 
 use super::*;
+use crate::monitor::model::RowModel;
 use link::rows::{Heard, Hold, What};
 use link::session::Happening;
-use link::settings::Settings;
+use link::settings::{Setting, Settings};
 use link::{EventLine, Status};
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;

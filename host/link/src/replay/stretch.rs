@@ -1,0 +1,234 @@
+//! A stretch of a log, from one start of the link to its end: what stands there in its order, and what follows for where the machine
+//! was.
+
+use super::replayed::ReplayError;
+use crate::log::{Entry, Kind};
+use crate::settings::{Setting, Settings, shown};
+use crate::{EventLine, Mode, Said, Status};
+use control::ground::class::label;
+use control::ground::features;
+use control::say::command::{self, Command};
+use knn::Example;
+use std::collections::VecDeque;
+
+/// What happened at one place of the log.
+pub(super) enum Happened<'a> {
+    Status(Status),
+    Event(EventLine),
+    Command {
+        line: &'a str,
+        /// Whether the firmware answered by an error, and so did nothing.
+        is_refused: bool,
+    },
+}
+
+/// A log from one start of the link to its end.
+pub(super) struct Stretch<'a> {
+    pub(super) settings: Settings,
+    /// All examples, the built-in ones first, and how many those are.
+    pub(super) examples: Vec<Example<{ features::COUNT }>>,
+    pub(super) built_in: usize,
+    /// The first of its statuses.
+    pub(super) first: Status,
+    pub(super) happened: Vec<(&'a Entry, Happened<'a>)>,
+}
+
+impl<'a> Stretch<'a> {
+    /// Reads one; none where the machine said nothing.
+    pub(super) fn read(entries: &'a [Entry]) -> Result<Option<Self>, ReplayError> {
+        let mut settings = Settings::new();
+        let (mut examples, mut built_in) = (Vec::new(), 0);
+        let mut happened = Vec::new();
+        // Places in `happened` of the commands that are not answered yet. Answers come in their order.
+        let mut unanswered = VecDeque::new();
+        for entry in entries {
+            let wrong = |problem: &str| {
+                let problem = format!("`{}` is {problem}", entry.text);
+                ReplayError::Line { line: entry.number, problem }
+            };
+            match entry.kind {
+                Kind::Setting => {
+                    let (setting, value) = shown(&entry.text).ok_or_else(|| wrong("no setting of this version"))?;
+                    settings.set(setting, value).map_err(|_| wrong("out of range"))?;
+                }
+                Kind::Example => {
+                    examples.extend(example(&entry.text).map_err(|()| wrong("no example"))?);
+                    built_in += usize::from(entry.text.starts_with("built_in "));
+                }
+                Kind::Status => {
+                    let status = Status::parse(&entry.text).ok_or_else(|| wrong("no status"))?;
+                    happened.push((entry, Happened::Status(status)));
+                }
+                Kind::Event => {
+                    let event = EventLine::parse(&entry.text).ok_or_else(|| wrong("no event"))?;
+                    happened.push((entry, Happened::Event(event)));
+                }
+                Kind::Command => {
+                    unanswered.push_back(happened.len());
+                    happened.push((entry, Happened::Command { line: &entry.text, is_refused: false }));
+                }
+                Kind::Answer => {
+                    let Some(is_error) = end_of_answer(&entry.text) else { continue };
+                    let place = unanswered.pop_front();
+                    if let Some((_, Happened::Command { is_refused, .. })) = place.map(|place| &mut happened[place]) {
+                        *is_refused = is_error;
+                    }
+                }
+                Kind::Connected | Kind::Lost => {}
+                // Where the machine was on the earth changes nothing that it decides.
+                Kind::Antenna | Kind::GpsFound | Kind::GpsLost | Kind::Gps | Kind::GpsDamaged | Kind::GpsMark => {}
+            }
+        }
+        let first = happened.iter().find_map(|(_, happened)| match happened {
+            Happened::Status(status) => Some(status.clone()),
+            _ => None,
+        });
+        Ok(first.map(|first| Self { settings, examples, built_in, first, happened }))
+    }
+
+    /// Where watching began, as far as the log tells. Where all ground up to the tool had been seen, the log does not: then it is
+    /// where the log begins, or the beginning of what stood in the beam there.
+    pub(super) fn began(&self) -> i32 {
+        let first = self.first.position;
+        let beam_to_tool_mm = self.settings.get(Setting::BeamToToolMm);
+        let unseen_mm = self.first.unseen_mm.clamp(0, beam_to_tool_mm.into()) as u16;
+        if unseen_mm > 0 {
+            return first.wrapping_sub(self.settings.wheel().ticks(beam_to_tool_mm - unseen_mm).0);
+        }
+        self.in_the_beam_at_first().map_or(first, |(from, _)| from)
+    }
+
+    /// The ground of the object that was in the beam when the log began.
+    fn in_the_beam_at_first(&self) -> Option<(i32, i32)> {
+        let widest = self.settings.ticks(Setting::MaxWidthMm).0;
+        self.happened.iter().find_map(|(_, happened)| match happened {
+            Happened::Event(EventLine::Object { position, hold, .. }) => {
+                let before = self.first.position.wrapping_sub(*position);
+                (0..=widest).contains(&before).then_some((*position, position.wrapping_add(*hold)))
+            }
+            _ => None,
+        })
+    }
+
+    /// From where on the log tells all that the tool's swings rest on. A machine that has just started knows no window yet, and
+    /// the ground that it has seen was bare.
+    pub(super) fn judged_from(&self) -> i32 {
+        if self.first.unseen_mm > 0 && self.first.windows == 0 {
+            return i32::MIN;
+        }
+        let first = self.first.position;
+        // The hold has both margins.
+        let behind = self.in_the_beam_at_first().map_or(0, |(_, to)| to.wrapping_sub(first).max(0));
+        first.saturating_add(self.settings.ticks(Setting::BeamToToolMm).0).saturating_add(behind)
+    }
+
+    /// Where the machine was when a command was typed that changes no state: on its way to the next status, by the host's clock. `start
+    /// now` at work lets the tool into the row where it swings in next.
+    pub(super) fn place_of_command(&self, time_ms: u64, last: &(Status, u64), place: usize) -> Option<i32> {
+        if let Happened::Command { line, .. } = self.happened[place].1
+            && matches!(command::parse(line.as_bytes()), Ok(Command::Start { now: true }))
+            && let Some((position, true)) = self.happened[place..].iter().find_map(swing_or_status)
+        {
+            return Some(position);
+        }
+        let (entry, next) = self.happened[place..].iter().find_map(|(entry, happened)| match happened {
+            Happened::Status(status) => Some((entry, status)),
+            _ => None,
+        })?;
+        let whole_ms = entry.time_ms.checked_sub(last.1).filter(|&time_ms| time_ms > 0)?;
+        let share = time_ms.saturating_sub(last.1).min(whole_ms) as f64 / whole_ms as f64;
+        let way = f64::from(next.position.wrapping_sub(last.0.position)) * share;
+        Some(last.0.position.wrapping_add(way as i32))
+    }
+
+    /// Where the state changed that an event tells of: an alarm has its own place, and the swing that follows has it. Where no swing
+    /// follows, the tool was out already: work began as late, and was left as early as the log allows.
+    pub(super) fn place_of_change(&self, place: usize) -> Option<i32> {
+        let mode = match &self.happened[place].1 {
+            Happened::Event(EventLine::Alarm { position, .. }) => return Some(*position),
+            Happened::Event(EventLine::State(mode)) => mode,
+            _ => return None,
+        };
+        let is_state = |(_, happened): &&(_, _)| matches!(happened, Happened::Event(EventLine::State(_)));
+        // Behind the next change of state, a swing is that one's.
+        let mut until_next = self.happened[place + 1..].iter().take_while(|happened| !is_state(happened));
+        match (until_next.find_map(swing_or_status), mode) {
+            (Some((position, true)), _) | (Some((position, false)), Mode::Work) => Some(position),
+            _ => self.happened[..place].iter().rev().find_map(swing_or_status).map(|(position, _)| position),
+        }
+    }
+
+    /// Whether an event tells of the change of state that a command brought: it comes behind the answer, and no more than the status
+    /// that was asked for before comes between.
+    pub(super) fn is_told_by_state(&self, place: usize) -> bool {
+        let Happened::Command { line, .. } = self.happened[place].1 else { return false };
+        let brings = match command::parse(line.as_bytes()) {
+            Ok(Command::Start { .. }) => Mode::Work,
+            Ok(Command::Hold | Command::Clear) => Mode::Hold,
+            _ => return false,
+        };
+        let mut statuses = 0;
+        let soon = self.happened[place + 1..].iter().take_while(|(_, happened)| {
+            statuses += u8::from(matches!(happened, Happened::Status(_)));
+            statuses < 2
+        });
+        let told = soon.into_iter().find_map(|(_, happened)| match happened {
+            Happened::Event(EventLine::State(mode)) => Some(*mode),
+            _ => None,
+        });
+        told == Some(brings)
+    }
+
+    /// Whether a swing belongs to a change of state that was told just before it.
+    pub(super) fn follows_change(&self, place: usize) -> bool {
+        let before = self.happened[..place].iter().rev().map(|(_, happened)| happened);
+        before
+            .take_while(|happened| !matches!(happened, Happened::Status(_) | Happened::Event(EventLine::Swing { .. })))
+            .any(|happened| matches!(happened, Happened::Event(EventLine::State(_))))
+    }
+
+    /// The status that comes behind a place.
+    pub(super) fn next_status(&self, place: usize) -> Option<&Status> {
+        self.happened[place..].iter().find_map(|(_, happened)| match happened {
+            Happened::Status(status) => Some(status),
+            _ => None,
+        })
+    }
+}
+
+/// The place that a swing or a status tells, and whether it is a swing.
+fn swing_or_status((_, happened): &(&Entry, Happened<'_>)) -> Option<(i32, bool)> {
+    match happened {
+        Happened::Event(EventLine::Swing { position, .. }) => Some((*position, true)),
+        Happened::Status(status) => Some((status.position, false)),
+        _ => None,
+    }
+}
+
+/// Whether a line that ends an answer is an error; none where it ends none.
+fn end_of_answer(line: &str) -> Option<bool> {
+    match Said::parse(line) {
+        Said::Done => Some(false),
+        Said::Refused(_) => Some(true),
+        _ => None,
+    }
+}
+
+/// Reads a line of the examples; none where it only counts those that are spoiled.
+fn example(line: &str) -> Result<Option<Example<{ features::COUNT }>>, ()> {
+    let words: Vec<&str> = line.split(' ').collect();
+    match words.as_slice() {
+        ["built_in" | "field", _, class, rest @ ..] => {
+            let label = match *class {
+                "plant" => label::PLANT,
+                "weed" => label::WEED,
+                _ => return Err(()),
+            };
+            let bytes: Result<Vec<u8>, _> = rest.iter().map(|word| word.parse()).collect();
+            let features = bytes.map_err(|_| ())?.try_into().map_err(|_| ())?;
+            Ok(Some(Example::new(features, label)))
+        }
+        [line] if line.starts_with("spoiled=") => Ok(None),
+        _ => Err(()),
+    }
+}

@@ -1,0 +1,120 @@
+//! A plot as it is counted and measured, and what follows from it by the paper's Eq. 22 to 27.
+
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// Square metres in a hectare.
+const M2_PER_HA: f64 = 10_000.0;
+
+/// Seconds in an hour.
+const S_PER_H: f64 = 3600.0;
+
+/// One plot of a trial, as counted and measured in it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PlotRecord {
+    /// Which repetition of its speed and spacing it is.
+    pub replication: u32,
+    /// Forward speed that the machine was set to, km/h.
+    pub speed_km_h: f64,
+    /// Plant spacing along the row, cm.
+    pub spacing_cm: f64,
+    /// Weeds counted before weeding.
+    pub weeds_before: u32,
+    /// Weeds counted after weeding, on the same ground.
+    pub weeds_after: u32,
+    /// Crop plants in the plot.
+    pub plants: u32,
+    /// Crop plants that the machine injured.
+    pub damaged: u32,
+    /// Area that was weeded, m2.
+    pub area_m2: f64,
+    /// Time that this took, with turns and stops, s.
+    pub time_s: f64,
+    /// Working width of the machine, m.
+    pub width_m: f64,
+    /// Power that the machine needs, hp.
+    pub power_hp: f64,
+}
+
+/// What follows from one plot.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Performance {
+    /// Plants injured, percent of those in the plot (Eq. 23).
+    pub plant_damage_percent: f64,
+    /// Weeds gone, percent of those before weeding (Eq. 22).
+    pub weeding_efficiency_percent: f64,
+    /// Area an hour at the set speed with the whole width and no time lost, ha/h (Eq. 25).
+    pub theoretical_capacity_ha_h: f64,
+    /// Area an hour that was weeded, ha/h (Eq. 26).
+    pub effective_capacity_ha_h: f64,
+    /// Effective in percent of theoretical capacity (Eq. 24).
+    pub field_efficiency_percent: f64,
+    /// Capacity times the percentages of plants and weeds done right, a horsepower (Eq. 27). The paper does not say which
+    /// capacity it takes; here it is the effective one. ha %2/(h hp).
+    pub performance_index: f64,
+}
+
+/// A plot cannot be as it is written down.
+#[derive(Clone, Copy, Debug, Error, PartialEq)]
+#[error("{column} is {value}: {right}")]
+pub struct Implausible {
+    /// The column, which is the field of [`PlotRecord`].
+    pub column: &'static str,
+    /// What stands there.
+    pub value: f64,
+    /// What would be right.
+    pub right: &'static str,
+}
+
+impl PlotRecord {
+    /// Says whether a plot can be like this.
+    ///
+    /// # Errors
+    /// Names the first quantity that is out of its range or contradicts another.
+    pub fn check(&self) -> Result<(), Implausible> {
+        let within = |value: f64, lowest: f64, highest: f64| (lowest..=highest).contains(&value);
+        let checks = [
+            ("speed_km_h", self.speed_km_h, within(self.speed_km_h, 0.1, 15.0), "it has to be from 0.1 to 15 km/h"),
+            ("spacing_cm", self.spacing_cm, within(self.spacing_cm, 5.0, 500.0), "it has to be from 5 to 500 cm"),
+            (
+                "weeds_before",
+                self.weeds_before.into(),
+                self.weeds_before > 0,
+                "without a weed before weeding there is no weeding efficiency",
+            ),
+            (
+                "weeds_after",
+                self.weeds_after.into(),
+                self.weeds_after <= self.weeds_before,
+                "it cannot exceed weeds_before",
+            ),
+            ("plants", self.plants.into(), self.plants > 0, "without a plant there is no plant damage in percent"),
+            ("damaged", self.damaged.into(), self.damaged <= self.plants, "it cannot exceed plants"),
+            ("area_m2", self.area_m2, within(self.area_m2, 0.01, 1e6), "it has to be from 0.01 to 1000000 m2"),
+            ("time_s", self.time_s, within(self.time_s, 0.1, 1e6), "it has to be from 0.1 to 1000000 s"),
+            ("width_m", self.width_m, within(self.width_m, 0.01, 50.0), "it has to be from 0.01 to 50 m"),
+            ("power_hp", self.power_hp, within(self.power_hp, 0.001, 1000.0), "it has to be from 0.001 to 1000 hp"),
+        ];
+        let wrong = checks.into_iter().find(|(_, _, fits, _)| !fits);
+        wrong.map_or(Ok(()), |(column, value, _, right)| Err(Implausible { column, value, right }))
+    }
+
+    /// What follows from the plot by Eq. 22 to 27. Finite where [`PlotRecord::check`] is content.
+    pub fn performance(&self) -> Performance {
+        let share = |part: u32, whole: u32| f64::from(part) / f64::from(whole);
+        let plant_damage_percent = share(self.damaged, self.plants) * 100.0;
+        let weeding_efficiency_percent =
+            share(self.weeds_before.saturating_sub(self.weeds_after), self.weeds_before) * 100.0;
+        let theoretical_capacity_ha_h = self.speed_km_h * self.width_m / 10.0;
+        let effective_capacity_ha_h = (self.area_m2 / M2_PER_HA) / (self.time_s / S_PER_H);
+        Performance {
+            plant_damage_percent,
+            weeding_efficiency_percent,
+            theoretical_capacity_ha_h,
+            effective_capacity_ha_h,
+            field_efficiency_percent: effective_capacity_ha_h / theoretical_capacity_ha_h * 100.0,
+            performance_index: effective_capacity_ha_h * (100.0 - plant_damage_percent) * weeding_efficiency_percent
+                / self.power_hp,
+        }
+    }
+}

@@ -1,0 +1,21 @@
+//! An object of which somebody knows what it was.
+
+use control::ground::{class::label, features::Features};
+use field::row::Kind;
+
+/// An object whose kind is known.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Labelled {
+    /// What the machine measured.
+    pub features: Features,
+    /// What it was.
+    pub kind: Kind,
+}
+
+/// The label that stands for a kind in an example.
+pub const fn label_of(kind: Kind) -> u8 {
+    match kind {
+        Kind::Plant => label::PLANT,
+        Kind::Weed => label::WEED,
+    }
+}
