@@ -74,10 +74,10 @@ pub fn go_all(extent: Extent, walks: &BoxedStrategy<Walk>, go: impl Fn(&Walk) ->
     assert!(asked.is_some() || turns >= cases(extent.least_turns), "{turns} turns");
 }
 
-/// How many of so many cases a test tries: all of them where the environment has `WEEDER_THOROUGH`, as in the gate, and a fourth where
+/// How many of so many cases a test tries: all of them where the environment has `WEEDER_THOROUGH`, as in the gate, and a fifth where
 /// somebody waits for it.
 pub fn cases(all: u64) -> u64 {
-    if env::var_os("WEEDER_THOROUGH").is_some() { all } else { all.div_ceil(4) }
+    if env::var_os("WEEDER_THOROUGH").is_some() { all } else { all.div_ceil(5) }
 }
 
 /// Walks that are drawn before they are gone.
