@@ -8,6 +8,7 @@ use std::io::{BufRead, BufReader, ErrorKind, Write};
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
+use std::thread;
 use std::time::Duration;
 use trial::firmware;
 use uno::elf::Image;
@@ -143,6 +144,14 @@ fn elf_of(folder: &Path, bytes: usize) -> PathBuf {
 }
 
 #[test]
+fn an_uno_is_flashed_through_either_bootloader() {
+    // Each takes the time that its line takes.
+    thread::scope(|scope| {
+        scope.spawn(an_empty_uno_is_flashed_through_optiboot_and_answers);
+        scope.spawn(an_uno_with_the_old_bootloader_is_flashed_at_its_own_baud_rate_up_to_the_last_byte);
+    });
+}
+
 fn an_empty_uno_is_flashed_through_optiboot_and_answers() {
     let folder = tempfile::tempdir().unwrap();
     let (link, eeprom) = (folder.path().join("uno"), folder.path().join("uno.eeprom"));
@@ -158,7 +167,6 @@ fn an_empty_uno_is_flashed_through_optiboot_and_answers() {
     assert_eq!(fs::metadata(&eeprom).unwrap().len(), 1024);
 }
 
-#[test]
 fn an_uno_with_the_old_bootloader_is_flashed_at_its_own_baud_rate_up_to_the_last_byte() {
     let folder = tempfile::tempdir().unwrap();
     let link = folder.path().join("uno");
