@@ -6,7 +6,7 @@
 //! virtual Uno (`tests/end_to_end/random_walks.rs`). What is held is the same for both, as far as it can be seen from outside.
 //!
 //! The walks are the same each time, so that a change is judged by them and not by luck. `WEEDER_SEED` gives others, and
-//! `WEEDER_CASES` as many as asked for. [`cases`] is for every test that takes its time by trying much.
+//! `WEEDER_CASES` as many as asked for. [`is_thorough`] and [`cases`] are for every test that takes its time.
 
 pub mod drive;
 pub mod machine;
@@ -74,10 +74,14 @@ pub fn go_all(extent: Extent, walks: &BoxedStrategy<Walk>, go: impl Fn(&Walk) ->
     assert!(asked.is_some() || turns >= cases(extent.least_turns), "{turns} turns");
 }
 
-/// How many of so many cases a test tries: all of them where the environment has `WEEDER_THOROUGH`, as in the gate, and a fifth where
-/// somebody waits for it.
+/// Whether tests are to try all that they can: where the environment has `WEEDER_THOROUGH`, as in the gate. Else somebody waits for them.
+pub fn is_thorough() -> bool {
+    env::var_os("WEEDER_THOROUGH").is_some()
+}
+
+/// How many of so many cases a test tries: all of them, or a fifth where somebody waits.
 pub fn cases(all: u64) -> u64 {
-    if env::var_os("WEEDER_THOROUGH").is_some() { all } else { all.div_ceil(5) }
+    if is_thorough() { all } else { all.div_ceil(5) }
 }
 
 /// Walks that are drawn before they are gone.
