@@ -36,6 +36,7 @@ use super::EventLine;
 use super::log::{Entry, Kind};
 use super::settings::Setting;
 use control::say::command::{self, Command};
+use files::in_a_line;
 
 /// Replays a log.
 ///
@@ -143,7 +144,7 @@ fn play(stretch: &Stretch, pace: Pace) -> Result<Played, ReplayError> {
                     last.1 = entry.time_ms;
                 }
                 if !player.command(line) {
-                    notes.push(format!("line {}: not replayed from `{line}` on", entry.number));
+                    notes.push(format!("line {}: not replayed from `{}` on", entry.number, in_a_line(line)));
                     break;
                 }
             }
@@ -195,6 +196,12 @@ mod tests {
         let mut has_one = log(20, |_| Vec::new());
         has_one.insert(1, Entry { number: 2, time_ms: 0, kind: Kind::Setting, text: setting.to_owned() });
         assert_eq!(replay(&has_one).unwrap().notes.len(), 1);
+    }
+
+    #[test]
+    fn what_was_typed_is_told_without_what_a_terminal_obeys() {
+        let typed = |status| if status == 2 { vec![(Kind::Command, "test \u{1b}[2J")] } else { Vec::new() };
+        assert_eq!(replay(&log(20, typed)).unwrap().notes, [r"line 6: not replayed from `test \u{1b}[2J` on"]);
     }
 
     #[test]

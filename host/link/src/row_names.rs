@@ -317,8 +317,7 @@ fn parse(path: &Path, text: &str) -> Result<(DocumentMut, Vec<Row>), FileError> 
             (1, None, Some(port)) => Board::Port(port),
             _ => {
                 let right = format!("{{ {SERIAL_NUMBER} = \"...\" }} or {{ {PORT} = \"...\" }}");
-                let found = item.to_string().replace(['\n', '\r'], " ");
-                return Err(wrong(format!("{name} is `{}`: it has to be {right}", found.trim())));
+                return Err(wrong(format!("{name} is `{}`: it has to be {right}", item.to_string().trim())));
             }
         };
         if let Some(other) = rows.iter().find(|row| row.board == board) {

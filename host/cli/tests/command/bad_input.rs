@@ -1,20 +1,13 @@
 //! What the `weeder` command says to input that is wrong. None of these runs the firmware.
 
+use crate::common::{self, weeder};
+use std::fs;
 use std::path::Path;
-use std::process::{Command, Output};
 
-/// Runs `weeder` with these arguments.
-fn weeder(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_weeder")).args(arguments).output().expect("cargo has built the command")
-}
-
-/// Asserts status 2 and a message that contains `words`.
+/// Asserts that these arguments are refused with a message that contains `words`.
 #[track_caller]
 fn assert_refused(arguments: &[&str], words: &str) {
-    let output = weeder(arguments);
-    let message = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(2), "{message}");
-    assert!(message.contains(words), "{message}");
+    common::assert_refused(Path::new("."), arguments, words);
 }
 
 #[test]
@@ -87,7 +80,7 @@ fn no_cause_is_told_twice() {
         &["examples", "push", "no-such.csv"],
         &["design", "--machine", "no-such.toml"],
     ] {
-        let message = String::from_utf8_lossy(&weeder(arguments).stderr).into_owned();
+        let message = String::from_utf8_lossy(&weeder(Path::new("."), arguments).stderr).into_owned();
         assert_eq!(message.matches("No such file or directory").count(), 1, "{arguments:?}: {message}");
     }
 }
@@ -113,6 +106,23 @@ fn no_message_in_the_source_repeats_its_cause() {
         }
     }
     assert!(messages > 50, "{messages}");
+}
+
+#[test]
+fn what_a_file_says_gives_the_terminal_no_orders() {
+    let folder = tempfile::tempdir().unwrap();
+    let wires = "$timescale 1 us $end\n$var wire 1 ! A\u{1b}[2J $end\n$enddefinitions $end\n#0 0!\n";
+    let log = "time_ms,kind,line\n0,connected,0.1.0\n0,setting,k\u{1b}[2J=3\n";
+    fs::write(folder.path().join("logic.vcd"), wires).unwrap();
+    fs::write(folder.path().join("log.csv"), log).unwrap();
+    for (arguments, quoted) in [
+        (&["sim", "--capture", "logic.vcd", "--channel-a", "A", "--channel-b", "B"][..], r"`A\u{1b}[2J`"),
+        (&["replay", "log.csv"], r"`k\u{1b}[2J=3`"),
+    ] {
+        common::assert_refused(folder.path(), arguments, quoted);
+        let message = weeder(folder.path(), arguments).stderr;
+        assert!(!message.contains(&0x1B), "{}", String::from_utf8_lossy(&message));
+    }
 }
 
 #[test]

@@ -3,6 +3,9 @@
 use std::path::Path;
 use std::process::{Command, Output};
 
+/// A field so small that a trial in it takes a moment.
+pub const SMALL: &str = "[plot]\nrows = 1\nrow_m = 6\n";
+
 /// Runs `weeder` with these arguments in a folder.
 pub fn weeder(folder: &Path, arguments: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));

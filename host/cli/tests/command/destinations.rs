@@ -1,16 +1,14 @@
 //! Where commands write: what cannot be written is said before the work, and costs no result after it.
 
+use crate::common::{self, SMALL};
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
 
-/// A field so small that a trial in it takes a moment.
-const SMALL: &str = "[plot]\nrows = 1\nrow_m = 6\n";
-
+/// Runs `weeder` with these arguments in a folder that has a small field.
 fn weeder(folder: &Path, arguments: &[&str]) -> Output {
     fs::write(folder.join("small.toml"), SMALL).unwrap();
-    let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
-    command.current_dir(folder).args(arguments).output().expect("cargo has built the command")
+    common::weeder(folder, arguments)
 }
 
 /// Every argument that names something to write, without it.

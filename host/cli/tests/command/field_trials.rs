@@ -1,14 +1,11 @@
 //! `weeder trial` and `weeder sweep`, as they are called.
 
-use crate::common::{assert_refused, said, weeder};
+use crate::common::{SMALL, assert_refused, said, weeder};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
 use tempfile::TempDir;
-
-/// A field so small that a trial in it takes a moment.
-const SMALL: &str = "[plot]\nrows = 1\nrow_m = 6\n";
 
 /// A folder with the file `small.toml`.
 fn folder() -> TempDir {

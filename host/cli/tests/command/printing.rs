@@ -1,5 +1,6 @@
 //! What becomes of what a command prints: a reader that has seen enough, a disk that is full, a terminal that is interrupted.
 
+use crate::common::SMALL;
 use std::fs::{File, OpenOptions};
 use std::io;
 use std::path::Path;
@@ -32,7 +33,7 @@ const COMMANDS: [&[&str]; 10] = [
 fn weeder(arguments: &[&str], stdout: impl Into<Stdio>) -> Output {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("objects.csv"), OBJECTS).unwrap();
-    std::fs::write(folder.path().join("small.toml"), "[plot]\nrows = 1\nrow_m = 6\n").unwrap();
+    std::fs::write(folder.path().join("small.toml"), SMALL).unwrap();
     let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
     command.args(arguments).current_dir(folder.path()).stdout(stdout).output().expect("cargo has built the command")
 }

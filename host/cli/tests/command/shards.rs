@@ -1,6 +1,6 @@
 //! `--shard` and `weeder merge`: the parts of a study give the bytes of an undivided one, and what is no whole study is refused.
 
-use crate::common::{assert_refused, said, weeder};
+use crate::common::{SMALL, assert_refused, said, weeder};
 use std::fs;
 use std::path::Path;
 use std::process::Command;
@@ -8,9 +8,6 @@ use std::thread;
 use std::time::Duration;
 use tempfile::TempDir;
 use walks::is_thorough;
-
-/// A field so small that a trial in it takes a moment.
-const SMALL: &str = "[plot]\nrows = 1\nrow_m = 6\n";
 
 /// A trial in it.
 const TRIAL: [&str; 5] = ["trial", "--field", "small.toml", "--seed", "7"];
