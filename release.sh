@@ -1,18 +1,21 @@
 #!/usr/bin/env bash
-# Makes a release: a folder with all that somebody without Rust needs, and nothing of this machine.
+# Makes a release: a folder for users without Rust, with nothing of this machine.
 #
 #     ./release.sh FOLDER
 #
 # weeder.hex          the firmware, for the page or avrdude to write
 # firmware.txt        its size, and what it can need at most of stack and time
-# page/               the page: open its index.html, or have `weeder serve` give it to a phone
-# weeder              the host tools, for computers like this one
-# manual/             README.md and all that it leads to
-# licences/           what is inside, by whom and under which licence, with the licences' texts
+# page/               the page: open its index.html, or serve it to a phone with `weeder serve`
+# weeder              the host tools, for computers like this one, with the page inside
+# manual/             README.md and docs/, as Markdown; book/ is the same manual for a browser
+# sbom/               the parts as CycloneDX, for programs: packages, versions, licences
+# licences/           what is inside, its authors and licences, with the licences' texts
 # SHA256SUMS          of each of these files: `sha256sum --check SHA256SUMS`
 #
-# The same sources give the same weeder.hex and the same page, whatever machine or folder they are built in: .ci/from-nothing
-# holds them against each other. `weeder` has its folders' names in it, and the system's libraries. FOLDER must not be there yet;
+# Tools and firmware name their commit, with a `+` if the sources differ from it. Outside of a clone they name none.
+#
+# The same sources give the same weeder.hex, page and sbom on every machine and in every folder: .ci/from-nothing
+# compares them. `weeder` has its folders' names in it, and the system's libraries. FOLDER must not be there yet;
 # it is there when all of it is.
 set -euo pipefail
 
@@ -32,14 +35,16 @@ trap 'rm -rf "$folder"' EXIT
 chmod 755 "$folder"
 target=$(realpath -m "${CARGO_TARGET_DIR:-target}")
 
-# The firmware, and what it needs.
-cargo firmware --locked
-elf=$target/avr-none/firmware/weeder-firmware.elf
-avr-objcopy -O ihex -j .text -j .data "$elf" "$folder/weeder.hex"
-
-# The host tools.
+# The host tools, for now without the page: it takes them to make that.
 cargo build --locked --release --package weeder-cli
 cp "$target/release/weeder" "$folder/"
+WEEDER_COMMIT=$("$folder/weeder" --version | sed -n 's/.*(\(.*\))$/\1/p')
+export WEEDER_COMMIT
+
+# The firmware, whose bounds `weeder hex` proves before it writes it, and what it needs.
+cargo firmware --locked
+elf=$target/avr-none/firmware/weeder-firmware.elf
+"$folder/weeder" hex --elf "$elf" "$folder/weeder.hex"
 {
     (cd "$(dirname "$elf")" && avr-size -A "$(basename "$elf")" | grep -E '^(section|\.(text|data|bss|noinit|eeprom) )')
     echo
@@ -48,12 +53,16 @@ cp "$target/release/weeder" "$folder/"
 
 # The page.
 [ -d page/node_modules ] || npm --prefix page ci --no-audit --no-fund
-WEEDER_HEX="$folder/weeder.hex" npm --prefix page run build
+WEEDER="$folder/weeder" npm --prefix page run build
 cp -r page/dist "$folder/page"
+WEEDER_PAGE="$folder/page" cargo build --locked --release --package weeder-cli
+cp "$target/release/weeder" "$folder/"
 
 # The manual, with its links as they are. Those to sources lead nowhere here.
 mkdir "$folder/manual"
 cp -r README.md CHANGELOG.md CONTRIBUTING.md docs "$folder/manual/"
+cargo install --quiet --locked mdbook --version 0.5.4 --no-default-features --features search --root "$target/mdbook"
+"$target/mdbook/bin/mdbook" build --dest-dir "$folder/book"
 
 # Licences. What runs only as it is built, and is not in what is built, is left out.
 mkdir -p "$folder/licences/texts"
@@ -64,9 +73,10 @@ This project's own files are licensed under MIT or Apache-2.0, at your choice. W
 each licence's text where its author gives one.
 
 - weeder has simavr in it (https://github.com/buserror/simavr, by simavr-ffi), which is under GPL-3.0: so is `weeder` as a whole, and
-  whoever passes it on has to offer all sources with it. libelf (LGPL-3.0 or GPL-2.0) is in it too.
+  distributors have to offer all sources with it. libelf (LGPL-3.0 or GPL-2.0) is in it too.
 - weeder.hex has code of avr-libc (modified BSD) and libgcc (GPL-3.0 with the GCC Runtime Library Exception) in it.
 - The page has avr8js in it (MIT), and this project's firmware and Rust.
+- book/ has mdBook's theme in it (MPL-2.0), with highlight.js (BSD-3-Clause) and fonts (OFL-1.1).
 
 END
 # Lines `NAME VERSION LICENCE` of the crates that a package of this repository is linked with.
@@ -99,6 +109,33 @@ done | LC_ALL=C sort -u | while read -r name version _; do
     done
 done
 install -D -m 644 page/node_modules/avr8js/LICENSE "$folder/licences/texts/avr8js/LICENSE"
+
+# SBOMs. cargo-cyclonedx writes one beside each Cargo.toml of the workspace. What differs from run to run and from folder to folder is
+# taken out, and the C code that is linked in is added. simavr-ffi carries its simavr without a version of its own.
+c_avr_libc="avr-libc|$(printf '#include <avr/version.h>\n__AVR_LIBC_VERSION_STRING__' | avr-gcc -E -P - | tail -1 | tr -d '"')|BSD-3-Clause"
+c_libgcc="libgcc|$(avr-gcc -dumpversion)|GPL-3.0-or-later WITH GCC-exception-3.1"
+c_simavr="simavr|in simavr-ffi $(sed -n '/^name = "simavr-ffi"$/{n;s/.*"\(.*\)"/\1/p}' Cargo.lock)|GPL-3.0-or-later"
+c_libelf="libelf|$(pkg-config --modversion libelf)|GPL-2.0-or-later OR LGPL-3.0-or-later"
+cargo install --quiet --locked --root "$target/tools" --version 0.5.9 cargo-cyclonedx
+mkdir "$folder/sbom"
+# An SBOM by its name, the folder of its package, what is added, up to `--`, and the options.
+sbom() {
+    local name=$1 package=$2 c=()
+    shift 2
+    while [ "$1" != -- ]; do
+        c+=("$1")
+        shift
+    done
+    shift
+    SOURCE_DATE_EPOCH=0 "$target/tools/bin/cargo-cyclonedx" cyclonedx --quiet --format json --no-build-deps --override-filename sbom "$@"
+    node .ci/sbom.mjs "$package/sbom.json" "$folder/sbom/$name.json" "${c[@]}"
+    find . -name target -prune -o -name node_modules -prune -o -name sbom.json -exec rm {} +
+}
+sbom firmware . "$c_avr_libc" "$c_libgcc" -- --features avr --target avr-none
+sbom weeder host/cli "$c_simavr" "$c_libelf" -- --target "$(rustc --print host-tuple)"
+sbom page host/page -- --target wasm32-unknown-unknown
+(cd page && npx --yes npm@10.9.4 sbom --sbom-format cyclonedx --omit dev) >"$target/npm-sbom.json"
+node .ci/sbom.mjs "$target/npm-sbom.json" "$folder/sbom/page-npm.json"
 
 (cd "$folder" && find . -type f ! -name SHA256SUMS -printf '%P\0' | LC_ALL=C sort -z | xargs -0 sha256sum >SHA256SUMS)
 mv -T "$folder" "$release"

@@ -3,7 +3,8 @@
 # Rust toolchain that rust-toolchain.toml pins. Safe to run again; what is there already is left alone.
 #
 #     ./setup.sh         all that cargo needs
-#     ./setup.sh page    and what the page and its tests need on top of that: Node.js 18 or later with npm, and Chromium
+#     ./setup.sh page    and the page, built, with what it and its tests need: Node.js 18 or later with npm, Chromium
+#                        and Firefox ESR
 #     ./setup.sh slurm   and a Slurm on which a study in shards is tried; several words may be said at once
 set -euo pipefail
 cd "$(dirname "$0")"
@@ -23,6 +24,9 @@ for word in "$@"; do
             # Whoever has a Node.js has it from somewhere else, mostly, and Debian's would not go beside it.
             if ! command -v npm >/dev/null; then packages+=(nodejs npm); fi
             if ! command -v chromium >/dev/null; then packages+=(chromium); fi
+            if ! command -v firefox-esr >/dev/null; then packages+=(firefox-esr); fi
+            # The page's tests measure texts in Hindi.
+            if [ -z "$(fc-list :lang=hi 2>/dev/null)" ]; then packages+=(fonts-lohit-deva); fi
             ;;
         slurm)
             packages+=(munge procps slurm-client slurmctld slurmd)
@@ -81,7 +85,13 @@ if [ "$page" = yes ]; then
         echo "setup.sh: the page needs Node.js 18 or later, and this is $(node --version || echo none)." >&2
         exit 1
     fi
-    echo "Node.js: $(node --version). The page's own packages: npm ci, in page/."
+    echo "Node.js: $(node --version)."
+    lock=page/node_modules/.package-lock.json
+    if [ ! -e "$lock" ] || [ page/package-lock.json -nt "$lock" ]; then npm --prefix page ci --no-audit --no-fund; fi
+    cargo firmware --quiet
+    cargo build --release --quiet --package weeder-cli
+    WEEDER=$(realpath "${CARGO_TARGET_DIR:-target}")/release/weeder npm --prefix page run --silent build
+    echo "See it in your browser: cargo serve"
 fi
 
 echo "Ready. Try: cargo sim"

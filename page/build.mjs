@@ -1,13 +1,16 @@
 // Makes what runs out of what is written: `node build.mjs page` makes dist/, `node build.mjs tests` makes build/tests/.
 //
-// The page is three files that a browser opens from anywhere, the disk included: the firmware is inside, and so is the project's
-// own Rust, as a browser gives no page a file of the disk. The firmware's HEX comes from `cargo firmware`, which has to be run
-// first; WEEDER_HEX names another HEX file. The Rust is built here.
+// The page is three files that a browser opens from anywhere, the disk included, and three more by which it can be installed where it
+// comes from a server. The firmware is inside, and so is the project's own Rust, as a browser gives no page a file of the disk. Both are
+// packed, as they would be more than half of the page. The firmware comes from `cargo firmware`, which has to be run first; the
+// command `weeder`, the one that WEEDER names or else this repository's, proves its bounds. The Rust is built here.
 
 import { execFileSync } from "node:child_process";
+import { createHash } from "node:crypto";
 import { existsSync, mkdirSync, readdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
-import { join, resolve } from "node:path";
+import { basename, extname, join, resolve } from "node:path";
 import { fileURLToPath } from "node:url";
+import { deflateRawSync } from "node:zlib";
 import { build } from "esbuild";
 
 const here = fileURLToPath(new URL(".", import.meta.url));
@@ -15,17 +18,20 @@ process.chdir(here);
 
 const target = process.env.CARGO_TARGET_DIR ?? "../target";
 
-/** The firmware as a HEX file. */
+/** The firmware as a HEX file: `weeder hex` writes none whose bounds are not proved. */
 function firmware() {
-    if (process.env.WEEDER_HEX) return process.env.WEEDER_HEX;
     const elf = join(target, "avr-none/firmware/weeder-firmware.elf");
     if (!existsSync(elf)) {
-        console.error(`${elf} is not there: run \`cargo firmware\` first, or name a HEX file in WEEDER_HEX`);
+        console.error(`${elf} is not there: run \`cargo firmware\` first`);
         process.exit(1);
     }
     mkdirSync("build", { recursive: true });
-    execFileSync("avr-objcopy", ["-O", "ihex", "-j", ".text", "-j", ".data", elf, "build/weeder.hex"]);
-    return "build/weeder.hex";
+    const [command, ...words] = process.env.WEEDER
+        ? [process.env.WEEDER]
+        : ["cargo", "run", "--quiet", "--package", "weeder-cli", "--"];
+    const hex = "build/weeder.hex";
+    execFileSync(command, [...words, "hex", hex, "--force", "--elf", elf], { stdio: ["ignore", "ignore", "inherit"] });
+    return hex;
 }
 
 /** The project's Rust as WebAssembly. */
@@ -34,38 +40,103 @@ function rust() {
     return join(target, "wasm32-unknown-unknown/page/page.wasm");
 }
 
-/** What the manual's table says of alarms and warnings, as a file. */
+/** A file packed, as a file: src/unpack.ts unpacks it. */
+function packed(/** @type {string} */ path) {
+    const to = join("build", `${basename(path)}.deflated`);
+    writeFileSync(to, deflateRawSync(readFileSync(path), { level: 9 }));
+    return resolve(to);
+}
+
+/** The worker that reads logs, as a file: a page from the disk has no worker but one whose code is inside. */
+async function logWorker() {
+    const outfile = resolve("build/log-worker.txt");
+    await build({ entryPoints: ["src/record/worker.ts"], bundle: true, minify: true, target: "es2022", outfile });
+    return outfile;
+}
+
+/** What the manual says of alarms and warnings, as a file: what to do in its table, and the causes in its lists. */
 function faults() {
-    const rows = readFileSync("../docs/faults.md", "utf8").matchAll(
-        /^\| (?:(\d-\d) )?\| `(\w+)`[^|]*\| ([^|]*) \| [^|]* \| ([^|]*) \|$/gm,
+    const manual = readFileSync("../docs/faults.md", "utf8");
+    const causes = new Map(
+        [...manual.matchAll(/^- `(?:\d-\d )?(\w+)`[^:\n]*: (.*?)\.\s/gms)].map(([, name, cause]) => [
+            name,
+            (cause ?? "").replaceAll(/\s+/g, " "),
+        ]),
     );
-    const faults = [...rows].map(([, code = "", name, cause, advice]) => ({ code, name, cause, advice }));
+    const rows = manual.matchAll(/^\| `((?:\d-\d )?(\w+))`[^|]*\| ([^|]*) \|$/gm);
+    const faults = [...rows].map(([, title, name, advice]) => ({ name, title, cause: causes.get(name), advice }));
+    const silent = faults.filter(({ cause }) => cause === undefined).map(({ title }) => title);
+    if (silent.length > 0) throw new Error(`docs/faults.md has no cause of ${silent.join(", ")}`);
     mkdirSync("build", { recursive: true });
     writeFileSync("build/faults.json", JSON.stringify(faults));
     return "build/faults.json";
 }
 
+/** Puts the page's texts in English into its HTML, which has their names behind `$`. */
+async function english() {
+    const { outputFiles } = await build({ entryPoints: ["src/words/en.ts"], format: "esm", write: false });
+    const { en } = await import(`data:text/javascript,${encodeURIComponent(outputFiles[0]?.text ?? "")}`);
+    const text = (/** @type {string} */ name) => {
+        const text = en.words[name];
+        if (text === undefined) throw new Error(`src/index.html names the text ${name}, which src/words/en.ts has not`);
+        return text;
+    };
+    return {
+        name: "english",
+        setup(/** @type {import("esbuild").PluginBuild} */ { onLoad }) {
+            onLoad({ filter: /\.html$/ }, ({ path }) => ({
+                contents: readFileSync(path, "utf8").replaceAll(/\$(\w+)/g, (_, name) => text(name)),
+                loader: /** @type {const} */ ("copy"),
+            }));
+        },
+    };
+}
+
+const hex = firmware();
+
 /** @type {import("esbuild").BuildOptions} */
 const common = {
     bundle: true,
+    charset: "utf8",
     target: "es2022",
     // avr8js as modules also for node: its other form looks each function up anew at every call, and takes twice the time.
     mainFields: ["module", "main"],
-    alias: { "weeder.hex": resolve(firmware()), "page.wasm": resolve(rust()), "faults.json": resolve(faults()) },
-    loader: { ".hex": "text", ".wasm": "binary" },
+    alias: {
+        "weeder.hex": resolve(hex),
+        "packed.hex": packed(hex),
+        "page.wasm": packed(rust()),
+        "log-worker.js": await logWorker(),
+        "faults.json": resolve(faults()),
+    },
+    loader: { ".hex": "text", ".txt": "text", ".deflated": "binary" },
 };
 
 const what = process.argv[2];
 if (what === "page") {
     rmSync("dist", { recursive: true, force: true });
-    await build({
+    /** @type {import("esbuild").BuildOptions} */
+    const page = {
         ...common,
-        entryPoints: ["src/page.ts", "src/page.css", "src/index.html"],
         outdir: "dist",
+        entryNames: "[name]",
         format: "iife",
-        loader: { ...common.loader, ".html": "copy" },
+        loader: { ...common.loader, ".html": "copy", ".svg": "copy", ".webmanifest": "copy" },
         minify: true,
-    });
+        plugins: [await english()],
+    };
+    const entryPoints = [
+        { in: "src/start.ts", out: "page" },
+        ...["src/page.css", "src/index.html", "src/app/manifest.webmanifest", "src/app/icon.svg"].map((path) => ({
+            in: path,
+            out: basename(path, extname(path)),
+        })),
+    ];
+    await build({ ...page, entryPoints });
+    // Another name for each page that differs.
+    const hash = createHash("sha256");
+    for (const name of readdirSync("dist").sort()) hash.update(readFileSync(join("dist", name)));
+    const define = { BUILD: JSON.stringify(hash.digest("hex").slice(0, 16)) };
+    await build({ ...page, entryPoints: ["src/app/worker.ts"], define });
     console.log("The page is in page/dist: open index.html.");
 } else if (what === "tests") {
     rmSync("build/tests", { recursive: true, force: true });
@@ -75,6 +146,7 @@ if (what === "page") {
         entryPoints: entryPoints.map((name) => join("tests", name)),
         outdir: "build/tests",
         outExtension: { ".js": ".mjs" },
+        inject: ["tests/ready.ts"],
         platform: "node",
         external: ["playwright-core"],
         format: "esm",

@@ -113,12 +113,12 @@ macro_rules! keep_nearest {
         let mut front = first + (free * size_of::<Neighbour>()) as u16;
         let (level, ones): (u8, u8);
         asm!(
-            // The sum has its upper bytes in R17 and R16, what it begins with in R19 and R18: MOVW wants pairs that begin with
-            // an even register, which the compiler's own choice of a pair need not be.
+            // The sum has its upper bytes in R17 and R16, what it begins with in R19 and R18, and the next row is at R25 and R24: MOVW
+            // wants pairs that begin with an even register, which the compiler's own choice of a pair need not be.
             // R1, which is 0 elsewhere, takes the products: the carry is added by a register of its own.
             // The stack keeps where the other direction begins and how many rows it has, and one more.
-            "push {next:l}",
-            "push {next:h}",
+            "push r24",
+            "push r25",
             "push {byte}",
             "ld   {a}, Z+",
             "ld   {b}, Z+",
@@ -141,9 +141,9 @@ macro_rules! keep_nearest {
             "2:",
             "dec  {left}",
             "breq 3b",
-            "movw r30, {next:l}",
-            "add  {next:l}, {step:l}",
-            "adc  {next:h}, {step:h}",
+            "movw r30, r24",
+            "add  r24, {step:l}",
+            "adc  r25, {step:h}",
             "mov  {low}, {start_low}",
             "movw r16, r18",
             feature!($load, "a", $first_is_out),
@@ -230,12 +230,12 @@ macro_rules! keep_nearest {
             "in   r30, 0x3d",
             "in   r31, 0x3e",
             "ldd  {left}, Z+1",
-            "ldd  {next:h}, Z+2",
-            "ldd  {next:l}, Z+3",
+            "ldd  r25, Z+2",
+            "ldd  r24, Z+3",
             "neg  {step:l}",
             "com  {step:h}",
-            "add  {next:l}, {step:l}",
-            "adc  {next:h}, {step:h}",
+            "add  r24, {step:l}",
+            "adc  r25, {step:h}",
             "rjmp 2b",
             "9:",
             "pop  r1",
@@ -247,7 +247,7 @@ macro_rules! keep_nearest {
             "clr  r1",
             place = const size_of::<Neighbour>(),
             step = inout(reg_pair) size_of::<Row>() as u16 => _,
-            next = inout(reg_pair) $rows => _,
+            inout("r25r24") $rows => _,
             left = inout(reg) $count + 1 => _,
             start_low = out(reg) _,
             out("r18") _,

@@ -29,32 +29,42 @@ mod watchdog;
 use avr_device::{atmega328p::Peripherals, interrupt};
 use control::{
     ground::nearest::Nearest,
-    measure::readings::{Readings, WakeUp},
+    measure::readings::{Readings, Startup},
     say::{Console, command::LineBuffer},
     units::Position,
-    weeder::{Asleep, Controller},
+    weeder::{Controller, Uninit},
 };
 use embedded_hal::digital::{InputPin, OutputPin};
 use embedded_hal_nb::serial::Read;
-use static_cell::ConstStaticCell;
 use ufmt::uWrite;
 
 /// The decisions, with the memories of this machine.
 type Weeder = Controller<Nearest<examples::BuiltIn, eeprom::Upper>, eeprom::Lower>;
-type WeederAsleep = Asleep<Nearest<examples::BuiltIn, eeprom::Upper>, eeprom::Lower>;
+type UninitWeeder = Uninit<Nearest<examples::BuiltIn, eeprom::Upper>, eeprom::Lower>;
 
 /// Bytes that a turn of the loop reads or writes at most: more than the line carries meanwhile.
 const CONSOLE_BYTES: u8 = 8;
 
 #[avr_device::entry]
 fn main() -> ! {
+    let (console, asleep) = (&raw mut CONSOLE, &raw mut ASLEEP);
+    // SAFETY: nothing else names these statics, and the entry point runs once.
+    let (console, asleep) = unsafe { (&mut *console, &mut *asleep) };
     // In a frame of its own: a byte that lies farther than 63 from a frame's end takes five more instructions to reach.
-    run(&mut LineBuffer::new())
+    run(&mut LineBuffer::new(), console, asleep)
 }
+
+static mut CONSOLE: Console = Console::new();
+
+static mut ASLEEP: UninitWeeder = {
+    // SAFETY: these are the only halves, and what holds them is taken once, by the entry point.
+    let (settings, examples) = unsafe { (eeprom::Lower::new(), eeprom::Upper::new()) };
+    Uninit::new(Nearest::asleep(examples::BuiltIn, examples), settings)
+};
 
 /// Sets everything up, and turns the loop.
 #[inline(never)]
-fn run(typed: &mut LineBuffer) -> ! {
+fn run(typed: &mut LineBuffer, console: &mut Console, asleep: &mut UninitWeeder) -> ! {
     // SAFETY: the entry point is the first code to run and runs once, as this does, so nobody else holds the peripherals.
     let peripherals = unsafe { Peripherals::steal() };
     // Before the first interrupt: their handlers use the register that told it.
@@ -76,10 +86,8 @@ fn run(typed: &mut LineBuffer) -> ! {
         let stack_free = stack.free();
         Readings { now, position: Position::new(position), switch_on, lost, jumps, end_switch_on, stack_free }
     };
-    static CONSOLE: ConstStaticCell<Console> = ConstStaticCell::new(Console::new());
-    let console = CONSOLE.take();
     eeprom::finish(&peripherals.EEPROM);
-    let controller = wake_up(WakeUp { readings: read(), beam_broken: beam.is_broken(), cause });
+    let controller = init(asleep, Startup { readings: read(), beam_broken: beam.is_broken(), cause });
     // The settings say which pulse has the tool out, so there is none before they are loaded.
     let mut servo = servo::Servo::new(peripherals.TC1, &peripherals.PORTB, controller.orders().pulse);
 
@@ -95,7 +103,7 @@ fn run(typed: &mut LineBuffer) -> ! {
 
         // A turn has little time for the console: some bytes, or one thing that takes longer than a byte does. One that
         // has done enough has none.
-        let bytes = if orders.is_enough { 0 } else { CONSOLE_BYTES };
+        let bytes = if orders.turn_spent { 0 } else { CONSOLE_BYTES };
         for _ in 0..bytes {
             passes::at_most::<CONSOLE_BYTES>();
             if serial.room() > 0
@@ -123,11 +131,6 @@ fn run(typed: &mut LineBuffer) -> ! {
 /// Wakes the decisions up, with what the EEPROM holds. A function of its own, so that the loop's stack does not hold for
 /// ever what only this needs.
 #[inline(never)]
-fn wake_up(wake_up: WakeUp) -> &'static mut Weeder {
-    static WEEDER: ConstStaticCell<WeederAsleep> = ConstStaticCell::new({
-        // SAFETY: these are the only halves, and what holds them is taken once, by the loop.
-        let (settings, examples) = unsafe { (eeprom::Lower::new(), eeprom::Upper::new()) };
-        Asleep::new(Nearest::asleep(examples::BuiltIn, examples), settings)
-    });
-    WEEDER.take().wake_up(wake_up)
+fn init(asleep: &mut UninitWeeder, startup: Startup) -> &mut Weeder {
+    asleep.init(startup)
 }

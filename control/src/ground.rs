@@ -1,38 +1,41 @@
 //! The ground: what the beam has seen of it, and the one question whether the tool may work on it.
 //!
-//! [`watch`] makes objects of the beam's edges, [`schedule`] remembers the canopies among them, and [`reach`] knows how far
+//! [`detector`] makes detections of the beam's edges, [`keep_out`] remembers the canopies among them, and [`reach`] knows how far
 //! ahead the servo has to be told. [`guard`] knows where a plant is due. [`Ground`] holds them together, so that none of them can
 //! forget by itself: whatever the reason, [`Ground::forget`] closes all that was seen, what is open at the frontier becomes the
 //! rest of something, and no plant is due.
 //!
 //! Places have 16 bits, so ground is left behind before the counter could come round: see [`Ground::roll_to`].
 //!
-//! What an [`object`] is, plant or weed, the ground is told: that is a [`class`], by the object's [`features`] the vote of the
+//! What an [`detection`] is, plant or weed, the ground is told: that is a [`class`], by the detection's [`features`] the vote of the
 //! [`nearest`] of built-in [`examples`] and [those taught in the field](field_examples).
 
 pub mod class;
+pub mod detection;
+pub mod detector;
 pub mod examples;
 pub mod features;
 pub mod field_examples;
 pub mod guard;
+pub mod keep_out;
 pub mod nearest;
-pub mod object;
 pub mod reach;
-pub mod schedule;
 pub mod second_beam;
-pub mod watch;
+pub mod slip;
 
 use self::{
+    class::Class,
+    detection::{Detection, End},
+    detector::Detector,
     guard::Guard,
-    object::Object,
+    keep_out::{Canopy, KeepOut, Plan, ScheduleFull},
     reach::{Geometry, Leads},
-    schedule::{Plan, Schedule, ScheduleFull},
-    second_beam::{Compared, SecondBeam},
-    watch::Watch,
+    second_beam::{Blind, SecondBeam},
+    slip::News,
 };
 use crate::{
     settings::Settings,
-    units::{Length, Place, Position, Ticks, TicksPerSecond, Wheel},
+    units::{Length, Position, Ticks, TicksPerSecond, Wheel, WrappedPosition},
 };
 
 /// What is known of the ground around the machine.
@@ -41,32 +44,50 @@ pub struct Ground {
     geometry: Geometry,
     leads: Leads,
     /// The ground that the beam is at.
-    beam: Place,
-    watch: Watch,
-    schedule: Schedule,
+    beam: WrappedPosition,
+    detector: Detector,
+    keep_out: KeepOut,
     guard: Guard,
     second_beam: SecondBeam,
-    /// The slip by which the geometry goes: how much more the wheel turns than the ground.
-    corrected_by: i8,
+    /// The slip by which the geometry goes, and what was believed last.
+    corrected_by: (i8, i8),
     /// The last plant's leading edge, or where watching began; no farther behind than is remembered.
-    last_plant: Place,
-    unjudged: Unjudged,
+    last_plant: WrappedPosition,
+    unclassified: Unclassified,
     /// Whether the tool has just come to ground that had to be left behind.
     rolled_back_too_far: bool,
 }
 
-/// The object that was seen in full, and of which nobody knows yet what it is.
+/// Why the tool may or may not work where it is: for a study of where the row's ground goes. The machine asks only whether it may.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AtTool {
+    /// Nothing is kept here.
+    Open,
+    /// The ground is unknown.
+    Unknown,
+    /// A zone is kept here, or its margin.
+    Kept {
+        /// Where the tool is, as what the odometer shows when the beam is there.
+        tool: Position,
+        /// Where the zone begins behind its margin.
+        begin: Position,
+        /// Where it ends ahead of its margin.
+        end: Position,
+    },
+}
+
+/// The detection that was seen in full, and of which nobody knows yet what it is.
 ///
 /// With its kind in front and none of them as 0, ground of which nobody knows anything is all zeros, which takes no flash.
 #[derive(Clone, Copy, Debug)]
 #[repr(u8)]
-enum Unjudged {
+enum Unclassified {
     /// There is none.
     None,
     /// Where it stands is forgotten.
     Forgotten,
     /// As far as both beams have seen it.
-    Seen(Object),
+    Seen(Canopy),
 }
 
 impl Ground {
@@ -74,38 +95,38 @@ impl Ground {
     pub const NONE: Self = Self {
         geometry: Geometry::NONE,
         leads: Leads::NONE,
-        beam: Place::new(0),
-        watch: Watch::NONE,
-        schedule: Schedule::NONE,
+        beam: WrappedPosition::new(0),
+        detector: Detector::NONE,
+        keep_out: KeepOut::NONE,
         guard: Guard::NONE,
         second_beam: SecondBeam::NONE,
-        corrected_by: 0,
-        last_plant: Place::new(0),
-        unjudged: Unjudged::None,
+        corrected_by: (0, 0),
+        last_plant: WrappedPosition::new(0),
+        unclassified: Unclassified::None,
         rolled_back_too_far: false,
     };
 
-    /// Ground of which nothing has been seen, with the beam at a position, broken or not.
+    /// Begins to watch ground of which nothing has been seen, with the beam at a position, broken or not.
     pub fn begin(&mut self, settings: &Settings, position: Position, broken: bool) {
         self.correct(settings);
-        self.beam = self.geometry.grain.place(position);
-        self.watch = Watch::start(self.beam, broken);
-        self.schedule = Schedule::new(self.beam);
+        self.beam = self.geometry.scale.place(position);
+        self.detector.begin(self.beam, broken);
+        self.keep_out.trust_from(self.beam);
         self.last_plant = self.beam;
         self.second_beam.begin(self.beam);
     }
 
-    /// Works out what follows from other settings. With another grain, what was seen means nothing any more.
+    /// Works out what follows from other settings. With another scale, what was seen means nothing any more.
     pub fn follow(&mut self, settings: &Settings, position: Position, speed: TicksPerSecond) {
-        let grain = self.geometry.grain;
+        let scale = self.geometry.scale;
         let guard_spacing = self.geometry.guard_spacing;
         self.correct(settings);
         self.lead(settings, speed);
         if self.geometry.guard_spacing != guard_spacing {
             self.guard = Guard::NONE;
         }
-        if self.geometry.grain != grain {
-            self.beam = self.geometry.grain.place(position);
+        if self.geometry.scale != scale {
+            self.beam = self.geometry.scale.place(position);
             self.begin_here();
         }
     }
@@ -113,135 +134,167 @@ impl Ground {
     /// Whether another slip was measured than the distances are corrected by.
     #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn is_to_be_corrected(&self) -> bool {
-        self.corrected_by != self.second_beam.slip().excess()
+        self.corrected_by != self.second_beam.slip().believed()
     }
 
     /// Works out what follows from the slip that was measured.
     pub fn correct(&mut self, settings: &Settings) {
-        self.corrected_by = self.second_beam.slip().excess();
-        self.geometry = Geometry::of(settings, self.corrected_by);
+        self.corrected_by = self.second_beam.slip().believed();
+        let (excess, believed) = self.corrected_by;
+        self.geometry.follow(settings, excess);
+        // What was believed until it became doubtful may be right: the tool keeps off where that has it as well.
+        let doubted = u32::from(self.geometry.beam_to_tool.0 as u16) * u32::from(excess.abs_diff(believed));
+        self.geometry.margin = self.geometry.margin + Length((doubted >> 8) as i16);
     }
 
     /// Forgets what the second beam has measured: the wheel, or where the beams stand, may be another. It has nothing to tell of what
     /// the first has seen before.
     pub fn forget_slip(&mut self) {
-        self.second_beam.begin(self.watch.frontier());
+        self.second_beam.begin(self.detector.frontier());
     }
 
     /// Works out what follows from another speed.
     pub fn lead(&mut self, settings: &Settings, speed: TicksPerSecond) {
-        self.leads = Leads::at(speed, settings, self.geometry.grain);
+        self.leads = Leads::at(speed, settings, self.geometry.scale);
     }
 
-    /// Takes an edge of the beam, with the position at which it came; returns the object that was complete before it.
-    pub fn edge(&mut self, position: Position, broken: bool) -> Option<Object> {
-        let place = self.geometry.grain.place(position) - self.leads.response;
-        self.watch.edge(place, broken, self.geometry.merge_gap)
+    /// Takes an edge of the beam, with the position at which it came; returns the detection that was complete before it.
+    pub fn edge(&mut self, position: Position, broken: bool) -> Option<Detection> {
+        let place = self.geometry.scale.place(position) - self.leads.response;
+        self.detector.edge(place, broken, self.geometry.merge_gap)
     }
 
-    /// The second beam is at a position of the machine, broken or not; returns what follows from what it has seen.
-    pub fn look_again(&mut self, position: Position, broken: bool) -> Option<Compared> {
-        let Geometry { grain, second_beam: apart, merge_gap, .. } = self.geometry;
-        let place = grain.place(position) - self.leads.response - apart;
+    /// The second beam is at a position of the machine, broken or not; returns what it has seen, unless all is known of that.
+    pub fn match_second_beam(&mut self, position: Position, broken: bool) -> Option<Detection> {
+        let Geometry { scale, second_beam: apart, merge_gap, .. } = self.geometry;
+        let least = self.geometry.least_seen();
+        let place = scale.place(position) - self.leads.response - apart;
         if broken != self.second_beam.is_broken() {
-            self.widen(place);
+            self.widen(place, place, self.second_beam.end(place));
         }
-        self.second_beam.look(place, broken, apart, merge_gap)
+        let mut detection = self.second_beam.look(place, broken, apart, merge_gap, least)?;
+        // Behind the last plant its spacing is not known, and what it is neither.
+        detection.cut |= !detection.leading.is_ahead_of(self.last_plant);
+        if self.widen(detection.leading, detection.trailing, End::None) {
+            return None;
+        }
+        // One beam alone cannot tell a single plant.
+        self.detector.doubt();
+        Some(detection)
     }
 
-    /// The first beam has seen an object, which is to come to the second, if there is one.
-    pub fn await_object(&mut self, object: Object) {
-        self.second_beam.await_object(object);
-    }
-
-    /// The machine has rolled to a position; returns the object that this completes.
+    /// The beam that is blind, if one is.
     #[cfg_attr(not(target_arch = "avr"), inline)]
-    pub fn roll_to(&mut self, position: Position) -> Option<Object> {
-        let had_left = self.schedule.has_left(self.tool());
-        self.beam = self.geometry.grain.place(position);
+    pub fn blind(&self) -> Option<Blind> {
+        self.second_beam.blind()
+    }
+
+    /// The first beam has seen a detection, which is to come to the second, if there is one.
+    pub fn await_detection(&mut self, detection: Detection) {
+        self.second_beam.await_detection(detection, self.geometry.least_seen());
+    }
+
+    /// The machine has rolled to a position; returns the detection that this completes.
+    #[cfg_attr(not(target_arch = "avr"), inline)]
+    pub fn roll_to(&mut self, position: Position) -> Option<Detection> {
+        let had_left = self.has_left();
+        self.beam = self.geometry.scale.place(position);
         let memory = self.geometry.memory;
         // Ground ahead of the beam that lies so far ahead is seen anew when the machine comes back to it.
-        let is_beyond_memory = self.watch.frontier() - self.beam > memory;
+        let is_beyond_memory = self.detector.frontier() - self.beam > memory;
         if is_beyond_memory {
             self.begin_here();
         }
-        let complete = self.watch.roll_to(self.beam - self.leads.response, self.geometry.merge_gap);
+        let complete = self.detector.roll_to(self.beam - self.leads.response, self.geometry.merge_gap);
         // Counted from the frontier, as the beam is never more than the memory behind it: counted from the tool, it could be
         // farther from what is known than a place can tell.
-        let farthest = self.watch.frontier() - memory;
-        self.schedule.leave(farthest - self.geometry.beam_to_tool);
+        let farthest = self.detector.frontier() - memory;
+        self.keep_out.leave(farthest - self.geometry.beam_to_tool);
         if farthest.is_ahead_of(self.last_plant) {
             self.last_plant = farthest;
         }
-        self.rolled_back_too_far = is_beyond_memory || (!had_left && self.schedule.has_left(self.tool()));
+        self.rolled_back_too_far = is_beyond_memory || (!had_left && self.has_left());
         complete
+    }
+
+    /// Whether the tool is at ground that had to be left behind.
+    #[cfg_attr(target_arch = "avr", inline(never))]
+    fn has_left(&self) -> bool {
+        self.keep_out.has_left(self.tool())
     }
 
     /// Forgets everything: none of what was seen is to be relied on, and the tool keeps off it.
     #[cfg_attr(target_arch = "avr", inline(never))]
     pub fn forget(&mut self) {
-        self.watch.forget();
-        if let Unjudged::Seen(_) = self.unjudged {
-            self.unjudged = Unjudged::Forgotten;
+        self.detector.forget();
+        if let Unclassified::Seen(_) = self.unclassified {
+            self.unclassified = Unclassified::Forgotten;
         }
         self.guard = Guard::NONE;
         self.forget_slip();
-        self.schedule.spoil(self.watch.frontier());
+        self.keep_out.spoil(self.detector.frontier());
     }
 
     /// Edges of the beam were lost, and with them what stood there; its level is now `broken`.
     pub fn lose_edges(&mut self, broken: bool) {
-        self.watch.lose_edges(broken);
+        self.detector.lose_edges(broken);
         self.forget();
     }
 
     /// Forgets everything, and begins to watch where the beam is.
     fn begin_here(&mut self) {
-        self.watch = Watch::start(self.beam, self.watch.is_broken());
+        self.detector.begin(self.beam, self.detector.is_broken());
         self.last_plant = self.beam;
         self.forget();
-        self.unjudged = Unjudged::None;
+        self.unclassified = Unclassified::None;
     }
 
     /// Takes the operator's word that no plant stands under the tool and ahead of it where nothing is known, if the tool is there.
     pub fn trust(&mut self) {
         if self.is_unseen() {
             // A margin behind the tool as well, so that it does not stand on the border of what is known.
-            self.schedule.trust_from(self.tool() - self.geometry.margin);
+            self.keep_out.trust_from(self.tool() - self.geometry.margin);
         }
     }
 
-    /// An object is being judged: until that is done, the ground is closed from where it begins, as by one that is still being seen.
-    pub fn await_judgement(&mut self, object: Object) {
-        self.unjudged = Unjudged::Seen(object);
+    /// A detection is being classified: until that is done, the ground is closed from where it begins, as by one that is still being seen.
+    pub fn await_class(&mut self, detection: Detection) {
+        let zone = if self.detector.is_parted() { Length::ZERO } else { self.geometry.stem_zone };
+        self.unclassified = Unclassified::Seen(Canopy::of(&detection, zone));
         // A wide one has come to the second beam before its end was seen by the first.
         if let Some(begin) = self.second_beam.open() {
-            self.widen(begin);
+            self.widen(begin, begin, End::Leading);
         }
     }
 
-    /// The object is judged, and if it is a plant it is remembered.
+    /// The detection is classified, and if it is a plant it is remembered.
     ///
     /// # Errors
     /// [`ScheduleFull`] when more plants stand between beam and tool than can be remembered.
-    pub fn judged(&mut self, object: Object, is_plant: bool) -> Result<(), ScheduleFull> {
-        let unjudged = core::mem::replace(&mut self.unjudged, Unjudged::None);
-        if !is_plant || matches!(unjudged, Unjudged::None) {
+    pub fn classified(&mut self, detection: Detection, class: Class) -> Result<(), ScheduleFull> {
+        let unclassified = core::mem::replace(&mut self.unclassified, Unclassified::None);
+        if class == Class::Weed || matches!(unclassified, Unclassified::None) {
             return Ok(());
         }
-        self.last_plant = object.leading;
-        let Unjudged::Seen(plant) = unjudged else { return Ok(()) };
-        self.guard.see(&object, &self.geometry);
-        self.schedule.push(plant, self.tool(), self.geometry.margin)
+        if detection.leading.is_ahead_of(self.last_plant) {
+            self.last_plant = detection.leading;
+        }
+        let Unclassified::Seen(mut plant) = unclassified else { return Ok(()) };
+        // What it is may be anything, or several of it.
+        if class != Class::Plant {
+            plant.trim = 0;
+        }
+        self.guard.see(&detection, &self.geometry);
+        self.keep_out.push(plant, self.tool(), self.geometry.margin)
     }
 
-    /// What the second beam has an edge of goes that far.
-    fn widen(&mut self, place: Place) {
+    /// What the second beam sees a part of, from one place to another, goes that far; whether that is a canopy's.
+    fn widen(&mut self, from: WrappedPosition, to: WrappedPosition, end: End) -> bool {
         let within = Length(self.geometry.second_beam.0 >> 2);
-        if let Unjudged::Seen(object) = &mut self.unjudged {
-            object.widen(place, within);
+        if let Unclassified::Seen(canopy) = &mut self.unclassified {
+            canopy.widen(from, to, within, within, end);
         }
-        self.schedule.widen(place, within);
+        self.keep_out.widen(from, to, within, end)
     }
 
     /// Guards the ground where a plant was due, once the beam has seen that none stands there; returns its middle.
@@ -250,22 +303,22 @@ impl Ground {
     /// [`ScheduleFull`], as for a plant that was seen.
     #[cfg_attr(target_arch = "avr", inline(never))]
     #[cfg_attr(not(target_arch = "avr"), inline)]
-    pub fn guard(&mut self) -> Option<Result<Place, ScheduleFull>> {
-        // What is in the beam, or being judged, may be the plant.
-        let seen_to = self.open().unwrap_or(self.watch.frontier());
+    pub fn guard(&mut self) -> Option<Result<WrappedPosition, ScheduleFull>> {
+        // What is in the beam, or being classified, may be the plant.
+        let seen_to = self.open().unwrap_or(self.detector.frontier());
         let guarded = self.guard.pass(seen_to, &self.geometry)?;
-        let pushed = self.schedule.push(guarded, self.tool(), self.geometry.margin);
-        Some(pushed.map(|()| guarded.leading + self.geometry.guard_scatter))
+        let pushed = self.keep_out.push(guarded, self.tool(), self.geometry.margin);
+        Some(pushed.map(|()| guarded.leading + self.geometry.guarded))
     }
 
-    /// From the last plant's leading edge, or where watching began, to that of an object; what is remembered, at the most.
-    pub fn spacing(&self, object: &Object) -> Ticks {
-        self.ticks(object.leading - self.last_plant)
+    /// From the last plant's leading edge, or where watching began, to that of a detection; what is remembered, at the most.
+    pub fn spacing(&self, detection: &Detection) -> Ticks {
+        self.ticks(detection.leading - self.last_plant)
     }
 
-    /// The paper's schedule of an object.
-    pub fn plan(&self, object: &Object) -> Plan {
-        Plan::new(&self.geometry, object.width())
+    /// The paper's schedule of a detection.
+    pub fn plan(&self, detection: &Detection) -> Plan {
+        Plan::new(&self.geometry, detection.width())
     }
 
     /// The ground wheel, as the settings give it.
@@ -280,11 +333,11 @@ impl Ground {
 
     /// A length in ticks.
     pub fn ticks(&self, length: Length) -> Ticks {
-        self.geometry.grain.ticks(length)
+        self.geometry.scale.ticks(length)
     }
 
     /// What the odometer shows at a place, if it shows `position` where the beam is.
-    pub fn position_of(&self, place: Place, position: Position) -> Position {
+    pub fn position_of(&self, place: WrappedPosition, position: Position) -> Position {
         position + self.ticks(place - self.beam)
     }
 
@@ -300,6 +353,11 @@ impl Ground {
         self.second_beam.is_broken()
     }
 
+    /// What has become of the slip since it was last asked for.
+    pub fn take_news(&mut self) -> News {
+        self.second_beam.take_news()
+    }
+
     /// The wheel's slip in thousandths; none where nothing has told it.
     pub fn slip_permille(&self) -> Option<i16> {
         self.second_beam.slip().permille()
@@ -308,8 +366,8 @@ impl Ground {
     /// Whether the beam has been broken over more ground than a canopy covers.
     #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn is_blocked(&self) -> bool {
-        let too_wide = |leading| self.watch.frontier() - leading > self.geometry.max_width;
-        self.watch.is_broken() && self.watch.open().is_some_and(too_wide)
+        let too_wide = |leading| self.detector.frontier() - leading > self.geometry.max_width;
+        self.detector.is_broken() && self.detector.open().is_some_and(too_wide)
     }
 
     /// Whether the tool has just come to ground that had to be left behind.
@@ -320,20 +378,20 @@ impl Ground {
 
     /// Whether the tool is on ground that the beam has not seen.
     pub fn is_unseen(&self) -> bool {
-        self.schedule.known_from().is_ahead_of(self.tool())
+        self.keep_out.known_from().is_ahead_of(self.tool())
     }
 
     /// How far the machine has to roll until ground that the beam has seen reaches the tool.
     pub fn unseen(&self) -> Ticks {
-        self.ticks((self.schedule.known_from() - self.tool()).max(Length::ZERO))
+        self.ticks((self.keep_out.known_from() - self.tool()).max(Length::ZERO))
     }
 
-    /// Windows at the tool or ahead of it, those that are still being seen or judged included.
-    pub fn windows(&self) -> u8 {
-        let unjudged = matches!(self.unjudged, Unjudged::Seen(_));
-        self.schedule.ahead(self.tool(), self.geometry.margin)
-            + u8::from(unjudged)
-            + u8::from(self.watch.open().is_some())
+    /// Keep-out zones at the tool or ahead of it, those that are still being seen or classified included.
+    pub fn zones(&self) -> u8 {
+        let unclassified = matches!(self.unclassified, Unclassified::Seen(_));
+        self.keep_out.ahead(self.tool(), self.geometry.margin)
+            + u8::from(unclassified)
+            + u8::from(self.detector.open().is_some())
     }
 
     /// Whether closed ground comes up before the tool could be out of the row, or in its place again.
@@ -349,36 +407,50 @@ impl Ground {
         self.is_closed(Length::ZERO, Length::ZERO)
     }
 
+    /// What keeps the tool out where it is, with the odometer at `position`.
+    pub fn at_tool(&self, position: Position) -> AtTool {
+        let of = |place| self.position_of(place, position);
+        match self.keep_out.zone_at(self.tool(), self.geometry.margin) {
+            Some((begin, end)) => AtTool::Kept { tool: of(self.tool()), begin: of(begin), end: of(end) },
+            None if self.is_closed_at_tool() => AtTool::Unknown,
+            None => AtTool::Open,
+        }
+    }
+
     /// Whether the machine is so fast that a plant just behind the beam would be reached before the tool is out.
     #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn outruns_the_beam(&self, tool_out: bool) -> bool {
         let out = self.leads.out;
         // Slowing down by an eighth is what it takes to be trusted again.
         let lead = if tool_out { out + Length(out.0 / 8) } else { out };
-        (self.tool() + lead) - self.watch.frontier() >= -self.geometry.margin
+        (self.tool() + lead) - self.detector.frontier() >= -self.geometry.margin
     }
 
     /// Whether any of the ground between two distances from the tool is closed: unknown, or within the margin of a canopy, the
-    /// one that is still being seen or judged and the one that is due included.
+    /// one that is still being seen or classified and the one that is due included.
     #[cfg_attr(not(target_arch = "avr"), inline)]
     fn is_closed(&self, one: Length, other: Length) -> bool {
         let margin = self.geometry.margin;
         let (near, far) = (self.tool() + one.min(other), self.tool() + one.max(other));
         let reaches = |leading| far - leading >= -margin;
-        self.schedule.is_closed(near, far, margin)
+        self.keep_out.is_closed(near, far, margin)
             || self.open().is_some_and(reaches)
-            || self.guard.awaited(self.watch.frontier(), &self.geometry).is_some_and(reaches)
+            || self.guard.awaited(self.detector.frontier(), &self.geometry).is_some_and(reaches)
             || self.second_beam.open_alone().is_some_and(reaches)
     }
 
-    /// Where the first object begins of which it is not known yet where it ends, or what it is.
+    /// Where the first detection begins of which it is not known yet where it ends, or what it is.
     #[cfg_attr(not(target_arch = "avr"), inline)]
-    fn open(&self) -> Option<Place> {
-        if let Unjudged::Seen(object) = self.unjudged { Some(object.leading) } else { self.watch.open() }
+    fn open(&self) -> Option<WrappedPosition> {
+        if let Unclassified::Seen(detection) = self.unclassified {
+            Some(detection.leading)
+        } else {
+            self.detector.open()
+        }
     }
 
     /// The ground that the tool works on.
-    fn tool(&self) -> Place {
+    fn tool(&self) -> WrappedPosition {
         self.beam - self.geometry.beam_to_tool
     }
 }
@@ -390,10 +462,10 @@ mod tests {
 
     const SPEED: TicksPerSecond = TicksPerSecond(1000);
 
-    /// A canopy is judged to be one.
-    fn keep(ground: &mut Ground, canopy: Object) -> Result<(), ScheduleFull> {
-        ground.await_judgement(canopy);
-        ground.judged(canopy, true)
+    /// A canopy is classified to be one.
+    fn keep(ground: &mut Ground, canopy: Detection) -> Result<(), ScheduleFull> {
+        ground.await_class(canopy);
+        ground.classified(canopy, Class::Plant)
     }
 
     /// Ground that the beam has seen from 0 to 3000, with a canopy from 1000 to 1300, without leads.
@@ -425,6 +497,22 @@ mod tests {
     }
 
     #[test]
+    fn of_what_is_not_known_to_be_a_plant_all_is_kept() {
+        for (class, trim) in [(Class::Plant, 38), (Class::Unknown, 0)] {
+            let (mut ground, mut settings) = ground();
+            settings.set(Setting::StemZoneMm, 100).expect("within its range");
+            ground.follow(&settings, Position::new(1400), SPEED);
+            ground.await_class(Detection {
+                leading: WrappedPosition::new(1500),
+                trailing: WrappedPosition::new(1800),
+                ..Detection::NONE
+            });
+            ground.classified(Detection::NONE, class).expect("there is room");
+            assert_eq!(opens(&mut ground, 1500), 1800 - trim + 95 + 1, "{class:?}");
+        }
+    }
+
+    #[test]
     fn what_is_forgotten_is_closed_up_to_a_margin_ahead_of_the_frontier() {
         let margin = 95;
         let (mut known, _) = ground();
@@ -433,7 +521,7 @@ mod tests {
             let (mut forgetful, _) = ground();
             forgetful.roll_to(Position::new(frontier));
             forgetful.forget();
-            assert_eq!(forgetful.windows(), 0, "no plant is known any more");
+            assert_eq!(forgetful.zones(), 0, "no plant is known any more");
             assert_eq!(opens(&mut forgetful, 1000), frontier + margin);
         }
     }
@@ -460,16 +548,16 @@ mod tests {
         let (mut ground, mut settings) = ground();
         settings.set(Setting::TicksPerM, 15_000).expect("within its range");
         ground.follow(&settings, Position::new(1400), SPEED);
-        assert_eq!((ground.windows(), ground.is_unseen()), (0, true));
+        assert_eq!((ground.zones(), ground.is_unseen()), (0, true));
         let (beam_to_tool, margin) = (6000, 750);
-        let grain = ground.ticks(Length(1)).0;
-        assert_eq!(grain, 8);
+        let scale = ground.ticks(Length(1)).0;
+        assert_eq!(scale, 8);
         let open_from = (1400 + beam_to_tool + margin..20_000).find(|&position| {
             ground.roll_to(Position::new(position));
             !ground.is_closed_at_tool()
         });
         assert!(
-            open_from.is_some_and(|position| position - 1400 - beam_to_tool - margin <= 3 * grain),
+            open_from.is_some_and(|position| position - 1400 - beam_to_tool - margin <= 3 * scale),
             "{open_from:?}"
         );
     }

@@ -1,7 +1,7 @@
 //! The weeder's decisions, from beam edge to swing, without a register, a clock, a float or a heap.
 //!
-//! The data's way: [`measure`] takes clock, encoder, beam and switches; a beam edge with its position becomes an object of the
-//! [`ground`], the object's features a class, a plant a window on the ground, and that with the present speed tells whether the
+//! The data's way: [`measure`] takes clock, encoder, beam and switches; a beam edge with its position becomes a detection of the
+//! [`ground`], the detection's features a class, a plant a window on the ground, and that with the present speed tells whether the
 //! tool has to be out of the row. [`operate`] holds what the operator and the servo have to do with that. [`weeder`] joins them,
 //! a turn of the loop at a time, and [`say`] is its console. Imports run that way and no other: `ground` and `measure` know
 //! neither each other nor the three behind them, and all of them know [`units`], [`settings`], [`memory`] and [`alarm`].

@@ -20,18 +20,19 @@ mod names;
 pub mod packed;
 mod status;
 mod texts;
+mod version;
 mod words;
 
 pub use self::{answer::Answer, events::write_event, execute::execute, status::write_plot, texts::Text};
 
 use self::{
-    command::{Command, Mistake},
+    command::{Command, ParseError},
     line::Line,
 };
 use crate::{ground::class::Classifier, memory::Memory, weeder::Controller};
 
 /// Characters that a line has at most, its end included.
-pub const LINE: usize = 127;
+pub const LINE: usize = 140;
 
 /// The console's answers: what answers the line that was typed last, and the line that is being written.
 #[derive(Clone, Debug, Default)]
@@ -52,7 +53,7 @@ impl Console {
     }
 
     /// Takes a line that was typed, to carry it out in a later turn.
-    pub fn take(&mut self, line: Result<Command, Mistake>) {
+    pub fn take(&mut self, line: Result<Command, ParseError>) {
         self.answer = Answer::Typed(line);
     }
 

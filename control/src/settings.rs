@@ -47,16 +47,14 @@ macro_rules! settings {
             }
         }
 
-        avr_progmem::progmem! {
-            static progmem DESCRIPTIONS: [Description; Setting::COUNT as usize] = [
-                $(Description {
-                    least: $least,
-                    greatest: $greatest,
-                    default: $default,
-                    hold_only: $hold_only,
-                },)*
-            ];
-        }
+        const DESCRIPTIONS: [Description; Setting::COUNT as usize] = [
+            $(Description {
+                least: $least,
+                greatest: $greatest,
+                default: $default,
+                hold_only: $hold_only,
+            },)*
+        ];
 
         $(const _: () = assert!($least <= $default && $default <= $greatest, $name);)*
 
@@ -67,71 +65,75 @@ macro_rules! settings {
 
 settings! {
     /// Encoder counts in a turn of the ground wheel.
-    TicksPerRev "ticks_per_rev": 100 to 10000, 2400, true,
-        "encoder counts in a turn of the ground wheel";
+    TicksPerRev "ticks_per_rev": 600 to 10000, 2400, true,
+        "encoder counts a wheel turn";
     /// Diameter of the ground wheel.
     WheelMm "wheel_mm" in "mm": 200 to 800, 400, true,
-        "diameter of the ground wheel";
+        "wheel diameter";
     /// Encoder counts a metre, measured.
     TicksPerM "ticks_per_m": 0 to 20000, 0, true,
-        "encoder counts a metre, as calibrated; 0 for what wheel and encoder give";
+        "encoder counts a metre, calibrated; 0 not yet";
     /// X: how far the beam stands ahead of the tool.
     BeamToToolMm "beam_to_tool_mm" in "mm": 100 to 2000, 400, true,
-        "X, how far the beam stands ahead of the tool";
+        "X, from the tool to the beam";
     /// How far a second beam stands behind the first.
     SecondBeamMm "second_beam_mm" in "mm": 0 to 900, 0, true,
-        "how far a second beam on D10 stands behind the first; 0 for none";
+        "from the beam to a second beam; 0 none";
     /// Ground kept free of the tool on both sides of a canopy.
     MarginMm "margin_mm" in "mm": 0 to 200, 50, true,
-        "ground that the tool leaves alone on both sides of a canopy";
-    /// Time from the command to the tool being out.
-    LeadOutMs "lead_out_ms" in "ms": 0 to 500, 180, false,
-        "from the command until the tool is out, under load; 0 as in the paper";
+        "kept on both sides of a canopy";
+    /// What is kept of a single plant, around the middle of its canopy.
+    StemZoneMm "stem_zone_mm" in "mm": 0 to 300, 0, true,
+        "kept round a stem; 0 the canopy";
+    /// Time from the command to the tool being out. The default is the slowest swing of the default servo over its default stroke: 80 ms
+    /// of dead time, 144 ms for 45 degrees against the soil, and 6 ms for the pulse that is on the line.
+    LeadOutMs "lead_out_ms" in "ms": 0 to 500, 230, false,
+        "longest time until the tool is out";
     /// Shortest time from the command to the tool beginning to come back.
     LeadInMs "lead_in_ms" in "ms": 0 to 500, 40, false,
-        "shortest time from the command until the tool begins to come back";
+        "shortest time until the tool starts back";
     /// Pulse for the tool in the row.
     ServoInUs "servo_in_us" in "us": 500 to 2500, 1500, true,
-        "servo pulse for the tool in the row, 0 degrees";
+        "servo pulse, tool in the row";
     /// Pulse for the tool out of the row.
     ServoOutUs "servo_out_us" in "us": 500 to 2500, 2000, true,
-        "servo pulse for the tool out of the row, 45 degrees";
+        "servo pulse, tool out of the row";
     /// Shortest gap between two servo pulses.
     ServoGapMs "servo_gap_ms" in "ms": 0 to 15, 3, false,
-        "shortest gap between servo pulses; 0 keeps fixed frames of 20 ms";
+        "shortest gap between servo pulses; 0 is 50 Hz";
     /// Examples that vote.
     K "k": 1 to 15, 3, false,
-        "nearest examples that vote on what an object is";
+        "nearest examples that vote";
     /// Width below which an object is dust.
     MinWidthMm "min_width_mm" in "mm": 0 to 100, 0, false,
-        "what is narrower is dust, and weeded over; 0 for nothing";
+        "narrower objects are dust; 0 none";
     /// Narrow objects in a row, none of them a plant, that are an alarm.
     MisfitAfter "misfit_after": 0 to 100, 5, false,
-        "so many narrow objects in a row and no plant raise an alarm; 0 never";
+        "alarm at so many narrow objects in a row; 0 never";
     /// Ground over which the beam may be broken before that is an alarm.
     MaxWidthMm "max_width_mm" in "mm": 20 to 1500, 400, false,
-        "a beam broken over more ground than this raises an alarm";
+        "alarm where an object is wider";
     /// Gaps in a canopy shorter than this belong to it.
     MergeGapMm "merge_gap_mm" in "mm": 0 to 1000, 21, false,
-        "clear stretches shorter than this belong to the canopy";
+        "shorter gaps belong to the canopy";
     /// Distance at which the crop is set, so that plants that are not seen can be guarded.
     GuardSpacingMm "guard_spacing_mm" in "mm": 0 to 2000, 0, false,
-        "where plants stand evenly, this far apart, unseen ones are kept; 0 off";
+        "planting distance, keeps unseen plants; 0 off";
     /// How far off its place a guarded plant may stand.
     GuardScatterMm "guard_scatter_mm" in "mm": 0 to 200, 30, false,
-        "how far from where it is due an unseen plant may stand";
+        "how far off it an unseen plant may stand";
     /// The sensor's response time.
     BeamResponseMs "beam_response_ms" in "ms": 0 to 50, 1, false,
-        "time the beam's sensor takes to answer";
-    /// Speed above which the machine must not work.
-    TopSpeedMmS "top_speed_mm_s" in "mm/s": 100 to 3000, 1400, false,
-        "working faster than this raises an alarm; 1400 is 5 km/h";
+        "time the beam takes to answer";
+    /// Speed above which the machine must not work. With the default lead and margin, the default beam allows 1330 mm/s.
+    TopSpeedMmS "top_speed_mm_s" in "mm/s": 100 to 3000, 1300, false,
+        "alarm where work is faster";
     /// Ground without a plant that is worth a warning.
     NoPlantM "no_plant_m" in "m": 0 to 100, 10, false,
-        "so many metres without a plant give a warning; 0 never";
+        "warning after so far without a plant; 0 never";
     /// Whether an end switch tells that the tool is out.
     EndSwitch "end_switch": 0 to 1, 0, false,
-        "whether a switch on D5 closes when the tool is out, and is to be watched";
+        "switch on D5 closes with the tool out";
 }
 
 /// Stands for this table wherever values are kept without their names: the CRC-16 of the names in their
@@ -149,11 +151,17 @@ pub const TABLE_MARK: u16 = {
     checksum(bytes.split_at(end).0)
 };
 
-/// The second beam stands no nearer to the first: slip is measured over the way between them, to a tick or two.
-pub const SECOND_BEAM_LEAST_MM: u16 = 50;
+/// The second beam stands no nearer to the first: with the coarsest encoder that may work that is 64 ticks, and a tick is a 64th of
+/// the slip then. It stands no nearer to the tool: where a weed is expected, the ground is closed only behind what is as wide as that.
+pub const SECOND_BEAM_LEAST_MM: u16 = 72;
+const _: () = assert!(SECOND_BEAM_LEAST_MM as u32 * TICKS_PER_M_LEAST as u32 >= 64 * 1000);
 
 /// With a second beam, X is no longer: what slip makes of it has to fit into what is remembered.
 pub const SLIPPING_BEAM_TO_TOOL_MM: u16 = 1000;
+
+/// The coarsest wheel with which a failing encoder is found in time, from 0.5 km/h on: four ticks then come within
+/// [32 ms](crate::measure::monitor), and what may be lost unnoticed, 48 ticks, is about the usual margin.
+pub const TICKS_PER_M_LEAST: u16 = 900;
 
 /// Settings that cannot be right together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -165,8 +173,10 @@ pub enum Contradiction {
     },
     /// Both pulses are the same: the tool would not move.
     PulsesEqual,
-    /// The second beam stands at the first or not ahead of the tool, or X is too long for it.
+    /// The second beam stands too near to the first or to the tool, or X is too long for it.
     SecondBeamAstray,
+    /// The wheel, as it is given or as it was measured, counts fewer than [`TICKS_PER_M_LEAST`].
+    EncoderTooCoarse,
 }
 
 impl Setting {
@@ -177,7 +187,7 @@ impl Setting {
 
     /// Whether it is switched on and off, as 1 and 0.
     pub fn is_switched(self) -> bool {
-        self.description().greatest == 1
+        self.greatest() == 1
     }
 
     /// Whether another value means another wheel or encoder: one whose `ticks_per_m` nobody has measured.
@@ -186,10 +196,64 @@ impl Setting {
     }
 
     /// The numbers that the table gives for it.
-    #[inline(never)]
     pub fn description(self) -> Description {
-        DESCRIPTIONS.load_at(self as usize)
+        let (least, greatest, default) = (self.least(), self.greatest(), self.default());
+        Description { least, greatest, default, hold_only: self.is_hold_only() }
     }
+
+    /// Its least value.
+    pub fn least(self) -> u16 {
+        self.number(0)
+    }
+
+    /// Its greatest value.
+    pub fn greatest(self) -> u16 {
+        self.number(1) & !HOLD_ONLY
+    }
+
+    /// Whether a value is within its range.
+    #[cfg_attr(target_arch = "avr", inline(never))]
+    pub fn allows(self, value: u16) -> bool {
+        self.least() <= value && value <= self.greatest()
+    }
+
+    /// The value before anything is set.
+    pub fn default(self) -> u16 {
+        self.number(2)
+    }
+
+    /// Whether it changes where the tool is.
+    pub fn is_hold_only(self) -> bool {
+        self.number(1) & HOLD_ONLY != 0
+    }
+
+    /// One of its numbers in flash.
+    #[inline(never)]
+    fn number(self, which: u8) -> u16 {
+        let place = 6 * usize::from(self as u8) + 2 * usize::from(which);
+        u16::from_le_bytes([flash::byte(&NUMBERS, place), flash::byte(&NUMBERS, place + 1)])
+    }
+}
+
+/// The bit of the greatest value that tells whether a setting is for hold only: a structure with a flag takes a frame wherever it is read.
+const HOLD_ONLY: u16 = 1 << 15;
+
+avr_progmem::progmem! {
+    static progmem NUMBERS: [u8; 6 * Setting::COUNT as usize] = numbers();
+}
+
+/// Least and greatest value and default of each setting, little-endian.
+const fn numbers() -> [u8; 6 * Setting::COUNT as usize] {
+    let (mut bytes, mut place) = ([0; 6 * Setting::COUNT as usize], 0);
+    while place < bytes.len() {
+        let Description { least, greatest, default, hold_only } = DESCRIPTIONS[place / 6];
+        assert!(greatest < HOLD_ONLY);
+        let greatest = if hold_only { greatest | HOLD_ONLY } else { greatest };
+        let numbers = [least.to_le_bytes(), greatest.to_le_bytes(), default.to_le_bytes()];
+        bytes[place] = numbers[place % 6 / 2][place % 2];
+        place += 1;
+    }
+    bytes
 }
 
 /// The values in use.
@@ -209,10 +273,16 @@ impl Settings {
     /// The defaults.
     pub fn new() -> Self {
         let mut settings = Self::NONE;
-        for (value, setting) in settings.values.iter_mut().zip(Setting::all()) {
-            *value = setting.description().default;
-        }
+        settings.take_defaults();
         settings
+    }
+
+    /// Goes back to the defaults.
+    #[cfg_attr(target_arch = "avr", inline(never))]
+    pub fn take_defaults(&mut self) {
+        for (value, setting) in self.values.iter_mut().zip(Setting::all()) {
+            *value = setting.default();
+        }
     }
 
     /// A setting's value, in the unit that its name carries.
@@ -225,8 +295,7 @@ impl Settings {
     /// # Errors
     /// [`OutOfRange`] when the table does not allow it; the old value then stays.
     pub fn set(&mut self, setting: Setting, value: u16) -> Result<(), OutOfRange> {
-        let Description { least, greatest, .. } = setting.description();
-        if !(least..=greatest).contains(&value) {
+        if !setting.allows(value) {
             return Err(OutOfRange);
         }
         self.values[setting as usize] = value;
@@ -242,6 +311,11 @@ impl Settings {
         if self.get(Setting::ServoInUs) == self.get(Setting::ServoOutUs) {
             return Some(Contradiction::PulsesEqual);
         }
+        // Both: a wheel that is given anew is one that was not measured.
+        let measured = self.get(Setting::TicksPerM);
+        if self.nominal_ticks_per_m() < TICKS_PER_M_LEAST || (1..TICKS_PER_M_LEAST).contains(&measured) {
+            return Some(Contradiction::EncoderTooCoarse);
+        }
         let lead_out_ms = self.get(Setting::LeadOutMs);
         let notice_ms = lead_out_ms + lead_out_ms / 8 + self.get(Setting::BeamResponseMs) + 1;
         let rolled = TicksPerSecond(self.get(Setting::TopSpeedMmS).into()).distance_in_ms(notice_ms);
@@ -251,28 +325,28 @@ impl Settings {
             return Some(Contradiction::BeamTooNear { needed_mm });
         }
         let second_beam_mm = self.get(Setting::SecondBeamMm);
-        let can_stand = (SECOND_BEAM_LEAST_MM..beam_to_tool_mm).contains(&second_beam_mm);
+        let can_stand = (SECOND_BEAM_LEAST_MM..=beam_to_tool_mm - SECOND_BEAM_LEAST_MM).contains(&second_beam_mm);
         let is_astray = second_beam_mm > 0 && (!can_stand || beam_to_tool_mm > SLIPPING_BEAM_TO_TOOL_MM);
         is_astray.then_some(Contradiction::SecondBeamAstray)
     }
 
     /// The ground wheel with its encoder.
     pub fn wheel(&self) -> Wheel {
-        match self.get(Setting::TicksPerM) {
-            0 => self.nominal_wheel(),
-            ticks_per_m => Wheel::measured(ticks_per_m),
-        }
+        Wheel::of_tick(match self.get(Setting::TicksPerM) {
+            0 => self.nominal_tick(),
+            ticks_per_m => Wheel::tick_measured(ticks_per_m),
+        })
     }
 
-    /// The ground wheel as its diameter and its encoder give it, whatever was measured.
-    fn nominal_wheel(&self) -> Wheel {
-        Wheel::of_diameter(self.get(Setting::TicksPerRev), self.get(Setting::WheelMm))
+    /// A tick of the ground wheel as its diameter and its encoder give it, whatever was measured.
+    fn nominal_tick(&self) -> u32 {
+        Wheel::tick_of_diameter(self.get(Setting::TicksPerRev), self.get(Setting::WheelMm))
     }
 
     /// Ticks a metre of that wheel.
     #[inline(never)]
     pub fn nominal_ticks_per_m(&self) -> u16 {
-        self.nominal_wheel().ticks(1000).0 as u16
+        Wheel::ticks_of(self.nominal_tick(), 1000).0 as u16
     }
 
     /// A setting in millimetres as ticks of the present wheel.

@@ -5,8 +5,8 @@
 //! as long as two points that are compared lie within half the counter's range.
 //!
 //! There are two counters of the way. The odometer, [`Position`] and [`Ticks`], has 32 bits: what the operator reads, and
-//! what is measured over a long stretch. The ground that is remembered around the tool, [`Place`] and [`Length`], has 16,
-//! which the chip compares in half the time and half the code; [`Grain`] leads from the one to the other.
+//! what is measured over a long stretch. The ground that is remembered around the tool, [`WrappedPosition`] and [`Length`], has 16,
+//! which the chip compares in half the time and half the code; [`LengthScale`] leads from the one to the other.
 
 use core::ops::{Add, Neg, Sub};
 
@@ -43,13 +43,13 @@ impl Ticks {
     pub const ZERO: Self = Self(0);
 }
 
-/// A place on the ground that is remembered, in units of a [`Grain`], wrapping.
+/// A place on the ground that is remembered, in units of a [`LengthScale`], wrapping.
 ///
 /// Places are ordered by the distance between them, never by their number, so there is no `Ord`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Place(i16);
+pub struct WrappedPosition(i16);
 
-impl Place {
+impl WrappedPosition {
     /// The place that a counter of units stands for.
     pub const fn new(count: i16) -> Self {
         Self(count)
@@ -67,7 +67,7 @@ impl Place {
     }
 }
 
-/// A distance along the ground that is remembered, in units of a [`Grain`], positive forward.
+/// A distance along the ground that is remembered, in units of a [`LengthScale`], positive forward.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Length(pub i16);
 
@@ -125,36 +125,36 @@ macro_rules! points_and_distances {
 
 points_and_distances! {
     Position Ticks;
-    Place Length;
+    WrappedPosition Length;
 }
 
-/// How many ticks make a unit of the ground that is remembered: a power of two, 1 for any wheel of up to [`Grain::FINEST`]
+/// How many ticks make a unit of the ground that is remembered: a power of two, 1 for any wheel of up to [`LengthScale::FINEST`]
 /// ticks a metre.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Grain {
+pub struct LengthScale {
     shift: u8,
 }
 
-impl Grain {
+impl LengthScale {
     /// A tick is a unit.
     pub const TICK: Self = Self { shift: 0 };
 
     /// Units that a metre has at the most, 0.42 mm each: 13 m are within half of 16 bits.
     pub const FINEST: i32 = 2400;
 
-    /// The grain for a wheel of so many ticks a metre.
+    /// The scale for a wheel of so many ticks a metre.
     pub const fn of(ticks_per_m: Ticks) -> Self {
-        let mut shift = 0;
-        while ticks_per_m.0 >> shift > Self::FINEST {
-            shift += 1;
+        let (mut shift, mut units) = (0, ticks_per_m.0);
+        while units > Self::FINEST {
+            (shift, units) = (shift + 1, units >> 1);
         }
         Self { shift }
     }
 
     /// The place at which the odometer has counted so far.
     #[cfg_attr(target_arch = "avr", inline(never))]
-    pub const fn place(self, position: Position) -> Place {
-        Place((position.0 >> self.shift) as i16)
+    pub const fn place(self, position: Position) -> WrappedPosition {
+        WrappedPosition((position.0 >> self.shift) as i16)
     }
 
     /// A distance in units, which is to be less than 13 m.
@@ -296,24 +296,40 @@ impl Wheel {
 
     /// A wheel by its encoder's counts a turn, 100 to 10,000, and its diameter, 200 to 800 mm.
     pub const fn of_diameter(ticks_per_rev: u16, diameter_mm: u16) -> Self {
+        Self::of_tick(Self::tick_of_diameter(ticks_per_rev, diameter_mm))
+    }
+
+    /// A tick of such a wheel in 2^-20 mm.
+    pub(crate) const fn tick_of_diameter(ticks_per_rev: u16, diameter_mm: u16) -> u32 {
         let circumference = (((Self::PI_NUMERATOR * diameter_mm as u32) << 12) / Self::PI_DENOMINATOR) << 8;
-        Self::of_tick(circumference / ticks_per_rev as u32)
+        circumference / ticks_per_rev as u32
     }
 
     /// A wheel by its counts a metre, as measured, 1 to 20,000.
     pub const fn measured(ticks_per_m: u16) -> Self {
-        Self::of_tick((1000 << 20) / ticks_per_m as u32)
+        Self::of_tick(Self::tick_measured(ticks_per_m))
     }
 
-    const fn of_tick(tick: u32) -> Self {
+    /// A tick of such a wheel in 2^-20 mm.
+    pub(crate) const fn tick_measured(ticks_per_m: u16) -> u32 {
+        (1000 << 20) / ticks_per_m as u32
+    }
+
+    /// A wheel by its tick in 2^-20 mm.
+    pub(crate) const fn of_tick(tick: u32) -> Self {
         Self { tick, too_far: ((i16::MAX as u32) << 16) / (tick >> 4) }
     }
 
     /// A distance in ticks, rounded to the nearest: `mm * ticks_per_rev / (pi * diameter)`, the paper's Eq. 1 and 2, or by
     /// what was measured. Right to a tick up to 4 m.
-    #[cfg_attr(target_arch = "avr", inline(never))]
     pub const fn ticks(self, millimetres: u16) -> Ticks {
-        Ticks((((millimetres as u32) << 20) + self.tick / 2).wrapping_div(self.tick) as i32)
+        Self::ticks_of(self.tick, millimetres)
+    }
+
+    /// A distance in ticks of so many 2^-20 mm.
+    #[cfg_attr(target_arch = "avr", inline(never))]
+    pub(crate) const fn ticks_of(tick: u32, millimetres: u16) -> Ticks {
+        Ticks((((millimetres as u32) << 20) + tick / 2).wrapping_div(tick) as i32)
     }
 
     /// A distance in millimetres, rounded toward zero and limited to what 16 bits hold; right to 1 mm and 0.02 %.

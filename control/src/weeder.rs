@@ -11,17 +11,18 @@ mod faults;
 mod shown;
 
 use crate::{
-    alarm::Alarm,
+    alarm::{Alarm, Warning},
     ground::{
         Ground,
-        class::{Class, Classifier, Vote},
+        class::{Classifier, Vote},
+        detection::Detection,
         features,
-        object::Object,
-        schedule::ScheduleFull,
-        second_beam::Compared,
+        keep_out::ScheduleFull,
+        second_beam::Blind,
+        slip::News,
     },
     measure::{
-        readings::{Edge, Readings, WakeUp},
+        readings::{Edge, Readings, Startup},
         reset::Cause,
         sensors::Sensors,
     },
@@ -30,16 +31,16 @@ use crate::{
         bench::Bench,
         calibration::Distance,
         configuration::Configuration,
+        detections::{Classified, Detections},
         event::{Event, Events},
+        example_entry::ExampleEntry,
         limits::Limits,
-        misfits::Misfits,
-        no_plants::NoPlants,
-        objects::{Judged, Objects},
-        plot::Curves,
+        plant_timeout::PlantTimeout,
+        plot::Telemetry,
         servo::{self, HalfMicros},
         state::State,
-        told_example::ToldExample,
         tool::Tool,
+        unknown_run::UnknownRun,
     },
     settings::Setting,
     units::{Position, count},
@@ -54,8 +55,8 @@ pub struct Orders {
     pub pulse_out: HalfMicros,
     /// The shortest gap between servo pulses in milliseconds; 0 for fixed frames.
     pub gap_ms: u8,
-    /// Whether an object was judged, or another speed or other settings were followed: that is enough for a turn of the loop.
-    pub is_enough: bool,
+    /// Whether a detection was classified, or another speed or other settings were followed: that is enough for a turn of the loop.
+    pub turn_spent: bool,
 }
 
 /// The machine's decisions and all that they rest on.
@@ -74,28 +75,30 @@ pub struct Controller<C, M> {
     /// Whether the speed is another than the one by which the ground leads.
     leads_are_old: bool,
     /// Whether this turn has done what takes long.
-    is_enough: bool,
+    turn_spent: bool,
     /// Lines that were not understood, or came with a hole in them.
     mistakes: u16,
-    /// Objects that were narrower than any plant or weed.
+    /// Detections that were narrower than any plant or weed.
     dust: u16,
-    /// The object that is being judged, if one is.
-    judging: Object,
-    is_judging: bool,
-    no_plants: NoPlants,
-    misfits: Misfits,
-    told: ToldExample,
-    objects: Objects,
+    /// The detection that is being classified, if one is.
+    classifying: Detection,
+    is_classifying: bool,
+    /// Whether that is what the second beam has seen, and the first may have told already.
+    is_of_second: bool,
+    plant_timeout: PlantTimeout,
+    unknown_run: UnknownRun,
+    told: ExampleEntry,
+    detections: Detections,
     events: Events,
-    curves: Curves,
+    telemetry: Telemetry,
 }
 
 /// A controller before the machine has woken up: nothing but zeros and what it is made of, so that a `static` can hold it
 /// without a copy in flash, and it is woken up where it lies.
 #[derive(Debug)]
-pub struct Asleep<C, M>(Controller<C, M>);
+pub struct Uninit<C, M>(Controller<C, M>);
 
-impl<C: Classifier, M: Memory> Asleep<C, M> {
+impl<C: Classifier, M: Memory> Uninit<C, M> {
     /// A controller with a classifier and a memory of which nobody has read anything.
     pub const fn new(classifier: C, memory: M) -> Self {
         Self(Controller {
@@ -110,44 +113,45 @@ impl<C: Classifier, M: Memory> Asleep<C, M> {
             state: State::Hold,
             tool: Tool::NONE,
             leads_are_old: false,
-            is_enough: false,
+            turn_spent: false,
             mistakes: 0,
             dust: 0,
-            judging: Object::NONE,
-            is_judging: false,
-            no_plants: NoPlants::since(Position::new(0)),
-            misfits: Misfits::NONE,
-            told: ToldExample::NONE,
-            objects: Objects::NONE,
+            classifying: Detection::NONE,
+            is_classifying: false,
+            is_of_second: false,
+            plant_timeout: PlantTimeout::since(Position::new(0)),
+            unknown_run: UnknownRun::NONE,
+            told: ExampleEntry::NONE,
+            detections: Detections::NONE,
             events: Events::NONE,
-            curves: Curves::NONE,
+            telemetry: Telemetry::NONE,
         })
     }
 
     /// Wakes the machine up: in HOLD, with the tool out, and with no ground known. Where the memory holds no settings, or some
     /// that cannot be right, that is an alarm.
-    pub fn wake_up(&mut self, wake_up: WakeUp) -> &mut Controller<C, M> {
-        let WakeUp { readings: Readings { now, position, .. }, beam_broken, cause } = wake_up;
+    pub fn init(&mut self, startup: Startup) -> &mut Controller<C, M> {
+        let Startup { readings: Readings { now, position, .. }, beam_broken, cause } = startup;
         let controller = &mut self.0;
-        controller.classifier.wake_up();
+        controller.classifier.init();
         controller.state = controller.configuration.load().map_or(State::Hold, State::Alarm);
         controller.follow_settings();
         controller.ground.begin(controller.configuration.settings(), position, beam_broken);
         controller.cause = cause;
-        controller.sensors.wake_up(wake_up);
-        controller.tool.wake_up(now);
-        controller.no_plants = NoPlants::since(position);
-        controller.curves.wake_up(now);
+        controller.sensors.init(startup);
+        controller.tool.init(now);
+        controller.plant_timeout = PlantTimeout::since(position);
+        controller.telemetry.init(now);
         controller
     }
 }
 
 impl<C: Classifier, M: Memory> Controller<C, M> {
-    /// A controller for a machine that just woke up, see [`Asleep::wake_up`].
-    pub fn new(classifier: C, memory: M, wake_up: WakeUp) -> Self {
-        let mut asleep = Asleep::new(classifier, memory);
-        asleep.wake_up(wake_up);
-        asleep.0
+    /// A controller for a machine that just woke up, see [`Uninit::init`].
+    pub fn new(classifier: C, memory: M, startup: Startup) -> Self {
+        let mut uninit = Uninit::new(classifier, memory);
+        uninit.init(startup);
+        uninit.0
     }
 
     /// A turn of the loop: takes what came from the beam since the last one, in its order, then the machine's readings, and decides
@@ -171,7 +175,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
                     self.beam_edge(position, broken);
                 }
                 if is_of_second {
-                    self.look_again(self.sensors.odometer.place(position), second_broken);
+                    self.match_second_beam(self.sensors.odometer.place(position), second_broken);
                 }
             }
             Edge::Lost { broken } => self.beam_edges_lost(broken),
@@ -187,31 +191,32 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         {
             self.raise(alarm);
         }
-        if let Some(object) = self.ground.edge(self.sensors.odometer.place(position), broken) {
-            self.see(object);
+        if let Some(detection) = self.ground.edge(self.sensors.odometer.place(position), broken) {
+            self.see(detection);
         }
     }
 
     /// The second beam is broken or not, with the machine at a position.
     #[cfg_attr(target_arch = "avr", inline(never))]
-    fn look_again(&mut self, position: Position, broken: bool) {
-        match self.ground.look_again(position, broken) {
-            Some(Compared::Slip) => {
-                if let Some(permille) = self.ground.slip_permille() {
-                    self.events.add(Event::Slip { permille });
-                }
-            }
-            Some(Compared::Alone(object)) => self.judge(object),
-            Some(Compared::FirstIsBlind) => self.raise(Alarm::BeamBlind),
-            Some(Compared::SecondIsBlind) => self.raise(Alarm::SecondBeamBlind),
-            None => {}
+    fn match_second_beam(&mut self, position: Position, broken: bool) {
+        let seen = self.ground.match_second_beam(position, broken);
+        if let Some(blind) = self.ground.blind() {
+            return self.raise(if blind == Blind::First { Alarm::BeamBlind } else { Alarm::SecondBeamBlind });
         }
+        if let Some(detection) = seen {
+            self.classify(detection, true);
+        }
+        self.events.add(match self.ground.take_news() {
+            News::None => return,
+            News::Told => Event::Slip { permille: self.ground.slip_permille().unwrap_or(0) },
+            News::Lost => Event::Warning(Warning::SlipUnknown),
+        });
     }
 
-    /// The first beam has seen an object in full.
-    fn see(&mut self, object: Object) {
-        self.ground.await_object(object);
-        self.judge(object);
+    /// The first beam has seen a detection in full.
+    fn see(&mut self, detection: Detection) {
+        self.ground.await_detection(detection);
+        self.classify(detection, false);
     }
 
     /// Edges of the beam were lost: what stood there is not known, and neither is the beam's level, which is now `broken`.
@@ -234,11 +239,11 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             Some(false) => self.enter(State::Hold),
             _ => {}
         }
-        if let Some(object) = self.ground.roll_to(position) {
-            self.see(object);
+        if let Some(detection) = self.ground.roll_to(position) {
+            self.see(detection);
         }
         if self.ground.has_second_beam() {
-            self.look_again(position, self.ground.second_is_broken());
+            self.match_second_beam(position, self.ground.second_is_broken());
         }
         match self.ground.guard() {
             Some(Ok(due)) => self.events.add(Event::Guarded(self.ground.position_of(due, position))),
@@ -246,18 +251,18 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             None => {}
         }
         // Each of these takes a good part of what a turn may take: a turn does one of them.
-        if !self.is_enough {
+        if !self.turn_spent {
             if self.configuration.has_changed() {
                 self.follow_settings();
             } else if self.ground.is_to_be_corrected() {
                 self.ground.correct(self.configuration.settings());
-                self.is_enough = true;
+                self.turn_spent = true;
             } else if self.leads_are_old {
                 self.ground.lead(self.configuration.settings(), self.sensors.meter.speed());
-                (self.leads_are_old, self.is_enough) = (false, true);
-            } else if self.is_judging {
-                // The last of them, as one object may come after the other.
-                self.go_on_judging();
+                (self.leads_are_old, self.turn_spent) = (false, true);
+            } else if self.is_classifying {
+                // The last of them, as one detection may come after the other.
+                self.go_on_classifying();
             }
         }
         if let Some(alarm) = self.fault(doubted) {
@@ -271,7 +276,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         let orders = self.orders();
         self.tool.order(orders.pulse, readings.now);
         self.warn();
-        self.is_enough = false;
+        self.turn_spent = false;
         orders
     }
 
@@ -283,7 +288,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             pulse: self.bench.pulse().unwrap_or_else(|| pulse_of(pulse)),
             pulse_out: pulse_of(Setting::ServoOutUs),
             gap_ms: self.configuration.get(Setting::ServoGapMs) as u8,
-            is_enough: self.is_enough,
+            turn_spent: self.turn_spent,
         }
     }
 
@@ -293,57 +298,59 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         self.sensors.encoder.is_doubtful() || out && self.sensors.encoder.is_quiet() || self.ground.must_be_out(out)
     }
 
-    /// Begins to judge a complete object, which takes some turns more. What is dust is only counted.
-    fn judge(&mut self, object: Object) {
-        self.is_enough = true;
-        let width_mm = self.ground.millimetres(self.ground.ticks(object.width()));
-        if !object.cut && (width_mm as u16) < self.configuration.get(Setting::MinWidthMm) {
+    /// Begins to classify a complete detection, which takes some turns more. What is dust is only counted.
+    fn classify(&mut self, detection: Detection, is_of_second: bool) {
+        self.turn_spent = true;
+        let width_mm = self.ground.millimetres(self.ground.ticks(detection.width()));
+        if !detection.cut && (width_mm as u16) < self.configuration.get(Setting::MinWidthMm) {
             count(&mut self.dust);
             return;
         }
-        // The one before it, a few millimetres off, is not judged yet. Like all of which nobody knows what it is, it is kept.
-        if self.is_judging {
+        // The one before it, a few millimetres off, is not classified yet. Like all of which nobody knows what it is, it is kept.
+        if self.is_classifying {
             self.decide(Some(Vote::UNKNOWN));
         }
+        self.is_of_second = is_of_second;
         let position = self.sensors.readings.position;
-        let spacing_mm = self.ground.millimetres(self.ground.spacing(&object));
+        let spacing_mm = self.ground.millimetres(self.ground.spacing(&detection));
         let speed_class_mm_s = features::speed_class(self.speed_mm_s());
-        self.no_plants = NoPlants::since(position);
-        let judged = Judged { speed_class_mm_s, spacing_mm, width_mm, vote: Vote::UNKNOWN, label: None };
-        self.objects.remember(judged);
-        self.ground.await_judgement(object);
-        (self.judging, self.is_judging) = (object, true);
-        // What is left of an object whose beginning was not seen may be as narrow as a weed.
-        let vote = if object.cut {
+        self.plant_timeout = PlantTimeout::since(position);
+        let classified = Classified { speed_class_mm_s, spacing_mm, width_mm, vote: Vote::UNKNOWN, label: None };
+        self.detections.remember(classified);
+        self.ground.await_class(detection);
+        (self.classifying, self.is_classifying) = (detection, true);
+        // What is left of a detection whose beginning was not seen may be as narrow as a weed.
+        let vote = if detection.cut {
             Some(Vote::UNKNOWN)
         } else {
-            self.classifier.begin(&judged.features(), self.configuration.get(Setting::K) as u8)
+            self.classifier.begin(&classified.features(), self.configuration.get(Setting::K) as u8)
         };
         self.decide(vote);
     }
 
-    /// Judges on.
+    /// Classifies on.
     #[cfg_attr(target_arch = "avr", inline(never))]
-    fn go_on_judging(&mut self) {
-        self.is_enough = true;
+    fn go_on_classifying(&mut self) {
+        self.turn_spent = true;
         let vote = self.classifier.go_on();
         self.decide(vote);
     }
 
-    /// Tells of the object that is being judged, once there is a vote, and keeps it unless it is a weed.
+    /// Tells of the detection that is being classified, once there is a vote, and keeps it unless it is a weed.
     #[cfg_attr(target_arch = "avr", inline(never))]
     fn decide(&mut self, vote: Option<Vote>) {
-        let (Some(vote), Some(judged)) = (vote, self.objects.newest()) else { return };
-        judged.vote = vote;
-        let (object, width_mm) = (self.judging, judged.width_mm);
-        self.is_judging = false;
-        let leading = self.ground.position_of(object.leading, self.sensors.readings.position);
-        let (spacing, plan) = (self.ground.spacing(&object), self.ground.plan(&object));
-        self.events.add(Event::Object { vote, leading, spacing, plan });
-        if self.ground.judged(object, vote.class != Class::Weed).is_err() {
+        let (Some(vote), Some(classified)) = (vote, self.detections.newest()) else { return };
+        classified.vote = vote;
+        let (detection, width_mm) = (self.classifying, classified.width_mm);
+        self.is_classifying = false;
+        let leading = self.ground.position_of(detection.leading, self.sensors.readings.position);
+        let (spacing, plan) = (self.ground.spacing(&detection), self.ground.plan(&detection));
+        self.events.add(Event::Detection { vote, leading, spacing, plan });
+        if self.ground.classified(detection, vote.class).is_err() {
             self.raise(Alarm::ScheduleFull);
         }
-        self.count_misfit(vote.class, width_mm);
+        // What is told twice counts once.
+        self.count_misfit(vote.class, if self.is_of_second { 0 } else { width_mm });
     }
 
     /// Latches an alarm. What was seen can no longer be trusted.
@@ -366,8 +373,8 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             self.raise(Alarm::SettingsContradict);
             return;
         }
-        self.no_plants = NoPlants::since(self.sensors.readings.position);
-        self.misfits = Misfits::NONE;
+        self.plant_timeout = PlantTimeout::since(self.sensors.readings.position);
+        self.unknown_run = UnknownRun::NONE;
         self.enter(State::Work);
     }
 

@@ -13,12 +13,12 @@ use control::{
     ground::{examples::EXAMPLES, nearest::Nearest},
     measure::{
         quadrature::{Quadrature, Step},
-        readings::{Edge, Readings, WakeUp},
+        readings::{Edge, Readings, Startup},
         reset::Cause,
     },
     memory::Volatile,
     operate::{servo, state::State},
-    settings::Setting,
+    settings::{Setting, TICKS_PER_M_LEAST},
     units::{Instant, Interval, Position},
     weeder::Controller,
 };
@@ -29,7 +29,7 @@ use rayon::prelude::*;
 use std::fmt::{self, Write};
 use std::ops::Range;
 
-/// A wheel of 400 mm with 2400 counts.
+/// A tick of a wheel of 400 mm with 2400 counts.
 const TICK_MM: f64 = std::f64::consts::PI * 400.0 / 2400.0;
 
 /// The row: plants half a metre apart, with canopies of 150 mm, the first so far from where the machine starts.
@@ -68,6 +68,8 @@ enum Fault {
     Spikes { a_second: u32 },
     /// So many of a thousand edges do not come: the channel stays where it is until its next edge but one.
     LostEdges { in_1000: u32 },
+    /// One channel drops out for so many ticks, time and again.
+    Dropouts { ticks: u32, every_mm: u32 },
 }
 
 impl fmt::Display for Fault {
@@ -79,6 +81,7 @@ impl fmt::Display for Fault {
             }
             Self::Spikes { a_second } => write!(f, "{a_second} spikes a second on both channels"),
             Self::LostEdges { in_1000 } => write!(f, "{} % of the edges lost", f64::from(in_1000) / 10.0),
+            Self::Dropouts { ticks, every_mm } => write!(f, "one channel dead for {ticks} ticks every {every_mm} mm"),
         }
     }
 }
@@ -117,6 +120,7 @@ struct Run {
     speed_km_h: f64,
     from_mm: f64,
     seed: u64,
+    tick_mm: f64,
 }
 
 /// What a run showed.
@@ -175,6 +179,8 @@ struct Wires {
     way: Way,
     fault: Fault,
     from_s: f64,
+    from_mm: f64,
+    tick_mm: f64,
     rng: ChaCha8Rng,
     /// The number of the next edge, and its time.
     edge: i64,
@@ -197,6 +203,8 @@ impl Wires {
             way,
             fault: run.fault,
             from_s: way.time_s(run.from_mm),
+            from_mm: run.from_mm,
+            tick_mm: run.tick_mm,
             rng: ChaCha8Rng::seed_from_u64(run.seed),
             edge: 0,
             edge_s: 0.0,
@@ -218,7 +226,7 @@ impl Wires {
         self.edge += 1;
         // The edges of one channel come late by a third of the distance between two.
         let late = if self.edge % 2 == 0 { 1.0 / 3.0 } else { 0.0 };
-        self.edge_s = self.way.time_s((self.edge as f64 + late) * TICK_MM);
+        self.edge_s = self.way.time_s((self.edge as f64 + late) * self.tick_mm);
     }
 
     /// Rolls on to a time.
@@ -237,7 +245,7 @@ impl Wires {
                 let from = FORWARD[(self.edge - 1).rem_euclid(4) as usize];
                 let to = FORWARD[self.edge.rem_euclid(4) as usize];
                 let channel = from ^ to;
-                if !self.is_lost(self.edge_s) {
+                if !self.is_lost(self.edge_s, channel) {
                     self.levels = self.levels & !channel | to & channel;
                 }
                 self.next_edge();
@@ -252,7 +260,7 @@ impl Wires {
         }
     }
 
-    fn is_lost(&mut self, time_s: f64) -> bool {
+    fn is_lost(&mut self, time_s: f64, channel: u8) -> bool {
         let since_s = time_s - self.from_s;
         match self.fault {
             _ if since_s < 0.0 => false,
@@ -261,6 +269,10 @@ impl Wires {
                 phase_s < f64::from(length_ms) / 1000.0
             }
             Fault::Spikes { .. } => false,
+            Fault::Dropouts { ticks, every_mm } => {
+                let phase_mm = (self.edge as f64 * self.tick_mm - self.from_mm).rem_euclid(every_mm.into());
+                channel == 0b01 && phase_mm < f64::from(ticks) * self.tick_mm
+            }
             Fault::LostEdges { in_1000 } => self.rng.random_bool(f64::from(in_1000) / 1000.0),
         }
     }
@@ -281,9 +293,16 @@ fn roll(run: Run) -> Shown {
         let now = Instant::default() + Interval::from_steps((time_s * f64::from(Interval::STEPS_PER_SECOND)) as u32);
         Readings { jumps: wires.jumps, ..Readings::new(now, Position::new(wires.count as i32)) }
     };
-    let wake_up = WakeUp { readings: readings(0.0, &wires), beam_broken: false, cause: Cause::PowerOn };
-    let mut weeder = Controller::new(Nearest::new(&EXAMPLES[..], Volatile::new()), Volatile::new(), wake_up);
+    let startup = Startup { readings: readings(0.0, &wires), beam_broken: false, cause: Cause::PowerOn };
+    let mut weeder = Controller::new(Nearest::new(&EXAMPLES[..], Volatile::new()), Volatile::new(), startup);
     weeder.clear();
+    if run.tick_mm != TICK_MM {
+        weeder.set(Setting::TicksPerM, (1000.0 / run.tick_mm).round() as u16).expect("fine enough");
+    }
+    // As quick as this servo is, the machine may work at 5 km/h.
+    for (setting, value) in [(Setting::LeadOutMs, (SWING_S * 1000.0) as u16), (Setting::TopSpeedMmS, 1400)] {
+        weeder.set(setting, value).expect("within its range");
+    }
     weeder.start(false).expect("nothing is wrong yet");
     let tool_in = servo::from_us(weeder.settings().get(Setting::ServoInUs));
 
@@ -347,7 +366,7 @@ fn worst(fault: Fault, speed_km_h: f64) -> (Outcome, Run) {
         .map(|place| {
             // The tool is at work between the first plants.
             let from_mm = 1800.0 + SPACING_MM * f64::from(place) / f64::from(places);
-            let run = Run { fault, speed_km_h, from_mm, seed: place.into() };
+            let run = Run { fault, speed_km_h, from_mm, seed: place.into(), tick_mm: TICK_MM };
             (roll(run).outcome(), run)
         })
         .max_by_key(|(outcome, _)| *outcome)
@@ -411,8 +430,31 @@ fn whatever_ails_the_encoder_every_canopy_is_kept_or_the_alarm_comes_before_a_se
 #[test]
 fn spikes_on_both_channels_are_not_counted() {
     for speed_km_h in [1.0, 2.5, 4.0] {
-        let run = Run { fault: Fault::Spikes { a_second: 10 }, speed_km_h, from_mm: 300.0, seed: 1 };
+        let run = Run { fault: Fault::Spikes { a_second: 10 }, speed_km_h, from_mm: 300.0, seed: 1, tick_mm: TICK_MM };
         let shown = roll(run);
         assert!((shown.rolled - shown.counted).abs() <= 4, "{run:?}: {shown:?}");
     }
+}
+
+#[test]
+fn a_channel_that_drops_out_now_and_then_costs_a_plant_at_the_most_with_the_coarsest_encoder_from_half_a_kilometre_an_hour_on()
+ {
+    let tick_mm = 1000.0 / f64::from(TICKS_PER_M_LEAST);
+    let runs: Vec<Run> = [tick_mm, 1.0, TICK_MM]
+        .into_iter()
+        .flat_map(|tick_mm| [0.5, 0.6, 0.75, 0.88, 1.0, 2.5].map(|speed_km_h| (tick_mm, speed_km_h)))
+        .flat_map(|of| [4, 8, 20, 60, 200].map(|ticks| (of, ticks)))
+        .flat_map(|of| [70, 130, 300, 500, 900].map(|every_mm| (of, every_mm)))
+        .map(|(((tick_mm, speed_km_h), ticks), every_mm)| {
+            let fault = Fault::Dropouts { ticks, every_mm };
+            Run { fault, speed_km_h, from_mm: 1850.0, seed: 1, tick_mm }
+        })
+        .collect();
+    let failed: Vec<String> = runs
+        .par_iter()
+        .map(|&run| (run, roll(run)))
+        .filter(|(_, shown)| shown.outcome() == Outcome::Failed)
+        .map(|(run, shown)| format!("{run:?}: {shown:?}"))
+        .collect();
+    assert!(failed.is_empty(), "{} of {}: {failed:#?}", failed.len(), runs.len());
 }

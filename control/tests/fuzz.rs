@@ -8,7 +8,7 @@ use control::{
     alarm::Alarm,
     ground::{class::Classifier, examples::EXAMPLES, field_examples, nearest::Nearest},
     measure::{
-        readings::{Readings, WakeUp},
+        readings::{Readings, Startup},
         reset::Cause,
     },
     memory::{ERASED, Memory, SIZE, Volatile},
@@ -29,8 +29,8 @@ use control::{
 /// The machine as the firmware has it, with these contents of its EEPROM's halves.
 fn machine(for_settings: Volatile, for_examples: Volatile) -> Controller<impl Classifier, impl Memory> {
     let readings = Readings::new(Instant::new(0), Position::new(0));
-    let wake_up = WakeUp { readings, beam_broken: false, cause: Cause::PowerOn };
-    Controller::new(Nearest::new(&EXAMPLES[..], for_examples), for_settings, wake_up)
+    let startup = Startup { readings, beam_broken: false, cause: Cause::PowerOn };
+    Controller::new(Nearest::new(&EXAMPLES[..], for_examples), for_settings, startup)
 }
 
 /// Something that may come along the line: bytes by chance seldom make a command.

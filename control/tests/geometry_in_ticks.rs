@@ -1,7 +1,7 @@
 //! The paper's Eq. 1 to 3 in integers, over every machine that the settings allow.
 
 use control::{
-    ground::{reach::Geometry, schedule::Plan},
+    ground::{keep_out::Plan, reach::Geometry},
     settings::{Setting, Settings},
     units::{Length, Ticks},
 };
@@ -11,7 +11,7 @@ use std::f64::consts::PI;
 /// Settings of any wheel, by its diameter or measured, and X.
 fn machines() -> impl Strategy<Value = Settings> {
     let ticks_per_m = prop_oneof![Just(0), 40_u16..=20_000];
-    (100_u16..=10_000, 200_u16..=800, ticks_per_m, 100_u16..=2000).prop_map(
+    (600_u16..=10_000, 200_u16..=800, ticks_per_m, 100_u16..=2000).prop_map(
         |(ticks_per_rev, wheel_mm, ticks_per_m, beam_to_tool_mm)| {
             let mut settings = Settings::new();
             for (setting, value) in [
@@ -41,7 +41,7 @@ proptest! {
     #[test]
     fn delay_hold_and_actuation_are_within_two_units_of_the_equations(settings in machines(), width in 0_i16..4000) {
         let geometry = Geometry::of(&settings, 0);
-        let unit = f64::from(geometry.grain.ticks(Length(1)).0);
+        let unit = f64::from(geometry.scale.ticks(Length(1)).0);
         let plan = Plan::new(&geometry, Length(width));
         let scale = ticks_a_metre(&settings);
         let delay = (f64::from(settings.get(Setting::BeamToToolMm)) / 1000.0 - 0.05) * scale;

@@ -73,6 +73,19 @@ fn a_plant_that_was_not_seen_is_kept_with_a_swing_of_its_own() {
 }
 
 #[test]
+fn a_stem_zone_is_kept_beside_the_scatter_of_a_plant_that_was_not_seen() {
+    for zone_mm in [0.0, 100.0] {
+        let seen_mm = [500.0, 1000.0, 2000.0].map(canopy).to_vec();
+        let mut rolling = guarding(seen_mm, &[(Setting::StemZoneMm, zone_mm as u16)]);
+        rolling.roll_to(2400.0, 400.0);
+        rolling.assert_guarded(&[1500.0]);
+        let half_mm = 30.0 + zone_mm / 2.0 + MARGIN_MM;
+        assert!(!rolling.has_weeded(1500.0 - half_mm + TOLERANCE_MM, 1500.0 + half_mm - TOLERANCE_MM));
+        assert!(rolling.has_weeded(1500.0 + half_mm - 1.0, 1500.0 + half_mm + TOLERANCE_MM), "{zone_mm}");
+    }
+}
+
+#[test]
 fn behind_three_unseen_plants_the_row_is_at_its_end_until_a_plant_is_seen() {
     let mut seen = vec![true, true];
     seen.extend([false; 8]);
@@ -160,8 +173,7 @@ fn a_plant_that_is_due_keeps_the_tool_out_before_it_is_clear_whether_it_is_seen(
     ];
     let mut rolling = guarding(vec![canopy(500.0)], &settings);
     rolling.roll_to(1200.0, 80.0);
-    let nearer_mm = BEAM_TO_TOOL_MM - 100.0;
-    let weeded = |place_mm: f64| rolling.has_weeded(place_mm - nearer_mm - 1.0, place_mm - nearer_mm + 1.0);
+    let weeded = |place_mm: f64| rolling.has_weeded(place_mm - 1.0, place_mm + 1.0);
     assert!(!weeded(950.0) && !weeded(1000.0) && !weeded(1050.0) && weeded(800.0));
 }
 

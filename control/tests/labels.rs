@@ -1,4 +1,4 @@
-//! What the operator says of the last object, against what the built-in examples say.
+//! What the operator says of the last detection, against what the built-in examples say.
 
 #[path = "common/readings.rs"]
 mod readings;
@@ -27,7 +27,7 @@ const SPEED: u64 = 1061;
 struct Rolling {
     machine: Machine,
     count: i32,
-    /// Where the last object began.
+    /// Where the last detection began.
     leading: i32,
     /// What came from the beam since the last turn.
     edges: Vec<Edge>,
@@ -52,7 +52,7 @@ impl Rolling {
         self.edges.push(Edge::Seen { position: Position::new(trailing), broken: false, second_broken: false });
         self.roll_to(trailing + wheel.ticks(40).0);
         self.leading = leading;
-        self.machine.objects().last().expect("the object was seen").vote.class
+        self.machine.detections().last().expect("the object was seen").vote.class
     }
 
     fn roll_to(&mut self, count: i32) {
@@ -76,7 +76,7 @@ impl Rolling {
     }
 
     fn label(&self) -> Option<u8> {
-        self.machine.objects().last().expect("an object").label
+        self.machine.detections().last().expect("an object").label
     }
 }
 

@@ -91,7 +91,9 @@ fn roll(distance_mm: u16, plants: &[(f64, f64)], legs: &[Leg], paper: bool) -> R
     let mut out_since_us = None;
     let mut edges = Vec::new();
     for leg in legs {
-        let target = leg.speed_mm_s.min(0.95 * top_speed_mm_s) * TICKS_A_METRE / 1000.0;
+        // Rolling back too fast is an alarm as well.
+        let most_mm_s = 0.95 * top_speed_mm_s;
+        let target = leg.speed_mm_s.clamp(-most_mm_s, most_mm_s) * TICKS_A_METRE / 1000.0;
         let mut left = leg.length_mm * TICKS_A_METRE / 1000.0;
         while left > 0.0 {
             // A person pushes: 1 m/s2.
@@ -114,7 +116,7 @@ fn roll(distance_mm: u16, plants: &[(f64, f64)], legs: &[Leg], paper: bool) -> R
             farthest = farthest.max(count);
             let orders = machine.turn(readings(time_us, count), edges.drain(..));
             while let Some(event) = machine.next_event() {
-                run.plants_told += usize::from(matches!(event, Event::Object { .. }));
+                run.plants_told += usize::from(matches!(event, Event::Detection { .. }));
             }
             let tool = f64::from(count) - distance;
             if orders.pulse != tool_in {

@@ -71,7 +71,7 @@ impl<const CLASSES: usize> Nearest<CLASSES> {
         (self.places.get_mut(..self.k.into()).unwrap_or_default(), self.free.into())
     }
 
-    /// Examples have joined the [`places`](Self::places), of which so many are still free, and no more than were.
+    /// Examples have joined the [`gps`](Self::places), of which so many are still free, and no more than were.
     #[inline]
     pub fn have_joined(&mut self, free: usize) {
         self.free = free.min(self.free.into()) as u8;

@@ -1,15 +1,25 @@
-// What build.mjs puts in: the firmware, the project's Rust, and what the manual says of alarms and warnings.
+// What build.mjs puts in: the firmware, as it is and packed, the project's Rust, packed, the worker that reads logs, and what the manual says of alarms and warnings.
 declare module "weeder.hex" {
     const hex: string;
     export default hex;
 }
 
+declare module "packed.hex" {
+    const packed: Uint8Array<ArrayBuffer>;
+    export default packed;
+}
+
+declare module "log-worker.js" {
+    const code: string;
+    export default code;
+}
+
 declare module "page.wasm" {
-    const bytes: Uint8Array<ArrayBuffer>;
-    export default bytes;
+    const packed: Uint8Array<ArrayBuffer>;
+    export default packed;
 }
 
 declare module "faults.json" {
-    const faults: { code: string; name: string; cause: string; advice: string }[];
+    const faults: { name: string; title: string; cause: string; advice: string }[];
     export default faults;
 }

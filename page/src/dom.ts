@@ -1,5 +1,7 @@
 // The page's elements, by the names that index.html gives them in `data-part`, each with the kind that it has to be.
 
+import { show } from "./words/words.ts";
+
 export class Parts {
     readonly root: HTMLElement;
 
@@ -26,7 +28,13 @@ export class Parts {
     /** Puts a text where another was. */
     write(name: string, text: string): void {
         const element = this.html(name);
+        show(element);
         if (element.textContent !== text) element.textContent = text;
+    }
+
+    /** Puts a text where another was, and writes it again where the language is another one. */
+    say(name: string, text: () => string): void {
+        show(this.html(name), text);
     }
 }
 

@@ -1,27 +1,48 @@
 // The page: three things to do, and what they share. The panel that stands beside the row in "Try it" is the one that works
 // with a real Uno; it is only connected to another.
 
-import hex from "weeder.hex";
+import { makeInstallable } from "./app/install.ts";
 import { Parts } from "./dom.ts";
+import { hex } from "./firmware.ts";
 import { Flasher } from "./flasher/flasher.ts";
+import { keepFocus } from "./focus.ts";
 import { isServed } from "./link/served.ts";
 import type { Wire } from "./link/session.ts";
 import { Connection } from "./panel/connection.ts";
 import { Panel } from "./panel/panel.ts";
 import { showServed } from "./panel/served.ts";
+import { chosen, isStill, keep } from "./preferences.ts";
+import { RecordView } from "./record/record.ts";
+import { isOn, isWaiting, turn, wakeOnTouch } from "./signals.ts";
 import { Drawing } from "./try/drawing.ts";
 import { inWords } from "./try/outcome.ts";
+import { commandsSetUp, machineSetUp } from "./try/set_up.ts";
 import { Trial } from "./try/trial.ts";
 import { CYCLES_PER_SECOND } from "./uno/uno.ts";
+import {
+    type Code,
+    LANGUAGES,
+    language,
+    number,
+    onLanguage,
+    quantity,
+    say,
+    show,
+    speak,
+    told,
+    translate,
+} from "./words/words.ts";
 
 /** Share of a frame's time that the chip may take: the rest is for the picture, and for the operator's clicks. */
 const CHIP_SHARE = 0.75;
 /** Longest time that passes in a frame: a page that was hidden does not catch up. */
 const LONGEST_FRAME_S = 0.1;
+/** Time between two pictures of the row where little motion is asked for: it does not glide. */
+const STILL_MS = 1000;
 /** Time over which the pace is measured. */
 const PACE_S = 1;
 /** The things to do, by their sections and the address behind #. */
-const VIEWS = ["try", "work", "flash"] as const;
+const VIEWS = ["try", "work", "flash", "record"] as const;
 
 function find<Kind extends Element>(id: string, kind: new () => Kind): Kind {
     const element = document.getElementById(id);
@@ -35,7 +56,23 @@ function write(id: string, text: string): void {
     if (element.textContent !== text) element.textContent = text;
 }
 
-const trial = new Trial(hex, Date.now());
+translate(document.body);
+const nameLanguage = () => {
+    document.documentElement.lang = language();
+};
+nameLanguage();
+onLanguage(nameLanguage);
+const languages = find("language", HTMLSelectElement);
+for (const [code, { name }] of Object.entries(LANGUAGES)) {
+    const option = new Option(name, code);
+    option.lang = code;
+    languages.append(option);
+}
+languages.value = language();
+languages.addEventListener("change", () => speak(languages.value as Code));
+show(find("unchecked", HTMLElement), () => say("unchecked"));
+
+const trial = new Trial(hex, Date.now(), machineSetUp());
 const drawing = new Drawing(find("drawing", SVGSVGElement), trial);
 const trialPanel = new Panel(find("try-panel", HTMLElement), "try");
 const wire: Wire = {
@@ -50,14 +87,16 @@ const trialMs = () => (trial.uno.cycle / CYCLES_PER_SECOND) * 1000;
 trialPanel.connect(wire, trialMs(), true);
 trialPanel.onHappening = (happening) => {
     trial.take(happening);
-    // A board without settings says so: its own are right for this machine.
+    // A board without settings says so: it is told those of this machine, which is set up.
     if (happening.is === "started" && happening.line.includes("settings_lost")) settleAt = "connected";
     if (happening.is !== settleAt) return;
     settleAt = undefined;
-    for (const command of ["save", "clear"]) trialPanel.ask(command).catch(() => {});
+    for (const command of [...commandsSetUp(), "save", "clear"]) trialPanel.ask(command).catch(() => {});
 };
 /** What is waited for before the settings are saved. */
 let settleAt: "connected" | undefined;
+
+new RecordView(find("view-record", HTMLElement));
 
 /** The panels of real machines. */
 let workPanels: Panel[] = [];
@@ -70,6 +109,9 @@ function workHere(): void {
     const panel = new Panel(find("work-panel", HTMLElement), "work");
     workPanels = [panel];
     const connection = new Connection(new Parts(find("connection", HTMLElement)), panel);
+    connection.onFlash = () => {
+        location.hash = "#flash";
+    };
     flasher.onBegin = (port) => connection.release(port);
     flasher.onWork = (port) => {
         location.hash = "#work";
@@ -85,28 +127,66 @@ async function workServed(): Promise<void> {
     try {
         workPanels = await showServed(served);
     } catch (error) {
-        served.append(
-            `The machines cannot be asked for: ${error instanceof Error ? error.message : error}. Load the page anew.`,
-        );
+        const why = error instanceof Error ? error.message : String(error);
+        const said = document.createElement("p");
+        show(said, () => say("noMachinesList", { why: told(why) }));
+        served.append(said);
     }
 }
 
 /** Shows what is chosen. */
 function choose(): void {
-    const chosen = VIEWS.find((view) => `#${view}` === location.hash) ?? "try";
-    for (const view of VIEWS) find(`view-${view}`, HTMLElement).hidden = view !== chosen;
-    for (const link of document.querySelectorAll("nav a"))
-        link.ariaCurrent = link.getAttribute("href") === `#${chosen}` ? "page" : null;
+    const shown = VIEWS.find((view) => `#${view}` === location.hash) ?? "try";
+    const focused = document.activeElement;
+    for (const view of VIEWS) find(`view-${view}`, HTMLElement).hidden = view !== shown;
+    for (const link of document.querySelectorAll<HTMLElement>("nav a")) {
+        const isShown = link.getAttribute("href") === `#${shown}`;
+        link.ariaCurrent = isShown ? "page" : null;
+        if (isShown && focused?.closest("main [hidden]")) link.focus();
+    }
 }
 globalThis.addEventListener("hashchange", choose);
 choose();
 
+keepFocus();
+
+void makeInstallable((load) => {
+    find("newer", HTMLElement).hidden = false;
+    button("load-newer", load);
+});
+
+/** HOLD on a key, for every machine that is shown. */
+globalThis.addEventListener("keydown", ({ key }) => {
+    if (key !== "Escape") return;
+    if (!find("view-try", HTMLElement).hidden) trialPanel.hold();
+    else for (const panel of workPanels) panel.hold();
+});
+
 /** Light or dark as the system has it, or light where the sun shines on it. */
 const light = find("light", HTMLButtonElement);
-light.addEventListener("click", () => {
-    const on = light.ariaPressed !== "true";
+function lighten(on: boolean): void {
     light.ariaPressed = String(on);
     document.documentElement.classList.toggle("light", on);
+}
+lighten(chosen("light") === "on");
+light.addEventListener("click", () => {
+    const on = light.ariaPressed !== "true";
+    keep("light", on ? "on" : "off");
+    lighten(on);
+});
+
+const sound = find("sound", HTMLButtonElement);
+function showSound(): void {
+    sound.ariaPressed = String(isOn());
+    sound.classList.toggle("waiting", isWaiting());
+    sound.ariaLabel = say(isWaiting() ? "soundWaits" : "sound");
+}
+showSound();
+onLanguage(showSound);
+wakeOnTouch(showSound);
+sound.addEventListener("click", () => {
+    turn(!isOn());
+    showSound();
 });
 
 /** Shows a slider's value beside it, and does with it what it is for, now and whenever it is moved. */
@@ -117,6 +197,7 @@ function slider(id: string, shown: (value: number) => string, use: (value: numbe
         use(input.valueAsNumber);
     };
     input.addEventListener("input", apply);
+    onLanguage(apply);
     apply();
 }
 
@@ -132,33 +213,31 @@ function button(id: string, use: () => void): void {
 }
 
 for (const form of ["drive", "bench"]) find(form, HTMLFormElement).reset();
+// Where little motion is asked for, the machine stands until the operator drives it.
+if (isStill()) find("speed", HTMLInputElement).value = "0";
 slider(
     "speed",
-    (speed) => `${speed.toFixed(1)} km/h`,
-    (speed) => trial.rollAt(speed),
+    (speed) => quantity(speed, "kilometer-per-hour", 1),
+    (speedKmH) => trial.machine.change({ speedKmH }),
 );
 slider(
     "spacing",
-    (spacing) => `${spacing} mm`,
-    (spacing) => {
-        trial.planting.spacingMm = spacing;
-    },
+    (spacing) => quantity(spacing, "millimeter"),
+    (spacingMm) => trial.machine.change({ spacingMm }),
 );
 slider(
     "weeds",
-    (share) => `${share} % of gaps`,
-    (share) => {
-        trial.planting.weedShare = share / 100;
-    },
+    (share) => say("ofGaps", { share: quantity(share, "percent") }),
+    (share) => trial.machine.change({ weedShare: share / 100 }),
 );
 slider(
     "slip",
-    (slip) => `${slip} %`,
-    (slip) => trial.slipBy(slip / 100),
+    (slip) => quantity(slip, "percent"),
+    (slip) => trial.machine.change({ slip: slip / 100 }),
 );
 toggle("switch", (on) => trial.work(on));
-toggle("torn", (on) => trial.machine.tearBeamWire(on));
-toggle("dead", (on) => trial.machine.killEncoder(on));
+toggle("torn", (beamWireTorn) => trial.machine.change({ beamWireTorn }));
+toggle("dead", (encoderDead) => trial.machine.change({ encoderDead }));
 button("brown-out", () => trial.uno.reset("brown-out"));
 button("press-reset", () => trial.uno.reset("external"));
 
@@ -170,16 +249,20 @@ const outcome = find("outcome", HTMLElement);
 
 function showTrial(): void {
     const { machine } = trial;
-    write("true-tool", machine.isWeeding ? "in the row" : machine.isClear ? "out" : "swings");
+    trialPanel.show();
+    write("true-tool", say(machine.isWeeding ? "toolIn" : machine.isClear ? "toolOut" : "swings"));
     lamp.classList.toggle("lit", trial.isLampLit);
-    lamp.ariaLabel = trial.isLampLit ? "status lamp, lit" : "status lamp, dark";
+    lamp.ariaLabel = say(trial.isLampLit ? "lampLit" : "lampDark");
     const { totals } = trial.outcome;
     write("outcome", inWords(totals));
+    write("why", trial.why);
     outcome.classList.toggle("damaged", totals.plants.damaged > 0);
     hint.hidden = !(workSwitch.checked && trialPanel.machine.mode !== "work");
+    if (isStill() && performance.now() - drawnMs < STILL_MS) return;
+    drawnMs = performance.now();
     drawing.draw(trial);
-    trialPanel.show();
 }
+let drawnMs = Number.NEGATIVE_INFINITY;
 
 /** How much time passed, on the chip and outside, since the pace was last shown. */
 const passed = { chipS: 0, outsideS: 0 };
@@ -193,7 +276,7 @@ function frame(nowMs: number): void {
         passed.chipS += trial.advance(outsideS * Number(time.value), outsideS * 1000 * CHIP_SHARE);
         passed.outsideS += outsideS;
         if (passed.outsideS > PACE_S) {
-            write("pace", `${(passed.chipS / passed.outsideS).toFixed(2)} x`);
+            write("pace", `${number(passed.chipS / passed.outsideS, 2)} x`);
             passed.chipS = passed.outsideS = 0;
         }
         trialPanel.turn(trialMs());

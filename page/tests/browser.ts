@@ -1,15 +1,18 @@
 // What the tests in a browser share: headless Chromium, the page opened from the disk as somebody without a network does, and
 // what is held against every page: no error, no request, nothing wider than the screen, nothing that axe-core finds.
 //
-// CHROMIUM names the browser where it is not Debian's. Screenshots go to build/screenshots.
+// CHROMIUM and FIREFOX name the browsers where they are not Debian's. Screenshots go to build/screenshots.
 
 import assert from "node:assert/strict";
-import { readFileSync } from "node:fs";
+import { existsSync, readFileSync } from "node:fs";
+import { createServer } from "node:http";
 import { createRequire } from "node:module";
-import { resolve } from "node:path";
+import type { AddressInfo } from "node:net";
+import { basename, extname, join, resolve } from "node:path";
+import type { TestContext } from "node:test";
 import { pathToFileURL } from "node:url";
 import type { AxeResults } from "axe-core";
-import { type Browser, chromium, type Page } from "playwright-core";
+import { type Browser, chromium, firefox, type Page } from "playwright-core";
 import type { Trial } from "../src/try/trial.ts";
 import { type Device, offerPorts } from "./ports.ts";
 
@@ -21,8 +24,15 @@ declare global {
 /** The longest that anything on the page may take: CI's machines are slow, and share their cores. */
 export const PATIENCE_MS = 60_000;
 
-export const PHONE = { width: 390, height: 844 };
-export const DESK = { width: 1440, height: 900 };
+/** What a page is shown on, and the browser's language where that is another one than American English. */
+export interface Screen {
+    readonly width: number;
+    readonly height: number;
+    readonly locale?: string;
+}
+
+export const PHONE: Screen = { width: 390, height: 844 };
+export const DESK: Screen = { width: 1440, height: 900 };
 
 const axe = readFileSync(createRequire(resolve("package.json")).resolve("axe-core/axe.min.js"), "utf8");
 
@@ -43,6 +53,36 @@ export function launch(): Promise<Browser> {
     });
 }
 
+/** Firefox, by WebDriver BiDi: the browser as Debian has it, and not a build of Playwright's own. */
+export function launchFirefox(): Promise<Browser> {
+    return firefox.launch({ channel: "moz-firefox", executablePath: process.env.FIREFOX ?? "/usr/bin/firefox-esr" });
+}
+
+const MEDIA: Readonly<Record<string, string>> = {
+    ".css": "text/css",
+    ".html": "text/html",
+    ".js": "text/javascript",
+    ".svg": "image/svg+xml",
+    ".webmanifest": "application/manifest+json",
+};
+
+/** A web server that knows nothing of the page gives away what lies in a folder. */
+export async function served(test: TestContext, folder: string): Promise<{ port: number; close(): Promise<void> }> {
+    const server = createServer((request, response) => {
+        const name = basename(new URL(request.url ?? "", "http://any").pathname) || "index.html";
+        const path = join(folder, name);
+        if (!existsSync(path)) response.writeHead(404).end();
+        else response.writeHead(200, { "content-type": MEDIA[extname(name)] }).end(readFileSync(path));
+    });
+    await new Promise<void>((done) => server.listen(0, "127.0.0.1", done));
+    const close = async () => {
+        server.closeAllConnections();
+        await new Promise((done) => server.close(done));
+    };
+    test.after(close);
+    return { port: (server.address() as AddressInfo).port, close };
+}
+
 /** A page, and what went wrong in it. */
 export interface Opened {
     readonly page: Page;
@@ -53,6 +93,8 @@ export interface Opened {
 export async function openAt(browser: Browser, address: string, viewport = DESK): Promise<Opened> {
     const opened = await blank(browser, viewport, new URL(address).origin);
     await opened.page.goto(address);
+    // The page is unpacked first. Where a phone is to be paired, another page comes instead.
+    await opened.page.waitForFunction(() => "trial" in globalThis || !document.getElementById("view-try"));
     return opened;
 }
 
@@ -61,12 +103,13 @@ export async function open(browser: Browser, view: string, viewport = DESK, port
     const opened = await blank(browser, viewport, "file:");
     if (ports) await offerPorts(opened.page, ports);
     await opened.page.goto(`${pathToFileURL(resolve("dist/index.html")).href}#${view}`);
+    await opened.page.waitForFunction(() => "trial" in globalThis);
     return opened;
 }
 
 /** A page that has opened nothing yet, and is to ask for nothing that does not begin like this. */
-async function blank(browser: Browser, viewport: typeof DESK, own: string): Promise<Opened> {
-    const page = await browser.newPage({ viewport });
+async function blank(browser: Browser, { locale, ...viewport }: Screen, own: string): Promise<Opened> {
+    const page = await browser.newPage({ viewport, ...(locale && { locale }) });
     page.setDefaultTimeout(PATIENCE_MS);
     const errors: string[] = [];
     page.on("pageerror", (error) => errors.push(String(error)));

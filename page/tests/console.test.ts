@@ -6,7 +6,7 @@ import { poweredUp, wokenUp } from "./operator.ts";
 
 test("the firmware names itself, why it started and what is missing", () => {
     const { greeting } = poweredUp();
-    assert.match(greeting, /^weeder \d+\.\d+\.\d+, .*power_on.*settings_lost.*help.*\r\n/);
+    assert.match(greeting, /^weeder \d+\.\d+\.\d+( \([0-9a-f]+\+?\))?, .*power_on.*settings_lost.*help.*\r\n/);
 });
 
 test("every kind of command is answered by its lines and one ok", () => {

@@ -2,8 +2,8 @@
 
 import assert from "node:assert/strict";
 import test from "node:test";
-import { chance } from "../src/row/row.ts";
 import { CYCLES_PER_SECOND } from "../src/uno/uno.ts";
+import { chance } from "./chance.ts";
 import { wokenUp } from "./operator.ts";
 
 /** Half a second or more, so that a loop that gets no time any more would be reset. */

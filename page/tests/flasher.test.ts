@@ -2,17 +2,13 @@
 // it cannot.
 
 import assert from "node:assert/strict";
-import { readFileSync } from "node:fs";
-import { createServer } from "node:http";
-import type { AddressInfo } from "node:net";
-import { basename, extname, join } from "node:path";
 import test, { after, before } from "node:test";
 import type { Browser, Page } from "playwright-core";
 import hex from "weeder.hex";
 import { BOARDS } from "../src/flasher/boards.ts";
 import { FLASH_BYTES } from "../src/uno/chip.ts";
 import { readHex } from "../src/uno/hex.ts";
-import { close, inspect, launch, open, PHONE } from "./browser.ts";
+import { close, inspect, launch, open, PHONE, served } from "./browser.ts";
 import { type Device, Foreign, VirtualUno } from "./ports.ts";
 
 const OPTIBOOT = ["--bootloader", "optiboot"];
@@ -49,10 +45,10 @@ test("an Uno with an empty flash is flashed through its bootloader, and is worke
     const opened = await open(browser, "flash", PHONE, [uno]);
     const { page } = opened;
     const flashing = flash(page);
-    await page.locator("[data-part=phase]", { hasText: /Writing: [1-9]\d* %/ }).waitFor();
+    await page.locator("[data-part=phase]", { hasText: /Writing: [1-9]\d*%/ }).waitFor();
     await inspect(page, "phone-flashing");
     const done = await flashing;
-    assert.match(done, /^Done: \d{5} bytes were written and read back in [\d.]+ s\.$/);
+    assert.match(done, /^Done: \d\d,\d{3} bytes were written and read back in [\d.]+ sec\.$/);
     test.diagnostic(done);
     await inspect(page, "phone-flashed");
     await page.getByRole("button", { name: "Work with it" }).click();
@@ -65,7 +61,7 @@ test("an old bootloader is flashed at its own rate and its fault is told, or tha
     const opened = await open(browser, "flash", undefined, [uno]);
     const board = BOARDS.find(({ isOld }) => isOld);
     assert(board);
-    await opened.page.getByLabel("Board").selectOption({ label: board.name });
+    await opened.page.getByLabel("Board").selectOption(board.id);
     const fits = readHex(hex, FLASH_BYTES).findLastIndex((byte) => byte !== 0xff) < board.roomBytes;
     assert.match(
         await flash(opened.page),
@@ -106,7 +102,7 @@ test("a port at which nothing answers is told with what to try", async () => {
 });
 
 test("the firmware without a bootloader is known by its greeting", async () => {
-    const text = await said(new Foreign(() => [], "weeder 0.1.0, reset by power_on, state hold, tool out\r\n"));
+    const text = await said(new Foreign(() => [], "weeder 0.2.0, reset by power_on, state hold, tool out\r\n"));
     assert.match(text, /the weeder's firmware answers, and no bootloader.*press the board's reset/);
 });
 
@@ -116,7 +112,7 @@ test("another chip is named, and nothing is written to it", async () => {
         commands.push(command);
         return command === 0x75 ? [0x14, 0x1e, 0x98, 0x01, 0x10] : [0x14, 0x10];
     });
-    assert.match(await said(mega), /this board has an ATmega2560, as on a Mega, .*nothing was written/);
+    assert.match(await said(mega), /this board has another chip, ATmega2560 \(Mega\): nothing was written/);
     assert.deepEqual(
         commands.filter((command) => command !== 0x30 && command !== 0x75),
         [],
@@ -160,14 +156,7 @@ test("a browser without Web Serial is told so, with the HEX and the command that
 });
 
 test("over plain http from another computer the page says why there is no port, and where there is one", async (test) => {
-    const server = createServer((request, response) => {
-        const name = basename(request.url ?? "") || "index.html";
-        const type = { ".css": "text/css", ".html": "text/html", ".js": "text/javascript" }[extname(name)];
-        response.writeHead(200, { "content-type": type }).end(readFileSync(join("dist", name)));
-    });
-    await new Promise<void>((done) => server.listen(0, "127.0.0.1", done));
-    test.after(() => server.close());
-    const { port } = server.address() as AddressInfo;
+    const { port } = await served(test, "dist");
     const page = await browser.newPage({ viewport: PHONE });
     await page.goto(`http://weeder.test:${port}/#work`);
     await page

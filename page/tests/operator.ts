@@ -11,13 +11,14 @@ const CYCLES_PER_MS = CYCLES_PER_SECOND / 1000;
 /** The line that ends an answer. */
 const END_OF_ANSWER = /^(ok|error: .*)\r\n/m;
 
-/** A level on each input: encoder low, beam clear, switches open. */
+/** A level on each input: encoder low, beams clear, switches open. */
 const AT_REST: [number, boolean][] = [
     [2, false],
     [3, false],
     [4, true],
     [5, true],
     [8, true],
+    [10, true],
 ];
 
 export class Operator {

@@ -3,13 +3,16 @@
 import assert from "node:assert/strict";
 import test from "node:test";
 import { Machine } from "../src/row/machine.ts";
-import { Motion, mmS } from "../src/row/motion.ts";
-import { chance, PLANTING, Row, sow, span } from "../src/row/row.ts";
+import { span, type Thing } from "../src/row/row.ts";
+import { CYCLES_PER_SECOND } from "../src/uno/uno.ts";
+import { chance } from "./chance.ts";
 import { type Operator, wokenUp } from "./operator.ts";
 
 const PLANTS = 8;
 const FIRST_MM = 900;
-const ACCELERATION_MM_S2 = 1000;
+const SECOND_BEAM_PIN = 10;
+/** Cycles between two looks at the tool. */
+const LOOK_CYCLES = CYCLES_PER_SECOND / 1000;
 
 /** What came of a row. */
 interface Outcome {
@@ -18,7 +21,8 @@ interface Outcome {
     /** Plants over whose canopies the tool was not fully out, and those over which it was. */
     touched: number;
     clear: number;
-    /** Weeds that the tool worked. */
+    /** Tall weeds, and those that the tool worked. */
+    weeds: number;
     weeded: number;
     /** Share of the ground between the plants that the tool worked. */
     worked: number;
@@ -26,16 +30,15 @@ interface Outcome {
 }
 
 /** Plants 480 to 620 mm apart with canopies of 100 to 180 mm, and a tall weed in the middle of every second gap. */
-function irregularRow(seed: number): Row {
-    const planting = { ...PLANTING, spacingScatterMm: 70, canopyMm: 140, canopyScatterMm: 40, weedShare: 0 };
-    const plants = new Row();
-    sow(plants, FIRST_MM + (PLANTS - 1.5) * planting.spacingMm, planting, chance(seed), FIRST_MM);
-    const row = new Row();
-    for (const [index, plant] of plants.things.slice(0, PLANTS).entries()) {
-        const before = row.things.at(-1);
-        if (before && index % 2 === 1)
-            row.add({ kind: "weed", placeMm: (span(before).endMm + span(plant).startMm) / 2, widthMm: 15 });
-        row.add(plant);
+function irregularRow(seed: number): Thing[] {
+    const random = chance(seed);
+    const row: Thing[] = [];
+    for (let [plants, placeMm] = [0, FIRST_MM]; plants < PLANTS; plants++, placeMm += 480 + 140 * random()) {
+        const plant: Thing = { kind: "plant", placeMm, widthMm: 100 + 80 * random() };
+        const before = row.at(-1);
+        if (before && plants % 2 === 1)
+            row.push({ kind: "weed", placeMm: (span(before).endMm + span(plant).startMm) / 2, widthMm: 15 });
+        row.push(plant);
     }
     return row;
 }
@@ -44,60 +47,47 @@ function irregularRow(seed: number): Row {
 function weed(speedKmH: number, seed: number, commands: readonly string[] = []): Outcome {
     const operator = wokenUp();
     for (const command of commands) operator.ask(command);
-    const row = irregularRow(seed);
-    const motion = new Motion(0);
-    const machine = new Machine(operator.uno, row, motion);
+    const things = irregularRow(seed);
+    const machine = new Machine(operator.uno, { things });
     operator.ask("start");
-    operator.run(50);
+    machine.runUntil(operator.uno.cycle + CYCLES_PER_SECOND / 20);
 
-    const startS = machine.timeS();
-    motion.changeSpeed(startS, mmS(speedKmH), ACCELERATION_MM_S2);
-    const swingsBefore = machine.servo.commands;
-    const endMm = row.endMm + 100;
-    const touched = new Set<number>();
-    const worked = new Set<number>();
+    machine.change({ speedKmH });
+    const swingsBefore = machine.commands;
+    const [fromMm, toMm] = [FIRST_MM, Math.max(...things.map((thing) => span(thing).endMm))];
     let [weededMm, lastMm] = [0, 0];
-    const isOver = (index: number) => {
-        const thing = row.things[index];
-        return thing && machine.toolMm >= span(thing).startMm && machine.toolMm <= span(thing).endMm;
-    };
-    while (machine.toolMm < endMm) {
-        machine.runUntil(operator.uno.cycle + 160_000, () => {
-            for (const index of row.things.keys()) {
-                if (!isOver(index)) continue;
-                if (!machine.isClear) touched.add(index);
-                if (machine.isWeeding) worked.add(index);
-            }
-            if (machine.isWeeding && machine.toolMm > FIRST_MM && machine.toolMm < row.endMm)
-                weededMm += machine.toolMm - lastMm;
-            lastMm = machine.toolMm;
-        });
+    while (machine.toolMm < toMm + 100) {
+        machine.runUntil(operator.uno.cycle + LOOK_CYCLES);
+        if (machine.isWeeding && machine.toolMm > fromMm && machine.toolMm < toMm) weededMm += machine.toolMm - lastMm;
+        lastMm = machine.toolMm;
     }
-    const swings = machine.servo.commands - swingsBefore;
-    motion.changeSpeed(machine.timeS(), 0, ACCELERATION_MM_S2);
-    machine.runUntil(operator.uno.cycle + 16_000_000);
-    const plants = [...row.things.keys()].filter((index) => row.things[index]?.kind === "plant");
-    const canopiesMm = plants.reduce((sum, index) => sum + (row.things[index]?.widthMm ?? 0), 0);
+    const swings = machine.commands - swingsBefore;
+    machine.change({ speedKmH: 0 });
+    machine.runUntil(operator.uno.cycle + CYCLES_PER_SECOND);
+    const fates = machine.judge(0, 0).map(([, fate]) => fate);
+    const plants = things.filter(({ kind }) => kind === "plant");
+    const canopiesMm = plants.reduce((sum, { widthMm }) => sum + widthMm, 0);
     return {
         operator,
         machine,
-        touched: plants.filter((index) => touched.has(index)).length,
-        clear: plants.filter((index) => !touched.has(index)).length,
-        weeded: worked.size - plants.filter((index) => worked.has(index)).length,
-        worked: weededMm / (row.endMm - FIRST_MM - canopiesMm),
+        touched: fates.filter((fate) => fate === "damaged").length,
+        clear: fates.filter((fate) => fate === "kept").length,
+        weeds: things.length - plants.length,
+        weeded: fates.filter((fate) => fate === true).length,
+        worked: weededMm / (toMm - fromMm - canopiesMm),
         swings,
     };
 }
 
 for (const speedKmH of [1, 1.5, 2, 2.5]) {
     test(`at ${speedKmH} km/h no canopy is reached, and the ground between is weeded`, () => {
-        const outcome = weed(speedKmH, speedKmH * 10);
+        // So short a lead that the tool comes in between any two plants.
+        const outcome = weed(speedKmH, speedKmH * 10, ["set lead_out_ms 180"]);
         const { operator, machine } = outcome;
         assert.deepEqual([outcome.touched, outcome.clear], [0, PLANTS]);
         // In, as the first ground that was seen reaches the tool; then out and in for each plant.
         assert.equal(outcome.swings, 1 + 2 * PLANTS);
-        const weeds = machine.row.things.length - PLANTS;
-        assert.equal(outcome.weeded, weeds, `tall weeds worked of ${weeds}`);
+        assert.equal(outcome.weeded, outcome.weeds, `tall weeds worked of ${outcome.weeds}`);
         assert(outcome.worked > 0.25, `worked ${outcome.worked} of the ground between the plants`);
         const { pos, lost, state, mistakes } = operator.status();
         assert.deepEqual([Number(pos), lost, state, mistakes], [machine.ticks, "0", "work", "0"]);
@@ -114,17 +104,41 @@ test("without look-ahead, as in the paper, the tool reaches canopies at 2.5 km/h
 test("a dead encoder takes the tool out of the row, and says so", () => {
     const operator = wokenUp();
     operator.ask("events on");
-    const row = new Row();
-    sow(row, 5000, PLANTING, chance(3), FIRST_MM);
-    const motion = new Motion(0);
-    const machine = new Machine(operator.uno, row, motion);
+    const sowing = { seed: 3, spacingMm: 550, weedShare: 0.25, firstMm: FIRST_MM };
+    const machine = new Machine(operator.uno, { sowing });
     operator.ask("start now");
-    motion.changeSpeed(machine.timeS(), mmS(2), ACCELERATION_MM_S2);
-    machine.runUntil(operator.uno.cycle + 2 * 16_000_000);
-    machine.killEncoder(true);
+    machine.change({ speedKmH: 2 });
+    machine.runUntil(operator.uno.cycle + 2 * CYCLES_PER_SECOND);
+    machine.change({ encoderDead: true });
     operator.take();
-    machine.runUntil(operator.uno.cycle + 5 * 16_000_000);
+    machine.runUntil(operator.uno.cycle + 5 * CYCLES_PER_SECOND);
     assert.match(operator.take(), /^alarm /m);
     assert.equal(operator.status().state, "alarm");
     assert(machine.isClear);
+});
+
+test("the second beam sees the row as far behind the first as it stands, and the firmware measures the slip by it", () => {
+    const operator = wokenUp();
+    const SECOND_BEAM_MM = 220;
+    operator.ask(`set second_beam_mm ${SECOND_BEAM_MM}`);
+    const things = [500, 1300, 1800, 2300].map((placeMm): Thing => ({ kind: "plant", placeMm, widthMm: 150 }));
+    things.splice(1, 0, { kind: "weed", placeMm: 800, widthMm: 15 });
+    const machine = new Machine(operator.uno, { things }, { secondBeamMm: SECOND_BEAM_MM });
+    const SLIP = 0.05;
+    machine.change({ slip: SLIP });
+    const seen: boolean[] = [];
+    const setPin = operator.uno.set.bind(operator.uno);
+    operator.uno.set = (pin, high) => {
+        if (pin === SECOND_BEAM_PIN) seen.push(high);
+        setPin(pin, high);
+    };
+    operator.ask("start");
+    assert.equal(operator.status().slip_permille, "none");
+    machine.change({ speedKmH: 2 });
+    while (machine.placeMm < 2300 + SECOND_BEAM_MM + 200) machine.runUntil(operator.uno.cycle + LOOK_CYCLES);
+
+    assert.deepEqual(seen.filter((high) => !high).length, things.length);
+    const measured = Number(operator.status().slip_permille);
+    // A share of the wheel's way, or that of the ground: 50 or 53.
+    assert(Math.abs(measured - 1000 * SLIP) <= 6, `slip_permille=${measured}`);
 });

@@ -1,19 +1,11 @@
-// The page as `weeder serve` gives it to a phone: the real process at a virtual Uno, in a real browser. 127.0.0.2 stands for the
-// computer's address in the network, where a code is needed.
+// The page as `weeder serve` gives it to a phone: the real process at a virtual Uno, in a real browser.
 
 import assert from "node:assert/strict";
-import { type ChildProcess, spawn } from "node:child_process";
-import { existsSync, mkdtempSync, rmSync } from "node:fs";
-import { tmpdir } from "node:os";
-import { join, resolve } from "node:path";
-import { createInterface } from "node:readline";
-import test, { after, before, type TestContext } from "node:test";
-import { setTimeout as wait } from "node:timers/promises";
-import type { Browser, Page } from "playwright-core";
+import { join } from "node:path";
+import test, { after, before } from "node:test";
+import type { Browser } from "playwright-core";
 import { close, inspect, launch, openAt, PHONE } from "./browser.ts";
-
-const FIRMWARE = resolve("../target/avr-none/firmware/weeder-firmware.elf");
-const WEEDER = process.env.WEEDER ?? resolve("../target/debug/weeder");
+import { end, folder, part, plugIn, serve } from "./serving.ts";
 
 let browser: Browser;
 
@@ -22,74 +14,6 @@ before(async () => {
 });
 
 after(() => browser?.close());
-
-const part = (page: Page, machine: string, name: string) =>
-    page.getByRole("region", { name: machine, exact: true }).locator(`[data-part="${name}"]`);
-
-/** Ends a process as Ctrl-C does. */
-async function end(child: ChildProcess): Promise<void> {
-    if (child.exitCode !== null || child.signalCode !== null) return;
-    const ended = new Promise((done) => child.once("exit", done));
-    child.kill("SIGINT");
-    await ended;
-}
-
-/** A virtual Uno whose port has this path, until the test ends. */
-async function plugIn(test: TestContext, path: string): Promise<ChildProcess> {
-    const uno = spawn(WEEDER, ["virtual-uno", "--elf", FIRMWARE, "--link", path], { stdio: "ignore" });
-    test.after(() => end(uno));
-    for (let waited = 0; !existsSync(path); waited += 50) {
-        assert(uno.exitCode === null && waited < 60_000, "the virtual Uno does not start");
-        await wait(50);
-    }
-    return uno;
-}
-
-interface Served {
-    /** The page's addresses for the computer itself, and for a phone without the code and with it. */
-    readonly here: string;
-    readonly lan: string;
-    readonly code: string;
-    readonly process: ChildProcess;
-    /** Types a line at the computer itself. */
-    type(line: string, machine?: number): Promise<void>;
-}
-
-/** Serves machines at ports. */
-async function serve(test: TestContext, ports: string[], ...options: string[]): Promise<Served> {
-    const named = ports.flatMap((port) => ["--port", port]);
-    const words = ["serve", "--page", "dist", "--http-port", "0", "--lan", "127.0.0.2", ...named, ...options];
-    const child = spawn(WEEDER, words, { stdio: ["ignore", "pipe", "inherit"] });
-    test.after(() => end(child));
-    const said: string[] = [];
-    for await (const line of createInterface({ input: child.stdout })) if (said.push(line) === 2) break;
-    const [here = "", withCode = ""] = said.map((line) => line.split(" ")[0] ?? "");
-    const [lan = "", code = ""] = withCode.split("#");
-    const origin = new URL(here).origin;
-    return {
-        here,
-        lan,
-        code,
-        process: child,
-        async type(line, machine = 0) {
-            const address = `${origin}/machines/${machine}/command`;
-            // A machine that was just plugged in is not there at once.
-            for (let tries = 0; ; tries++) {
-                const answer = await fetch(address, { method: "POST", body: line, headers: { Origin: origin } });
-                if (answer.ok) return;
-                assert(answer.status === 503 && tries < 600, `${line}: ${await answer.text()}`);
-                await wait(100);
-            }
-        },
-    };
-}
-
-/** A folder that is gone at the test's end. */
-function folder(test: TestContext): string {
-    const folder = mkdtempSync(join(tmpdir(), "weeder-served-"));
-    test.after(() => rmSync(folder, { recursive: true }));
-    return folder;
-}
 
 test("a phone is paired by the code, sees the machine, and holds it", async (test) => {
     const port = join(folder(test), "uno");

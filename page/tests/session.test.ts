@@ -21,8 +21,11 @@ class Connected {
     /** What had happened when it was reset. */
     #resetAt = Number.POSITIVE_INFINITY;
 
-    /** `dropped` says which of the lines, counted from 0, others have dropped on their way, where they share the machine. */
-    constructor(dropped?: (line: number) => boolean) {
+    /**
+     * `dropped` says which of the lines, counted from 0, others have dropped on their way, where they share the machine; `lost`
+     * which of them noise on the wire takes.
+     */
+    constructor(dropped?: (line: number) => boolean, lost: (line: number) => boolean = () => false) {
         const { uno } = this.#operator;
         this.#operator.ask("start now");
         let lines = 0;
@@ -30,7 +33,13 @@ class Connected {
             onText: () => {},
             onEnd: () => {},
             send: (text) => {
-                if (text.trim() === "" || !dropped?.(lines++)) uno.send(text);
+                if (text.trim() === "") {
+                    uno.send(text);
+                    return;
+                }
+                const line = lines++;
+                if (lost(line)) return;
+                if (!dropped?.(line)) uno.send(text);
                 else wire.onText("error: hold came first, so this was not sent\r\n");
             },
             ...(dropped && { onStatus: () => {} }),
@@ -81,7 +90,7 @@ test("HOLD at any moment of a session holds the machine, and the session goes on
         const machine = new Connected();
         for (let turn = 0; turn < TURNS && !(machine.has("help") && machine.mode === "hold"); turn++) {
             await machine.turn();
-            if (isMoment(turn)) machine.session.hold();
+            if (isMoment(turn)) machine.session.hold().catch(() => {});
         }
         for (const is of ["connected", "help"] as const) assert(machine.has(is), `${is} is missing at moment ${index}`);
         assert(!machine.has("lost"), `the session is lost at moment ${index}`);
@@ -120,13 +129,28 @@ test("a HOLD of others, who share the machine, drops no question of the page's o
     assert(!machine.has("lost"));
 });
 
+test("a question that noise takes, whichever it is, loses no machine for good", async () => {
+    // Those that a session begins with, and the help and the status behind them.
+    for (const taken of [0, 1, 2, 3, 40]) {
+        const machine = new Connected(undefined, (line) => line === taken);
+        for (let turn = 0; turn < 2 * TURNS; turn++) await machine.turn();
+        const connected = machine.happened.findLastIndex(({ is }) => is === "connected");
+        const lost = machine.happened.findLastIndex(({ is }) => is === "lost");
+        assert(connected > lost, `connected at the end, question ${taken}`);
+        assert(
+            machine.happened.every((happening) => happening.is !== "lost" || !happening.forGood),
+            `question ${taken} ends the session`,
+        );
+    }
+});
+
 test("what was typed and waits is not sent behind a HOLD, and says so", async () => {
     const machine = new Connected();
     for (let turn = 0; turn < TURNS; turn++) await machine.turn();
     assert.equal(machine.mode, "work");
     const examples = machine.session.ask("examples");
     const start = machine.session.ask("start");
-    machine.session.hold();
+    machine.session.hold().catch(() => {});
     for (const dropped of [examples, start]) await assert.rejects(dropped, Refused);
     for (let turn = 0; turn < 50; turn++) await machine.turn();
     assert.equal(machine.mode, "hold");

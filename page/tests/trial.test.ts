@@ -4,17 +4,25 @@
 import assert from "node:assert/strict";
 import test from "node:test";
 import hex from "weeder.hex";
+import { isTold, read } from "../src/link/grammar.ts";
+import { LineReader } from "../src/link/lines.ts";
 import { inWords } from "../src/try/outcome.ts";
 import { Trial } from "../src/try/trial.ts";
 
-/** A trial whose firmware has woken up, been told that its settings are right, and some more. */
+/** A trial whose firmware has woken up, been told that its settings are right, and some more. It hears what the firmware says, as the page's does. */
 class Tried {
     readonly trial = new Trial(hex, 7);
     heard = "";
 
     constructor(...commands: string[]) {
+        const lines = new LineReader();
         this.trial.onText = (text) => {
             this.heard += text;
+            for (const line of lines.take(text)) {
+                const said = read(line);
+                if (said.is === "status") this.trial.take({ is: "status", status: said.status, line });
+                else if (isTold(said)) this.trial.take({ is: "told", said, line });
+            }
         };
         this.pass(0.5);
         for (const command of ["clear", "events on", ...commands]) this.ask(command);
@@ -34,8 +42,16 @@ class Tried {
 
     /** Rolls at a speed until the tool has come to a place. */
     roll(speedKmH: number, toolMm: number): void {
-        this.trial.rollAt(speedKmH);
-        while (this.trial.machine.toolMm < toolMm) this.pass(0.05);
+        this.trial.machine.change({ speedKmH });
+        while (this.trial.machine.toolMm < toolMm) {
+            this.trial.uno.send("status\n");
+            this.pass(0.05);
+        }
+    }
+
+    /** Why each plant that was not kept was not, without those that are the same. */
+    get notKept(): string[] {
+        return [...new Set(this.trial.outcome.notKept.values())];
     }
 
     get damaged(): number {
@@ -45,7 +61,7 @@ class Tried {
 
 test("a row that the real firmware weeds has no plant damaged and no margin cut, and tall weeds are cut", () => {
     const tried = new Tried();
-    tried.trial.planting.weedShare = 1;
+    tried.trial.machine.change({ weedShare: 1 });
     tried.trial.work(true);
     tried.roll(2, 6000);
     const { plants, weeds } = tried.trial.outcome.totals;
@@ -57,6 +73,18 @@ test("a row that the real firmware weeds has no plant damaged and no margin cut,
         inWords(tried.trial.outcome.totals),
         /^The tool has passed \d+ plants: all kept, with the margin\. Of \d+ tall/,
     );
+    const { machine, losses, outcome, why } = tried.trial;
+    const rolledMm = machine.toolMm + machine.dimensions.beamToToolMm;
+    const sumMm = Object.values(losses.groundMm).reduce((sum, mm) => sum + mm, 0);
+    assert(Math.abs(sumMm - rolledMm) < 1, `${sumMm} of ${rolledMm} mm`);
+    for (const part of ["weeded", "plants", "margins", "swings", "closed"] as const)
+        assert(losses.groundMm[part] > rolledMm / 100, `${part}: ${why}`);
+    const left = [...outcome.weeds].filter(([, cut]) => !cut);
+    assert(left.length > 0 && left.every(([number]) => losses.below.get(number) !== "weeded"), why);
+    assert.match(
+        why,
+        /^Left: \d+ (beside a plant|where the tool swung|taken for a plant).* Of the ground: (2[5-9]|[3-9]\d)% weeded, /,
+    );
 });
 
 test("without the servo's leads plants are damaged, and that is said", () => {
@@ -65,20 +93,24 @@ test("without the servo's leads plants are damaged, and that is said", () => {
     tried.roll(2.5, 3000);
     assert(tried.damaged >= 3, `${tried.damaged} of the plants`);
     assert.match(inWords(tried.trial.outcome.totals), / damaged: the tool was over the canopy\./);
+    assert.deepEqual(tried.notKept, ["late"]);
+    assert.match(tried.trial.why, /^Why plants were not kept: \d+ the swing was late or early for this speed\./);
 });
 
 test("a plant over which the tool is taken by hand is damaged, and stays so when the machine rolls back and passes it anew", () => {
     const tried = new Tried();
-    const [first] = tried.trial.machine.row.things;
+    const [first] = tried.trial.machine.things;
     assert(first?.kind === "plant");
     const [beforeMm, behindMm] = [first.placeMm - 200, first.placeMm + 200];
-    // Out in hold; in by hand, as the tool is beside the first plant.
+    // Out in hold; in by hand, as the tool stands beside the first plant.
     tried.roll(1, first.placeMm - 50);
+    tried.trial.machine.change({ speedKmH: 0 });
+    tried.pass(2);
     tried.ask("servo in");
     tried.ask("servo out");
     tried.roll(1, behindMm);
     assert.deepEqual([...tried.trial.outcome.plants], [[0, "damaged"]]);
-    tried.trial.rollAt(-1);
+    tried.trial.machine.change({ speedKmH: -1 });
     while (tried.trial.machine.toolMm > beforeMm) tried.pass(0.1);
     tried.roll(1, behindMm);
     assert.deepEqual([...tried.trial.outcome.plants], [[0, "damaged"]]);
@@ -86,21 +118,23 @@ test("a plant over which the tool is taken by hand is damaged, and stays so when
 
 test("a wheel that slips has each window come late, until the margin is cut", () => {
     const tried = new Tried();
-    tried.trial.slipBy(0.2);
+    tried.trial.machine.change({ slip: 0.2 });
     tried.trial.work(true);
     tried.roll(2, 4000);
     const { plants } = tried.trial.outcome.totals;
     // A fifth of the way from beam to tool is 80 mm, which no margin of 50 mm holds.
     assert(plants["margin cut"] + plants.damaged >= 4, inWords(tried.trial.outcome.totals));
+    assert.deepEqual(tried.notKept, ["off"]);
 });
 
 test("behind a torn beam wire every plant is damaged, and the machine warns of ground without plants", () => {
     const tried = new Tried("set no_plant_m 2");
     tried.trial.work(true);
-    tried.trial.machine.tearBeamWire(true);
+    tried.trial.machine.change({ beamWireTorn: true });
     tried.roll(2.5, 3500);
     assert(tried.damaged >= 3, `${tried.damaged} of the plants`);
     assert.match(tried.heard, /^warning name=no_plants/m);
+    assert.deepEqual(tried.notKept, ["unseen"]);
 });
 
 test("a supply that sags at work takes the tool out until the switch is thrown again, and no plant is damaged", () => {
@@ -118,17 +152,18 @@ test("a machine that rolls too fast has the tool out, and says why", () => {
     const tried = new Tried();
     tried.trial.work(true);
     tried.roll(7, 4000);
-    assert.match(tried.heard, /^alarm name=too_fast/m);
+    assert.match(tried.heard, /^alarm code=3-1 name=too_fast/m);
     assert(tried.trial.machine.isClear);
     assert.equal(tried.damaged, 0);
 });
 
 test("spacing and weeds are sown as they are asked for, ahead of what is sown already", () => {
     const tried = new Tried();
-    const sown = tried.trial.machine.row.things.length;
-    Object.assign(tried.trial.planting, { spacingMm: 350, weedShare: 0 });
+    const sown = tried.trial.machine.things.length;
+    tried.trial.machine.change({ spacingMm: 350 });
+    tried.trial.machine.change({ weedShare: 0 });
     tried.roll(2.5, 3500);
-    const things = tried.trial.machine.row.things.slice(sown);
+    const things = tried.trial.machine.things.slice(sown);
     assert(things.length >= 8 && things.every(({ kind }) => kind === "plant"));
     const [first, last] = [things[0], things.at(-1)];
     const spacingMm = ((last?.placeMm ?? 0) - (first?.placeMm ?? 0)) / (things.length - 1);

@@ -46,7 +46,17 @@ async function type(page: Page, command: string): Promise<void> {
     await page.getByRole("tab", { name: "Console" }).click();
     const before = await said.locator("div", { hasText: /^ok$/ }).count();
     await part(page, "typed").fill(command);
-    await page.locator("#work-panel").getByRole("button", { name: "Send" }).click();
+    try {
+        await page.locator("#work-panel").getByRole("button", { name: "Send" }).click();
+    } catch (error) {
+        const told = await said.locator("div").allTextContents();
+        throw new Error(
+            `the console takes no ${command}: ${await part(page, "why").textContent()} ${told.join(" / ")}`,
+            {
+                cause: error,
+            },
+        );
+    }
     await said.locator("div", { hasText: /^ok$/ }).nth(before).waitFor();
 }
 
@@ -127,10 +137,8 @@ test("a setting that is sent is saved, and there after a reset", async (test) =>
     const { page, errors } = await atHold(test);
     await page.getByRole("tab", { name: "Settings" }).click();
     const margin = page.locator("#work-panel [data-setting=margin_mm]");
-    await page
-        .getByText(/ground that the tool leaves alone on both sides of a canopy \(0 to 200 mm, default 50\)/)
-        .waitFor();
-    await margin.fill("70");
+    await page.getByText(/kept on both sides of a canopy \(0 to 200 mm, default 50\)/).waitFor();
+    await margin.fill("55");
     await page.getByRole("button", { name: "Send 1 change and save" }).click();
     await part(page, "settings-said").filter({ hasText: "Saved" }).waitFor();
     await inspect(page, "desk-settings");
@@ -138,7 +146,7 @@ test("a setting that is sent is saved, and there after a reset", async (test) =>
     await part(page, "state").filter({ hasText: "no machine" }).waitFor();
     await page.getByRole("button", { name: "Connect an Uno" }).click();
     await part(page, "state").filter({ hasText: "hold" }).waitFor();
-    assert.equal(await margin.inputValue(), "70");
+    assert.equal(await margin.inputValue(), "55");
     await close({ page, errors });
 });
 
@@ -156,12 +164,12 @@ test("settings go to a file that weeder reads, and come from one, whatever the o
     const { page, errors } = await atHold(test);
     await page.getByRole("tab", { name: "Settings" }).click();
     // What the settings are comes behind the settings.
-    await page.getByText(/X, how far the beam stands/).waitFor();
+    await page.getByText(/X, from the tool to the beam/).waitFor();
     const download = page.waitForEvent("download");
     await page.getByRole("button", { name: "To a file" }).click();
     await (await download).saveAs("build/files/machine.toml");
     const text = readFileSync("build/files/machine.toml", "utf8");
-    assert.match(text, /\n# diameter of the ground wheel\n# 200 to 800 mm, default 400\nwheel_mm = 400\n/);
+    assert.match(text, /\n# wheel diameter\n# 200 to 800 mm, default 400\nwheel_mm = 400\n/);
     // A lead that only a beam farther ahead allows stands before it.
     writeFileSync(
         "build/files/other.toml",
@@ -220,24 +228,28 @@ test("a port that another program has is told with the way out", async () => {
     await close(opened);
 });
 
-test("the wheel is calibrated over a measured stretch, and the servo by eye", async (test) => {
+test("the wheel is calibrated over a measured stretch", async (test) => {
     const { page, errors } = await atHold(test, PHONE);
     await page.getByRole("tab", { name: "Calibrate" }).click();
     await part(page, "wheel-end").click();
     await part(page, "wheel-said").filter({ hasText: "calibrate start first, then roll" }).waitFor();
     await part(page, "wheel-begin").click();
-    await part(page, "wheel-rolled")
-        .filter({ hasText: /^[1-9]\d*\.\d\d m/ })
-        .waitFor();
-    await part(page, "wheel-mm").fill("20000");
+    const rolled = part(page, "wheel-rolled").filter({ hasText: /^[3-9]\.\d\d m/ });
+    await rolled.waitFor();
+    // Twice what the wheel says: no wheel is as wrong as that.
+    const measuredMm = 2000 * Number.parseFloat((await rolled.textContent()) ?? "");
+    await part(page, "wheel-mm").fill(measuredMm.toFixed(0));
     await part(page, "wheel-end").click();
     await part(page, "wheel-said").filter({ hasText: "look again, or add force" }).waitFor();
     await part(page, "wheel-force").click();
     await part(page, "wheel-said")
-        .filter({ hasText: /^\d+ encoder counts a metre/ })
+        .filter({ hasText: /^[\d,]+ encoder counts a metre/ })
         .waitFor();
-    // That was no 20 m: a wheel like that makes every canopy too wide.
-    await type(page, "set ticks_per_m 0");
+    await close({ page, errors });
+});
+
+test("the servo is calibrated by eye, and timed, while the machine stands", async (test) => {
+    const { page, errors } = await atHold(test, PHONE, "--stand");
     await page.getByRole("tab", { name: "Calibrate" }).click();
     await part(page, "servo-in").click();
     await part(page, "servo-said").filter({ hasText: "The tool has 1500 us." }).waitFor();
@@ -250,6 +262,11 @@ test("the wheel is calibrated over a measured stretch, and the servo by eye", as
     await part(page, "lead_out_ms").fill("150");
     await part(page, "servo-leads").click();
     await part(page, "servo-said").filter({ hasText: "Both leads are set" }).waitFor();
+    // The steps are the manual's, and so is what comes next.
+    await part(page, "set-up-steps").filter({ hasText: "Time the servo" }).waitFor();
+    await part(page, "margin-said")
+        .filter({ hasText: "Next, time the servo: `calibrate servo` (1 of 2 done)" })
+        .waitFor();
     await inspect(page, "phone-calibrate");
     await part(page, "servo-save").click();
     await part(page, "servo-said").filter({ hasText: "Saved." }).waitFor();

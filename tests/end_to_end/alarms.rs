@@ -1,15 +1,16 @@
 //! Alarms: a fault puts the tool out, is named and blinked, and is latched until it is cleared.
 
 use crate::common::{
-    Run, ask, bare_ground, is_out_at_the_pin, number, refusal, run_for_ms, status, steady, throw_switch, trial, value,
+    Run, ask, bare_ground, is_out_at_the_pin, named, number, refusal, run_for_ms, status, steady, throw_switch, trial,
+    value,
 };
 use field::machine::Machine;
 use field::motion::mm_s;
 use field::row::{Row, Thing};
 use field::trial::{Start, Trial};
 use field::wiring;
-use signal::{CYCLES_PER_SECOND, PinChange};
 use uno::Uno;
+use uno::{CYCLES_PER_SECOND, PinChange};
 
 /// A flash and the dark behind it, within a digit.
 const FLASH_CYCLES: u64 = CYCLES_PER_SECOND * 524 / 1000;
@@ -33,14 +34,14 @@ fn with_a_blocked_beam(start: Start) -> Run {
 
 /// The alarm is named in event and status, and the tool is out.
 #[track_caller]
-fn assert_alarm(run: &mut Run, name: &str, code: i64) {
+fn assert_alarm(run: &mut Run, alarm: &str) {
     let events = run.events("alarm");
     assert_eq!(events.len(), 1, "{:#?}", run.lines());
-    assert_eq!((value(&events[0], "name"), number(&events[0], "code")), (name, code));
+    assert_eq!(named(&events[0]), alarm);
     assert!(is_out_at_the_pin(&run.uno));
     let status = status(&mut run.uno);
-    let said = ["state", "alarm", "tool"].map(|key| value(&status, key));
-    assert_eq!(said, ["alarm", name, "out"], "{status}");
+    let said = (value(&status, "state"), &*named(&status), value(&status, "tool"));
+    assert_eq!(said, ("alarm", alarm, "out"), "{status}");
 }
 
 /// The codes that the LED blinks during some seconds, as their digits; the first and the last code, which may be cut, left
@@ -72,7 +73,7 @@ fn assert_blinks(uno: &mut Uno, code: [usize; 2]) {
 #[test]
 fn a_beam_that_stays_broken_is_an_alarm_that_puts_the_tool_out() {
     let mut run = with_a_blocked_beam(Start::Now);
-    assert_alarm(&mut run, "beam_blocked", 11);
+    assert_alarm(&mut run, "1-1 beam_blocked");
     let command = run.commands().pop().expect("a command");
     let place_mm = run.place_mm(command.rise_cycle);
     assert!(command.is_out() && (1395.0..1410.0).contains(&place_mm), "{place_mm} mm");
@@ -94,7 +95,7 @@ fn more_plants_than_the_schedule_holds_are_an_alarm() {
     let machine = Machine { beam_to_tool_mm: 2000.0, ..Machine::default() };
     let mut run = Run::begin(Trial { machine, ..trial(row, steady(mm_s(2.5), 2300.0)) }, &["set merge_gap_mm 3"]);
     run.roll_to_the_end();
-    assert_alarm(&mut run, "schedule_full", 33);
+    assert_alarm(&mut run, "3-3 schedule_full");
     assert_blinks(&mut run.uno, [3, 3]);
 }
 
@@ -108,7 +109,7 @@ fn a_crop_of_stalks_that_the_built_in_examples_do_not_know_is_an_alarm_before_th
         let row = Row::new(widths_mm.into_iter().zip(0..).map(stalk).collect()).expect("the stalks stand apart");
         let mut run = Run::begin(trial(row, steady(mm_s(speed_km_h), before_mm + 5.5 * spacing_mm)), &[]);
         run.roll_to_the_end();
-        assert_alarm(&mut run, "crop_unknown", 34);
+        assert_alarm(&mut run, "3-4 crop_unknown");
     }
 }
 
@@ -130,7 +131,7 @@ fn a_beam_that_flickers_faster_than_it_can_be_followed_is_an_alarm() {
     let begin = run.uno.cycle();
     run.uno.drive((0..400).map(|edge| PinChange { cycle: begin + edge * 160, pin: wiring::BEAM, high: edge % 2 == 1 }));
     run.roll_to_the_end();
-    assert_alarm(&mut run, "beam_edges_lost", 13);
+    assert_alarm(&mut run, "1-3 beam_edges_lost");
     assert_blinks(&mut run.uno, [1, 3]);
 }
 

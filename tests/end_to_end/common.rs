@@ -9,12 +9,12 @@ use field::servo::Command;
 use field::trial::{Start, Trial};
 use field::verdict::{Judgement, PlantOutcome, Timing, Verdict, judge};
 use field::wiring;
-use signal::PinChange;
 use std::ops::Range;
 use std::path::PathBuf;
 use trial::Outcome;
 use trial::console::{self, ConsoleError};
 use trial::firmware;
+use uno::PinChange;
 use uno::Uno;
 
 /// Greatest distance between a swing's command at the pin and its ideal place.
@@ -61,6 +61,11 @@ pub fn value<'a>(line: &'a str, key: &str) -> &'a str {
     line.split_whitespace()
         .find_map(|word| word.strip_prefix(key)?.strip_prefix('='))
         .unwrap_or_else(|| panic!("{line:?} has no {key}="))
+}
+
+/// The alarm that a line names, as `3-1 too_fast`.
+pub fn named(line: &str) -> String {
+    format!("{} {}", value(line, "code"), value(line, "name"))
 }
 
 /// The number behind `key=` in a line.
@@ -222,12 +227,6 @@ impl Run {
     pub fn roll_to(&mut self, place_mm: f64) {
         let passing = self.trial.motion.passings(place_mm).next().expect("the machine comes to the place");
         self.uno.run_until(cycle_at(self.start_cycle, passing.time_s)).expect("the firmware runs");
-    }
-
-    /// Rolls on until so many seconds after the motion began.
-    #[track_caller]
-    pub fn roll_for(&mut self, time_s: f64) {
-        self.uno.run_until(cycle_at(self.start_cycle, time_s)).expect("the firmware runs");
     }
 
     /// Types a line every so many milliseconds of the way, to the motion's end.

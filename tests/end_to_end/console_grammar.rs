@@ -58,7 +58,7 @@ fn the_firmware_names_itself_and_its_state_when_it_wakes_up() {
     );
     assert_eq!(greeting.lines().count(), 1, "{greeting:?}");
     let version = exchange(&mut uno, b"version\n");
-    assert_eq!(version[0], format!("weeder {}", env!("CARGO_PKG_VERSION")));
+    assert_eq!(version[0].split(" (").next(), Some(concat!("weeder ", env!("CARGO_PKG_VERSION"))));
 }
 
 #[test]
@@ -134,16 +134,6 @@ fn a_bad_line_is_answered_by_one_error_that_says_what_would_be_right() {
 }
 
 #[test]
-fn carriage_return_line_feed_or_both_end_a_line() {
-    let mut uno = woken_up();
-    for end in ["\r", "\n", "\r\n"] {
-        let answer = exchange(&mut uno, format!("hold{end}version{end}").as_bytes());
-        assert_eq!(answer.len(), 3, "{end:?}: {answer:#?}");
-        assert!(answer[0] == "ok" && answer[1].starts_with("weeder") && answer[2] == "ok", "{end:?}: {answer:#?}");
-    }
-}
-
-#[test]
 fn an_empty_line_is_not_answered() {
     let mut uno = woken_up();
     assert_eq!(exchange(&mut uno, b"\n\r\n\r \t \n"), [""; 0]);
@@ -159,12 +149,6 @@ fn eighty_characters_are_a_line_and_eighty_one_are_too_long() {
     assert_eq!(answer.len(), 1, "{answer:#?}");
     assert!(answer[0].starts_with("error: ") && answer[0].contains("80"), "{answer:#?}");
     assert_eq!(exchange(&mut uno, b"hold\n"), ["ok"], "the next line is read");
-}
-
-#[test]
-fn backspace_takes_back_the_last_character() {
-    let mut uno = woken_up();
-    assert_eq!(exchange(&mut uno, b"hole\x08d\nclewr\x7F\x7Far\n"), ["ok", "ok"]);
 }
 
 #[test]

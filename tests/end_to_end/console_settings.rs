@@ -34,7 +34,7 @@ fn get(uno: &mut Uno, name: &str) -> String {
 /// An Uno with settings that no value of another setting contradicts.
 fn easily_set() -> Uno {
     let mut uno = woken_up();
-    for line in ["set lead_out_ms 0", "set margin_mm 0", "set beam_to_tool_mm 1000"] {
+    for line in ["set lead_out_ms 0", "set margin_mm 0", "set beam_to_tool_mm 1000", "set wheel_mm 200"] {
         ask(&mut uno, line);
     }
     uno
@@ -94,7 +94,7 @@ fn every_setting_refuses_what_is_beyond_its_range_and_keeps_its_value() {
 fn settings_that_contradict_each_other_are_refused() {
     let mut uno = woken_up();
     let answer = refusal(&mut uno, "set beam_to_tool_mm 300");
-    assert!(answer.contains("beam_to_tool_mm 336 or more"), "{answer}");
+    assert!(answer.contains("beam_to_tool_mm 389 or more"), "{answer}");
     let answer = refusal(&mut uno, "set servo_out_us 1500");
     assert!(answer.contains("equal"), "{answer}");
     assert_eq!((get(&mut uno, "beam_to_tool_mm"), get(&mut uno, "servo_out_us")), ("400".into(), "2000".into()));
@@ -126,6 +126,7 @@ fn settings_that_change_where_the_tool_is_are_refused_while_the_machine_works() 
         "beam_to_tool_mm",
         "second_beam_mm",
         "margin_mm",
+        "stem_zone_mm",
         "servo_in_us",
         "servo_out_us",
     ];

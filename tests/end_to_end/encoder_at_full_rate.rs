@@ -2,10 +2,10 @@
 
 use crate::common::{ask, elf, encoder_steps, number, run_for_ms, status, woken_up};
 use field::wiring;
-use signal::{CYCLES_PER_SECOND, PinChange};
 use std::path::Path;
 use trial::bench::BenchError;
 use trial::bench::encoder::{self, Counted, Direction, JITTER, Load, Turning};
+use uno::{CYCLES_PER_SECOND, PinChange};
 
 /// Counts in a second that the firmware follows while its status streams at 115200 baud and the beam flickers, whatever the
 /// moments at which the edges come: evenly, and early and late by 30 % of the time between two.

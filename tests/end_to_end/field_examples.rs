@@ -8,7 +8,7 @@ use field::motion::Motion;
 use field::row::{Row, Thing};
 use field::wiring;
 use knn::Example;
-use signal::CYCLES_PER_SECOND;
+use uno::CYCLES_PER_SECOND;
 use uno::Uno;
 
 /// Where the firmware keeps the slots in EEPROM.
@@ -41,7 +41,7 @@ fn greeted(uno: &mut Uno) {
 /// An EEPROM with an example in every slot.
 fn full_eeprom() -> Vec<u8> {
     let mut store = FieldExamples::asleep(Volatile::new());
-    store.wake_up();
+    store.init();
     for number in 0..field_examples::CAPACITY {
         store.add(Example::new([number, 1, 2, 3, 4], number % 2)).expect("there is room");
     }

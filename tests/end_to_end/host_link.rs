@@ -19,7 +19,7 @@ fn link() -> Link {
 
 #[test]
 fn a_link_waits_for_the_greeting_and_knows_the_version() {
-    assert_eq!(link().version(), env!("CARGO_PKG_VERSION"));
+    assert!(link().version().starts_with(env!("CARGO_PKG_VERSION")));
 }
 
 #[test]
@@ -105,7 +105,7 @@ fn every_line_of_a_row_being_weeded_is_understood() {
     for _ in 0..500 {
         match link.next_line().expect("the port stays").as_deref().map(EventLine::parse) {
             None => {}
-            Some(Some(EventLine::Object { .. })) => objects += 1,
+            Some(Some(EventLine::Detection { .. })) => objects += 1,
             Some(Some(EventLine::Swing { .. })) => swings += 1,
             other => panic!("{other:?}"),
         }

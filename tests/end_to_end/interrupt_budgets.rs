@@ -6,7 +6,7 @@
 
 use crate::common::{ask, encoder_steps, number, run_for_ms, status, woken_up};
 use field::wiring;
-use signal::{CYCLES_PER_SECOND, PinChange};
+use uno::{CYCLES_PER_SECOND, PinChange};
 use uno::{InterruptStatistics, Uno};
 
 /// Vector, name and budget in cycles; the encoder's two last.

@@ -4,7 +4,7 @@ use crate::common::{Run, bare_ground, is_out_at_the_pin, run_for_ms, status, ste
 use field::motion::mm_s;
 use field::trial::{Start, Trial};
 use field::wiring;
-use signal::CYCLES_PER_SECOND;
+use uno::CYCLES_PER_SECOND;
 use uno::SENT_BYTE_CYCLES;
 
 /// A running pulse, the gap behind it, and turns of the loop.

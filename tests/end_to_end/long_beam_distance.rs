@@ -54,7 +54,7 @@ fn a_beam_too_near_for_the_speed_keeps_the_tool_out() {
     // 180 ms are 125 mm at 2.5 km/h: a plant just behind the beam could not be left in time.
     let mut run = run_with_beam_at(120.0, 2.5);
     assert_all_kept(&run.judgement());
-    assert!(run.events("alarm")[0].starts_with("alarm name=too_fast code=31 "), "{:?}", run.lines());
+    assert!(run.events("alarm")[0].starts_with("alarm code=3-1 name=too_fast "), "{:?}", run.lines());
     let cycles = run.cycles();
     let swings = run.commands().into_iter().filter(|command| cycles.contains(&command.rise_cycle));
     assert_eq!(swings.collect::<Vec<_>>(), []);

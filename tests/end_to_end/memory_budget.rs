@@ -9,8 +9,8 @@ use field::verdict::Timing;
 use std::process::Command;
 use uno::elf::{Image, Size};
 
-/// The flash below the Uno's bootloader, less a reserve of 1 KiB.
-const FLASH_BYTES: u64 = 32_256 - 1024;
+/// The flash below the Uno's bootloader, less a reserve of 356 bytes.
+const FLASH_BYTES: u64 = 32_256 - 356;
 
 /// What the stack that is proved (budgets.toml) leaves of the 2 KiB of SRAM, less a reserve of 400 bytes.
 const SRAM_BYTES: u64 = 1264;

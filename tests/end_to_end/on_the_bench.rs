@@ -1,11 +1,12 @@
-//! What is tried on the bench, on the real ELF: the servo by hand and timed, the wheel calibrated, a row without sensors.
+//! What is tried on the bench, on the real ELF: the servo by hand and timed, and a row without sensors.
 
-use crate::common::{ask, exchange, refusal, run_for_ms, status, value, woken_up};
+use crate::common::{Run, ask, assert_all_kept, exchange, refusal, run_for_ms, status, trial, value, woken_up};
 use field::machine::Machine;
 use field::motion::{Motion, mm_s};
+use field::row::{Row, Thing};
 use field::servo::Servo;
 use field::wiring;
-use uno::Uno;
+use uno::{CYCLES_PER_SECOND, Uno};
 
 /// The last servo pulse's width.
 fn pulse_us(uno: &Uno) -> f64 {
@@ -13,36 +14,31 @@ fn pulse_us(uno: &Uno) -> f64 {
 }
 
 #[test]
-fn the_servo_moves_by_hand_in_hold_only() {
-    let mut uno = woken_up();
-    for (command, width_us) in [("servo in", 1500.0), ("servo 1720", 1720.0), ("servo out", 2000.0)] {
+fn what_moves_the_tool_in_hold_waits_until_the_machine_stands_and_ends_when_it_rolls() {
+    let motion = Motion::steady(0.0, 3000.0, mm_s(2.5), 1000.0).change_speed(0.0, 3000.0);
+    let roll = |uno: &mut Uno| {
+        let start = uno.cycle();
+        uno.drive(Machine::default().pin_changes(&crate::common::bare_ground(), &motion, start));
+    };
+    let rolls_ms = (motion.duration_s() * 1000.0) as u64;
+    for (command, width_us) in
+        [("calibrate servo", 1500.0), ("servo in", 1500.0), ("servo 1720", 1720.0), ("test row", 1500.0)]
+    {
+        let mut uno = woken_up();
+        roll(&mut uno);
+        run_for_ms(&mut uno, 500);
+        assert!(refusal(&mut uno, command).contains("the machine rolls, stop first"), "{command}");
+        run_for_ms(&mut uno, rolls_ms);
+        assert_eq!(pulse_us(&uno), 2000.0, "{command}");
         ask(&mut uno, command);
-        run_for_ms(&mut uno, 50);
+        run_for_ms(&mut uno, 200);
         assert_eq!(pulse_us(&uno), width_us, "{command}");
+        roll(&mut uno);
+        run_for_ms(&mut uno, 100);
+        assert_eq!(pulse_us(&uno), 2000.0, "{command}");
+        run_for_ms(&mut uno, rolls_ms + 500);
+        assert_eq!(pulse_us(&uno), 2000.0, "{command}: it does not come back by itself");
     }
-    assert!(refusal(&mut uno, "servo 400").contains("from 500 to 2500"));
-    ask(&mut uno, "servo in");
-    ask(&mut uno, "start");
-    run_for_ms(&mut uno, 50);
-    assert_eq!(pulse_us(&uno), 2000.0, "the ground is not known");
-    assert!(refusal(&mut uno, "servo in").contains("hold first"));
-}
-
-#[test]
-fn a_measured_distance_sets_the_wheel() {
-    let mut uno = woken_up();
-    ask(&mut uno, "calibrate start");
-    // The tyre is worn: the machine takes its wheel for larger than it is.
-    let machine = Machine { wheel_mm: 384.0, ..Machine::default() };
-    let motion = Motion::steady(0.0, 3000.0, mm_s(2.5), 2000.0).change_speed(0.0, 3000.0);
-    let (rolled_mm, start) = (motion.end_mm().round() as u32, uno.cycle());
-    uno.drive(machine.pin_changes(&crate::common::bare_ground(), &motion, start));
-    run_for_ms(&mut uno, (motion.duration_s() * 1000.0) as u64 + 50);
-    assert!(refusal(&mut uno, &format!("calibrate {}", rolled_mm / 2)).contains("add force"));
-    let answer = ask(&mut uno, &format!("calibrate {rolled_mm}")).remove(0);
-    // 2400 counts in pi * 0.384 m.
-    let ticks_per_m: f64 = value(&answer, "ticks_per_m").parse().expect("a number");
-    assert!((ticks_per_m - 1989.4).abs() < 3.0, "{answer}");
 }
 
 /// Has the end switch follow the servo's commands, as a tool does that takes `out_ms` and begins to leave after `in_ms`.
@@ -94,7 +90,36 @@ fn a_row_without_sensors_swings_the_servo_for_each_plant() {
     assert_eq!(commands.len(), 1 + 2 * 6 + 1, "{commands:?}");
     let said = status(&mut uno);
     assert_eq!((value(&said, "state"), value(&said, "pos")), ("hold", "0"), "{said}");
-    assert!(refusal(&mut uno, "test row 2000").contains("from 100 to 1400"));
+    assert!(refusal(&mut uno, "test row 2000").contains("from 100 to 1300"));
+}
+
+#[test]
+fn a_command_in_the_turn_in_which_a_played_row_ends_leaves_the_real_plants_alone() {
+    // The row ends 3.5 m on, half a turn more or less.
+    let ends_us = 3_500_000_000 / 1300;
+    for (command, off_us) in
+        [("servo in", -600), ("servo in", -200), ("servo in", 0), ("servo in", 300), ("calibrate servo", 0)]
+    {
+        let mut uno = woken_up();
+        ask(&mut uno, "hold");
+        let typed = "test row 1300\n";
+        uno.send(typed.as_bytes());
+        // A byte takes ten bits' time; the row begins with the last of them, and the other line ends with its last, too.
+        let bytes_us = |text: &str| text.len() as i64 * 1_000_000 * 10 / 115_200;
+        let wait_us = bytes_us(typed) + ends_us + off_us - bytes_us(command) - bytes_us("\n");
+        let cycle = uno.cycle() + wait_us as u64 * (CYCLES_PER_SECOND / 1_000_000);
+        uno.run_until(cycle).expect("the firmware runs");
+        uno.send(format!("{command}\n").as_bytes());
+        run_for_ms(&mut uno, 100);
+        ask(&mut uno, "hold");
+        let row = Row::new((0..4).map(|plant| Thing::plant(700.0 + 600.0 * f64::from(plant), 150.0)).collect());
+        let motion = Motion::starting_at(0.0).change_speed(mm_s(2.0), 3000.0).roll_to(3100.0);
+        let mut run = Run::set_off(uno, trial(row.expect("the plants stand apart"), motion), &[], |_, changes| changes);
+        run.roll_to_the_end();
+        let seen = run.events("plant").len() + run.events("unknown").len();
+        assert_eq!(seen, 4, "{command}: {:#?}", run.lines());
+        assert_all_kept(&run.judgement());
+    }
 }
 
 #[test]

@@ -3,8 +3,8 @@
 
 use crate::common::elf;
 use field::machine::Machine;
+use model_test::cases;
 use trial::bench::swings::{Lateness, Rows, lateness};
-use walks::cases;
 
 /// Greatest and mean distance of a command from its ideal place at 2.5 km/h, in ticks.
 const WORST_TICKS: f64 = 9.0;

@@ -12,8 +12,8 @@ use field::motion::mm_s;
 use field::row::{Row, Thing};
 use field::trial::{Start, Trial};
 use field::wiring;
-use signal::CYCLES_PER_SECOND;
 use trial::power_up;
+use uno::CYCLES_PER_SECOND;
 use uno::Uno;
 
 /// Longest time from a reset to the greeting.
@@ -103,7 +103,11 @@ fn a_stack_that_nearly_reaches_the_variables_is_an_alarm() {
     run.uno.write_sram(spoiled, &[0]).expect("an address in SRAM");
     run.roll_to_the_end();
     let said = status(&mut run.uno);
-    assert_eq!(["state", "alarm", "tool"].map(|key| value(&said, key)), ["alarm", "stack_low", "out"], "{said}");
+    assert_eq!(
+        ["state", "code", "name", "tool"].map(|key| value(&said, key)),
+        ["alarm", "6-1", "stack_low", "out"],
+        "{said}"
+    );
     assert_eq!(number(&said, "stack_free"), 40);
     assert!(is_out_at_the_pin(&run.uno));
 }
@@ -141,7 +145,7 @@ fn k(uno: &mut Uno) -> String {
 fn an_erased_eeprom_gives_the_defaults_and_an_alarm_that_is_to_be_cleared_before_work() {
     let mut uno = power_up(&elf(), &[]).expect("it wakes up");
     let said = status(&mut uno);
-    assert_eq!(["state", "alarm"].map(|key| value(&said, key)), ["alarm", "settings_lost"], "{said}");
+    assert_eq!(["state", "code", "name"].map(|key| value(&said, key)), ["alarm", "5-1", "settings_lost"], "{said}");
     assert!(refusal(&mut uno, "start").contains("clear"));
     assert!(k(&mut uno).starts_with("k=3 "));
     ask(&mut uno, "clear");
@@ -189,7 +193,7 @@ fn two_spoiled_copies_or_another_tables_are_lost_settings() {
         let mut spoiled = eeprom.clone();
         places.into_iter().for_each(|place| spoiled[place] ^= 0x20);
         let (greeting, mut uno) = waking_up_with(&spoiled);
-        assert!(greeting.contains("state alarm settings_lost,"), "{greeting:?}");
+        assert!(greeting.contains("state alarm 5-1 settings_lost,"), "{greeting:?}");
         assert!(k(&mut uno).starts_with("k=3 "));
     }
 }
@@ -228,11 +232,11 @@ fn power_lost_at_any_byte_of_a_save_leaves_the_old_settings_or_the_new() {
 fn saved_settings_that_contradict_each_other_are_an_alarm_and_never_start() {
     let eeprom = eeprom_with(&[with(&[(Setting::BeamToToolMm, 150)])]);
     let (greeting, mut uno) = waking_up_with(&eeprom);
-    assert!(greeting.contains("state alarm settings_contradict,"), "{greeting:?}");
+    assert!(greeting.contains("state alarm 5-2 settings_contradict,"), "{greeting:?}");
     ask(&mut uno, "clear");
     for command in ["start", "start now", "save"] {
         let answer = refusal(&mut uno, command);
-        assert!(answer.contains("beam_to_tool_mm 336 or more"), "{answer}");
+        assert!(answer.contains("beam_to_tool_mm 389 or more"), "{answer}");
     }
     ask(&mut uno, "set beam_to_tool_mm 400");
     ask(&mut uno, "start");

@@ -4,6 +4,8 @@ use crate::common::{elf, encoder_steps};
 use field::wiring;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use std::fs::File;
+use std::io::BufWriter;
 use std::path::Path;
 use trial::replay::{Counted, replay};
 use uno::capture::Capture;
@@ -13,7 +15,8 @@ use uno::waveform;
 #[track_caller]
 fn assert_counts(name: &str, steps: &[(u64, i32)]) {
     let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name).with_extension("vcd");
-    waveform::write(&path, &wiring::WIRES, encoder_steps(steps.iter().copied())).expect("the recording is written");
+    let file = File::create(&path).expect("the recording is written");
+    waveform::write(BufWriter::new(file), &wiring::WIRES, encoder_steps(steps.iter().copied())).expect("it is written");
     let channels = [(wiring::ENCODER_A, "encoder_a"), (wiring::ENCODER_B, "encoder_b")];
     let capture = Capture::read(&path, &channels).expect("the recording is read");
     let replay = replay(&capture, &elf(), |_| {}).expect("the firmware runs");

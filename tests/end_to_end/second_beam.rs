@@ -1,13 +1,13 @@
 //! A second beam: the wheel's slip is measured plant by plant, and a torn wire of either beam is told before it costs a plant.
 
-use crate::common::{Run, is_out_at_the_pin, number, status, steady, trial, value, woken_up};
+use crate::common::{Run, is_out_at_the_pin, named, number, status, steady, trial, value, woken_up};
 use field::machine::{Machine, cycle_at};
 use field::motion::mm_s;
 use field::row::{Row, Thing};
 use field::trial::{Start, Trial};
 use field::verdict::{Judgement, Verdict};
 use field::wiring;
-use signal::{Pin, PinChange};
+use uno::{Pin, PinChange};
 
 const SECOND_BEAM_MM: f64 = 200.0;
 
@@ -76,7 +76,7 @@ fn with_torn_wire(pin: Pin, torn_mm: f64) -> Run {
 
 #[test]
 fn a_torn_wire_of_either_beam_is_an_alarm_within_three_plants_and_costs_none() {
-    for (pin, alarm, code) in [(wiring::BEAM, "beam_blind", 14), (wiring::SECOND_BEAM, "second_beam_blind", 15)] {
+    for (pin, alarm) in [(wiring::BEAM, "1-4 beam_blind"), (wiring::SECOND_BEAM, "1-5 second_beam_blind")] {
         // Between the fourth plant and the fifth, for both of the beams.
         let mut run = with_torn_wire(pin, 2400.0);
         run.roll_to(3525.0 + 3.0 * 75.0);
@@ -85,7 +85,7 @@ fn a_torn_wire_of_either_beam_is_an_alarm_within_three_plants_and_costs_none() {
         run.roll_to(4020.0);
         let told = run.events("alarm");
         assert_eq!(told.len(), 1, "{:#?}", run.lines());
-        assert_eq!((value(&told[0], "name"), number(&told[0], "code")), (alarm, code));
+        assert_eq!(named(&told[0]), alarm);
         run.roll_to_the_end();
         assert!(is_out_at_the_pin(&run.uno));
         assert_eq!(run.judgement().count(Verdict::Damaged), 0, "{:#?}", run.judgement().plants);

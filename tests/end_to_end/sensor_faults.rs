@@ -1,7 +1,7 @@
 //! Encoder and beam that fail on the way: the firmware notices, names the fault, and has the tool out of the row.
 
 use crate::common::{
-    Run, ask, bare_ground, is_out_at_the_pin, number, run_for_ms, status, steady, trial, value, woken_up,
+    Run, ask, bare_ground, is_out_at_the_pin, named, number, run_for_ms, status, steady, trial, value, woken_up,
 };
 use field::machine::cycle_at;
 use field::motion::{Motion, mm_s};
@@ -9,7 +9,7 @@ use field::row::{Row, Thing};
 use field::trial::{Start, Trial};
 use field::verdict::Verdict;
 use field::wiring;
-use signal::{CYCLES_PER_SECOND, Pin, PinChange};
+use uno::{CYCLES_PER_SECOND, Pin, PinChange};
 
 /// Where the fault begins: the tool is in the row between the second plant and the third, which the beam has just passed.
 const FAULT_MM: f64 = 1720.0;
@@ -29,11 +29,11 @@ fn with_fault(row: Row, length_mm: f64, alter: impl FnOnce(u64, Vec<PinChange>) 
 
 /// The alarm of this name and code was told once, and the tool is out.
 #[track_caller]
-fn assert_alarm(run: &mut Run, name: &str, code: i64) {
+fn assert_alarm(run: &mut Run, alarm: &str) {
     run.roll_to_the_end();
     let events = run.events("alarm");
     assert_eq!(events.len(), 1, "{:#?}", run.lines());
-    assert_eq!((value(&events[0], "name"), number(&events[0], "code")), (name, code));
+    assert_eq!(named(&events[0]), alarm);
     let status = status(&mut run.uno);
     assert_eq!((value(&status, "state"), value(&status, "tool")), ("alarm", "out"), "{status}");
     assert!(is_out_at_the_pin(&run.uno));
@@ -55,7 +55,7 @@ fn an_encoder_that_falls_silent_harms_no_plant_and_is_an_alarm() {
     run.roll_to(FAULT_MM + 60.0);
     assert!(is_out_at_the_pin(&run.uno));
     assert_eq!(value(&status(&mut run.uno), "for"), "encoder_doubtful");
-    assert_alarm(&mut run, "encoder_silent", 21);
+    assert_alarm(&mut run, "2-1 encoder_silent");
     for plant in run.judgement().plants {
         assert_ne!(plant.verdict, Verdict::Damaged, "{plant:?}");
     }
@@ -80,7 +80,7 @@ fn damaged(run: &Run) -> usize {
 #[test]
 fn an_encoder_that_is_silent_for_25_ms_in_every_100_is_an_alarm_before_it_costs_a_plant() {
     let mut run = losing_edges(plants(), 1.0, 500.0, 3500.0, |time_s| time_s % 0.1 < 0.025);
-    assert_alarm(&mut run, "encoder_silent", 21);
+    assert_alarm(&mut run, "2-1 encoder_silent");
     assert_eq!(damaged(&run), 0);
 }
 
@@ -103,7 +103,7 @@ fn one_silence_of_200_ms_costs_no_plant_wherever_it_comes_and_is_no_alarm() {
 #[test]
 fn an_encoder_that_stutters_at_a_crawl_costs_one_plant_at_most() {
     let mut run = losing_edges(plants(), 0.5, 500.0, 2600.0, |time_s| time_s % 0.05 < 0.01);
-    assert_alarm(&mut run, "encoder_silent", 21);
+    assert_alarm(&mut run, "2-1 encoder_silent");
     assert!(damaged(&run) <= 1);
 }
 
@@ -163,7 +163,7 @@ fn an_encoder_with_one_dead_channel_is_an_alarm() {
             changes.retain(|change| change.cycle < fault || change.pin != dead);
             changes
         });
-        assert_alarm(&mut run, "encoder_channel_dead", 22);
+        assert_alarm(&mut run, "2-2 encoder_channel_dead");
         // Within a quarter of a second.
         let command = run.commands().pop().expect("a command");
         let place_mm = run.place_mm(command.rise_cycle);
@@ -183,7 +183,7 @@ fn an_encoder_whose_channels_change_at_once_is_an_alarm() {
         changes.extend(noise);
         changes
     });
-    assert_alarm(&mut run, "encoder_jumps", 23);
+    assert_alarm(&mut run, "2-3 encoder_jumps");
     assert!(number(&status(&mut run.uno), "jumps") > 20);
 }
 
@@ -194,7 +194,7 @@ fn a_machine_that_is_pushed_faster_than_its_limit_is_an_alarm() {
     let mut run = Run::begin(trial, &["set top_speed_mm_s 900"]);
     run.roll_to(1000.0);
     assert!(!is_out_at_the_pin(&run.uno));
-    assert_alarm(&mut run, "too_fast", 31);
+    assert_alarm(&mut run, "3-1 too_fast");
 }
 
 #[test]
@@ -208,7 +208,7 @@ fn a_beam_that_flickers_in_dust_is_an_alarm() {
         }));
         changes
     });
-    assert_alarm(&mut run, "beam_flickers", 12);
+    assert_alarm(&mut run, "1-2 beam_flickers");
 }
 
 #[test]
@@ -252,22 +252,6 @@ fn a_speed_that_jumps_before_a_window_has_its_late_command_counted_and_told() {
 }
 
 #[test]
-fn rolling_back_to_forgotten_ground_is_an_alarm() {
-    // 21 small plants every 160 mm: the 16 that are remembered go back 2.5 m.
-    let plants = (0..21).map(|number| Thing::plant(600.0 + 160.0 * f64::from(number), 70.0));
-    let row = Row::new(plants.collect()).expect("the plants stand apart");
-    let motion = Motion::starting_at(0.0)
-        .change_speed(mm_s(2.5), 1000.0)
-        .stop_at(4600.0, 1000.0)
-        .change_speed(-mm_s(2.5), 1000.0)
-        .stop_at(1200.0, 1000.0);
-    let mut run = Run::begin(Trial { start: Start::Now, ..trial(row, motion) }, &["set k 1"]);
-    run.roll_to(4500.0);
-    assert_eq!(run.events("alarm"), [""; 0]);
-    assert_alarm(&mut run, "rolled_back_too_far", 32);
-}
-
-#[test]
 fn rolling_back_farther_than_ground_is_remembered_is_an_alarm() {
     let motion = Motion::starting_at(0.0)
         .change_speed(mm_s(2.5), 1000.0)
@@ -277,7 +261,7 @@ fn rolling_back_farther_than_ground_is_remembered_is_an_alarm() {
     let mut run = Run::begin(Trial { start: Start::Now, ..trial(bare_ground(), motion) }, &["set no_plant_m 0"]);
     run.roll_to(8900.0);
     assert_eq!(run.events("alarm"), [""; 0]);
-    assert_alarm(&mut run, "rolled_back_too_far", 32);
+    assert_alarm(&mut run, "3-2 rolled_back_too_far");
 }
 
 #[test]
@@ -296,7 +280,7 @@ fn an_end_switch_that_does_not_follow_is_an_alarm() {
     assert_eq!(run.events("alarm"), [""; 0], "contacts bounce");
     run.uno.set(wiring::END_SWITCH, true);
     run_for_ms(&mut run.uno, 100);
-    assert_alarm(&mut run, "tool_stuck", 41);
+    assert_alarm(&mut run, "4-1 tool_stuck");
 }
 
 #[test]

@@ -4,8 +4,8 @@ use crate::common::{Run, ask, run_for_ms, steady, trial, woken_up};
 use field::motion::mm_s;
 use field::row::{Row, Thing};
 use field::wiring;
-use signal::{CYCLES_PER_SECOND, Pulse};
 use uno::Uno;
+use uno::{CYCLES_PER_SECOND, Pulse};
 
 fn microseconds(cycles: u64) -> f64 {
     cycles as f64 * 1e6 / CYCLES_PER_SECOND as f64

@@ -11,7 +11,8 @@ fn twenty_minutes_of_the_decisions_with_faults_harm_no_plant() {
     let tally = hours(PLAN, 1.0 / 3.0, |_| {}).expect("rows grow");
     assert!(tally.violations.is_empty(), "{tally}");
     assert!(tally.plants > 500 && tally.alarms.len() > 3 && tally.resets.len() > 3, "{tally}");
-    assert!(tally.weeded_metres > 0.3 * tally.metres, "{tally}");
+    // One row in eight has a stand so dense that next to nothing of it may be weeded.
+    assert!(tally.weeded_metres > 0.2 * tally.metres, "{tally}");
 }
 
 #[test]

@@ -10,7 +10,7 @@ use control::say::command::{LINE_LENGTH, Word};
 use control::settings::Setting;
 use field::planting::Planting;
 use link::settings::name;
-use signal::CYCLES_PER_SECOND;
+use uno::CYCLES_PER_SECOND;
 use uno::Uno;
 
 /// A turn's cycles at most: 1 ms.
@@ -39,7 +39,7 @@ fn lines() -> Vec<String> {
         "test row",
         "test row 99",
         "test row 700",
-        "test row 1400",
+        "test row 1300",
         "start",
         "hold",
         "start now",

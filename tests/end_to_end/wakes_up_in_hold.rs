@@ -9,9 +9,9 @@ use field::motion::mm_s;
 use field::row::{Row, Thing};
 use field::trial::Start;
 use field::wiring;
-use signal::{CYCLES_PER_SECOND, PinChange};
 use trial::boot;
 use uno::Uno;
+use uno::{CYCLES_PER_SECOND, PinChange};
 
 /// Time in which the servo shows a decision: a frame and the loop's turn.
 const FRAME_MS: u64 = 25;

@@ -6,7 +6,7 @@ use field::motion::mm_s;
 use field::planting::Planting;
 use field::trial::Trial;
 use field::verdict::Timing;
-use walks::cases;
+use model_test::cases;
 
 /// Rows of 8 plants, 480 to 620 mm apart, with canopies of 100 to 180 mm.
 const PLANTING: Planting = Planting {

@@ -1,4 +1,4 @@
-//! The question what an object is, plant or weed, and who answers it.
+//! The question what a detection is, plant or weed, and who answers it.
 //!
 //! Whatever an answer leaves open is [`Class::Unknown`], which everyone treats as a plant. The machine asks the [nearest
 //! examples](super::nearest); a test may ask something else.
@@ -6,7 +6,7 @@
 use super::features::{self, Features};
 use knn::Example;
 
-/// What an object is taken for.
+/// What a detection is taken for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Class {
     /// A crop plant: the tool leaves the row for it.
@@ -59,12 +59,12 @@ pub struct ExamplesFull;
 /// Tells plants from weeds, and may be taught.
 pub trait Classifier {
     /// Looks what was kept over the loss of power; to be called once, before anything else.
-    fn wake_up(&mut self);
+    fn init(&mut self);
 
-    /// Classifies an object by its `k` nearest examples.
+    /// Classifies a detection by its `k` nearest examples.
     fn classify(&self, features: &Features, k: u8) -> Vote;
 
-    /// Begins to classify an object as [`classify`](Self::classify) does, but takes no longer than a turn of the loop may; the vote, if
+    /// Begins to classify a detection as [`classify`](Self::classify) does, but takes no longer than a turn of the loop may; the vote, if
     /// that was enough. Otherwise [`go_on`](Self::go_on) is called until it has the vote.
     fn begin(&mut self, features: &Features, k: u8) -> Option<Vote> {
         Some(self.classify(features, k))
@@ -76,10 +76,10 @@ pub trait Classifier {
         Some(Vote::UNKNOWN)
     }
 
-    /// What the built-in examples alone take an object for; [`Class::Unknown`] where there are none. What was begun is dropped.
+    /// What the built-in examples alone take a detection for; [`Class::Unknown`] where there are none. What was begun is dropped.
     fn built_in_class(&mut self, features: &Features) -> Class;
 
-    /// Adds an object as an example of the class `label`, to be kept over a loss of power.
+    /// Adds a detection as an example of the class `label`, to be kept over a loss of power.
     ///
     /// # Errors
     /// [`ExamplesFull`]; one has to be forgotten first.

@@ -35,7 +35,7 @@ pub const SCALE_BYTES: [u8; 8 * features::COUNT] = {
     bytes
 };
 
-/// Squared distance beyond which an object is like no example.
+/// Squared distance beyond which a detection is like no example.
 pub const RADIUS: u32 = table::RADIUS;
 
 /// Examples that vote, as the table was trained.
@@ -193,8 +193,8 @@ mod tests {
 
     #[test]
     fn whatever_passes_at_most_a_third_of_the_examples_are_among_the_nearest_when_the_search_meets_them() {
-        let among_the_nearest = |object: Features| {
-            let query = SCALE.quantise(&object.values());
+        let among_the_nearest = |detection: Features| {
+            let query = SCALE.quantise(&detection.values());
             let nearest: &mut knn::Nearest<{ label::COUNT }> =
                 &mut knn::Nearest::<{ label::COUNT }, _>::new([Neighbour::NONE; K as usize]);
             nearest.begin(K).expect("there are so many places");

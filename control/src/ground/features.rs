@@ -1,8 +1,9 @@
-//! The paper's five features of an object.
+//! The paper's five features of a detection.
 //!
-//! Speed, encoder value, delay, hold and actuation are given in millimetres and millimetres a second, as a machine with
-//! the default settings would schedule the object: beam 400 mm ahead of the tool, 50 mm margin, 180 and 40 ms of lead. So
-//! the examples that one machine was taught with hold on another, whatever its wheel, its encoder and its settings.
+//! Speed, encoder value, delay, hold and actuation are given in millimetres and millimetres a second, as the reference machine
+//! would schedule the detection: beam 400 mm ahead of the tool, 50 mm margin, 180 and 40 ms of lead. So the examples that one
+//! machine was taught hold on another, for all wheels, encoders and settings. The default lead is longer: the examples would not hold
+//! if the reference followed it.
 
 /// Features in a vector.
 pub const COUNT: usize = 5;
@@ -10,7 +11,7 @@ pub const COUNT: usize = 5;
 /// The forward speeds of the paper's trial, in mm/s: 1, 1.5, 2 and 2.5 km/h.
 pub const SPEED_CLASSES_MM_S: [i16; 4] = [278, 417, 556, 694];
 
-/// The machine as which every object is described.
+/// The machine as which every detection is described.
 mod reference {
     pub const BEAM_TO_TOOL_MM: u16 = 400;
     pub const MARGIN_MM: u16 = 50;
@@ -18,10 +19,10 @@ mod reference {
     pub const LEAD_IN_MS: u16 = 40;
 }
 
-/// What hold is more than an object's width, in mm.
+/// What hold is more than a detection's width, in mm.
 pub const HOLD_BEYOND_WIDTH_MM: i32 = 2 * reference::MARGIN_MM as i32;
 
-/// The feature vector of an object.
+/// The feature vector of a detection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Features {
     /// S: the machine's speed class in mm/s.
@@ -37,7 +38,7 @@ pub struct Features {
 }
 
 impl Features {
-    /// Describes an object of `width_mm`, `spacing_mm` behind the last plant, in one of the speed classes.
+    /// Describes a detection of `width_mm`, `spacing_mm` behind the last plant, in one of the speed classes.
     #[inline(never)]
     pub const fn describe(speed_class_mm_s: i16, spacing_mm: i16, width_mm: i16) -> Self {
         let delay = reference::BEAM_TO_TOOL_MM - reference::MARGIN_MM;

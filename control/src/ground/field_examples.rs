@@ -61,7 +61,7 @@ impl<M: Memory> FieldExamples<M> {
     }
 
     /// Looks through the memory for the examples that it holds.
-    pub fn wake_up(&mut self) {
+    pub fn init(&mut self) {
         self.spoiled = 0;
         for (number, example) in (0..).zip(&mut self.examples) {
             let mut bytes = [0; SLOT];
@@ -214,12 +214,12 @@ mod tests {
     use std::vec::Vec;
 
     fn store() -> FieldExamples<Volatile> {
-        wake_up(Volatile::new())
+        init(Volatile::new())
     }
 
-    fn wake_up(memory: Volatile) -> FieldExamples<Volatile> {
+    fn init(memory: Volatile) -> FieldExamples<Volatile> {
         let mut store = FieldExamples::asleep(memory);
-        store.wake_up();
+        store.init();
         store
     }
 
@@ -228,7 +228,7 @@ mod tests {
     }
 
     fn restart(store: FieldExamples<Volatile>) -> FieldExamples<Volatile> {
-        wake_up(store.into_memory().with_power())
+        init(store.into_memory().with_power())
     }
 
     #[test]
@@ -313,7 +313,7 @@ mod tests {
         for label in [label::COUNT as u8, VACANT] {
             let mut memory = Volatile::new();
             memory.bytes[..SLOT].copy_from_slice(&encode(Example::new([1, 2, 3, 4, 5], label)));
-            let store = wake_up(memory);
+            let store = init(memory);
             assert_eq!((store.slot(0), store.len(), store.spoiled()), (None, 0, 1), "{label}");
         }
     }

@@ -8,8 +8,8 @@
 //!
 //! What it does not do: tell an unseen plant from none. Gaps are guarded too, and weeds in them stay.
 
-use super::{object::Object, reach::Geometry};
-use crate::units::{Length, Place};
+use super::{detection::Detection, keep_out::Canopy, reach::Geometry};
+use crate::units::{Length, WrappedPosition};
 
 /// Plants in a row that are taken for unseen; one more that does not come, and the row is at its end.
 const IN_A_ROW: u8 = 3;
@@ -18,18 +18,17 @@ const IN_A_ROW: u8 = 3;
 #[derive(Clone, Debug)]
 pub struct Guard {
     /// Its middle.
-    due: Place,
+    due: WrappedPosition,
     /// How many of this and the next are still waited for; none where nobody knows where any would be.
     left: u8,
 }
 
 impl Guard {
     /// No plant is due.
-    pub const NONE: Self = Self { due: Place::new(0), left: 0 };
+    pub const NONE: Self = Self { due: WrappedPosition::new(0), left: 0 };
 
-    /// Takes an object that is kept.
-    #[cfg_attr(target_arch = "avr", inline(never))]
-    pub fn see(&mut self, plant: &Object, geometry: &Geometry) {
+    /// Takes a detection that is kept.
+    pub fn see(&mut self, plant: &Detection, geometry: &Geometry) {
         let (spacing, scatter) = (geometry.guard_spacing, geometry.guard_scatter);
         // Of one whose beginning was not seen, nobody knows the middle.
         if spacing == Length::ZERO || plant.cut {
@@ -43,22 +42,21 @@ impl Guard {
     }
 
     /// The ground that is to be guarded now that the beam has seen what stands up to a place: where a plant was due.
-    #[cfg_attr(target_arch = "avr", inline(never))]
     #[cfg_attr(not(target_arch = "avr"), inline)]
-    pub fn pass(&mut self, seen_to: Place, geometry: &Geometry) -> Option<Object> {
-        let (due, scatter) = (self.due, geometry.guard_scatter);
-        if self.left == 0 || !seen_to.is_ahead_of(due + scatter) {
+    pub fn pass(&mut self, seen_to: WrappedPosition, geometry: &Geometry) -> Option<Canopy> {
+        let (due, guarded) = (self.due, geometry.guarded);
+        if self.left == 0 || !seen_to.is_ahead_of(due + guarded) {
             return None;
         }
         self.left -= 1;
         self.due = due + geometry.guard_spacing;
-        Some(Object { leading: due - scatter, trailing: due + scatter, cut: false })
+        Some(Canopy { leading: due - guarded, trailing: due + guarded, trim: 0 })
     }
 
     /// Where the ground begins on which a plant may stand that has not been seen yet, if the beam has come to it.
     #[cfg_attr(not(target_arch = "avr"), inline)]
-    pub fn awaited(&self, frontier: Place, geometry: &Geometry) -> Option<Place> {
-        let from = self.due - geometry.guard_scatter;
+    pub fn awaited(&self, frontier: WrappedPosition, geometry: &Geometry) -> Option<WrappedPosition> {
+        let from = self.due - geometry.guarded;
         (self.left > 0 && frontier.is_ahead_of(from)).then_some(from)
     }
 }

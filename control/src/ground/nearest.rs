@@ -1,4 +1,4 @@
-//! What an object is: the vote of the nearest labelled examples.
+//! What a detection is: the vote of the nearest labelled examples.
 //!
 //! The examples are feature vectors in bytes, scaled by [`examples::scale`] and searched by the
 //! crate `knn` wherever they lie. Whatever the answer leaves open, a tie, a stranger, a table with fewer examples than
@@ -44,7 +44,7 @@ impl<B: Examples<{ features::COUNT }>, M: Memory> Nearest<B, M> {
     /// A classifier with the built-in examples and those that the memory holds.
     pub fn new(built_in: B, memory: M) -> Self {
         let mut nearest = Self::asleep(built_in, memory);
-        nearest.wake_up();
+        nearest.init();
         nearest
     }
 
@@ -79,7 +79,7 @@ fn scaled(features: &Features) -> [u8; features::COUNT] {
     examples::scale().quantise(&features.values())
 }
 
-/// What an answer says of the object.
+/// What an answer says of the detection.
 fn vote(answer: Result<Answer<{ label::COUNT }>, ClassifyError>) -> Vote {
     let Ok(Answer { label, votes, kind, .. }) = answer else { return Vote::UNKNOWN };
     let class = match (kind, label) {
@@ -92,8 +92,8 @@ fn vote(answer: Result<Answer<{ label::COUNT }>, ClassifyError>) -> Vote {
 }
 
 impl<B: Examples<{ features::COUNT }>, M: Memory> Classifier for Nearest<B, M> {
-    fn wake_up(&mut self) {
-        self.field.wake_up();
+    fn init(&mut self) {
+        self.field.init();
     }
 
     fn classify(&self, features: &Features, k: u8) -> Vote {
@@ -179,7 +179,7 @@ mod tests {
 
     #[test]
     fn examples_in_flash_and_from_the_field_are_searched_as_one_set() {
-        // As many of both as there may ever be: weeds built in, and the field teaches that the same object is a plant.
+        // As many of both as there may ever be: weeds built in, and the field teaches that the same detection is a plant.
         let features = Features::describe(556, 300, 60);
         let bytes = examples::scale().quantise(&features.values());
         let mut nearest = Nearest::new([Example::new(bytes, label::WEED); examples::CAPACITY], Volatile::new());
@@ -206,7 +206,7 @@ mod tests {
         let mut memory = Volatile::new();
         (memory.bytes[0], memory.bytes[100]) = (0, 0);
         let mut nearest = Nearest::new([Example::new([0; features::COUNT], label::WEED); 1], memory);
-        nearest.wake_up();
+        nearest.init();
         assert_eq!(nearest.spoiled(), 2);
     }
 

@@ -1,9 +1,9 @@
 //! Where the tool may be in the row: the machine's distances, and the stretch of ground that its servo needs to be open.
 
-use super::second_beam::Slip;
+use super::slip::Slip;
 use crate::{
     settings::{Setting, Settings},
-    units::{Grain, Length, Ticks, TicksPerSecond, Wheel},
+    units::{Length, LengthScale, Ticks, TicksPerSecond, Wheel},
 };
 
 /// How far the machine may be rolled back with the ground still remembered, in metres. Together with twice the longest X and
@@ -16,7 +16,7 @@ pub struct Geometry {
     /// The wheel by which the others are measured.
     pub wheel: Wheel,
     /// Ticks in a unit of the others.
-    pub grain: Grain,
+    pub scale: LengthScale,
     /// X.
     pub beam_to_tool: Length,
     /// From the first beam back to the second; zero where there is none.
@@ -25,12 +25,16 @@ pub struct Geometry {
     pub margin: Length,
     /// What no canopy is wider than.
     pub max_width: Length,
+    /// What is kept of a single plant; zero for all of its canopy.
+    pub stem_zone: Length,
     /// Clear ground behind which a canopy is over.
     pub merge_gap: Length,
     /// From the middle of a plant to that of the next; zero where the crop is not set at even distances.
     pub guard_spacing: Length,
     /// How far off its place such a plant may stand.
     pub guard_scatter: Length,
+    /// How far ground is guarded on either side of where a plant is due: the zone of a stem that stands off by the scatter.
+    pub guarded: Length,
     /// How far the machine may be rolled back with the ground still remembered.
     pub memory: Length,
 }
@@ -39,45 +43,63 @@ impl Geometry {
     /// No distances.
     pub const NONE: Self = Self {
         wheel: Wheel::NONE,
-        grain: Grain::TICK,
+        scale: LengthScale::TICK,
         beam_to_tool: Length::ZERO,
         second_beam: Length::ZERO,
         margin: Length::ZERO,
         max_width: Length::ZERO,
+        stem_zone: Length::ZERO,
         merge_gap: Length::ZERO,
         guard_spacing: Length::ZERO,
         guard_scatter: Length::ZERO,
+        guarded: Length::ZERO,
         memory: Length::ZERO,
     };
 
+    /// The narrowest that both beams are asked for, 8 mm or a tick: less may be an insect or a clod in one of them.
+    pub fn least_seen(&self) -> Length {
+        // The memory is eight metres.
+        Length((self.memory.0 + 1023) >> 10)
+    }
+
     /// Those of the settings, where the wheel turns by so many 256ths of its way more than the ground that is rolled over.
     pub fn of(settings: &Settings, excess: i8) -> Self {
-        let wheel = settings.wheel();
-        let metre = wheel.ticks(1000);
-        let grain = Grain::of(metre);
-        let length = |setting| {
-            let millimetres = settings.get(setting);
-            // Each takes time, which those that are off need not.
-            if millimetres == 0 {
-                return Length::ZERO;
-            }
-            let turned = wheel.ticks(millimetres).0 * i32::from(Slip::WHOLE + i16::from(excess));
-            grain.length(Ticks(turned >> 8))
-        };
-        let guard_spacing = length(Setting::GuardSpacingMm);
-        let is_guarded = guard_spacing > Length::ZERO;
-        Self {
-            wheel,
-            grain,
-            beam_to_tool: length(Setting::BeamToToolMm),
-            second_beam: length(Setting::SecondBeamMm),
-            margin: length(Setting::MarginMm),
-            max_width: length(Setting::MaxWidthMm),
-            merge_gap: length(Setting::MergeGapMm),
-            guard_spacing,
-            guard_scatter: if is_guarded { length(Setting::GuardScatterMm) } else { Length::ZERO },
-            memory: Length(grain.length(metre).0 * MEMORY_M),
+        let mut geometry = Self::NONE;
+        geometry.follow(settings, excess);
+        geometry
+    }
+
+    /// Follows the settings, as [`of`](Self::of) does.
+    pub fn follow(&mut self, settings: &Settings, excess: i8) {
+        self.wheel = settings.wheel();
+        let metre = self.wheel.ticks(1000);
+        self.scale = LengthScale::of(metre);
+        let length = |geometry: &Self, setting| geometry.length(settings, setting, excess);
+        self.beam_to_tool = length(self, Setting::BeamToToolMm);
+        self.second_beam = length(self, Setting::SecondBeamMm);
+        self.margin = length(self, Setting::MarginMm);
+        self.max_width = length(self, Setting::MaxWidthMm);
+        self.stem_zone = length(self, Setting::StemZoneMm);
+        self.merge_gap = length(self, Setting::MergeGapMm);
+        self.guard_spacing = length(self, Setting::GuardSpacingMm);
+        self.guard_scatter = Length::ZERO;
+        if self.guard_spacing > Length::ZERO {
+            self.guard_scatter = length(self, Setting::GuardScatterMm);
         }
+        self.guarded = self.guard_scatter + Length(self.stem_zone.0 >> 1);
+        self.memory = Length(self.scale.length(metre).0 * MEMORY_M);
+    }
+
+    /// A setting in millimetres, as the wheel turns over it.
+    #[cfg_attr(target_arch = "avr", inline(never))]
+    fn length(&self, settings: &Settings, setting: Setting, excess: i8) -> Length {
+        let millimetres = settings.get(setting);
+        // Each takes time, which those that are off need not.
+        if millimetres == 0 {
+            return Length::ZERO;
+        }
+        let turned = self.wheel.ticks(millimetres).0 * i32::from(Slip::WHOLE + i16::from(excess));
+        self.scale.length(Ticks(turned >> 8))
     }
 }
 
@@ -96,10 +118,10 @@ impl Leads {
     /// Those of a machine at rest.
     pub const NONE: Self = Self { out: Length::ZERO, back: Length::ZERO, response: Length::ZERO };
 
-    /// Those at a speed, in units of the grain.
-    pub fn at(speed: TicksPerSecond, settings: &Settings, grain: Grain) -> Self {
+    /// Those at a speed, in units of the scale.
+    pub fn at(speed: TicksPerSecond, settings: &Settings, scale: LengthScale) -> Self {
         let out_ms = settings.get(Setting::LeadOutMs);
-        let rolled = |milliseconds| grain.length(speed.distance_in_ms(milliseconds));
+        let rolled = |milliseconds| scale.length(speed.distance_in_ms(milliseconds));
         // A lead is longer by what a command takes to the pin in the mean: half a tick, half a turn of the loop, half a pulse.
         // Without a lead the paper's schedule stands as it is.
         let lead = |milliseconds: u16| rolled(milliseconds + u16::from(milliseconds > 0));
@@ -164,7 +186,7 @@ mod tests {
     fn a_lead_is_what_is_rolled_in_its_time_and_a_millisecond_and_none_is_none() {
         let mut settings = Settings::new();
         let leads = |settings: &Settings| {
-            let Leads { out, back, response } = Leads::at(TicksPerSecond(1000), settings, Grain::TICK);
+            let Leads { out, back, response } = Leads::at(TicksPerSecond(1000), settings, LengthScale::TICK);
             (out, back, response)
         };
         for (setting, milliseconds) in
@@ -186,10 +208,10 @@ mod tests {
             {
                 settings.set(setting, value).expect("within its range");
             }
-            let Geometry { grain, beam_to_tool, max_width, memory, .. } = Geometry::of(&settings, 0);
+            let Geometry { scale, beam_to_tool, max_width, memory, .. } = Geometry::of(&settings, 0);
             let farthest = i32::from(memory.0) + 2 * i32::from(beam_to_tool.0) + i32::from(max_width.0);
             assert!(farthest < i16::MAX.into(), "{ticks_per_m} a metre: {farthest}");
-            let error = grain.ticks(beam_to_tool).0 - 2 * i32::from(ticks_per_m);
+            let error = scale.ticks(beam_to_tool).0 - 2 * i32::from(ticks_per_m);
             assert!(error <= 0 && -error < 16, "{ticks_per_m} a metre: {error}");
         }
     }

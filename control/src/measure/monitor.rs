@@ -17,12 +17,16 @@ use crate::{
 /// The time in which edges are counted.
 const PERIOD: u16 = Coarse::steps_in_ms(500);
 
-/// Edges without progress in a period that no tremble gives: one channel alone shows them from 0.6 km/h on, and an
-/// engine's vibration of 50 Hz, which makes 50 of them, does not.
-const DEAD_CHANNEL_EDGES: u8 = 80;
+/// Turns of the wheel to and fro in a period, without progress, that no tremble gives. One channel alone has each of its edges look
+/// like one, and shows so many from 0.6 km/h on; an engine's vibration of 50 Hz, which makes 50 of them, does not.
+const DEAD_CHANNEL_TURNS: u8 = 80;
 
 /// Without progress for so long, the machine stands: slower than 0.05 km/h.
 const STANDS: u16 = Coarse::steps_in_ms(150);
+
+/// Turns to and fro without progress, in slow rolling, from which on the distance is unknown. A machine that stops rolls back a
+/// little, and on again: those are two.
+const FALTERS: u8 = 3;
 
 /// Times that the beam may break while the machine stands: leaves move in the wind, but plants do not pass.
 const BREAKS: u8 = 3;
@@ -37,10 +41,19 @@ const QUIET: Short = (crate::measure::speed::SPACING >> 2) as Short;
 /// A machine rolls steadily where a progress takes no longer than this, 15.4 ms: from 0.5 km/h on with ticks of 0.5 mm or finer.
 /// Coarser ones need four ticks in this time, and are not known to fall silent at less.
 ///
-/// Who brakes with 3 m/s2, as hard as a walking person can, takes longer for the last progress but one before the standstill.
-/// So behind a shorter one there is another, and it comes within 2.42 times this one: where the way to the standstill is `x` of
-/// them, x - 1 or more being left, `sqrt(x) - sqrt(x - 1)` is at most so many times `sqrt(x + 1) - sqrt(x)`.
+/// Below it, nothing tells a silence from a stop: a machine stops within a progress.
 const STEADY: Short = 59;
+
+/// A machine that brakes takes longer for each progress than for the one before, and soon stops. So it rolls steadily only where
+/// twice the last progress is no more than so much above the one before, 15.6 ms. Who brakes with 3.3 m/s2, 3 on the ground and a
+/// tenth for the wheel's slip, exceeds that in the last progress but one before the standstill: with `x` of them to roll and ticks of
+/// 0.5 mm it takes `sqrt(x + 1) - sqrt(x)` times 35.6 ms, and `x` below 1 gives 18.2 ms. From 1 on there is another progress,
+/// within 2.42 times this one: `sqrt(x) - sqrt(x - 1)` is at most so many times `sqrt(x + 1) - sqrt(x)`.
+const BRAKES: Short = 61;
+
+/// Slower than four ticks in this time, 32.8 ms, a wheel may tremble to and fro while it rolls: below 0.5 km/h with the coarsest
+/// encoder ([`TICKS_PER_M_LEAST`](crate::settings::TICKS_PER_M_LEAST)).
+const SLOW: Short = 128;
 
 /// What a turn of the loop at either end may add to a time: 1 ms, or the turn and a step where it is longer.
 const TURN: Short = 4;
@@ -101,8 +114,8 @@ pub struct EncoderMonitor {
     /// The last reading.
     last: u16,
     read_at: Coarse,
-    /// Edges since the period began, all of them without progress.
-    edges: u8,
+    /// Times that the wheel seemed to turn round since the period began, without progress.
+    turns: u8,
     /// Times that the beam broke since the machine stands.
     breaks: u8,
     period_since: Coarse,
@@ -115,28 +128,31 @@ pub struct EncoderMonitor {
 
 impl EncoderMonitor {
     /// A monitor that nobody has read.
-    pub const NONE: Self = Self { took: 0, took_before: 0, ..Self::new(Instant::ZERO, Position::new(0)) };
+    pub const NONE: Self = Self {
+        anchor: 0,
+        progress_at: Coarse::ZERO,
+        took: 0,
+        took_before: 0,
+        backwards: false,
+        stands: false,
+        quiet: false,
+        silent: false,
+        last: 0,
+        read_at: Coarse::ZERO,
+        turns: 0,
+        breaks: 0,
+        period_since: Coarse::ZERO,
+        debt: 0,
+        silences: 0,
+        since_silence: 0,
+    };
 
-    /// A monitor for a machine that stands at `position`.
-    pub const fn new(now: Instant, position: Position) -> Self {
-        Self {
-            anchor: position.count() as u16,
-            progress_at: now.coarse(),
-            took: Short::MAX,
-            took_before: Short::MAX,
-            backwards: false,
-            stands: false,
-            quiet: false,
-            silent: false,
-            last: position.count() as u16,
-            read_at: now.coarse(),
-            edges: 0,
-            breaks: 0,
-            period_since: now.coarse(),
-            debt: 0,
-            silences: 0,
-            since_silence: 0,
-        }
+    /// The machine wakes up, and stands at `position`.
+    pub const fn init(&mut self, now: Instant, position: Position) {
+        let (now, place) = (now.coarse(), position.count() as u16);
+        (self.anchor, self.last) = (place, place);
+        (self.progress_at, self.read_at, self.period_since) = (now, now, now);
+        (self.took, self.took_before, self.stands) = (Short::MAX, Short::MAX, true);
     }
 
     /// Takes a reading, with the ticks that came by jumps and are not believed; returns the fault that it shows.
@@ -151,7 +167,7 @@ impl EncoderMonitor {
         let place = position.count() as u16;
         if now.since(self.period_since) >= PERIOD {
             self.period_since = now;
-            self.edges = 0;
+            self.turns = 0;
             if self.stands {
                 self.debt = 0;
             }
@@ -168,11 +184,12 @@ impl EncoderMonitor {
             let (before, gap) = (self.took_before, self.took);
             // Where the machine stood, the clock may have run round; else it may have come there as early as the turn began.
             self.took = if self.stands { Short::MAX } else { short - turn };
-            self.took_before = gap;
+            // Where it stood without having fallen silent, it has stopped, and there was no gap.
+            self.took_before = if self.stands && !self.silent { Short::MAX } else { gap };
             (self.anchor, self.progress_at) = (place, now);
             self.backwards = moved < 0;
             (self.stands, self.quiet, self.silent) = (false, false, false);
-            (self.edges, self.breaks) = (0, 0);
+            (self.turns, self.breaks) = (0, 0);
             self.since_silence = self.since_silence.wrapping_add(1);
             if (self.since_silence as u8).is_multiple_of(PAID_BY) {
                 self.debt -= u8::from(self.debt > 0);
@@ -193,21 +210,25 @@ impl EncoderMonitor {
                 }
             }
         } else {
-            let steady = self.took <= STEADY;
+            let steady = self.took <= STEADY && 2 * u16::from(self.took) <= u16::from(self.took_before) + BRAKES as u16;
             self.quiet = steady && short >= QUIET;
             self.silent |= steady && is_silence(short, self.took, turn);
             self.stands |= time >= STANDS;
-            if step != 0 {
-                self.edges = self.edges.wrapping_add(1);
-                // No wheel turns back from steady rolling within a tick or two.
-                if steady && !self.silent && (step < 0) != self.backwards {
-                    (self.anchor, self.progress_at) = (place, now);
-                    self.backwards = !self.backwards;
+            if step != 0 && (step < 0) != self.backwards {
+                self.backwards = !self.backwards;
+                self.turns = self.turns.wrapping_add(1);
+                // No rolling wheel turns back for a tick or two and rolls on: pulses of a channel do not come.
+                if !self.silent && !self.stands && self.took <= SLOW {
                     alarm = Alarm::EncoderChannelDead;
                     lost += TURNED_ROUND;
+                    if steady {
+                        (self.anchor, self.progress_at) = (place, now);
+                    } else {
+                        self.silent = self.turns >= FALTERS;
+                    }
                 }
             }
-            if self.edges > DEAD_CHANNEL_EDGES {
+            if self.turns > DEAD_CHANNEL_TURNS {
                 return Some(Alarm::EncoderChannelDead);
             }
         }
@@ -227,6 +248,11 @@ impl EncoderMonitor {
         // Behind the alarm nobody counts on before the machine has rolled.
         self.breaks += u8::from(self.breaks < BREAKS);
         (self.breaks >= BREAKS).then_some(Alarm::EncoderSilent)
+    }
+
+    /// Whether the machine stands, or rolls slower than 0.05 km/h.
+    pub const fn stands(&self) -> bool {
+        self.stands
     }
 
     /// Whether the encoder has just become quiet, and nobody knows yet whether the machine brakes or the encoder has died.
@@ -260,14 +286,17 @@ pub struct BeamMonitor {
 
 impl BeamMonitor {
     /// A monitor that has seen no edge.
-    pub const fn new(now: Instant) -> Self {
-        Self { edges: 0, since: now.coarse() }
+    pub const NONE: Self = Self { edges: 0, since: Coarse::ZERO };
+
+    /// The machine wakes up.
+    pub const fn init(&mut self, now: Instant) {
+        self.since = now.coarse();
     }
 
     /// The beam's level changed; returns the fault that this shows.
     pub fn edge(&mut self, now: Instant) -> Option<Alarm> {
         if now.coarse().since(self.since) >= FLICKER_PERIOD {
-            *self = Self::new(now);
+            (self.edges, self.since) = (0, now.coarse());
         }
         self.edges += u8::from(self.edges <= FLICKER_EDGES);
         (self.edges > FLICKER_EDGES).then_some(Alarm::BeamFlickers)
@@ -299,7 +328,7 @@ mod tests {
 
     /// Whether an edge to and one fro, so many milliseconds apart, are a dead channel within so many edges.
     fn is_dead_channel(edge_ms: u32, edges: u32) -> bool {
-        let mut monitor = EncoderMonitor::new(at(0), Position::new(0));
+        let mut monitor = awake();
         (1..=edge_ms * edges).any(|ms| {
             let position = Position::new((ms / edge_ms % 2) as i32);
             monitor.read(at(ms), position, 0, 4) == Some(Alarm::EncoderChannelDead)
@@ -308,9 +337,16 @@ mod tests {
 
     #[test]
     fn edges_that_lead_nowhere_are_a_dead_channel_where_they_come_faster_than_any_tremble() {
-        assert!(!is_dead_channel(5, 80));
-        assert!(is_dead_channel(5, 81));
+        assert!(!is_dead_channel(5, 81));
+        assert!(is_dead_channel(5, 82));
         assert!(!is_dead_channel(7, 1000), "71 in half a second");
+    }
+
+    /// A monitor of a machine that stands.
+    fn awake() -> EncoderMonitor {
+        let mut monitor = EncoderMonitor::NONE;
+        monitor.init(at(0), Position::new(0));
+        monitor
     }
 
     fn at(ms: u32) -> Instant {
@@ -319,13 +355,13 @@ mod tests {
 
     /// The first alarm within a second of an encoder that shows a position at each millisecond, and when it comes.
     fn first_alarm(position: impl Fn(u32) -> u32) -> Option<(u32, Alarm)> {
-        let mut monitor = EncoderMonitor::new(at(0), Position::new(0));
+        let mut monitor = awake();
         (1..1000).find_map(|ms| Some((ms, monitor.read(at(ms), Position::new(position(ms) as i32), 0, 4)?)))
     }
 
     #[test]
     fn a_rolling_wheel_is_quiet_when_no_progress_came_for_a_hundredth_of_a_second_until_it_comes() {
-        let mut monitor = EncoderMonitor::new(at(0), Position::new(0));
+        let mut monitor = awake();
         for ms in 0..100 {
             let position = if ms < 60 { ms.min(40) } else { ms - 20 };
             monitor.read(at(ms), Position::new(position as i32), 0, 4);
@@ -352,7 +388,7 @@ mod tests {
     #[test]
     fn a_beam_flickers_that_changes_more_than_forty_times_in_a_tenth_of_a_second() {
         let first_alarm = |every_ms: u32| {
-            let mut monitor = BeamMonitor::new(at(0));
+            let mut monitor = BeamMonitor::NONE;
             (1..200).find(|edge| monitor.edge(at(every_ms * (edge - 1))) == Some(Alarm::BeamFlickers))
         };
         assert_eq!(first_alarm(2), Some(41));

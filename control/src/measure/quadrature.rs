@@ -90,10 +90,19 @@ pub struct Odometer {
 }
 
 impl Odometer {
+    /// An odometer that nobody has read.
+    pub const NONE: Self = Self { counted: 0, jumps: 0, surplus: Ticks::ZERO };
+
     /// An odometer that believes what was `counted` until now.
-    #[inline(always)]
     pub const fn new(counted: Position, jumps: u16) -> Self {
-        Self { counted: counted.count() as u16, jumps, surplus: Ticks::ZERO }
+        let mut odometer = Self::NONE;
+        odometer.init(counted, jumps);
+        odometer
+    }
+
+    /// The machine wakes up, and what was `counted` is believed.
+    pub const fn init(&mut self, counted: Position, jumps: u16) {
+        (self.counted, self.jumps) = (counted.count() as u16, jumps);
     }
 
     /// Takes a reading of the count and of the jumps in it, modulo 65,536; returns how many ticks, 32 at the most, came by jumps

@@ -50,7 +50,7 @@ pub enum Edge {
 
 /// How the machine woke up.
 #[derive(Clone, Copy, Debug)]
-pub struct WakeUp {
+pub struct Startup {
     /// The first readings.
     pub readings: Readings,
     /// Whether something is in the beam.

@@ -6,7 +6,7 @@
 use super::{
     monitor::{BeamMonitor, EncoderMonitor},
     quadrature::Odometer,
-    readings::{Readings, WakeUp},
+    readings::{Readings, Startup},
     speed::SpeedMeter,
     switch::Switch,
 };
@@ -39,26 +39,26 @@ impl Sensors {
         let (start, place) = (Instant::ZERO, Position::new(0));
         Self {
             readings: Readings { stack_free: 0, ..Readings::new(start, place) },
-            switch: Switch::new(false),
-            end_switch: Switch::new(false),
-            odometer: Odometer::new(place, 0),
+            switch: Switch::NONE,
+            end_switch: Switch::NONE,
+            odometer: Odometer::NONE,
             encoder: EncoderMonitor::NONE,
             meter: SpeedMeter::NONE,
-            beam: BeamMonitor::new(start),
+            beam: BeamMonitor::NONE,
             beam_broken: false,
         }
     };
 
-    /// The machine wakes up: whatever was before is not known.
+    /// The machine wakes up, with sensors that nobody has read.
     #[inline(always)]
-    pub const fn wake_up(&mut self, WakeUp { readings, beam_broken, .. }: WakeUp) {
+    pub const fn init(&mut self, Startup { readings, beam_broken, .. }: Startup) {
         let Readings { now, position, jumps, .. } = readings;
         (self.readings, self.beam_broken) = (readings, beam_broken);
-        self.switch = Switch::new(readings.switch_on);
-        self.end_switch = Switch::new(readings.end_switch_on);
-        self.odometer = Odometer::new(position, jumps);
-        self.encoder = EncoderMonitor::new(now, position);
-        self.beam = BeamMonitor::new(now);
-        self.meter = SpeedMeter::new(position, now);
+        self.switch.init(readings.switch_on);
+        self.end_switch.init(readings.end_switch_on);
+        self.odometer.init(position, jumps);
+        self.encoder.init(now, position);
+        self.beam.init(now);
+        self.meter.init(position, now);
     }
 }

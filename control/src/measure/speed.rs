@@ -54,8 +54,15 @@ impl SpeedMeter {
 
     /// A meter for a machine that stands at `position`.
     pub const fn new(position: Position, now: Instant) -> Self {
-        let last = Sample { place: position.count() as u16, time: now.coarse() };
-        Self { last, patience: STANDSTILL, ..Self::NONE }
+        let mut meter = Self::NONE;
+        meter.init(position, now);
+        meter
+    }
+
+    /// The machine wakes up, and stands at `position`.
+    pub const fn init(&mut self, position: Position, now: Instant) {
+        self.last = Sample { place: position.count() as u16, time: now.coarse() };
+        self.patience = STANDSTILL;
     }
 
     /// The speed as of the last reading.

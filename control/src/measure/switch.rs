@@ -16,9 +16,12 @@ pub struct Switch {
 }
 
 impl Switch {
-    /// A switch as it is found at power-up.
-    pub const fn new(on: bool) -> Self {
-        Self { on, differs_since: None }
+    /// A switch that is off.
+    pub const NONE: Self = Self { on: false, differs_since: None };
+
+    /// The machine wakes up and finds it on or off.
+    pub const fn init(&mut self, on: bool) {
+        self.on = on;
     }
 
     /// Whether it is on.
@@ -55,7 +58,7 @@ mod tests {
 
     #[test]
     fn a_switch_that_is_on_from_the_start_counts_only_after_it_has_been_off() {
-        let mut switch = Switch::new(true);
+        let mut switch = Switch { on: true, ..Switch::NONE };
         assert_eq!(switch.read(at_ms(0), true), None);
         assert_eq!(switch.read(at_ms(1000), true), None);
         assert_eq!(switch.read(at_ms(1001), false), None);
@@ -66,7 +69,7 @@ mod tests {
 
     #[test]
     fn bouncing_contacts_throw_it_once() {
-        let mut switch = Switch::new(false);
+        let mut switch = Switch { on: false, ..Switch::NONE };
         let mut thrown = 0;
         for millisecond in 0..100 {
             let on = millisecond >= 15 || millisecond % 3 == 0;

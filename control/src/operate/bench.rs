@@ -6,7 +6,7 @@
 use crate::{
     operate::{
         calibration::{Outcome, Swings},
-        rehearsal::Rehearsal,
+        dry_run::DryRun,
         servo::HalfMicros,
     },
     units::Instant,
@@ -24,7 +24,7 @@ pub enum Bench {
     /// The servo swings to and fro, to be timed.
     Swings(Swings),
     /// The tool swings as for a row of plants.
-    Row(Rehearsal),
+    Row(DryRun),
 }
 
 impl Bench {

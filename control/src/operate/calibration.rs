@@ -5,7 +5,7 @@
 //! Without an end switch the same swings let the operator time them from a film, with the LED to mark the commands.
 
 use crate::{
-    operate::refusal::Refusal,
+    operate::command_error::CommandError,
     units::{Instant, Interval, Position},
 };
 
@@ -35,11 +35,11 @@ impl Distance {
     /// gives, from which it may differ as far as it likes if it is `forced`.
     ///
     /// # Errors
-    /// [`Refusal::NotBegun`], [`Refusal::TooShort`] and [`Refusal::WheelDiffers`]; the stretch can be ended again.
-    pub fn end(&mut self, position: Position, length_mm: u16, nominal: u16, forced: bool) -> Result<u16, Refusal> {
-        let begin = self.begin.ok_or(Refusal::NotBegun)?;
+    /// [`CommandError::NotBegun`], [`CommandError::TooShort`] and [`CommandError::WheelDiffers`]; the stretch can be ended again.
+    pub fn end(&mut self, position: Position, length_mm: u16, nominal: u16, forced: bool) -> Result<u16, CommandError> {
+        let begin = self.begin.ok_or(CommandError::NotBegun)?;
         if length_mm < SHORTEST_MM {
-            return Err(Refusal::TooShort);
+            return Err(CommandError::TooShort);
         }
         let length_mm = u32::from(length_mm);
         // Up to 4 million ticks, 250 m of the finest wheel, which nobody measures by hand.
@@ -49,7 +49,7 @@ impl Distance {
         // Whole ticks differ by more than the tolerance where they do by more than its whole ticks.
         let differs = counted.abs_diff(nominal) > (u32::from(nominal) * TOLERANCE_TENTHS / 10) as u16;
         if counted == 0 || differs && !forced {
-            return Err(Refusal::WheelDiffers);
+            return Err(CommandError::WheelDiffers);
         }
         Ok(counted)
     }
@@ -162,12 +162,12 @@ impl Swings {
 mod tests {
     use super::*;
 
-    fn end(distance: &mut Distance, ticks: i32, length_mm: u16, forced: bool) -> Result<u16, Refusal> {
+    fn end(distance: &mut Distance, ticks: i32, length_mm: u16, forced: bool) -> Result<u16, CommandError> {
         distance.begin(Position::new(i32::MAX - 100));
         distance.end(Position::new((i32::MAX - 100).wrapping_add(ticks)), length_mm, 1910, forced)
     }
 
-    fn counted(ticks: i32, length_mm: u16, forced: bool) -> Result<u16, Refusal> {
+    fn counted(ticks: i32, length_mm: u16, forced: bool) -> Result<u16, CommandError> {
         let mut distance = Distance::NONE;
         end(&mut distance, ticks, length_mm, forced)
     }
@@ -175,7 +175,7 @@ mod tests {
     /// What was counted of a stretch that is refused.
     fn refused(ticks: i32, length_mm: u16, forced: bool) -> u16 {
         let mut distance = Distance::NONE;
-        assert_eq!(end(&mut distance, ticks, length_mm, forced), Err(Refusal::WheelDiffers));
+        assert_eq!(end(&mut distance, ticks, length_mm, forced), Err(CommandError::WheelDiffers));
         distance.counted()
     }
 
@@ -190,8 +190,8 @@ mod tests {
     #[test]
     fn a_stretch_that_cannot_be_right_is_refused_and_can_be_forced() {
         let mut none = Distance::NONE;
-        assert_eq!(none.end(Position::new(0), 5000, 1910, true), Err(Refusal::NotBegun));
-        assert_eq!(counted(1900, 999, false), Err(Refusal::TooShort));
+        assert_eq!(none.end(Position::new(0), 5000, 1910, true), Err(CommandError::NotBegun));
+        assert_eq!(counted(1900, 999, false), Err(CommandError::TooShort));
         assert_eq!(counted(24_830, 10_000, false), Ok(2483));
         assert_eq!(refused(24_840, 10_000, false), 2484);
         assert_eq!(refused(13_360, 10_000, false), 1336);

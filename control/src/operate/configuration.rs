@@ -3,7 +3,7 @@
 use crate::{
     alarm::Alarm,
     memory::Memory,
-    operate::{refusal::Refusal, saved::SavedSettings},
+    operate::{command_error::CommandError, saved::SavedSettings},
     settings::{Contradiction, Setting, Settings},
 };
 
@@ -29,7 +29,7 @@ impl<M: Memory> Configuration<M> {
         if self.saved.load_into(&mut self.settings) {
             return self.settings.contradiction().map(|_| Alarm::SettingsContradict);
         }
-        self.settings = Settings::new();
+        self.settings.take_defaults();
         Some(Alarm::SettingsLost)
     }
 
@@ -61,16 +61,16 @@ impl<M: Memory> Configuration<M> {
     /// Sets several settings, or none of them; `is_working` tells whether the machine is.
     ///
     /// # Errors
-    /// [`Refusal::NotInHold`], [`Refusal::OutOfRange`], and that of a [`Contradiction`] where there was none before; nothing
+    /// [`CommandError::NotInHold`], [`CommandError::OutOfRange`], and that of a [`Contradiction`] where there was none before; nothing
     /// is changed then.
     #[inline(never)]
-    pub fn change(&mut self, changes: &[(Setting, u16)], is_working: bool) -> Result<(), Refusal> {
+    pub fn change(&mut self, changes: &[(Setting, u16)], is_working: bool) -> Result<(), CommandError> {
         let mut settings = self.settings.clone();
         for &(setting, value) in changes {
-            if setting.description().hold_only && is_working {
-                return Err(Refusal::NotInHold);
+            if setting.is_hold_only() && is_working {
+                return Err(CommandError::NotInHold);
             }
-            settings.set(setting, value).map_err(|_| Refusal::OutOfRange)?;
+            settings.set(setting, value).map_err(|_| CommandError::OutOfRange)?;
             // Another wheel is one that has not been measured.
             if setting.is_of_the_wheel() {
                 let _ = settings.set(Setting::TicksPerM, 0);
@@ -89,17 +89,17 @@ impl<M: Memory> Configuration<M> {
 
     /// Goes back to the settings of a new machine.
     pub fn take_defaults(&mut self) {
-        self.settings = Settings::new();
+        self.settings.take_defaults();
         self.changed = true;
     }
 
     /// Goes back to the saved settings.
     ///
     /// # Errors
-    /// [`Refusal::NothingSaved`].
-    pub fn take_saved(&mut self) -> Result<(), Refusal> {
+    /// [`CommandError::NothingSaved`].
+    pub fn take_saved(&mut self) -> Result<(), CommandError> {
         if !self.saved.restore(&mut self.settings) {
-            return Err(Refusal::NothingSaved);
+            return Err(CommandError::NothingSaved);
         }
         self.changed = true;
         Ok(())
@@ -109,7 +109,7 @@ impl<M: Memory> Configuration<M> {
     ///
     /// # Errors
     /// That of a [`Contradiction`].
-    pub fn save(&mut self) -> Result<(), Refusal> {
+    pub fn save(&mut self) -> Result<(), CommandError> {
         self.expect_no_contradiction()?;
         self.saved.save(&self.settings);
         Ok(())
@@ -125,22 +125,23 @@ impl<M: Memory> Configuration<M> {
     /// # Errors
     /// That of a [`Contradiction`].
     #[inline(never)]
-    pub fn expect_no_contradiction(&mut self) -> Result<(), Refusal> {
+    pub fn expect_no_contradiction(&mut self) -> Result<(), CommandError> {
         self.settings.contradiction().map_or(Ok(()), |contradiction| Err(self.refusal(contradiction)))
     }
 
-    /// The X that [`Refusal::BeamTooNear`] asked for last, in mm.
+    /// The X that [`CommandError::BeamTooNear`] asked for last, in mm.
     pub fn needed_mm(&self) -> u16 {
         self.needed_mm
     }
 
-    fn refusal(&mut self, contradiction: Contradiction) -> Refusal {
+    fn refusal(&mut self, contradiction: Contradiction) -> CommandError {
         match contradiction {
-            Contradiction::PulsesEqual => Refusal::PulsesEqual,
-            Contradiction::SecondBeamAstray => Refusal::SecondBeamAstray,
+            Contradiction::PulsesEqual => CommandError::PulsesEqual,
+            Contradiction::SecondBeamAstray => CommandError::SecondBeamAstray,
+            Contradiction::EncoderTooCoarse => CommandError::EncoderTooCoarse,
             Contradiction::BeamTooNear { needed_mm } => {
                 self.needed_mm = needed_mm;
-                Refusal::BeamTooNear
+                CommandError::BeamTooNear
             }
         }
     }
@@ -156,8 +157,8 @@ mod tests {
         let mut configuration = Configuration::new(Volatile::new());
         configuration.load();
         assert!(!configuration.has_changed(), "waking up works it out");
-        assert_eq!(configuration.change(&[(Setting::K, 0)], false), Err(Refusal::OutOfRange));
-        assert_eq!(configuration.take_saved(), Err(Refusal::NothingSaved));
+        assert_eq!(configuration.change(&[(Setting::K, 0)], false), Err(CommandError::OutOfRange));
+        assert_eq!(configuration.take_saved(), Err(CommandError::NothingSaved));
         assert!(!configuration.has_changed(), "what is refused changes nothing");
         let changes: [fn(&mut Configuration<Volatile>); 3] = [
             |configuration| configuration.change(&[(Setting::K, 5)], true).expect("it may be"),

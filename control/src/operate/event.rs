@@ -2,7 +2,7 @@
 
 use crate::{
     alarm::{Alarm, Warning},
-    ground::{class::Vote, schedule::Plan},
+    ground::{class::Vote, keep_out::Plan},
     operate::{calibration::Outcome, state::State},
     units::{Position, Ticks, count},
 };
@@ -14,8 +14,8 @@ pub const CAPACITY: usize = 6;
 /// Something that happened.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event {
-    /// An object was seen in full and classified.
-    Object {
+    /// A detection was seen in full and classified.
+    Detection {
         /// What it was taken for.
         vote: Vote,
         /// Where the beam broke.

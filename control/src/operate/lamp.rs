@@ -15,8 +15,8 @@ pub fn is_lit(state: State, now: Instant) -> bool {
         State::Work => true,
         State::Hold => quarter.is_multiple_of(4) && now.steps() & 0x8000 == 0,
         State::Alarm(alarm) => {
-            let first = 2 * u16::from(alarm.code() / 10);
-            let second = 2 * u16::from(alarm.code() % 10);
+            let (first, second) = alarm.code();
+            let (first, second) = (2 * u16::from(first), 2 * u16::from(second));
             let step = quarter % (first + GAP + second + PAUSE);
             let is_flashing = step < first || (first + GAP..first + GAP + second).contains(&step);
             is_flashing && step.is_multiple_of(2)
@@ -35,7 +35,7 @@ mod tests {
     fn an_alarm_is_blinked_as_its_codes_two_digits() {
         for alarm in (0..).map_while(Alarm::from_index) {
             let lit = |step: u32| is_lit(State::Alarm(alarm), Instant::default() + Interval::from_steps(step << 16));
-            let (first, second) = (alarm.code() / 10, alarm.code() % 10);
+            let (first, second) = alarm.code();
             let length = u32::from(2 * u16::from(first + second) + GAP + PAUSE);
             let seen: String = (0..2 * length).map(|step| if lit(step) { '*' } else { ' ' }).collect();
             let flashes = |digit: u8| "* ".repeat(usize::from(digit));

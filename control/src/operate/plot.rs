@@ -19,17 +19,17 @@ pub enum Plot {
 
 /// The curves that are drawn.
 #[derive(Clone, Debug)]
-pub struct Curves {
+pub struct Telemetry {
     plot: Plot,
     drawn_at: Coarse,
 }
 
-impl Curves {
+impl Telemetry {
     /// None.
     pub const NONE: Self = Self { plot: Plot::Off, drawn_at: Coarse::ZERO };
 
     /// The machine has woken up: the next points are due a period from now.
-    pub const fn wake_up(&mut self, now: Instant) {
+    pub const fn init(&mut self, now: Instant) {
         self.drawn_at = now.coarse();
     }
 

@@ -36,7 +36,7 @@ impl Tool {
     pub const NONE: Self = Self { out: false, pulse: 0, since: Instant::ZERO, awaits_ground: false, late: 0 };
 
     /// The machine has woken up, with the tool out of the row.
-    pub const fn wake_up(&mut self, now: Instant) {
+    pub const fn init(&mut self, now: Instant) {
         (self.out, self.since) = (true, now);
     }
 

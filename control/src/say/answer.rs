@@ -1,15 +1,16 @@
 //! Answers, a line at a time.
 
 use super::{
-    command::{Command, Mistake},
+    command::{Command, ParseError},
     errors::{write_mistake, write_refusal},
     line::Line,
-    status::{write_counts, write_example, write_object, write_setting, write_state, write_status},
+    status::{write_counts, write_detection, write_example, write_setting, write_state, write_status},
     texts::{self, Text},
     words::Word,
 };
 use crate::{
-    ground::class::Classifier, memory::Memory, operate::refusal::Refusal, settings::Setting, weeder::Controller,
+    ground::class::Classifier, memory::Memory, operate::command_error::CommandError, settings::Setting,
+    weeder::Controller,
 };
 
 /// The part of an answer that has not been written yet.
@@ -23,7 +24,7 @@ pub enum Answer {
     #[default]
     Done,
     /// Whatever answers this line, which has not been carried out yet.
-    Typed(Result<Command, Mistake>),
+    Typed(Result<Command, ParseError>),
     /// The commands, from the one at this place on.
     Help(u8),
     /// What a setting is.
@@ -38,18 +39,18 @@ pub enum Answer {
     GetAll(u8),
     /// All examples, from the one at this place on.
     Examples(u8),
-    /// The heading of the last objects.
+    /// The heading of the last detections.
     DumpHeading,
-    /// The last objects, from the one at this place on.
+    /// The last detections, from the one at this place on.
     Dump(u8),
     /// The firmware's name.
     Version,
     /// `ok`.
     Ok,
     /// What was wrong with the line.
-    Wrong(Mistake),
+    Wrong(ParseError),
     /// Why the command was refused.
-    Refused(Refusal, Option<Setting>),
+    Refused(CommandError, Option<Setting>),
 }
 
 impl Answer {
@@ -68,13 +69,14 @@ impl Answer {
                 line.say(texts::RESET_BY);
                 line.say(controller.cause().text());
                 line.say(texts::STATE);
-                write_state(controller.state(), texts::BLANK, line);
+                write_state(controller.state(), texts::IN_WORDS, line);
                 line.say(texts::TOOL_OUT);
                 Self::Done
             }
             Self::Help(place) => {
                 if let Some(word) = Word::from_index(place) {
-                    explain(word.usage(), word.help(), line);
+                    line.say(word.text());
+                    explain(word.takes(), word.help(), line);
                 }
                 if place + 1 < Word::COUNT { Self::Help(place + 1) } else { Self::Ok }
             }
@@ -113,13 +115,13 @@ impl Answer {
             },
             Self::DumpHeading => {
                 line.say(texts::DUMP);
-                if controller.objects().is_empty() { Self::Ok } else { Self::Dump(0) }
+                if controller.detections().is_empty() { Self::Ok } else { Self::Dump(0) }
             }
             Self::Dump(place) => {
-                if let Some(object) = controller.objects().get(place) {
-                    write_object(object, line);
+                if let Some(detection) = controller.detections().get(place) {
+                    write_detection(detection, line);
                 }
-                if place + 1 < controller.objects().len() { Self::Dump(place + 1) } else { Self::Ok }
+                if place + 1 < controller.detections().len() { Self::Dump(place + 1) } else { Self::Ok }
             }
             Self::Version => {
                 line.say(texts::WEEDER);
@@ -142,7 +144,7 @@ impl Answer {
     }
 }
 
-/// A name and what it stands for.
+/// The rest of a name, and what it stands for.
 fn explain(name: Text, explanation: Text, line: &mut Line) {
     line.say(name);
     line.say(texts::DASH);

@@ -1,7 +1,7 @@
 //! The console's grammar: bytes to lines, lines to commands.
 //!
 //! A line is at most 80 characters and ends with CR, LF or both; backspace works, because serial terminals send it. Words
-//! are separated by blanks. A line that cannot be understood becomes one [`Mistake`] and changes nothing. How commands
+//! are separated by blanks. A line that cannot be understood becomes one [`ParseError`] and changes nothing. How commands
 //! are carried out and answered is the business of [`say`](crate::say).
 
 use crate::{ground::class::label, operate::plot::Plot, settings::Setting};
@@ -99,7 +99,7 @@ const TEST_SPEED_MM_S: u16 = 500;
 
 /// Why a line was not understood.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Mistake {
+pub enum ParseError {
     /// More than [`LINE_LENGTH`] characters.
     TooLong,
     /// Characters other than printable ASCII.
@@ -119,12 +119,12 @@ pub enum Mistake {
 /// Reads a line.
 ///
 /// # Errors
-/// A [`Mistake`] that says what would have been right.
+/// A [`ParseError`] that says what would have been right.
 #[inline(never)]
-pub fn parse(line: &[u8]) -> Result<Command, Mistake> {
+pub fn parse(line: &[u8]) -> Result<Command, ParseError> {
     let (word, rest) = split_word(line);
-    let word = Word::find(word).ok_or(Mistake::UnknownCommand)?;
-    let usage = Err(Mistake::Usage(word));
+    let word = Word::find(word).ok_or(ParseError::UnknownCommand)?;
+    let usage = Err(ParseError::Usage(word));
     let (first, rest) = split_word(rest);
     let (second, rest) = split_word(rest);
     if !split_word(rest).0.is_empty() {
@@ -135,11 +135,11 @@ pub fn parse(line: &[u8]) -> Result<Command, Mistake> {
         if second.is_empty() == matches!(word, Word::Set) {
             return usage;
         }
-        let setting = Setting::find(first).ok_or(Mistake::UnknownSetting)?;
+        let setting = Setting::find(first).ok_or(ParseError::UnknownSetting)?;
         return match word {
             Word::Help => Ok(Command::Explain(setting)),
             Word::Get => Ok(Command::Get(setting)),
-            _ => value(setting, second).map(|value| Command::Set(setting, value)).ok_or(Mistake::Value(setting)),
+            _ => value(setting, second).map(|value| Command::Set(setting, value)).ok_or(ParseError::Value(setting)),
         };
     }
     let argument = Argument::find(first);
@@ -266,7 +266,7 @@ fn number(digits: &[u8]) -> Option<u16> {
 #[derive(Clone, Debug, Default)]
 pub struct LineBuffer {
     characters: Vec<u8, LINE_LENGTH, u8>,
-    mistake: Option<Mistake>,
+    mistake: Option<ParseError>,
 }
 
 impl LineBuffer {
@@ -276,7 +276,7 @@ impl LineBuffer {
     }
 
     /// Takes a byte. At a line's end, returns what the line says; an empty line says nothing.
-    pub fn take(&mut self, byte: u8) -> Option<Result<Command, Mistake>> {
+    pub fn take(&mut self, byte: u8) -> Option<Result<Command, ParseError>> {
         if self.collect(byte) { self.read() } else { None }
     }
 
@@ -290,18 +290,18 @@ impl LineBuffer {
             }
             b'\t' | b' '..=b'~' => {
                 if self.characters.push(byte).is_err() {
-                    self.spoil(Mistake::TooLong);
+                    self.spoil(ParseError::TooLong);
                 }
             }
-            GAP_MARK => self.spoil(Mistake::CharactersLost),
-            _ => self.spoil(Mistake::NotText),
+            GAP_MARK => self.spoil(ParseError::CharactersLost),
+            _ => self.spoil(ParseError::NotText),
         }
         false
     }
 
     /// Reads a line that has ended, the second half of [`take`](Self::take), which takes far longer than a byte does; the next line begins.
     #[inline(never)]
-    pub fn read(&mut self) -> Option<Result<Command, Mistake>> {
+    pub fn read(&mut self) -> Option<Result<Command, ParseError>> {
         let line = match self.mistake.take() {
             Some(mistake) => Some(Err(mistake)),
             None if split_word(&self.characters).0.is_empty() => None,
@@ -311,7 +311,7 @@ impl LineBuffer {
         line
     }
 
-    fn spoil(&mut self, mistake: Mistake) {
+    fn spoil(&mut self, mistake: ParseError) {
         self.mistake.get_or_insert(mistake);
     }
 }
@@ -322,7 +322,7 @@ mod tests {
     use super::*;
     use std::vec::Vec;
 
-    fn answers(bytes: &[u8]) -> Vec<Result<Command, Mistake>> {
+    fn answers(bytes: &[u8]) -> Vec<Result<Command, ParseError>> {
         let mut line = LineBuffer::new();
         bytes.iter().filter_map(|&byte| line.take(byte)).collect()
     }
@@ -380,49 +380,49 @@ mod tests {
     #[test]
     fn a_line_that_is_not_understood_says_what_would_be_right() {
         for (line, mistake) in [
-            (&b"hepl"[..], Mistake::UnknownCommand),
-            (b"HELP", Mistake::UnknownCommand),
-            (b"help me now", Mistake::Usage(Word::Help)),
-            (b"help me", Mistake::UnknownSetting),
-            (b"status please", Mistake::Usage(Word::Status)),
-            (b"set wheel_mm", Mistake::Usage(Word::Set)),
-            (b"set wheel_mm 400 mm", Mistake::Usage(Word::Set)),
-            (b"set wheel 400", Mistake::UnknownSetting),
-            (b"set wheel_mm 4oo", Mistake::Value(Setting::WheelMm)),
-            (b"set wheel_mm -400", Mistake::Value(Setting::WheelMm)),
-            (b"set wheel_mm on", Mistake::Value(Setting::WheelMm)),
-            (b"set end_switch yes", Mistake::Value(Setting::EndSwitch)),
-            (b"set wheel_mm 65936", Mistake::Value(Setting::WheelMm)),
-            (b"start later", Mistake::Usage(Word::Start)),
-            (b"events", Mistake::Usage(Word::Events)),
-            (b"events maybe", Mistake::Usage(Word::Events)),
-            (b"calibrate", Mistake::Usage(Word::Calibrate)),
-            (b"calibrate me", Mistake::Usage(Word::Calibrate)),
-            (b"calibrate start force", Mistake::Usage(Word::Calibrate)),
-            (b"calibrate servo force", Mistake::Usage(Word::Calibrate)),
-            (b"test row force", Mistake::Usage(Word::Test)),
-            (b"calibrate 10000 faster", Mistake::Usage(Word::Calibrate)),
-            (b"calibrate start now", Mistake::Usage(Word::Calibrate)),
-            (b"calibrate 70000", Mistake::Usage(Word::Calibrate)),
-            (b"servo", Mistake::Usage(Word::Servo)),
-            (b"servo up", Mistake::Usage(Word::Servo)),
-            (b"servo in now", Mistake::Usage(Word::Servo)),
-            (b"test", Mistake::Usage(Word::Test)),
-            (b"test plants", Mistake::Usage(Word::Test)),
-            (b"test row fast", Mistake::Usage(Word::Test)),
-            (b"plot", Mistake::Usage(Word::Plot)),
-            (b"plot start", Mistake::Usage(Word::Plot)),
-            (b"label tree", Mistake::Usage(Word::Label)),
-            (b"label weed now", Mistake::Usage(Word::Label)),
-            (b"label weed force now", Mistake::Usage(Word::Label)),
-            (b"label force", Mistake::Usage(Word::Label)),
-            (b"teach", Mistake::Usage(Word::Teach)),
-            (b"teach 256", Mistake::Usage(Word::Teach)),
-            (b"teach 1 2 3 4 5", Mistake::Usage(Word::Teach)),
-            (b"teach tree", Mistake::Usage(Word::Teach)),
-            (b"teach plant force", Mistake::Usage(Word::Teach)),
-            (b"forget", Mistake::Usage(Word::Forget)),
-            (b"forget 256", Mistake::Usage(Word::Forget)),
+            (&b"hepl"[..], ParseError::UnknownCommand),
+            (b"HELP", ParseError::UnknownCommand),
+            (b"help me now", ParseError::Usage(Word::Help)),
+            (b"help me", ParseError::UnknownSetting),
+            (b"status please", ParseError::Usage(Word::Status)),
+            (b"set wheel_mm", ParseError::Usage(Word::Set)),
+            (b"set wheel_mm 400 mm", ParseError::Usage(Word::Set)),
+            (b"set wheel 400", ParseError::UnknownSetting),
+            (b"set wheel_mm 4oo", ParseError::Value(Setting::WheelMm)),
+            (b"set wheel_mm -400", ParseError::Value(Setting::WheelMm)),
+            (b"set wheel_mm on", ParseError::Value(Setting::WheelMm)),
+            (b"set end_switch yes", ParseError::Value(Setting::EndSwitch)),
+            (b"set wheel_mm 65936", ParseError::Value(Setting::WheelMm)),
+            (b"start later", ParseError::Usage(Word::Start)),
+            (b"events", ParseError::Usage(Word::Events)),
+            (b"events maybe", ParseError::Usage(Word::Events)),
+            (b"calibrate", ParseError::Usage(Word::Calibrate)),
+            (b"calibrate me", ParseError::Usage(Word::Calibrate)),
+            (b"calibrate start force", ParseError::Usage(Word::Calibrate)),
+            (b"calibrate servo force", ParseError::Usage(Word::Calibrate)),
+            (b"test row force", ParseError::Usage(Word::Test)),
+            (b"calibrate 10000 faster", ParseError::Usage(Word::Calibrate)),
+            (b"calibrate start now", ParseError::Usage(Word::Calibrate)),
+            (b"calibrate 70000", ParseError::Usage(Word::Calibrate)),
+            (b"servo", ParseError::Usage(Word::Servo)),
+            (b"servo up", ParseError::Usage(Word::Servo)),
+            (b"servo in now", ParseError::Usage(Word::Servo)),
+            (b"test", ParseError::Usage(Word::Test)),
+            (b"test plants", ParseError::Usage(Word::Test)),
+            (b"test row fast", ParseError::Usage(Word::Test)),
+            (b"plot", ParseError::Usage(Word::Plot)),
+            (b"plot start", ParseError::Usage(Word::Plot)),
+            (b"label tree", ParseError::Usage(Word::Label)),
+            (b"label weed now", ParseError::Usage(Word::Label)),
+            (b"label weed force now", ParseError::Usage(Word::Label)),
+            (b"label force", ParseError::Usage(Word::Label)),
+            (b"teach", ParseError::Usage(Word::Teach)),
+            (b"teach 256", ParseError::Usage(Word::Teach)),
+            (b"teach 1 2 3 4 5", ParseError::Usage(Word::Teach)),
+            (b"teach tree", ParseError::Usage(Word::Teach)),
+            (b"teach plant force", ParseError::Usage(Word::Teach)),
+            (b"forget", ParseError::Usage(Word::Forget)),
+            (b"forget 256", ParseError::Usage(Word::Forget)),
         ] {
             assert_eq!(parse(line), Err(mistake), "{}", line.escape_ascii());
         }
@@ -445,8 +445,8 @@ mod tests {
     fn a_spoiled_line_is_one_mistake_and_the_next_line_is_read() {
         let mut text = [b'x'; 300].to_vec();
         text.extend(b"\nstatus\n");
-        assert_eq!(answers(&text), [Err(Mistake::TooLong), Ok(Command::Status)]);
-        assert_eq!(answers(b"\xFF\0\x1Bhold\nhold\n"), [Err(Mistake::NotText), Ok(Command::Hold)]);
+        assert_eq!(answers(&text), [Err(ParseError::TooLong), Ok(Command::Status)]);
+        assert_eq!(answers(b"\xFF\0\x1Bhold\nhold\n"), [Err(ParseError::NotText), Ok(Command::Hold)]);
     }
 
     #[test]
@@ -456,11 +456,11 @@ mod tests {
         text.push(b'\n');
         assert_eq!(answers(&text), [Ok(Command::Hold)]);
         text.insert(4, b' ');
-        assert_eq!(answers(&text), [Err(Mistake::TooLong)]);
+        assert_eq!(answers(&text), [Err(ParseError::TooLong)]);
     }
 
     #[test]
     fn a_line_that_lost_characters_is_not_carried_out() {
-        assert_eq!(answers(b"set k 1\x1A\nhold\n"), [Err(Mistake::CharactersLost), Ok(Command::Hold)]);
+        assert_eq!(answers(b"set k 1\x1A\nhold\n"), [Err(ParseError::CharactersLost), Ok(Command::Hold)]);
     }
 }

@@ -4,9 +4,9 @@ use super::status::write_allowed;
 use crate::{
     ground::class::Classifier,
     memory::Memory,
-    operate::refusal::Refusal,
+    operate::command_error::CommandError,
     say::{
-        command::Mistake,
+        command::ParseError,
         line::Line,
         texts,
         words::{Argument, Word},
@@ -15,55 +15,56 @@ use crate::{
     weeder::Controller,
 };
 
-pub(super) fn write_mistake(mistake: Mistake, line: &mut Line) {
+pub(super) fn write_mistake(mistake: ParseError, line: &mut Line) {
     line.say(texts::ERROR);
     let what = match mistake {
-        Mistake::TooLong => texts::TOO_LONG,
-        Mistake::NotText => texts::NOT_TEXT,
-        Mistake::CharactersLost => texts::CHARACTERS_LOST,
-        Mistake::UnknownCommand => texts::UNKNOWN_COMMAND,
-        Mistake::UnknownSetting => texts::UNKNOWN_SETTING,
-        Mistake::Usage(word) => {
+        ParseError::TooLong => texts::TOO_LONG,
+        ParseError::NotText => texts::NOT_TEXT,
+        ParseError::CharactersLost => texts::CHARACTERS_LOST,
+        ParseError::UnknownCommand => texts::UNKNOWN_COMMAND,
+        ParseError::UnknownSetting => texts::UNKNOWN_SETTING,
+        ParseError::Usage(word) => {
             line.say(texts::USAGE);
-            word.usage()
+            line.say(word.text());
+            word.takes()
         }
-        Mistake::Value(setting) => return write_allowed(setting.text(), setting, line),
+        ParseError::Value(setting) => return write_allowed(setting.text(), setting, line),
     };
     line.say(what);
 }
 
 pub(super) fn write_refusal<C: Classifier, M: Memory>(
-    refusal: Refusal,
+    refusal: CommandError,
     setting: Option<Setting>,
     controller: &Controller<C, M>,
     line: &mut Line,
 ) {
     line.say(texts::ERROR);
     let what = match (refusal, setting) {
-        (Refusal::OutOfRange, Some(setting)) => return write_allowed(setting.text(), setting, line),
+        (CommandError::OutOfRange, Some(setting)) => return write_allowed(setting.text(), setting, line),
         // Of all commands, this one alone takes a value that is no setting's.
-        (Refusal::OutOfRange, None) => return write_allowed(Word::Servo.text(), Setting::ServoOutUs, line),
-        (Refusal::NotInHold, Some(setting)) => {
+        (CommandError::OutOfRange, None) => return write_allowed(Word::Servo.text(), Setting::ServoOutUs, line),
+        (CommandError::NotInHold, Some(setting)) => {
             line.say(setting.text());
             texts::HOLD_TO_SET
         }
-        (Refusal::WheelDiffers, _) => {
+        (CommandError::WheelDiffers, _) => {
             line.say(texts::WHEEL_DIFFERS);
             line.counted(controller.distance().counted());
             line.counted(controller.settings().nominal_ticks_per_m());
             texts::LOOK_AGAIN
         }
-        (Refusal::TakenForPlant | Refusal::TakenForWeed, _) => {
-            let taken_for = if refusal == Refusal::TakenForPlant { Argument::Plant } else { Argument::Weed };
+        (CommandError::TakenForPlant | CommandError::TakenForWeed, _) => {
+            let taken_for = if refusal == CommandError::TakenForPlant { Argument::Plant } else { Argument::Weed };
             line.say(texts::TAKEN_FOR);
             line.say(taken_for.text());
             texts::LOOK_AGAIN
         }
-        (Refusal::BeamTooNear, _) => {
+        (CommandError::BeamTooNear, _) => {
             line.counted(controller.needed_mm());
             refusal.text()
         }
-        (Refusal::TestSpeed, _) => {
+        (CommandError::TestSpeed, _) => {
             line.counted(controller.settings().get(Setting::TopSpeedMmS));
             refusal.text()
         }

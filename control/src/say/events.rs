@@ -1,6 +1,9 @@
 //! The lines of events.
 
-use super::names::{class_name, place_name, state_name};
+use super::{
+    names::{class_name, place_name, state_name},
+    status::write_alarm,
+};
 use crate::{
     operate::{
         calibration::{Outcome, SwingTimes},
@@ -13,7 +16,7 @@ use crate::{
 #[inline(never)]
 pub fn write_event(event: &Event, line: &mut Line) {
     match *event {
-        Event::Object { vote, leading, spacing, plan } => {
+        Event::Detection { vote, leading, spacing, plan } => {
             line.say(class_name(vote.class));
             line.say(texts::OBJECT);
             line.number(leading.count());
@@ -55,10 +58,8 @@ pub fn write_event(event: &Event, line: &mut Line) {
         Event::Calibrated { outcome: Outcome::Shown, .. } => line.say(texts::CALIBRATED_BY_EYE),
         Event::Calibrated { outcome: Outcome::Failed, .. } => line.say(texts::NOT_CALIBRATED),
         Event::Alarm { alarm, position } => {
-            line.say(texts::ALARM);
-            line.say(alarm.text());
-            line.say(texts::CODE);
-            line.counted(alarm.code().into());
+            line.say(texts::IN_ALARM);
+            write_alarm(alarm, texts::CODE, line);
             line.say(texts::POS);
             line.number(position.count());
         }

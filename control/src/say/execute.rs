@@ -2,15 +2,16 @@
 
 use super::{
     answer::Answer,
-    command::{Command, Mistake},
+    command::{Command, ParseError},
 };
 use crate::{
-    ground::class::Classifier, memory::Memory, operate::refusal::Refusal, settings::Setting, weeder::Controller,
+    ground::class::Classifier, memory::Memory, operate::command_error::CommandError, settings::Setting,
+    weeder::Controller,
 };
 
 /// Carries a line out and begins its answer.
 #[inline(never)]
-pub fn execute<C, M>(line: Result<Command, Mistake>, controller: &mut Controller<C, M>) -> Answer
+pub fn execute<C, M>(line: Result<Command, ParseError>, controller: &mut Controller<C, M>) -> Answer
 where
     C: Classifier,
     M: Memory,
@@ -78,7 +79,7 @@ where
 
 /// The answer to a command that may have been refused.
 #[inline(never)]
-fn done(result: Result<(), Refusal>, setting: Option<Setting>) -> Answer {
+fn done(result: Result<(), CommandError>, setting: Option<Setting>) -> Answer {
     match result {
         Ok(()) => Answer::Ok,
         Err(refusal) => Answer::Refused(refusal, setting),

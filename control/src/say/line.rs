@@ -9,7 +9,7 @@ use ufmt::{Formatter, uDisplay, uWrite};
 /// Texts that a line may have; one that shows a setting has ten. A power of two, for short arithmetic.
 pub const TEXTS: usize = 16;
 
-/// Numbers that it may have; one that shows an object has six. A power of two as well.
+/// Numbers that it may have; one that shows a detection has six. A power of two as well.
 const NUMBERS: usize = 8;
 
 /// A line, or what is left of it.

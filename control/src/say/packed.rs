@@ -3,27 +3,34 @@
 //! An AVR keeps Rust's string literals in SRAM, of which there are 2 KiB. So the table lies in flash, and a [`Text`] is no more
 //! than its number there: one byte. What the table is made of stands in `texts`.
 //!
-//! The texts are packed: `FRAGMENTS` that come again and again are one byte each. A fragment is a pair of bytes, each of
+//! The texts are packed: fragments that come again and again are one byte each. A fragment is a pair of bytes, each of
 //! which is a character or stands for another fragment, so that nothing is searched where one is unpacked. The compiler
-//! packs, and [`Characters`] unpacks.
+//! packs, and [`Characters`] unpacks. A test finds the fragments (`fragments.rs`).
 
+mod fragments;
+
+use self::fragments::FRAGMENTS;
 use crate::say::texts::{COUNT, GROUPS, Text};
 
-/// Fragments of what is said, sorted, each of which stands for itself as a byte from 0x80 on. They come from joining the most
-/// frequent pair again and again; any others would do that can be split into two.
-const FRAGMENTS: &[&str] = &[
-    " m", " mm", " p", " the ", ", ", "0 ", ":#", "; ", "=#", "=# ", "_m", "_mm", "a ", "ac", "ad", "al", "alar",
-    "alarm", "all", "am", "an", "an ", "and ", "ar", "as ", "at ", "be", "beam", "beam_", "br", "cal", "cali",
-    "calibr", "calibra", "ch", "ck", "co", "comm", "d ", "de", "e ", "e the ", "ed", "ee", "eed", "el", "en", "enco",
-    "encod", "er", "er ", "es ", "ex", "exam", "examp", "example", "fi", "fir", "first", "for", "fr", "ge", "gr",
-    "hol", "in", "ing", "is ", "it", "la", "lan", "lant", "le", "lead", "lead_", "li", "lo", "mm", "nam", "nd ", "no",
-    "not ", "of", "ok", "ol", "on", "or", "or ", "ou", "out", "ow", "re", "row", "s ", "s, ", "s=# ", "s_", "sa",
-    "sav", "se", "ser", "servo", "set", "sett", "setting", "sp", "st", "st ", "sta", "star", "sw", "t ", "ta", "tak",
-    "te", "th", "the ", "ti", "tick", "to", "to ", "tool", "tool ", "tu", "ul", "um", "un", "vo", "wh",
-];
+/// The characters in the texts, each of which stands for itself as a byte: its place here.
+const CHARACTERS: ([u8; 128], usize) = {
+    let said = said();
+    let (mut characters, mut count, mut character) = ([0; 128], 0, 0);
+    while character < said.len() {
+        if said[character] {
+            (characters[count], count) = (character as u8, count + 1);
+        }
+        character += 1;
+    }
+    (characters, count)
+};
 
 /// The first byte that stands for a fragment.
-const FIRST_FRAGMENT: u8 = 0x80;
+const FIRST_FRAGMENT: u8 = CHARACTERS.1 as u8;
+
+/// The byte that stands for the digit 0. The others stand behind it.
+const ZERO: u8 = place_of(b'0');
+const _: () = assert!(place_of(b'9') == ZERO + 9);
 
 /// Characters and second halves of fragments that wait while others are unpacked, at most; a power of two, for short arithmetic.
 const WAITING: usize = 16;
@@ -41,12 +48,24 @@ const STRIDE: u8 = 16;
 /// the one looked for are passed over without being unpacked.
 const LENGTH: u8 = 0x3F;
 
-/// Where the index begins in the table, behind the fragments, and where the texts do.
-const INDEX: usize = 2 * FRAGMENTS.len();
+/// Where the characters begin in the table, behind the fragments, where the index does, and where the texts do.
+const LETTERS: usize = 2 * FRAGMENTS.len();
+const INDEX: usize = LETTERS + CHARACTERS.1;
 const TEXTS: usize = INDEX + 2 * (COUNT as usize).div_ceil(STRIDE as usize);
 
+/// The table with room behind it, and its length.
+#[allow(long_running_const_eval, reason = "it packs hundreds of texts, and ends")]
+const PACKED: ([u8; 4096], usize) = table();
+
 avr_progmem::progmem! {
-    static progmem TABLE: [u8; table::<4096>().1] = table().0;
+    static progmem TABLE: [u8; PACKED.1] = {
+        let (mut table, mut place) = ([0; PACKED.1], 0);
+        while place < table.len() {
+            table[place] = PACKED.0[place];
+            place += 1;
+        }
+        table
+    };
 }
 
 /// A byte of the table.
@@ -133,14 +152,14 @@ impl Characters {
         loop {
             let tenth = tenth(rest);
             // The remainder is less than 10, so that eight bits of it are enough. What waits last comes first.
-            self.wait((rest as u8).wrapping_sub((tenth as u8).wrapping_mul(10)) + b'0');
+            self.wait((rest as u8).wrapping_sub((tenth as u8).wrapping_mul(10)) + ZERO);
             rest = tenth;
             if rest == 0 {
                 break;
             }
         }
         if number < 0 {
-            self.wait(b'-');
+            self.wait(const { place_of(b'-') });
         }
     }
 
@@ -181,7 +200,7 @@ impl Iterator for Characters {
             self.wait(byte(pair + 1));
             code = byte(pair);
         }
-        Some(code)
+        Some(byte(LETTERS + usize::from(code)))
     }
 }
 
@@ -194,15 +213,23 @@ const fn mark(word: &[u8]) -> u8 {
 }
 
 /// The table and its length: the fragments, the index, and the texts, each behind a byte with its mark and packed length.
-const fn table<const SIZE: usize>() -> ([u8; SIZE], usize) {
-    let mut table = [0; SIZE];
+const fn table() -> ([u8; 4096], usize) {
+    let mut table = [0; 4096];
     let mut place = 0;
     while place < FRAGMENTS.len() {
-        let [first, second] = split(FRAGMENTS[place].as_bytes());
-        (table[2 * place], table[2 * place + 1]) = (first, second);
-        assert!(waiting(first) + DIGITS < WAITING && waiting(second) + DIGITS <= WAITING);
-        assert!(halvings(first) < HALVINGS);
+        [table[2 * place], table[2 * place + 1]] = split(FRAGMENTS[place].as_bytes());
         place += 1;
+    }
+    place = 0;
+    while place < FRAGMENTS.len() {
+        let (waiting, halvings) = depth(FIRST_FRAGMENT + place as u8, &table);
+        assert!(waiting + DIGITS < WAITING && halvings <= HALVINGS);
+        place += 1;
+    }
+    let mut character = 0;
+    while character < CHARACTERS.1 {
+        table[LETTERS + character] = CHARACTERS.0[character];
+        character += 1;
     }
     let (mut number, mut end, mut group) = (0, TEXTS, 0);
     while group < GROUPS.len() {
@@ -233,11 +260,11 @@ const fn pack(text: &str, table: &mut [u8], mut end: usize) -> usize {
     let mut at = text.len();
     while at > 0 {
         at -= 1;
-        best[at] = (text[at], 1, best[at + 1].2 + 1);
+        best[at] = (place_of(text[at]), 1, best[at + 1].2 + 1);
         let [mut place, behind] = beginning_with(text[at]);
         while place < behind {
             let fragment = FRAGMENTS[place].as_bytes();
-            if begins(text.split_at(at).1, fragment) && best[at + fragment.len()].2 + 1 < best[at].2 {
+            if begins(text, at, fragment) && best[at + fragment.len()].2 + 1 < best[at].2 {
                 best[at] = (FIRST_FRAGMENT + place as u8, fragment.len(), best[at + fragment.len()].2 + 1);
             }
             place += 1;
@@ -267,11 +294,11 @@ const fn split(fragment: &[u8]) -> [u8; 2] {
 /// The byte that stands for a part of a text, if one does.
 const fn code(part: &[u8]) -> Option<u8> {
     if let [character] = part {
-        return Some(*character);
+        return Some(place_of(*character));
     }
     let [mut place, behind] = beginning_with(part[0]);
     while place < behind {
-        if FRAGMENTS[place].len() == part.len() && begins(part, FRAGMENTS[place].as_bytes()) {
+        if FRAGMENTS[place].len() == part.len() && begins(part, 0, FRAGMENTS[place].as_bytes()) {
             return Some(FIRST_FRAGMENT + place as u8);
         }
         place += 1;
@@ -279,23 +306,51 @@ const fn code(part: &[u8]) -> Option<u8> {
     None
 }
 
-/// Second halves that wait at once while a byte is unpacked.
-const fn waiting(code: u8) -> usize {
-    if code < FIRST_FRAGMENT {
-        return 0;
-    }
-    let [first, second] = split(FRAGMENTS[(code - FIRST_FRAGMENT) as usize].as_bytes());
-    let (first, second) = (waiting(first) + 1, waiting(second));
-    if first > second { first } else { second }
+/// Second halves that wait at once while a byte is unpacked, and how often it is halved until its first half is a character.
+const fn depth(code: u8, table: &[u8]) -> (usize, usize) {
+    let Some(fragment) = code.checked_sub(FIRST_FRAGMENT) else { return (0, 0) };
+    let pair = 2 * fragment as usize;
+    let ((first, halvings), (second, _)) = (depth(table[pair], table), depth(table[pair + 1], table));
+    (if first + 1 > second { first + 1 } else { second }, halvings + 1)
 }
 
-/// How often a byte is halved until its first half is a character.
-const fn halvings(code: u8) -> usize {
-    if code < FIRST_FRAGMENT {
-        return 0;
+/// Whether a character is in a text, or in a number, or may be in the commit of a release.
+const fn said() -> [bool; 128] {
+    let (mut said, mut character) = ([false; 128], 0);
+    while character < 128 {
+        // Those of every number and of every commit, that of a changed clone too.
+        said[character as usize] = matches!(character, b'0'..=b'9' | b'a'..=b'f' | b'-' | b'(' | b')' | b'+');
+        character += 1;
     }
-    let [first, _] = split(FRAGMENTS[(code - FIRST_FRAGMENT) as usize].as_bytes());
-    1 + halvings(first)
+    let mut group = 0;
+    while group < GROUPS.len() {
+        let mut place = 0;
+        while place < GROUPS[group].len() {
+            let (text, mut at) = (GROUPS[group][place].as_bytes(), 0);
+            while at < text.len() {
+                said[text[at] as usize] = true;
+                at += 1;
+            }
+            place += 1;
+        }
+        group += 1;
+    }
+    said
+}
+
+/// For each character, the byte that stands for it.
+const PLACES: [u8; 128] = {
+    let (mut places, mut place) = ([u8::MAX; 128], 0);
+    while place < CHARACTERS.1 {
+        places[CHARACTERS.0[place] as usize] = place as u8;
+        place += 1;
+    }
+    places
+};
+
+/// The byte that stands for a character.
+const fn place_of(character: u8) -> u8 {
+    PLACES[character as usize]
 }
 
 /// Where the fragments stand that begin with a character: the first one's place, and the place behind the last one.
@@ -314,13 +369,14 @@ const STARTS: [usize; 129] = {
         starts[character] = place;
         character += 1;
     }
-    assert!(FRAGMENTS.len() <= 128 && place == FRAGMENTS.len());
+    assert!(FRAGMENTS.len() + CHARACTERS.1 <= 256 && place == FRAGMENTS.len());
     starts
 };
 
-const fn begins(text: &[u8], part: &[u8]) -> bool {
+/// Whether a part begins at a place in a text.
+const fn begins(text: &[u8], at: usize, part: &[u8]) -> bool {
     let mut same = 0;
-    while same < part.len() && same < text.len() && text[same] == part[same] {
+    while same < part.len() && at + same < text.len() && text[at + same] == part[same] {
         same += 1;
     }
     same == part.len()

@@ -1,11 +1,11 @@
-//! Lines that show the machine: its status, its curves, its settings, examples and objects.
+//! Lines that show the machine: its status, its curves, its settings, examples and detections.
 
 use super::names::{class_name, label_name, place_name, state_name};
 use crate::{
-    alarm::Warning,
+    alarm::{Alarm, Warning},
     ground::class::{Classifier, Listed},
     memory::Memory,
-    operate::{objects::Judged, plot::Plot, state::State},
+    operate::{detections::Classified, plot::Plot, state::State},
     say::{
         line::Line,
         texts::{self, Text},
@@ -15,18 +15,27 @@ use crate::{
     weeder::Controller,
 };
 
-/// The state, and which alarm, with a text between them.
+/// The state, and which alarm, its code in a text between them.
 pub(super) fn write_state(state: State, between: Text, line: &mut Line) {
     line.say(state_name(state));
     if let State::Alarm(alarm) = state {
-        line.say(between);
-        line.say(alarm.text());
+        write_alarm(alarm, between, line);
     }
+}
+
+/// An alarm's code and name: a text with room for the code's digits, and the name.
+#[inline(never)]
+pub(super) fn write_alarm(alarm: Alarm, code: Text, line: &mut Line) {
+    let (first, second) = alarm.code();
+    line.say(code);
+    line.counted(first.into());
+    line.counted(second.into());
+    line.say(alarm.text());
 }
 
 pub(super) fn write_status<C: Classifier, M: Memory>(controller: &Controller<C, M>, line: &mut Line) {
     line.say(texts::STATE_IS);
-    write_state(controller.state(), texts::ALARM_IS, line);
+    write_state(controller.state(), texts::CODE, line);
     line.say(texts::TOOL_IS);
     line.say(place_name(controller.tool_out()));
     if let Some(reason) = controller.reason() {
@@ -36,7 +45,7 @@ pub(super) fn write_status<C: Classifier, M: Memory>(controller: &Controller<C, 
     line.say(texts::PLACE);
     line.number(controller.readings().position.count());
     line.number(controller.speed_mm_s().into());
-    line.counted(controller.windows().into());
+    line.counted(controller.zones().into());
     line.number(controller.unseen_mm().into());
     if controller.has_second_beam() {
         line.say(texts::SLIP_IS);
@@ -70,7 +79,7 @@ pub fn write_plot<C: Classifier, M: Memory>(controller: &Controller<C, M>, plot:
     line.number(controller.speed_mm_s().into());
     line.number(if controller.tool_out() { 45 } else { 0 });
     line.counted(controller.beam_is_broken().into());
-    line.counted(controller.windows().into());
+    line.counted(controller.zones().into());
     line.say(texts::END);
 }
 
@@ -85,7 +94,7 @@ pub(super) fn write_setting<C: Classifier, M: Memory>(
     write_value(texts::IS, setting, value, line);
     line.say(setting.unit());
     write_range(setting, line);
-    write_value(texts::DEFAULT, setting, setting.description().default, line);
+    write_value(texts::DEFAULT, setting, setting.default(), line);
     match controller.saved(setting) {
         None => line.say(texts::NOT_SAVED),
         Some(saved) if saved == value => {}
@@ -108,10 +117,9 @@ fn write_range(setting: Setting, line: &mut Line) {
     if setting.is_switched() {
         return line.say(texts::ON_OR_OFF);
     }
-    let description = setting.description();
     line.say(texts::RANGE);
-    line.counted(description.least);
-    line.counted(description.greatest);
+    line.counted(setting.least());
+    line.counted(setting.greatest());
 }
 
 /// What may be given for a setting, or for something else that has the same range.
@@ -131,13 +139,13 @@ pub(super) fn write_example(listed: &Listed, line: &mut Line) {
     listed.example.features.iter().for_each(|&feature| line.counted(feature.into()));
 }
 
-pub(super) fn write_object(object: &Judged, line: &mut Line) {
+pub(super) fn write_detection(detection: &Classified, line: &mut Line) {
     line.say(texts::DUMPED);
-    object.features().values().iter().for_each(|&value| line.number(value));
-    line.say(class_name(object.vote.class));
+    detection.features().values().iter().for_each(|&value| line.number(value));
+    line.say(class_name(detection.vote.class));
     line.say(texts::VOTES);
-    line.counted(object.vote.votes.into());
-    if let Some(label) = object.label {
+    line.counted(detection.vote.votes.into());
+    if let Some(label) = detection.label {
         line.say(label_name(label));
     }
 }

@@ -6,8 +6,11 @@
 use crate::{
     alarm::{Alarm, Warning},
     measure::reset::Cause,
-    operate::{refusal::Refusal, tool::Reason},
-    say::words::{Argument, Word},
+    operate::{command_error::CommandError, tool::Reason},
+    say::{
+        version,
+        words::{Argument, Word},
+    },
     settings::{self, Setting},
 };
 
@@ -15,7 +18,7 @@ use crate::{
 pub(crate) const GROUPS: &[&[&str]] = &[
     SAID,
     REFUSALS,
-    USAGES,
+    TAKES_WORDS,
     HELPS,
     settings::UNITS,
     settings::HELPS,
@@ -103,12 +106,12 @@ said! {
     END = "\r\n";
     OK = "ok";
     ERROR = "error: ";
-    WEEDER = concat!("weeder ", env!("CARGO_PKG_VERSION"));
+    WEEDER = version::NAME;
     RESET_BY = ", reset by ";
     STATE = ", state ";
     TOOL_OUT = ", tool out; help lists the commands";
     DASH = " - ";
-    BLANK = " ";
+    IN_WORDS = " #-# ";
     NUMBER = "#";
     IS = "=";
     DEFAULT = ", default ";
@@ -119,7 +122,6 @@ said! {
     TAKES = " takes";
     TAKES_A_NUMBER = " takes a whole number";
     STATE_IS = "state=";
-    ALARM_IS = " alarm=";
     TOOL_IS = " tool=";
     FOR = " for=";
     PLACE = " pos=# speed_mm_s=# windows=# unseen_mm=#";
@@ -139,8 +141,7 @@ said! {
     NOT_SET = " set=no";
     CALIBRATED_BY_EYE = "calibrated by=eye, set lead_out_ms and lead_in_ms to what you saw";
     NOT_CALIBRATED = "calibrated by=none, the end switch did not follow";
-    ALARM = "alarm name=";
-    CODE = " code=#";
+    CODE = " code=#-# name=";
     SERIAL_PLOTTER = "speed_mm_s:#,tool_deg:#,beam_broken:#,windows:#";
     TELEPLOT = ">speed_mm_s:#\r\n>tool_deg:#\r\n>beam_broken:#\r\n>windows:#";
     FIELD = "field";
@@ -168,21 +169,21 @@ said! {
 
 /// What is wrong where the machine refuses: one text each, but for those behind the last, which are put together of several.
 macro_rules! refusals {
-    ($($Refusal:ident $text:literal;)*) => {
+    ($($CommandError:ident $text:literal;)*) => {
         const REFUSALS: &[&str] = &[$($text),*];
 
         const _: () = {
             let mut place = 0;
             $(
-                assert!(Refusal::$Refusal as u8 == place, "the refusals stand here in the order of declaration");
+                assert!(CommandError::$CommandError as u8 == place, "the refusals stand here in the order of declaration");
                 place += 1;
             )*
-            assert!(place == Refusal::WheelDiffers as u8);
+            assert!(place == CommandError::WheelDiffers as u8);
         };
     };
 }
 
-impl Refusal {
+impl CommandError {
     /// What is wrong, of those that are one text.
     pub(crate) fn text(self) -> Text {
         const { Text::first_of(REFUSALS) }.plus(self as u8)
@@ -194,9 +195,11 @@ refusals! {
     NotInHold "the machine is at work, hold first";
     PulsesEqual "servo_in_us and servo_out_us would be equal, and the tool would not move";
     BeamTooNear "margin, leads and top speed would need beam_to_tool_mm # or more, change one of them first";
-    SecondBeamAstray "second_beam_mm is to be 0, or from 50 to less than beam_to_tool_mm, and that 1000 at most";
+    SecondBeamAstray "second_beam_mm is to be 0, or 72 or more from beam and tool, and beam_to_tool_mm 1000 at most";
+    EncoderTooCoarse "a wheel gives 900 ticks a metre or more, take a finer encoder";
+    Rolls "the machine rolls, stop first";
     NothingToLabel "there is no object without a label, let the beam see one first";
-    NotTold "tell its 5 features first, as examples lists them";
+    IncompleteExample "tell its 5 features first, as examples lists them";
     ExamplesFull "all 32 places are taken, forget one first";
     NoSuchExample "no field example has this number, examples lists them";
     NothingSaved "no settings are saved, save does it";
@@ -207,8 +210,8 @@ refusals! {
 
 /// The one table of what is said about the commands.
 macro_rules! commands {
-    ($($Word:ident $usage:literal, $help:literal;)*) => {
-        const USAGES: &[&str] = &[$($usage),*];
+    ($($Word:ident $takes:literal, $help:literal;)*) => {
+        const TAKES_WORDS: &[&str] = &[$($takes),*];
         const HELPS: &[&str] = &[$($help),*];
 
         const _: () = {
@@ -223,9 +226,9 @@ macro_rules! commands {
 }
 
 impl Word {
-    /// The command with the words that it takes.
-    pub(crate) fn usage(self) -> Text {
-        const { Text::first_of(USAGES) }.plus(self as u8)
+    /// The words that stand behind it, each with a blank before it.
+    pub(crate) fn takes(self) -> Text {
+        const { Text::first_of(TAKES_WORDS) }.plus(self as u8)
     }
 
     /// What it does.
@@ -235,46 +238,46 @@ impl Word {
 }
 
 commands! {
-    Help "help [name]",
+    Help " [name]",
         "this list, or what a setting is";
-    Status "status",
-        "where the machine is, and what was counted";
-    Get "get [name]",
+    Status "",
+        "position, state and counts";
+    Get " [name]",
         "one setting, or all";
-    Set "set name value",
-        "change a setting; save keeps it";
-    Save "save",
-        "keep the settings for good";
-    Revert "revert",
-        "go back to the saved settings";
-    Defaults "defaults",
-        "go back to the settings of a new machine";
-    Calibrate "calibrate start|servo|MM [force]",
-        "start, roll a measured distance, give it; or time the servo";
-    Servo "servo in|out|US",
-        "move the tool by hand";
-    Test "test row [MM_S]",
-        "swing as for a row of plants, without a sensor";
-    Start "start [now]",
-        "weed; now, at once over ground the beam has not seen";
-    Hold "hold",
-        "take the tool out of the row";
-    Clear "clear",
+    Set " name value",
+        "change a setting";
+    Save "",
+        "keep the settings";
+    Revert "",
+        "back to the saved settings";
+    Defaults "",
+        "back to the settings of a new machine";
+    Calibrate " start|servo|MM [force]",
+        "start, roll, give the distance; or time the servo";
+    Servo " in|out|US",
+        "move the tool";
+    Test " row [MM_S]",
+        "swing as for a row of plants";
+    Start " [now]",
+        "weed; now, over unseen ground";
+    Hold "",
+        "tool out of the row";
+    Clear "",
         "clear an alarm";
-    Events "events on|off",
-        "tell of plants, swings and alarms as they come";
-    Plot "plot on|off|teleplot",
-        "curves for the Arduino Serial Plotter, or Teleplot";
-    Label "label plant|weed [force]",
-        "say what the last object was, and teach it";
-    Teach "teach N|plant|weed",
-        "tell an example, feature by feature, and teach it";
-    Examples "examples",
-        "all examples, with source and class";
-    Forget "forget N|all",
-        "forget examples from the field";
-    Dump "dump",
-        "the last 16 objects as CSV";
-    Version "version",
+    Events " on|off",
+        "tell of plants, swings and alarms";
+    Plot " on|off|teleplot",
+        "curves for Arduino, or Teleplot";
+    Label " plant|weed [force]",
+        "teach what the last object was";
+    Teach " N|plant|weed",
+        "teach an example, feature by feature";
+    Examples "",
+        "all examples";
+    Forget " N|all",
+        "forget field examples";
+    Dump "",
+        "the last 16 objects";
+    Version "",
         "name the firmware";
 }

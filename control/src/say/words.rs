@@ -145,6 +145,7 @@ words! {
     Warning {
         LateCommand = "late_command",
         NoPlants = "no_plants",
+        SlipUnknown = "slip_unknown",
     }
 
     Reason {

@@ -8,9 +8,9 @@ use crate::{
     operate::{
         bench::Bench,
         calibration::{Outcome, SwingTimes, Swings},
+        command_error::CommandError,
+        dry_run::DryRun,
         event::Event,
-        refusal::Refusal,
-        rehearsal::Rehearsal,
         servo,
         state::State,
     },
@@ -21,13 +21,12 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// Gives the servo a pulse by hand, in microseconds.
     ///
     /// # Errors
-    /// [`Refusal::NotInHold`], [`Refusal::AlarmLatched`], and [`Refusal::OutOfRange`] for what is no servo's pulse.
+    /// [`CommandError::NotInHold`], [`CommandError::AlarmLatched`], [`CommandError::Rolls`], and [`CommandError::OutOfRange`] for what is no servo's pulse.
     #[inline(never)]
-    pub fn servo_by_hand(&mut self, pulse_us: u16) -> Result<(), Refusal> {
-        self.expect_hold()?;
-        let range = Setting::ServoOutUs.description();
-        if !(range.least..=range.greatest).contains(&pulse_us) {
-            return Err(Refusal::OutOfRange);
+    pub fn servo_by_hand(&mut self, pulse_us: u16) -> Result<(), CommandError> {
+        self.expect_rest()?;
+        if !Setting::ServoOutUs.allows(pulse_us) {
+            return Err(CommandError::OutOfRange);
         }
         self.bench = Bench::ByHand(servo::from_us(pulse_us));
         Ok(())
@@ -37,15 +36,15 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     ///
     /// # Errors
     /// As [`servo_by_hand`](Self::servo_by_hand).
-    pub fn servo_in(&mut self) -> Result<(), Refusal> {
+    pub fn servo_in(&mut self) -> Result<(), CommandError> {
         self.servo_by_hand(self.configuration.get(Setting::ServoInUs))
     }
 
     /// Ends what was tried: the tool goes out of the row.
     ///
     /// # Errors
-    /// [`Refusal::NotInHold`] and [`Refusal::AlarmLatched`].
-    pub fn servo_out(&mut self) -> Result<(), Refusal> {
+    /// [`CommandError::NotInHold`] and [`CommandError::AlarmLatched`].
+    pub fn servo_out(&mut self) -> Result<(), CommandError> {
         self.expect_hold()?;
         self.bench = Bench::Idle;
         Ok(())
@@ -54,9 +53,9 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// Begins to time the servo; an event tells how it ends.
     ///
     /// # Errors
-    /// [`Refusal::NotInHold`] and [`Refusal::AlarmLatched`].
-    pub fn calibrate_servo(&mut self) -> Result<(), Refusal> {
-        self.expect_hold()?;
+    /// [`CommandError::NotInHold`], [`CommandError::AlarmLatched`] and [`CommandError::Rolls`].
+    pub fn calibrate_servo(&mut self) -> Result<(), CommandError> {
+        self.expect_rest()?;
         let watched = self.configuration.get(Setting::EndSwitch) != 0;
         let gap_ms = self.configuration.get(Setting::ServoGapMs);
         self.bench = Bench::Swings(Swings::new(self.sensors.readings.now, watched, gap_ms as u8));
@@ -66,8 +65,8 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// Begins to measure a distance, from where the machine stands.
     ///
     /// # Errors
-    /// [`Refusal::NotInHold`] and [`Refusal::AlarmLatched`].
-    pub fn calibrate_start(&mut self) -> Result<(), Refusal> {
+    /// [`CommandError::NotInHold`] and [`CommandError::AlarmLatched`].
+    pub fn calibrate_start(&mut self) -> Result<(), CommandError> {
         self.expect_hold()?;
         self.distance.begin(self.sensors.readings.position);
         Ok(())
@@ -77,7 +76,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     ///
     /// # Errors
     /// Those of [`Distance::end`](crate::operate::calibration::Distance::end) and [`set`](Self::set); nothing is changed then.
-    pub fn calibrate(&mut self, distance_mm: u16, force: bool) -> Result<(), Refusal> {
+    pub fn calibrate(&mut self, distance_mm: u16, force: bool) -> Result<(), CommandError> {
         let nominal = self.configuration.settings().nominal_ticks_per_m();
         let counted = self.distance.end(self.sensors.readings.position, distance_mm, nominal, force)?;
         self.set(Setting::TicksPerM, counted)
@@ -86,16 +85,16 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// Swings the tool as for a row of plants, at a speed in mm/s.
     ///
     /// # Errors
-    /// [`Refusal::NotInHold`], [`Refusal::AlarmLatched`], that of a [`Contradiction`](crate::settings::Contradiction), and
-    /// [`Refusal::TestSpeed`] for what the machine would not work at.
-    pub fn test_row(&mut self, speed_mm_s: u16) -> Result<(), Refusal> {
-        self.expect_hold()?;
+    /// [`CommandError::NotInHold`], [`CommandError::AlarmLatched`], [`CommandError::Rolls`], that of a
+    /// [`Contradiction`](crate::settings::Contradiction), and [`CommandError::TestSpeed`] for what the machine would not work at.
+    pub fn test_row(&mut self, speed_mm_s: u16) -> Result<(), CommandError> {
+        self.expect_rest()?;
         self.configuration.expect_no_contradiction()?;
         let fastest = self.configuration.get(Setting::TopSpeedMmS);
-        if !(Setting::TopSpeedMmS.description().least..=fastest).contains(&speed_mm_s) {
-            return Err(Refusal::TestSpeed);
+        if !(Setting::TopSpeedMmS.least()..=fastest).contains(&speed_mm_s) {
+            return Err(CommandError::TestSpeed);
         }
-        self.bench = Bench::Row(Rehearsal::new(self.sensors.readings.now, speed_mm_s, self.configuration.settings()));
+        self.bench = Bench::Row(DryRun::new(self.sensors.readings.now, speed_mm_s, self.configuration.settings()));
         Ok(())
     }
 
@@ -121,12 +120,19 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         self.events.announce(Event::Calibrated { outcome, fits });
     }
 
+    /// What moves the tool in hold swings it over ground that may have plants, and by no speed: it needs a machine that stands.
     #[inline(never)]
-    fn expect_hold(&self) -> Result<(), Refusal> {
+    fn expect_rest(&self) -> Result<(), CommandError> {
+        self.expect_hold()?;
+        if self.sensors.encoder.stands() { Ok(()) } else { Err(CommandError::Rolls) }
+    }
+
+    #[inline(never)]
+    fn expect_hold(&self) -> Result<(), CommandError> {
         match self.state {
             State::Hold => Ok(()),
-            State::Work => Err(Refusal::NotInHold),
-            State::Alarm(_) => Err(Refusal::AlarmLatched),
+            State::Work => Err(CommandError::NotInHold),
+            State::Alarm(_) => Err(CommandError::AlarmLatched),
         }
     }
 }

@@ -7,7 +7,7 @@ use crate::{
         field_examples,
     },
     memory::Memory,
-    operate::{limits::Limits, misfits::Misfits, plot::Plot, refusal::Refusal, state::State},
+    operate::{command_error::CommandError, limits::Limits, plot::Plot, state::State, unknown_run::UnknownRun},
     settings::Setting,
     units::count,
 };
@@ -17,10 +17,10 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// Goes to work; with `now`, at once and over ground that the beam has not seen.
     ///
     /// # Errors
-    /// [`Refusal::AlarmLatched`] while an alarm is, and that of a [`Contradiction`](crate::settings::Contradiction).
-    pub fn start(&mut self, now: bool) -> Result<(), Refusal> {
+    /// [`CommandError::AlarmLatched`] while an alarm is, and that of a [`Contradiction`](crate::settings::Contradiction).
+    pub fn start(&mut self, now: bool) -> Result<(), CommandError> {
         if let State::Alarm(_) = self.state {
-            return Err(Refusal::AlarmLatched);
+            return Err(CommandError::AlarmLatched);
         }
         self.configuration.expect_no_contradiction()?;
         if self.configuration.has_changed() {
@@ -50,19 +50,19 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// Sets a setting.
     ///
     /// # Errors
-    /// [`Refusal::NotInHold`], [`Refusal::OutOfRange`], and that of a [`Contradiction`](crate::settings::Contradiction) where there
+    /// [`CommandError::NotInHold`], [`CommandError::OutOfRange`], and that of a [`Contradiction`](crate::settings::Contradiction) where there
     /// was none before; nothing is changed then.
-    pub fn set(&mut self, setting: Setting, value: u16) -> Result<(), Refusal> {
+    pub fn set(&mut self, setting: Setting, value: u16) -> Result<(), CommandError> {
         self.configuration.change(&[(setting, value)], self.is_working())
     }
 
     /// Goes back to the settings of a new machine; [`save`](Self::save) makes it last.
     ///
     /// # Errors
-    /// [`Refusal::NotInHold`].
-    pub fn take_defaults(&mut self) -> Result<(), Refusal> {
+    /// [`CommandError::NotInHold`].
+    pub fn take_defaults(&mut self) -> Result<(), CommandError> {
         if self.is_working() {
-            return Err(Refusal::NotInHold);
+            return Err(CommandError::NotInHold);
         }
         self.configuration.take_defaults();
         Ok(())
@@ -71,10 +71,10 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// Goes back to the saved settings.
     ///
     /// # Errors
-    /// [`Refusal::NotInHold`] and [`Refusal::NothingSaved`].
-    pub fn take_saved(&mut self) -> Result<(), Refusal> {
+    /// [`CommandError::NotInHold`] and [`CommandError::NothingSaved`].
+    pub fn take_saved(&mut self) -> Result<(), CommandError> {
         if self.is_working() {
-            return Err(Refusal::NotInHold);
+            return Err(CommandError::NotInHold);
         }
         self.configuration.take_saved()
     }
@@ -90,16 +90,16 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         let settings = self.configuration.settings();
         self.ground.follow(settings, self.sensors.readings.position, self.sensors.meter.speed());
         self.limits = Limits::of(settings, self.ground.wheel());
-        (self.leads_are_old, self.is_enough) = (false, true);
+        (self.leads_are_old, self.turn_spent) = (false, true);
     }
 
     /// Begins to save the settings, which [`carry_on`](Self::carry_on) finishes.
     ///
     /// # Errors
-    /// [`Refusal::NotInHold`] and that of a [`Contradiction`](crate::settings::Contradiction).
-    pub fn save(&mut self) -> Result<(), Refusal> {
+    /// [`CommandError::NotInHold`] and that of a [`Contradiction`](crate::settings::Contradiction).
+    pub fn save(&mut self) -> Result<(), CommandError> {
         if self.is_working() {
-            return Err(Refusal::NotInHold);
+            return Err(CommandError::NotInHold);
         }
         self.configuration.save()
     }
@@ -109,30 +109,30 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         self.configuration.carry_on() && self.classifier.carry_on()
     }
 
-    /// Labels the last object and teaches it to the classifier; if it is `forced`, against the built-in examples too.
+    /// Labels the last detection and teaches it to the classifier; if it is `forced`, against the built-in examples too.
     ///
     /// # Errors
-    /// [`Refusal::NothingToLabel`], [`Refusal::TakenForPlant`] or [`Refusal::TakenForWeed`], and [`Refusal::ExamplesFull`]; the object has no label then.
-    pub fn label(&mut self, label: u8, forced: bool) -> Result<(), Refusal> {
-        let is_judged = !self.is_judging;
-        let object = self
-            .objects
+    /// [`CommandError::NothingToLabel`], [`CommandError::TakenForPlant`] or [`CommandError::TakenForWeed`], and [`CommandError::ExamplesFull`]; the detection has no label then.
+    pub fn label(&mut self, label: u8, forced: bool) -> Result<(), CommandError> {
+        let is_judged = !self.is_classifying;
+        let detection = self
+            .detections
             .newest()
-            .filter(|object| is_judged && object.label.is_none())
-            .ok_or(Refusal::NothingToLabel)?;
-        let features = object.features();
+            .filter(|detection| is_judged && detection.label.is_none())
+            .ok_or(CommandError::NothingToLabel)?;
+        let features = detection.features();
         // A label that is wrong would turn the class of all that come after it, and nobody would see why.
         if !forced {
             match (self.classifier.built_in_class(&features), label) {
-                (Class::Weed, label::PLANT) => return Err(Refusal::TakenForWeed),
-                (Class::Plant, label::WEED) => return Err(Refusal::TakenForPlant),
+                (Class::Weed, label::PLANT) => return Err(CommandError::TakenForWeed),
+                (Class::Plant, label::WEED) => return Err(CommandError::TakenForPlant),
                 _ => {}
             }
         }
-        self.classifier.teach(&features, label).map_err(|ExamplesFull| Refusal::ExamplesFull)?;
-        object.label = Some(label);
-        // Whoever labels looks at what the objects are taken for.
-        self.misfits = Misfits::NONE;
+        self.classifier.teach(&features, label).map_err(|ExamplesFull| CommandError::ExamplesFull)?;
+        detection.label = Some(label);
+        // Whoever labels looks at what the detections are taken for.
+        self.unknown_run = UnknownRun::NONE;
         Ok(())
     }
 
@@ -145,25 +145,25 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// a file.
     ///
     /// # Errors
-    /// [`Refusal::NotInHold`], as what stands between beam and tool would be judged by other examples than what came before it;
-    /// [`Refusal::NotTold`] and [`Refusal::ExamplesFull`].
-    pub fn teach(&mut self, label: u8) -> Result<(), Refusal> {
+    /// [`CommandError::NotInHold`], as what stands between beam and tool would be classified by other examples than what came before it;
+    /// [`CommandError::IncompleteExample`] and [`CommandError::ExamplesFull`].
+    pub fn teach(&mut self, label: u8) -> Result<(), CommandError> {
         if self.is_working() {
-            return Err(Refusal::NotInHold);
+            return Err(CommandError::NotInHold);
         }
-        let features = self.told.take().ok_or(Refusal::NotTold)?;
-        self.classifier.keep(Example::new(features, label)).map_err(|ExamplesFull| Refusal::ExamplesFull)?;
-        // Whoever teaches looks at what the objects are taken for.
-        self.misfits = Misfits::NONE;
+        let features = self.told.take().ok_or(CommandError::IncompleteExample)?;
+        self.classifier.keep(Example::new(features, label)).map_err(|ExamplesFull| CommandError::ExamplesFull)?;
+        // Whoever teaches looks at what the detections are taken for.
+        self.unknown_run = UnknownRun::NONE;
         Ok(())
     }
 
     /// Forgets an example from the field.
     ///
     /// # Errors
-    /// [`Refusal::NoSuchExample`].
-    pub fn forget(&mut self, number: u8) -> Result<(), Refusal> {
-        if self.classifier.forget(number) { Ok(()) } else { Err(Refusal::NoSuchExample) }
+    /// [`CommandError::NoSuchExample`].
+    pub fn forget(&mut self, number: u8) -> Result<(), CommandError> {
+        if self.classifier.forget(number) { Ok(()) } else { Err(CommandError::NoSuchExample) }
     }
 
     /// Forgets all examples from the field.
@@ -180,7 +180,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// Draws curves for a plotter, or no longer.
     pub fn set_plot(&mut self, plot: Plot) {
-        self.curves.set(plot);
+        self.telemetry.set(plot);
     }
 
     /// Counts a line that was not understood.

@@ -6,7 +6,7 @@ use crate::{
     ground::class::{Class, Classifier},
     measure::readings::Readings,
     memory::Memory,
-    operate::event::Event,
+    operate::{bench::Bench, event::Event},
     settings::Setting,
     units::Length,
 };
@@ -27,6 +27,10 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         let Readings { now, position, end_switch_on, stack_free, .. } = self.sensors.readings;
         let working = self.is_working();
         let fault = self.sensors.encoder.read(now, position, doubted, self.ground.ticks(PROGRESS).0 as u8);
+        if !self.sensors.encoder.stands() {
+            // What is tried on the bench ends with the tool out.
+            self.bench = Bench::Idle;
+        }
         if self.sensors.encoder.is_silent() {
             // Nobody knows how far the machine has rolled since.
             self.ground.forget();
@@ -58,10 +62,10 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         (stack_free < STACK_RESERVE).then_some(Alarm::StackLow)
     }
 
-    /// Counts what an object was taken for, while it is at stake.
+    /// Counts what a detection was taken for, while it is at stake.
     pub(super) fn count_misfit(&mut self, class: Class, width_mm: i16) {
-        if self.is_working() && self.misfits.count(class, width_mm, self.configuration.get(Setting::MisfitAfter) as u8)
-        {
+        let enough = self.configuration.get(Setting::MisfitAfter) as u8;
+        if self.is_working() && self.unknown_run.count(class, width_mm, enough) {
             self.raise(Alarm::CropUnknown);
         }
     }
@@ -78,7 +82,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
                 self.events.add(Event::Warning(Warning::LateCommand));
             }
         }
-        if self.no_plants.warn(self.sensors.readings.position, self.limits.no_plant()) {
+        if self.plant_timeout.warn(self.sensors.readings.position, self.limits.no_plant()) {
             self.events.add(Event::Warning(Warning::NoPlants));
         }
     }

@@ -2,10 +2,12 @@
 
 use super::Controller;
 use crate::{
-    ground::class::Classifier,
+    ground::{AtTool, class::Classifier},
     measure::{quadrature, readings::Readings, reset::Cause},
     memory::Memory,
-    operate::{calibration::Distance, event::Event, lamp, objects::Objects, plot::Plot, state::State, tool::Reason},
+    operate::{
+        calibration::Distance, detections::Detections, event::Event, lamp, plot::Plot, state::State, tool::Reason,
+    },
     settings::{Setting, Settings},
     units::Ticks,
 };
@@ -31,14 +33,19 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         }
     }
 
+    /// What keeps the tool out where it is.
+    pub fn ground_at_tool(&self) -> AtTool {
+        self.ground.at_tool(self.sensors.readings.position)
+    }
+
     /// The machine's speed in millimetres a second, negative backwards.
     pub fn speed_mm_s(&self) -> i16 {
         self.ground.millimetres(Ticks(self.sensors.meter.speed().0))
     }
 
     /// Windows at the tool or ahead of it, the one still being seen included.
-    pub fn windows(&self) -> u8 {
-        self.ground.windows()
+    pub fn zones(&self) -> u8 {
+        self.ground.zones()
     }
 
     /// How far the machine has to roll until ground that the beam has seen reaches the tool, in millimetres.
@@ -111,9 +118,9 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         &self.classifier
     }
 
-    /// The last objects.
-    pub fn objects(&self) -> &Objects {
-        &self.objects
+    /// The last detections.
+    pub fn detections(&self) -> &Detections {
+        &self.detections
     }
 
     /// Why the machine was reset.
@@ -131,7 +138,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         self.mistakes
     }
 
-    /// Objects that were too narrow to be judged.
+    /// Detections that were too narrow to be classified.
     pub fn dust(&self) -> u16 {
         self.dust
     }
@@ -143,7 +150,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// Whether the machine has worked for a long way without seeing a plant.
     pub fn sees_no_plants(&self) -> bool {
-        self.no_plants.has_warned()
+        self.plant_timeout.has_warned()
     }
 
     /// The next event to be told.
@@ -153,6 +160,6 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// The curves of which the next points are due, which are due 20 times a second.
     pub fn next_plot(&mut self) -> Option<Plot> {
-        self.curves.due(self.sensors.readings.now)
+        self.telemetry.due(self.sensors.readings.now)
     }
 }

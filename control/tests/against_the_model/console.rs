@@ -2,9 +2,9 @@
 
 use crate::decisions::Weeder;
 use control::say::{self, Answer, LINE, command::LineBuffer, line::Line};
+use model_test::machine::Checked;
 use proptest::prelude::*;
 use std::collections::VecDeque;
-use walks::machine::Checked;
 
 /// The console.
 #[derive(Debug)]

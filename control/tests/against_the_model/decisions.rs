@@ -14,7 +14,7 @@ use control::{
     },
     measure::{
         quadrature::Odometer,
-        readings::{Edge, Readings, WakeUp},
+        readings::{Edge, Readings, Startup},
         reset::Cause,
     },
     operate::{servo, state::State, tool::Reason},
@@ -23,12 +23,12 @@ use control::{
     weeder::{Controller, Orders},
 };
 use knn::Example;
+use model_test::{
+    machine::{Attended, Checked, Machine, World},
+    run::Beginning,
+};
 use proptest::prelude::*;
 use std::{cell::Cell, rc::Rc};
-use walks::{
-    machine::{Attended, Checked, Machine, World},
-    walk::Beginning,
-};
 
 /// Narrower than this is a weed.
 const PLANT_MM: i16 = 60;
@@ -45,8 +45,8 @@ pub struct ByWidth {
 }
 
 impl Classifier for ByWidth {
-    fn wake_up(&mut self) {
-        self.nearest.wake_up();
+    fn init(&mut self) {
+        self.nearest.init();
     }
 
     fn classify(&self, features: &Features, _: u8) -> Vote {
@@ -106,10 +106,10 @@ pub struct Decisions {
     reads_first: bool,
 }
 
-fn wake(eeprom: &Eeprom, weed: &Rc<Cell<Option<i16>>>, wake_up: WakeUp) -> Weeder {
+fn wake(eeprom: &Eeprom, weed: &Rc<Cell<Option<i16>>>, startup: Startup) -> Weeder {
     let [for_settings, for_examples] = eeprom.halves();
     let classifier = ByWidth { nearest: Nearest::asleep(&EXAMPLES[..], for_examples), weed: Rc::clone(weed) };
-    Controller::new(classifier, for_settings, wake_up)
+    Controller::new(classifier, for_settings, startup)
 }
 
 fn readings(steps: u32, world: &World) -> Readings {
@@ -136,7 +136,7 @@ impl Machine for Decisions {
     fn new(beginning: &Beginning, world: &World) -> Result<Self, TestCaseError> {
         let (eeprom, weed) = (Eeprom::new(), Rc::default());
         let readings = readings(beginning.steps, world);
-        let weeder = wake(&eeprom, &weed, WakeUp { readings, beam_broken: world.broken, cause: Cause::PowerOn });
+        let weeder = wake(&eeprom, &weed, Startup { readings, beam_broken: world.broken, cause: Cause::PowerOn });
         Ok(Self {
             odometer: Odometer::new(readings.position, world.jumps),
             orders: weeder.orders(),
@@ -257,7 +257,7 @@ impl Machine for Decisions {
         }
         self.console = Console::new();
         let readings = readings(self.steps, world);
-        self.weeder = wake(&self.eeprom, &self.weed, WakeUp { readings, beam_broken: world.broken, cause });
+        self.weeder = wake(&self.eeprom, &self.weed, Startup { readings, beam_broken: world.broken, cause });
         self.orders = self.weeder.orders();
         prop_assert!(self.weeder.tool_out() && self.is_sent_out());
         self.odometer = Odometer::new(readings.position, world.jumps);

@@ -15,9 +15,11 @@ use control::{
 };
 use knn::Example;
 
-/// Takes for a weed what is narrower than 60 mm.
+/// Takes for a weed what is narrower than 60 mm, or nothing.
 #[derive(Clone, Debug)]
 pub struct ByWidth {
+    /// What the hold of a plant is at least.
+    least_hold_mm: i16,
     /// Turns more than one that it takes.
     turns: u16,
     /// What it will say, and in how many turns.
@@ -27,12 +29,18 @@ pub struct ByWidth {
 impl ByWidth {
     /// One that answers so many turns later.
     pub fn late_by(turns: u16) -> Self {
-        Self { turns, vote: (Vote::UNKNOWN, 0) }
+        Self { least_hold_mm: 160, turns, vote: (Vote::UNKNOWN, 0) }
+    }
+
+    /// One that takes everything for a plant, as where stalks were taught.
+    #[allow(dead_code, reason = "not every test has stalks")]
+    pub fn of_stalks() -> Self {
+        Self { least_hold_mm: 0, ..Self::late_by(0) }
     }
 }
 
 impl Classifier for ByWidth {
-    fn wake_up(&mut self) {}
+    fn init(&mut self) {}
 
     fn begin(&mut self, features: &Features, k: u8) -> Option<Vote> {
         self.vote = (self.classify(features, k), self.turns);
@@ -46,7 +54,7 @@ impl Classifier for ByWidth {
     }
 
     fn classify(&self, features: &Features, _: u8) -> Vote {
-        let class = if features.hold_mm < 160 { Class::Weed } else { Class::Plant };
+        let class = if features.hold_mm < self.least_hold_mm { Class::Weed } else { Class::Plant };
         Vote { class, votes: 1 }
     }
 

@@ -2,15 +2,15 @@
 
 use control::{
     measure::{
-        readings::{Readings, WakeUp},
+        readings::{Readings, Startup},
         reset::Cause,
     },
     units::{Instant, Interval, Position},
 };
 
 /// Waking up at rest, with nothing in the beam.
-pub fn woken_up(cause: Cause) -> WakeUp {
-    WakeUp { readings: readings(0, 0), beam_broken: false, cause }
+pub fn woken_up(cause: Cause) -> Startup {
+    Startup { readings: readings(0, 0), beam_broken: false, cause }
 }
 
 /// Readings of a machine at `count`, `microseconds` after the first moment.

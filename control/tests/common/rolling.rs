@@ -2,6 +2,8 @@
 //!
 //! The wheel may slip. The tool is told apart in the row and out of it only: it swings in no time.
 
+#![allow(dead_code, reason = "no test uses all of it")]
+
 use crate::common::{Machine, machine, readings};
 use control::{
     measure::readings::{Edge, Readings},
@@ -39,6 +41,9 @@ pub struct Rolling {
     first_mm: Vec<(f64, f64)>,
     second_mm: Vec<(f64, f64)>,
     levels: (bool, bool),
+    /// How far the second beam and the tool are behind the first.
+    second_beam_mm: f64,
+    beam_to_tool_mm: f64,
 }
 
 impl Rolling {
@@ -59,7 +64,11 @@ impl Rolling {
         }
         machine.tell_events(true);
         machine.start(true).unwrap();
+        let set_mm = |setting| f64::from(machine.settings().get(setting));
+        let (second_beam_mm, beam_to_tool_mm) = (set_mm(Setting::SecondBeamMm), set_mm(Setting::BeamToToolMm));
         Self {
+            second_beam_mm,
+            beam_to_tool_mm,
             machine,
             place_mm: 0.0,
             turns: 1.0,
@@ -87,14 +96,14 @@ impl Rolling {
         self.wheel_mm += step_mm * self.turns;
         self.time_us += TURN_US;
         let sees = |seen: &[(f64, f64)], place| seen.iter().any(|&(from, to)| (from..to).contains(&place));
-        let levels = (sees(&self.first_mm, self.place_mm), sees(&self.second_mm, self.place_mm - SECOND_BEAM_MM));
+        let levels = (sees(&self.first_mm, self.place_mm), sees(&self.second_mm, self.place_mm - self.second_beam_mm));
         let (broken, second_broken) = levels;
         let now = self.readings();
         let edge = Edge::Seen { position: now.position, broken, second_broken };
         let edges = (levels != std::mem::replace(&mut self.levels, levels)).then_some(edge);
         self.machine.turn(now, edges);
         if !self.machine.tool_out() {
-            self.weeded_mm.push(self.place_mm - BEAM_TO_TOOL_MM);
+            self.weeded_mm.push(self.place_mm - self.beam_to_tool_mm);
         }
         while let Some(event) = self.machine.next_event() {
             self.told.push((event, self.place_mm));

@@ -48,14 +48,14 @@ fn what_is_narrower_than_the_least_width_is_counted_as_dust_and_is_neither_a_pla
         drive.machine.set(setting, value).unwrap();
     }
     assert_eq!((drive.pass_stalks(10), drive.alarm()), (10, None));
-    assert_eq!((drive.machine.dust(), drive.machine.objects().len()), (10, 0));
+    assert_eq!((drive.machine.dust(), drive.machine.detections().len()), (10, 0));
     assert_eq!(drive.events(), [Event::Warning(Warning::NoPlants)], "nobody has seen a plant");
     drive.pass(0.5, 0.03);
     drive.roll(0.5, 0.1);
-    assert_eq!((drive.machine.dust(), drive.machine.objects().len()), (10, 1));
+    assert_eq!((drive.machine.dust(), drive.machine.detections().len()), (10, 1));
     drive.pass(0.5, 0.0252);
     drive.roll(0.5, 0.1);
-    assert_eq!((drive.machine.dust(), drive.machine.objects().len()), (10, 2), "as wide as the least is no dust");
+    assert_eq!((drive.machine.dust(), drive.machine.detections().len()), (10, 2), "as wide as the least is no dust");
 }
 
 #[test]
@@ -66,7 +66,7 @@ fn the_narrow_rest_of_an_object_is_no_dust() {
     drive.roll(0.5, 0.02);
     drive.beam(false);
     drive.roll(0.5, 0.1);
-    assert_eq!((drive.machine.dust(), drive.machine.objects().len()), (0, 1));
+    assert_eq!((drive.machine.dust(), drive.machine.detections().len()), (0, 1));
 }
 
 #[test]
@@ -79,14 +79,14 @@ fn a_beam_that_flickers_is_an_alarm_and_a_ragged_canopy_is_none() {
         drive.roll(0.5, 0.0005);
     }
     assert_eq!(drive.alarm(), Some(Alarm::BeamFlickers));
-    // At 5 km/h, a clear stretch every 14 mm.
+    // At 4.6 km/h, a clear stretch every 14 ms.
     let mut drive = Drive::at_work();
-    drive.roll(1.39, 0.3);
+    drive.roll(1.28, 0.3);
     for _ in 0..10 {
         drive.beam(true);
-        drive.roll(1.39, 0.008);
+        drive.roll(1.28, 0.008);
         drive.beam(false);
-        drive.roll(1.39, 0.006);
+        drive.roll(1.28, 0.006);
     }
     assert_eq!(drive.alarm(), None);
 }

@@ -5,6 +5,7 @@ use control::{
     alarm::Alarm,
     measure::readings::{Edge, Readings},
     operate::{event::Event, state::State},
+    settings::Setting,
     units::Position,
     weeder::Orders,
 };
@@ -29,8 +30,7 @@ pub struct Drive {
 impl Drive {
     /// At work, with the tool in the row, at 1.8 km/h.
     pub fn at_work() -> Self {
-        let mut drive =
-            Self { machine: machine(), time_us: 0, place: 0.0, readings: readings(0, 0), edges: Vec::new() };
+        let mut drive = Self::in_hold();
         drive.machine.start(false).unwrap();
         drive.machine.tell_events(true);
         drive.roll(0.5, 1.0);
@@ -41,7 +41,11 @@ impl Drive {
 
     /// In HOLD, at rest.
     pub fn in_hold() -> Self {
-        Self { machine: machine(), time_us: 0, place: 0.0, readings: readings(0, 0), edges: Vec::new() }
+        let mut machine = machine();
+        // A servo that is out after 180 ms leaves room for speeds up to 5 km/h.
+        machine.set(Setting::LeadOutMs, 180).unwrap();
+        machine.set(Setting::TopSpeedMmS, 1400).unwrap();
+        Self { machine, time_us: 0, place: 0.0, readings: readings(0, 0), edges: Vec::new() }
     }
 
     pub fn tool_is_in(&self) -> bool {

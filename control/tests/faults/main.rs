@@ -173,9 +173,9 @@ fn nothing_happens_where_time_and_place_wrap() {
     };
     let swings = |wraps: bool| {
         let place = |now: Readings| if wraps { moved(now) } else { now };
-        let mut wake_up = woken_up(Cause::PowerOn);
-        wake_up.readings = place(readings(0, 0));
-        let mut machine = Controller::new(ByWidth::late_by(0), Volatile::new(), wake_up);
+        let mut startup = woken_up(Cause::PowerOn);
+        startup.readings = place(readings(0, 0));
+        let mut machine = Controller::new(ByWidth::late_by(0), Volatile::new(), startup);
         machine.clear();
         machine.start(false).unwrap();
         let (mut swings, mut was_out) = (Vec::new(), true);

@@ -8,7 +8,7 @@ use control::{
         reset::Cause,
     },
     memory::Volatile,
-    operate::{refusal::Refusal, saved::SavedSettings, state::State},
+    operate::{command_error::CommandError, saved::SavedSettings, state::State},
     settings::{Setting, Settings},
     units::Position,
     weeder::Controller,
@@ -38,9 +38,9 @@ fn a_test_row_that_contradicting_settings_refuse_leaves_what_stands_in_the_beam(
     machine.clear();
     machine.turn(readings(0, 0), []);
     machine.turn(readings(1000, 0), [Edge::Seen { position: Position::new(0), broken: true, second_broken: false }]);
-    assert_eq!(machine.windows(), 1);
-    assert_eq!(machine.test_row(500), Err(Refusal::PulsesEqual));
-    assert_eq!(machine.windows(), 1);
+    assert_eq!(machine.zones(), 1);
+    assert_eq!(machine.test_row(500), Err(CommandError::PulsesEqual));
+    assert_eq!(machine.zones(), 1);
 }
 
 #[test]
@@ -51,8 +51,8 @@ fn saved_settings_that_contradict_each_other_are_an_alarm_and_do_not_start() {
     let mut machine = Controller::new(ByWidth::late_by(0), saved(&settings), woken_up(Cause::PowerOn));
     assert_eq!(machine.state(), State::Alarm(Alarm::SettingsContradict));
     machine.clear();
-    assert_eq!(machine.start(false), Err(Refusal::PulsesEqual));
-    assert_eq!(machine.save(), Err(Refusal::PulsesEqual));
+    assert_eq!(machine.start(false), Err(CommandError::PulsesEqual));
+    assert_eq!(machine.save(), Err(CommandError::PulsesEqual));
     // The switch does not start it either.
     for millisecond in 0..100 {
         machine.turn(Readings { switch_on: true, ..readings(millisecond * 1000, 0) }, []);
@@ -61,7 +61,7 @@ fn saved_settings_that_contradict_each_other_are_an_alarm_and_do_not_start() {
     machine.clear();
     // They can be mended one at a time.
     machine.set(Setting::ServoInUs, 1500).unwrap();
-    assert_eq!((machine.start(false), machine.needed_mm()), (Err(Refusal::BeamTooNear), 336));
+    assert_eq!((machine.start(false), machine.needed_mm()), (Err(CommandError::BeamTooNear), 389));
     machine.set(Setting::BeamToToolMm, 400).unwrap();
     assert_eq!(machine.start(false), Ok(()));
 }

@@ -18,7 +18,7 @@ Examples:
   weeder bench-uno > figures.txt
   weeder bench-uno --json | jq .memory.flash_bytes")]
 pub struct Arguments {
-    /// Print JSON for programs instead of tables.
+    /// Print JSON instead of tables.
     #[arg(long)]
     json: bool,
 }

@@ -8,23 +8,23 @@ use crate::output::say;
 use crate::source;
 use anyhow::Result;
 use clap::Args;
+use experiments::training::table::{self, Recorded};
+use experiments::training::{Confusion, MAX_K, Model, class_of, label_of};
 use field::row::Kind;
 use serde_json::{Value, json};
 use std::path::PathBuf;
-use study::training::table::{self, Recorded};
-use study::training::{Confusion, MAX_K, Model, class_of, label_of};
 
 /// What the user asks to be classified.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
-  weeder classify field.csv          what `dump` has printed, labelled or not
+  weeder classify field.csv          the output of `dump`, labelled or not
   weeder classify field.csv --k 5    with five votes
   weeder classify field.csv --json | jq '.[] | select(.answer == \"unknown\")'
-The status is 1 where a plant would be taken for a weed.")]
+The status is 1 if a plant would be classified as a weed.")]
 pub struct Arguments {
-    /// A CSV file with the columns speed_mm_s,spacing_mm,delay_mm,hold_mm,actuation_mm and, if known, label;
-    /// - for standard input.
+    /// CSV file with the columns speed_mm_s,spacing_mm,delay_mm,hold_mm,actuation_mm, and label if known; - for
+    /// standard input.
     #[arg(value_name = "FILE.csv", value_parser = source::file)]
     file: PathBuf,
     #[arg(
@@ -34,7 +34,7 @@ pub struct Arguments {
         help = format!("Examples that vote, 1 to {MAX_K}; left out, as many as the firmware starts with")
     )]
     k: Option<u8>,
-    /// Print a JSON object for each instead of the table.
+    /// Print a JSON object for each detection instead of the table.
     #[arg(long)]
     json: bool,
 }

@@ -1,6 +1,7 @@
 //! `weeder completions`: what a shell has to be told so that Tab completes the command's words.
 //!
-//! The words are those of the arguments themselves, by clap_complete. Ports and values of settings are not among them.
+//! The words are those of the arguments themselves, by clap_complete. Presets and what an axis can be are among them,
+//! ports and values of settings are not.
 
 use crate::output;
 use anyhow::Result;
@@ -12,10 +13,10 @@ use clap_complete::Shell;
 #[command(after_help = "\
 Examples:
   source <(weeder completions bash)    as a line of ~/.bashrc
-  weeder completions zsh > ~/.zfunc/_weeder    where ~/.zfunc is in fpath before compinit runs
+  weeder completions zsh > ~/.zfunc/_weeder    if ~/.zfunc is in fpath before compinit
   weeder completions fish > ~/.config/fish/completions/weeder.fish")]
 pub struct Arguments {
-    /// The shell that is to complete.
+    /// The shell.
     shell: Shell,
 }
 

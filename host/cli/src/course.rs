@@ -4,10 +4,12 @@ use crate::numbers::{number_within, whole_within};
 use crate::source;
 use anyhow::{Result, ensure};
 use clap::Args;
+use field::conditions::Conditions;
 use field::machine::Machine;
 use field::planting::Planting;
 use field::row::Row;
 use files::csv_table;
+use std::fs;
 use std::path::PathBuf;
 
 /// What the user asks of row and machine.
@@ -25,19 +27,23 @@ pub struct CourseArguments {
     /// Number of crop plants, 1 to 1000.
     #[arg(long, default_value = "20", value_parser = whole_within(1..=1000_usize))]
     plants: usize,
-    /// Number of tall weeds between them, 0 to 1000; left out, 5, or as many as there is room for.
+    /// Number of tall weeds between them, 0 to 1000. Default: 5, or as many as there is room for.
     #[arg(long, value_parser = whole_within(0..=1000_usize))]
     weeds: Option<usize>,
-    /// Which of all the possible rows, 0 to 18446744073709551615: the same seed gives the same row.
+    /// Random seed, 0 to 18446744073709551615.
     #[arg(long, default_value = "1", value_parser = whole_within(0..=u64::MAX))]
     seed: u64,
-    /// Distance from the beam back to the tool in mm, 100 to 2000.
-    #[arg(long, default_value = "400", value_parser = whole_within(100..=2000_u32))]
-    beam_to_tool: u32,
-    /// Grow canopies with gaps through which the beam passes.
+    /// Distance from the beam back to the tool in mm, 100 to 2000. Default: the field's, 400.
+    #[arg(long, value_parser = whole_within(100..=2000_u32))]
+    beam_to_tool: Option<u32>,
+    /// Machine, settings and wheel slip: a preset such as set-up, from-the-box or paper, or a TOML file as for
+    /// `weeder trial`; - for standard input.
+    #[arg(long, value_name = "PRESET|FILE.toml", value_parser = source::preset_or_file(), hide_possible_values = true, default_value = "set-up")]
+    pub field: String,
+    /// Grow canopies with gaps for the beam.
     #[arg(long)]
     ragged: bool,
-    /// Take the row from a CSV file with the columns position_mm,width_mm,kind instead of growing one; - for standard input.
+    /// Read the row from a CSV file with the columns position_mm,width_mm,kind; - for standard input.
     #[arg(long, value_name = "FILE.csv", value_parser = source::file, conflicts_with_all = ["spacing", "canopy", "plants", "weeds", "seed", "ragged"])]
     row: Option<PathBuf>,
 }
@@ -91,8 +97,24 @@ impl CourseArguments {
         Ok(row?)
     }
 
-    /// The machine.
-    pub fn machine(&self) -> Machine {
-        Machine { beam_to_tool_mm: f64::from(self.beam_to_tool), ..Machine::default() }
+    /// The machine and what is around it, in this field.
+    ///
+    /// # Errors
+    /// Where it is no field, or its machine has no room for the distance from beam to tool.
+    pub fn conditions_of(&self, field: &str) -> Result<Conditions> {
+        let mut conditions = Conditions::load(field, |file| fs::read_to_string(file))?;
+        if let Some(beam_to_tool_mm) = self.beam_to_tool {
+            // A second beam stands no farther back, and not on a machine with a beam so far ahead.
+            if conditions.machine.second_beam_mm > 0.0 && !(300..=1000).contains(&beam_to_tool_mm) {
+                conditions.set("machine.second_beam_mm", 0.0)?;
+            }
+            conditions.set("machine.beam_to_tool_mm", beam_to_tool_mm.into())?;
+        }
+        Ok(conditions)
+    }
+
+    /// The machine in a field, which is one of all the possible ones as the row is.
+    pub fn machine(&self, conditions: &Conditions) -> Machine {
+        conditions.machine(self.seed)
     }
 }

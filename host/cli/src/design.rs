@@ -20,16 +20,16 @@ Examples:
   weeder design --print-machine > my.toml    a commented file to start from
   weeder design --machine my.toml --json     your machine, for a program")]
 pub struct Arguments {
-    /// The machine; what the file leaves out, or all without it, is as on the paper's machine; - for standard input.
+    /// The machine; omitted values are those of the paper's machine; - for standard input.
     #[arg(long, value_name = "FILE.toml", value_parser = source::file)]
     machine: Option<PathBuf>,
-    /// Show the paper's printed figures beside ours, with a verdict on each.
+    /// Compare with the paper's printed figures.
     #[arg(long)]
     against_paper: bool,
-    /// Print JSON for programs instead of a table.
+    /// Print JSON instead of a table.
     #[arg(long)]
     json: bool,
-    /// Print the machine as a commented file, to start one's own from.
+    /// Print the machine as a commented file to start from.
     #[arg(long, conflicts_with_all = ["against_paper", "json"])]
     print_machine: bool,
 }

@@ -4,8 +4,13 @@
 //! there is none; a single table goes to a file (`FILE.csv`), and so does a study's part. An argument can only be
 //! written to once it has been checked, and a command checks before it works. What is wrong all the same after the
 //! work, such as a disk that has filled up, is told after the result has been printed.
+//!
+//! A file that is there may hold a user's work: a table that was filled in, settings that were tuned, comments. No command
+//! can tell by looking, so none replaces one without [`Replace`], the option `--force`. A test in `main.rs` holds every
+//! argument with which a command writes to that.
 
 use anyhow::{Context, Result, bail, ensure};
+use clap::Args;
 use files::whole_file;
 use std::ffi::OsString;
 use std::fs;
@@ -14,6 +19,14 @@ use std::path::{Path, PathBuf};
 
 /// How files end that commands write: a folder is hardly meant to.
 const FILE_ENDINGS: [&str; 9] = ["csv", "geojson", "hex", "html", "json", "rs", "svg", "toml", "vcd"];
+
+/// Whether files that are there are replaced.
+#[derive(Args, Clone, Copy, Debug, Default)]
+pub struct Replace {
+    /// Replace existing files.
+    #[arg(long)]
+    force: bool,
+}
 
 /// A file's name, as it was typed.
 #[derive(Clone, Debug)]
@@ -39,17 +52,34 @@ impl From<OsString> for FolderName {
 #[derive(Debug)]
 pub struct OutFile<'a>(&'a Path);
 
-/// A folder in which files could be written when it was checked. It may not be there yet.
+/// A folder in which these files could be written when it was checked. It may not be there yet.
 #[derive(Debug)]
-pub struct OutFolder<'a>(&'a Path);
+pub struct OutFolder<'a> {
+    folder: &'a Path,
+    names: Vec<String>,
+}
+
+impl Replace {
+    /// Whether a file may be written: none is there, it is empty or a device, or it is to be replaced.
+    fn check(self, path: &Path) -> Result<()> {
+        let holds_something = path.metadata().is_ok_and(|there| there.is_file() && there.len() > 0);
+        ensure!(
+            self.force || !holds_something,
+            "{} is there already: choose another name, or have --force replace it",
+            path.display()
+        );
+        Ok(())
+    }
+}
 
 impl FileName {
-    /// Whether it could be written.
+    /// Whether it could be written, and nothing is lost by it.
     ///
     /// # Errors
     /// Where it could not, and why.
-    pub fn check(&self) -> Result<OutFile<'_>> {
+    pub fn check(&self, replace: Replace) -> Result<OutFile<'_>> {
         ensure!(!self.0.is_dir(), "{} is a folder, and a file has to be named", self.0.display());
+        replace.check(&self.0)?;
         whole_file::check(&self.0).with_context(|| cannot_be_written(&self.0))?;
         Ok(OutFile(&self.0))
     }
@@ -92,11 +122,15 @@ impl OutFile<'_> {
 }
 
 impl FolderName {
-    /// Whether files could be written there.
+    /// Whether files could be written there, and nothing is lost by those of these names.
     ///
     /// # Errors
     /// Where they could not, and why.
-    pub fn check(&self) -> Result<OutFolder<'_>> {
+    pub fn check<N: Into<String>>(
+        &self,
+        names: impl IntoIterator<Item = N>,
+        replace: Replace,
+    ) -> Result<OutFolder<'_>> {
         let folder = &self.0;
         ensure!(!folder.exists() || folder.is_dir(), "{} is a file, and a folder has to be named", folder.display());
         let ending = folder.extension().and_then(|ending| ending.to_str());
@@ -104,8 +138,13 @@ impl FolderName {
             bail!("{} is named like a file, and a folder has to be named: several files go there", folder.display());
         }
         let there = folder.ancestors().find(|part| part.exists()).unwrap_or(Path::new("."));
-        whole_file::check(&there.join("report")).with_context(|| cannot_be_written(folder))?;
-        Ok(OutFolder(folder))
+        whole_file::check_folder(there).with_context(|| cannot_be_written(folder))?;
+        let names: Vec<String> = names.into_iter().map(Into::into).collect();
+        for path in names.iter().map(|name| folder.join(name)) {
+            ensure!(!path.is_dir(), "{} is a folder, and a file would take its place", path.display());
+            replace.check(&path)?;
+        }
+        Ok(OutFolder { folder, names })
     }
 
     /// The name.
@@ -126,20 +165,22 @@ impl OutFolder<'_> {
     /// Writes a file there whole, or leaves what was there; makes the folder where there is none.
     ///
     /// # Errors
-    /// Where folder or file cannot be written.
+    /// Where folder or file cannot be written, or this name was not checked.
     pub fn write<E>(&self, name: &str, contents: impl FnOnce(&mut dyn Write) -> Result<(), E>) -> Result<()>
     where
         E: From<io::Error>,
         Result<(), E>: Context<(), E>,
     {
-        fs::create_dir_all(self.0).with_context(|| format!("the folder {} cannot be made", self.0.display()))?;
-        let path = self.0.join(name);
+        ensure!(self.names.iter().any(|checked| checked == name), "{name} was not checked before it was written");
+        let folder = self.folder;
+        fs::create_dir_all(folder).with_context(|| format!("the folder {} cannot be made", folder.display()))?;
+        let path = folder.join(name);
         whole_file::write(&path, contents).with_context(|| cannot_be_written(&path))
     }
 
     /// The name.
     pub fn path(&self) -> &Path {
-        self.0
+        self.folder
     }
 }
 

@@ -1,14 +1,14 @@
 //! `weeder evaluate`: judges a field trial by what was counted and measured in its plots.
 
-use crate::destination::{FolderName, OutFolder};
+use crate::destination::{FolderName, OutFolder, Replace};
 use crate::output::{self, say};
 use crate::source;
 use anyhow::{Context, Result};
 use clap::Args;
+use experiments::evaluation::{self, Analysis, ResponseAnalysis};
+use experiments::page::Page;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
-use study::evaluation::{self, Analysis, ResponseAnalysis};
-use study::page::Page;
 
 /// The report's name in its folder.
 const REPORT: &str = "report.html";
@@ -16,20 +16,22 @@ const REPORT: &str = "report.html";
 /// What the user asks of a trial.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
-    weeder evaluate trial.csv                   say how the machine did, and what that depends on\n  \
-    weeder evaluate trial.csv --out report      write report/report.html with plots as well\n  \
+    weeder evaluate trial.csv                   the results, and what they depend on\n  \
+    weeder evaluate trial.csv --out report      also write report/report.html, with plots\n  \
     weeder evaluate trial.csv --json | jq .responses[0].model.terms")]
 pub struct Arguments {
-    /// CSV file, a line a plot, with the columns
-    /// replication,speed_km_h,spacing_cm,weeds_before,weeds_after,plants,damaged,area_m2,time_s,width_m,power_hp; - for standard input.
+    /// CSV file with a line for each plot: replication, speed_km_h, spacing_cm, weeds_before, weeds_after, plants, damaged,
+    /// area_m2, time_s, width_m, power_hp; - for standard input.
     #[arg(value_name = "FILE.csv", value_parser = source::file)]
     file: PathBuf,
-    /// Print JSON for programs instead of tables.
+    /// Print JSON instead of tables.
     #[arg(long)]
     json: bool,
-    /// Write report.html into this folder, which is made where there is none.
+    /// Write report.html into this folder, and create it if needed.
     #[arg(long, value_name = "FOLDER")]
     out: Option<FolderName>,
+    #[command(flatten)]
+    replace: Replace,
 }
 
 /// Reads, judges and prints.
@@ -37,7 +39,7 @@ pub struct Arguments {
 /// # Errors
 /// Where the table cannot be read or has a plot that cannot be, or the report cannot be written.
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let folder = arguments.out.as_ref().map(FolderName::check).transpose()?;
+    let folder = arguments.out.as_ref().map(|out| out.check([REPORT], arguments.replace)).transpose()?;
     let records = evaluation::read_csv(&arguments.file)?;
     let analysis = Analysis::of(records).with_context(|| arguments.file.display().to_string())?;
     let printed = match arguments.json {
@@ -61,7 +63,7 @@ fn write_report(analysis: &Analysis, file: &Path, folder: &OutFolder) -> Result<
         command: &output::command_line()?,
         parameters: &[
             ("plots from".to_owned(), name.to_string()),
-            ("weeder's version".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
+            ("weeder's version".to_owned(), env!("WEEDER_VERSION").to_owned()),
         ],
         analysis,
         comparison: None,

@@ -1,26 +1,26 @@
 //! `weeder examples`: what a machine was taught in the field as a table that can be kept, learned from, and taught to another.
 
-use crate::destination::FileName;
+use crate::destination::{FileName, Replace};
 use crate::finding::Finding;
 use crate::output::{say, tell};
-use crate::settings::Port;
+use crate::ports::Port;
 use crate::source;
 use anyhow::{Result, bail, ensure};
 use clap::{Args, Subcommand};
 use comfy_table::{Table, presets};
+use experiments::training::{Labelled, label_of, listing, table};
 use field::row::Kind;
 use link::examples::{self, Taught, contradiction, example_of, features_of};
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
-use study::training::{Labelled, label_of, listing, table};
 
 /// What the user asks of the examples.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
-    weeder examples pull chilli.csv             write what the machine was taught into a table
+    weeder examples pull chilli.csv             write the taught examples into a table
   weeder examples push chilli.csv             teach it to another machine
-  weeder examples diff chilli.csv             say what either of them has alone; ends with status 1 if there is anything
-  weeder train chilli.csv dump.csv            learn from it, with other tables, see docs/training.md")]
+  weeder examples diff chilli.csv             list what only one of them has
+  weeder train chilli.csv dump.csv            learn from it, see docs/training.md")]
 pub struct Arguments {
     #[command(subcommand)]
     action: Action,
@@ -28,13 +28,15 @@ pub struct Arguments {
 
 #[derive(Subcommand)]
 enum Action {
-    /// Write the examples that the machine was taught into a CSV file, as `weeder train` and `push` read it.
+    /// Write the machine's taught examples into a CSV file, for `weeder train` and `push`.
     #[command(after_help = "Example: weeder examples pull chilli.csv --port /dev/ttyACM0")]
     Pull {
         /// The file.
         #[arg(value_name = "FILE.csv", required_unless_present = "json")]
         file: Option<FileName>,
-        /// Print them as JSON as well.
+        #[command(flatten)]
+        replace: Replace,
+        /// Also print them as JSON.
         #[arg(long)]
         json: bool,
         #[command(flatten)]
@@ -42,16 +44,16 @@ enum Action {
     },
     /// Teach the machine a table's examples; nothing is sent unless there is room for all of them.
     #[command(after_help = "\
-An Uno has room for 32 examples beside its built-in table. They are kept over a loss of power.\n\n\
+An Uno has room for 32 examples beside its built-in table. It keeps them without power.\n\n\
 Example: weeder examples push chilli.csv --replace")]
     Push {
         /// The table; - for standard input.
         #[arg(value_name = "FILE.csv", value_parser = source::file)]
         file: PathBuf,
-        /// Have the machine forget those examples that the table does not have.
+        /// Make the machine forget examples that the table does not have.
         #[arg(long)]
         replace: bool,
-        /// Teach even what the built-in examples contradict.
+        /// Teach even examples that the built-in table contradicts.
         #[arg(long)]
         force: bool,
         /// Print what was done as JSON.
@@ -60,7 +62,7 @@ Example: weeder examples push chilli.csv --replace")]
         #[command(flatten)]
         port: Port,
     },
-    /// Say which examples the table has and the machine has not, and the other way round; the status is 1 where there is one.
+    /// List the examples that only the table or only the machine has; the status is 1 if there is one.
     #[command(after_help = "Example: weeder examples diff chilli.csv && echo the same")]
     Diff {
         /// The table; - for standard input.
@@ -80,8 +82,8 @@ Example: weeder examples push chilli.csv --replace")]
 /// Where table or machine cannot be used; each says what would be right.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     match &arguments.action {
-        Action::Pull { file, json, port } => {
-            let file = file.as_ref().map(FileName::check).transpose()?;
+        Action::Pull { file, replace, json, port } => {
+            let file = file.as_ref().map(|file| file.check(*replace)).transpose()?;
             let taught = on_machine(port)?;
             let printed =
                 if *json { say!("{:#}", Value::from_iter(taught.iter().filter_map(in_json))) } else { Ok(()) };
@@ -171,7 +173,7 @@ fn refuse_contradictions(wanted: &[Taught]) -> Result<()> {
     let Some(Labelled { features, kind }) = contradicting.first() else { return Ok(()) };
     let [speed, spacing, .., hold, _] = features.values();
     bail!(
-        "{} of {} examples have a label of which the built-in ones are sure that it is wrong. The first: a {kind} at {speed} mm/s, \
+        "{} of {} examples have a label that the built-in ones contradict. The first: a {kind} at {speed} mm/s, \
          {spacing} mm behind the last plant, with a hold of {hold} mm. Look again; --force teaches them all the same. Nothing was sent",
         contradicting.len(),
         wanted.len(),

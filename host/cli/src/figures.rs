@@ -18,14 +18,14 @@ use std::process::{Command, Stdio};
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
-  weeder figures                      write the figures of the manual anew
-  weeder figures --check              say which of them are no longer true
-The status is 1 where --check finds one.")]
+  weeder figures                      update the manual's figures
+  weeder figures --check              check them
+The status is 1 if --check finds a difference.")]
 pub struct Arguments {
     /// The pages with figures.
-    #[arg(default_values = ["docs/figures.md", "README.md"], value_name = "PAGE.md")]
+    #[arg(default_values = ["docs/figures.md", "docs/set-up.md", "README.md"], value_name = "PAGE.md")]
     pages: Vec<PathBuf>,
-    /// Write nothing, but say which figures are not what their commands print.
+    /// Write nothing, but list the figures that differ from their commands' output.
     #[arg(long)]
     check: bool,
 }

@@ -1,6 +1,8 @@
-//! `weeder flash`: builds the firmware and has avrdude put it on the Uno.
+//! `weeder flash`: builds the firmware, proves its bounds, and has avrdude put it on the Uno.
 
+use crate::bounds::Unproved;
 use crate::output::say;
+use crate::ports::Port;
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use std::collections::HashSet;
@@ -17,21 +19,22 @@ use uno::hex;
 Examples:
   weeder flash                         the only Uno at a USB port
   weeder flash --port /dev/ttyACM0     this one
+  weeder flash --port left             the row with this name, see `weeder rows`
   weeder flash --old-bootloader        a board that does not answer at 115200 baud")]
 pub struct Arguments {
-    /// The Uno's serial port, such as /dev/ttyACM0 or COM3; found by itself where there is only one Uno.
-    #[arg(long)]
-    port: Option<String>,
-    /// Speak to the bootloader that came before optiboot, at 57600 baud: the one of the Duemilanove, and of many copies of the
-    /// Nano.
+    #[command(flatten)]
+    port: Port,
+    /// Use the bootloader before optiboot, at 57600 baud: the Duemilanove's, and that of many Nano copies.
     #[arg(long)]
     old_bootloader: bool,
-    /// Have ravedude do it where that is installed, as Ravedude.toml says, unless the bootloader is the old one.
+    /// Use ravedude (Ravedude.toml) if it is installed and the bootloader is not the old one.
     #[arg(long)]
     ravedude: bool,
-    /// Flash this firmware instead of building the one in this repository.
+    /// Flash this ELF instead of building the firmware of this repository.
     #[arg(long, value_name = "FILE.elf")]
     elf: Option<PathBuf>,
+    #[command(flatten)]
+    unproved: Unproved,
 }
 
 /// Baud rates of the bootloader, Optiboot's and its predecessor's.
@@ -40,19 +43,16 @@ const OLD_BAUD: u32 = 57_600;
 
 /// Flash that each leaves to the firmware, in bytes: they take the last 512 and the last 2048 of 32 KiB.
 const AVAILABLE_BYTES: usize = 32_256;
-const OLD_AVAILABLE_BYTES: usize = 30_720;
+pub const OLD_AVAILABLE_BYTES: usize = 30_720;
 
 /// Flashes, with each of avrdude's own messages once on the terminal.
 ///
 /// # Errors
-/// Where there is no Uno, it cannot be opened, or building or writing fails; each says what to do.
+/// Where there is no Uno, it cannot be opened, or building, proving or writing fails; each says what to do.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let (baud, available) =
         if arguments.old_bootloader { (OLD_BAUD, OLD_AVAILABLE_BYTES) } else { (BAUD, AVAILABLE_BYTES) };
-    let port = match &arguments.port {
-        Some(port) => port.clone(),
-        None => link::find_uno()?,
-    };
+    let port = arguments.port.board()?.port()?;
     // For an error that says more than avrdude's, and before anything is built.
     link::try_port(&port)?;
     let elf = match &arguments.elf {
@@ -61,11 +61,15 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     };
     let flash = Image::read(&elf)?.flash;
     hex::check_room(flash.len(), available)?;
+    arguments.unproved.check(&elf)?;
     if arguments.ravedude && !arguments.old_bootloader && run_ravedude(&elf, &port)? {
         return Ok(());
     }
-    let image = elf.with_extension("hex");
-    hex::write(&image, &flash)?;
+    say!("Writing {} to the Uno at {port}", elf.display())?;
+    // What stands beside the ELF is the user's.
+    let folder = tempfile::tempdir().context("there is no room for a temporary file")?;
+    let image = folder.path().join("weeder.hex");
+    std::fs::write(&image, hex::text(&flash)).context("there is no room for a temporary file")?;
     run_avrdude(&image, &port, baud, arguments.old_bootloader)
 }
 
@@ -87,7 +91,6 @@ fn run_ravedude(elf: &Path, port: &str) -> Result<bool> {
 
 /// Has avrdude write an Intel HEX file and verify it.
 fn run_avrdude(image: &Path, port: &str, baud: u32, old_bootloader: bool) -> Result<()> {
-    say!("Writing {} to the Uno at {port}", image.display())?;
     let mut avrdude = Command::new("avrdude")
         // Each page is erased as it is written; a bootloader cannot erase the chip.
         .args(["-c", "arduino", "-p", "atmega328p", "-D", "-b", &baud.to_string(), "-P", port])

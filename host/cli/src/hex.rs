@@ -1,6 +1,8 @@
-//! `weeder hex`: the firmware as an Intel HEX file, which a computer without Rust can put on an Uno.
+//! `weeder hex`: the firmware as an Intel HEX file, which a computer without Rust can put on an Uno. The page and the release
+//! take theirs from here, so that they carry what is proved.
 
-use crate::destination::FileName;
+use crate::bounds::Unproved;
+use crate::destination::{FileName, Replace};
 use crate::output::say;
 use anyhow::Result;
 use clap::Args;
@@ -15,29 +17,34 @@ use uno::hex;
 Example:
   weeder hex weeder.hex
 
-Any computer with avrdude, which the Arduino IDE brings along, can put the file on an Uno:
+avrdude flashes the file. The Arduino IDE contains it:
 
   avrdude -c arduino -p atmega328p -D -b 115200 -P /dev/ttyACM0 -U flash:w:weeder.hex:i")]
 pub struct Arguments {
     /// The file to write.
     #[arg(value_name = "OUT.hex")]
     out: FileName,
-    /// Write this firmware instead of building the one in this repository.
+    #[command(flatten)]
+    replace: Replace,
+    /// Write this ELF instead of building the firmware of this repository.
     #[arg(long, value_name = "FILE.elf")]
     elf: Option<PathBuf>,
+    #[command(flatten)]
+    unproved: Unproved,
 }
 
 /// Writes it.
 ///
 /// # Errors
-/// Where the firmware cannot be built or read, or the file not be written.
+/// Where the firmware cannot be built, read or proved, or the file cannot be written.
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let out = arguments.out.check()?;
+    let out = arguments.out.check(arguments.replace)?;
     let elf = match &arguments.elf {
         Some(elf) => elf.clone(),
         None => firmware::build()?,
     };
     let flash = Image::read(&elf)?.flash;
+    arguments.unproved.check(&elf)?;
     out.write(|to| to.write_all(hex::text(&flash).as_bytes()))?;
     say!("Written     {}, {} bytes of flash", out.path().display(), flash.len())
 }

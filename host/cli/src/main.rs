@@ -9,6 +9,7 @@
 
 mod bench;
 mod bounds;
+mod check_board;
 mod classify;
 mod completions;
 mod course;
@@ -19,7 +20,6 @@ mod examples;
 mod figures;
 mod finding;
 mod flash;
-mod gps;
 mod hex;
 mod map;
 mod merge;
@@ -30,10 +30,12 @@ mod part;
 mod plan;
 mod ports;
 mod progress;
+mod receiver;
 mod record;
 mod replay;
 mod rows;
 mod serve;
+mod set_up;
 mod settings;
 mod sim;
 mod soak;
@@ -44,6 +46,7 @@ mod trial;
 mod virtual_uno;
 
 use crate::finding::Finding;
+use anyhow::Result;
 use clap::builder::StyledStr;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
@@ -55,10 +58,14 @@ use std::process::ExitCode;
 #[derive(Parser)]
 #[command(
     name = "weeder",
-    version,
-    after_help = "Each command's --help has examples. A report goes into a folder (--out FOLDER), a single table to a file (--out \
-        FILE.csv); - is standard input wherever a file is read. The status is 0 where all is well; 1 where a plant was damaged, something \
-        differs, a bound is over its budget, or the machine refused a command; 2 where something else went wrong, with a message that says what would be right."
+    version = env!("WEEDER_VERSION"),
+    max_term_width = 100,
+    after_help = "Each command's --help has examples.\n\
+        A report goes into a folder (--out FOLDER), and a single table into a file (--out FILE.csv).\n\
+        Existing files are replaced only with --force. - is standard input for a file that is read.\n\
+        Status 0: success.\n\
+        Status 1: a plant was damaged, something differs, a bound is over its budget, or the machine refused a command.\n\
+        Status 2: an error. The message says what would be right."
 )]
 struct Arguments {
     #[command(subcommand)]
@@ -67,55 +74,59 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Weed a simulated row with the real firmware on a virtual Uno, and say how it went.
+    /// Weed a simulated row with the real firmware on a virtual Uno.
     Sim(Box<sim::Arguments>),
-    /// Build the firmware and put it on the Uno at a USB port.
+    /// Build the firmware and flash the Uno at a USB port.
     Flash(flash::Arguments),
     /// Write the firmware as an Intel HEX file, for the Arduino tools.
     Hex(hex::Arguments),
-    /// Run the firmware, or a bootloader, on a virtual Uno at a pseudo terminal, in real time.
+    /// Run the firmware or a bootloader on a virtual Uno, in real time, at a serial port.
     VirtualUno(Box<virtual_uno::Arguments>),
-    /// Count the cycles and bytes of the firmware and its classifier on a virtual Uno.
+    /// Measure the cycles and bytes of the firmware on a virtual Uno.
     BenchUno(bench::Arguments),
-    /// Prove from the ELF what the firmware needs at most: stack, interrupts, and how fast the encoder may turn.
+    /// Prove bounds from the ELF: stack, interrupts, and the encoder's rate.
     Bounds(bounds::Arguments),
-    /// Work for a day with everything going wrong now and then, and say what happened.
+    /// Check a real board with a second Uno, the tester.
+    CheckBoard(check_board::Arguments),
+    /// Work for a day with random faults.
     Soak(soak::Arguments),
-    /// Run the paper's experiment in a simulated field, and say how the firmware and others did.
+    /// Run the paper's experiment in a simulated field, with several controllers.
     Trial(Box<trial::Arguments>),
-    /// Show a result of the simulated trial against one or two of its parameters.
+    /// Map a result of the simulated trial against one or two parameters.
     Sweep(Box<sweep::Arguments>),
-    /// Put together the parts of a trial, sweep or soak that several machines have computed.
+    /// Merge the parts of a trial, sweep or soak from several machines.
     Merge(merge::Arguments),
-    /// Make an example table of labelled objects, and say how well it tells plants from weeds.
+    /// Learn a table of examples from labelled detections, and print its error rates.
     Train(train::Arguments),
-    /// Say what the firmware's classifier takes recorded objects for.
+    /// Classify recorded detections with the firmware's classifier.
     Classify(classify::Arguments),
-    /// Say which Uno is which row's, and name the rows of a machine.
+    /// List the Unos and the rows that they control, and name rows.
     Rows(rows::Arguments),
-    /// Watch the machine, and type into its console.
+    /// Watch the machine, and type commands.
     Monitor(monitor::Arguments),
-    /// Serve the page to a phone: what the machines at this computer do, and HOLD.
+    /// Serve the page to a phone, with the state of the machines and HOLD.
     Serve(serve::Arguments),
-    /// Write down what the machine does, for as long as it does it.
+    /// Record what the machine does.
     Record(record::Arguments),
-    /// Replay a log by the same decisions on this computer, and say where the result differs.
+    /// Replay a log with the same decisions on this computer, and compare.
     Replay(replay::Arguments),
-    /// Make a map of a record with a satellite receiver, and count the stand.
+    /// Make a map of a record with a satellite receiver, and count plants.
     Map(Box<map::Arguments>),
-    /// Keep what the machine was taught in a table, teach it from one, or compare both.
+    /// Save taught examples in a table, teach them, or compare.
     Examples(examples::Arguments),
-    /// Keep the machine's settings in a file, set them from it, or compare both.
+    /// Set up the machine step by step: ask, measure, set and save.
+    SetUp(set_up::Arguments),
+    /// Save the machine's settings in a file, set them from it, or compare.
     Settings(settings::Arguments),
-    /// Calculate what a machine's engine, servo, shanks, chain, wheels and handle have to be like.
+    /// Calculate engine, servo, shanks, chain, wheels and handle of a machine.
     Design(design::Arguments),
-    /// Draw the plan of a field trial by lot, as the table to fill in.
+    /// Create a randomised plan of a field trial, as a table to fill in.
     Plan(plan::Arguments),
-    /// Judge a field trial by what was counted and measured in its plots.
+    /// Judge a field trial from the counts of its plots.
     Evaluate(evaluate::Arguments),
-    /// Write the figures of the manual anew, or say which are no longer true.
+    /// Update or check the manual's figures.
     Figures(figures::Arguments),
-    /// Print what a shell needs to complete this command's words.
+    /// Print the completion script for a shell.
     Completions(completions::Arguments),
 }
 
@@ -150,13 +161,26 @@ fn main() -> ExitCode {
         Ok(arguments) => arguments,
         Err(error) => error.exit(),
     };
-    let result = match arguments.command {
+    match run(arguments.command) {
+        Ok(Finding::Good) => ExitCode::SUCCESS,
+        Ok(Finding::Bad) => ExitCode::from(1),
+        Err(error) => {
+            output::tell!("error: {error:#}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+/// Runs a command, and says what came of it.
+fn run(command: Command) -> Result<Finding> {
+    match command {
         Command::Sim(arguments) => sim::run(&arguments),
         Command::Flash(arguments) => flash::run(&arguments).map(|()| Finding::Good),
         Command::Hex(arguments) => hex::run(&arguments).map(|()| Finding::Good),
         Command::VirtualUno(arguments) => virtual_uno::run(&arguments).map(|()| Finding::Good),
         Command::BenchUno(arguments) => bench::run(&arguments).map(|()| Finding::Good),
         Command::Bounds(arguments) => bounds::run(&arguments),
+        Command::CheckBoard(arguments) => check_board::run(&arguments),
         Command::Soak(arguments) => soak::run(&arguments),
         Command::Trial(arguments) => trial::run(&arguments),
         Command::Sweep(arguments) => sweep::run(&arguments).map(|()| Finding::Good),
@@ -170,27 +194,25 @@ fn main() -> ExitCode {
         Command::Replay(arguments) => replay::run(&arguments),
         Command::Map(arguments) => map::run(&arguments).map(|()| Finding::Good),
         Command::Examples(arguments) => examples::run(&arguments),
+        Command::SetUp(arguments) => set_up::run(&arguments).map(|()| Finding::Good),
         Command::Settings(arguments) => settings::run(&arguments),
         Command::Design(arguments) => design::run(&arguments).map(|()| Finding::Good),
         Command::Plan(arguments) => plan::run(&arguments).map(|()| Finding::Good),
         Command::Evaluate(arguments) => evaluate::run(&arguments).map(|()| Finding::Good),
         Command::Figures(arguments) => figures::run(&arguments),
         Command::Completions(arguments) => completions::run(&arguments, grammar()).map(|()| Finding::Good),
-    };
-    match result {
-        Ok(Finding::Good) => ExitCode::SUCCESS,
-        Ok(Finding::Bad) => ExitCode::from(1),
-        Err(error) => {
-            output::tell!("error: {error:#}");
-            ExitCode::from(2)
-        }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clap::Command;
+    use crate::destination::{FileName, FolderName};
+    use clap::{Arg, Command};
+    use std::any::TypeId;
+    use std::collections::BTreeSet;
+    use std::fs;
+    use std::path::{Path, PathBuf};
 
     #[test]
     fn the_arguments_are_well_formed() {
@@ -224,6 +246,180 @@ mod tests {
             }
         }
         assert!(ranges > 20, "{ranges}");
+    }
+
+    /// Arguments of files that are only read.
+    const READ: &str = "bounds:elf bounds:budgets bounds:diff classify:file design:machine evaluate:file examples.diff:file \
+        examples.push:file flash:elf hex:elf map:logs merge:parts replay:log serve:page settings.diff:file settings.push:file \
+        sim:capture sim:elf sim:field sim:row soak:elf sweep:field train:files trial:elf trial:examples trial:field virtual-uno:bootloader \
+        virtual-uno:elf virtual-uno:field virtual-uno:row";
+
+    /// Of files that are gone on with, where they are of the command's own kind, and else refused: logs, an EEPROM, and what was set up.
+    const CONTINUED: &str = "monitor:log record:out set-up:state virtual-uno:eeprom";
+
+    /// Of files in which a command changes its own lines, and keeps the others: the rows' names, and figures of the manual. And links to a
+    /// virtual Uno's port, which take no file's place.
+    const EDITED: &str =
+        "figures:pages rows:rows_file rows.name:rows_file rows.forget:rows_file virtual-uno:gps_link virtual-uno:link";
+
+    /// Of the file with the rows' names, where it is only read.
+    const NAMES: &str = "examples.diff examples.pull examples.push flash monitor record serve set-up settings.diff settings.pull \
+        settings.push";
+
+    /// Of words that name no file.
+    const NO_FILE: &str = "bounds:chip bounds:function check-board:board check-board:port check-board:tester examples.diff:port examples.pull:port examples.push:port flash:port rows.forget:name rows.name:name \
+        rows.name:port set-up:port sim:channel_a sim:channel_b sim:channel_beam";
+
+    /// What stands before the name of each file or folder that a command writes, and for a folder the files that come there. `DIR` is a
+    /// folder that has what they ask for.
+    const WRITERS: [(&str, &str, &[&str]); 18] = [
+        ("check-board:page", "check-board --simulated --page", &[]),
+        ("evaluate:out", "evaluate DIR/filled.csv --out", &["report.html"]),
+        ("examples.pull:file", "examples pull --port /dev/no-such-port", &[]),
+        ("hex:out", "hex", &[]),
+        ("map:out", "map DIR/log.csv --out", &[]),
+        ("map:svg", "map DIR/log.csv --out DIR/new --svg", &[]),
+        ("map:table", "map DIR/log.csv --out DIR/new --table", &[]),
+        ("merge:out", "merge DIR/trial.part --out", &["report.html", "trial.csv", "controllers.csv"]),
+        ("merge:out", "merge DIR/sweep.part --out", &[]),
+        ("plan:out", "plan --out", &[]),
+        ("settings.pull:file", "settings pull --port /dev/no-such-port", &[]),
+        ("settings.pull:file", "settings pull --port a=/dev/no-a --port b=/dev/no-b", &["a.toml", "b.toml"]),
+        ("sim:out", "sim --out", &["row.svg", "weeding.svg", "row.csv", "plants.csv", "weeds.csv"]),
+        ("sim:vcd", "sim --vcd", &[]),
+        ("soak:out", "soak --shard 1/2 --out", &[]),
+        ("sweep:out", "sweep --x k=1..3:1 --out", &[]),
+        ("train:picture", "train --synthetic --picture", &[]),
+        ("trial:out", "trial --out", &["report.html", "trial.csv", "controllers.csv"]),
+    ];
+
+    /// Writers of files whose names end as their form does.
+    const BY_ENDING: [(&str, &str, &[&str]); 2] =
+        [("train:out", "train --synthetic --out", &["rs", "csv"]), ("trial:out", "trial --shard 1/2 --out", &["part"])];
+
+    /// Every argument that takes a word that could name a file, as `command.subcommand:argument`, and its type.
+    fn words_taken() -> Vec<(String, Arg)> {
+        let commands = subcommands(&grammar(), "weeder");
+        let of_one = |(name, command): &(String, Command)| -> Vec<(String, Arg)> {
+            let name = name.trim_start_matches("weeder ").replace(' ', ".");
+            let takes = |arg: &&Arg| arg.get_action().takes_values() && is_free(arg);
+            command.get_arguments().filter(takes).map(|arg| (format!("{name}:{}", arg.get_id()), arg.clone())).collect()
+        };
+        commands.iter().flat_map(of_one).collect()
+    }
+
+    /// Whether it takes free text or a path, and not numbers, a few known words, or what else is read by a parser of its own.
+    fn is_free(argument: &Arg) -> bool {
+        let parser = argument.get_value_parser();
+        let found = parser.type_id();
+        let kinds = [
+            TypeId::of::<String>(),
+            TypeId::of::<OsString>(),
+            TypeId::of::<PathBuf>(),
+            TypeId::of::<FileName>(),
+            TypeId::of::<FolderName>(),
+        ];
+        let has_words_alone = !argument.is_hide_possible_values_set() && parser.possible_values().is_some();
+        kinds.iter().any(|kind| found == *kind) && !has_words_alone
+    }
+
+    /// Whether it names something to write.
+    fn writes(argument: &Arg) -> bool {
+        let found = argument.get_value_parser().type_id();
+        [TypeId::of::<FileName>(), TypeId::of::<FolderName>(), TypeId::of::<OsString>()]
+            .iter()
+            .any(|kind| found == *kind)
+    }
+
+    #[test]
+    fn of_every_argument_that_could_name_a_file_it_is_decided_what_happens_to_one_that_is_there() {
+        let names = NAMES.split_whitespace().map(|command| format!("{command}:rows_file"));
+        let kept: BTreeSet<String> = [READ, CONTINUED, EDITED, NO_FILE]
+            .iter()
+            .flat_map(|list| list.split_whitespace())
+            .map(str::to_owned)
+            .chain(names)
+            .collect();
+        let replaced: BTreeSet<String> =
+            WRITERS.iter().chain(&BY_ENDING).map(|(argument, ..)| (*argument).to_owned()).collect();
+        let taken = words_taken();
+        for (name, argument) in &taken {
+            assert_eq!(writes(argument), replaced.contains(name), "{name}: is what is there replaced? See WRITERS");
+            assert_ne!(writes(argument), kept.contains(name), "{name}: what happens to a file that is there?");
+        }
+        let known: BTreeSet<String> = taken.into_iter().map(|(name, _)| name).collect();
+        let gone: Vec<&String> = kept.union(&replaced).filter(|name| !known.contains(*name)).collect();
+        assert!(gone.is_empty(), "{gone:?} are no arguments");
+    }
+
+    #[test]
+    fn a_command_that_writes_has_force_and_no_other_has_it_for_that() {
+        let writers: BTreeSet<&str> =
+            WRITERS.iter().chain(&BY_ENDING).filter_map(|(argument, ..)| argument.split(':').next()).collect();
+        for (name, command) in subcommands(&grammar(), "weeder") {
+            let name = name.trim_start_matches("weeder ").replace(' ', ".");
+            let mut options = command.get_arguments().filter(|argument| argument.get_long() == Some("force"));
+            let force = options.next().and_then(Arg::get_help).map(ToString::to_string).unwrap_or_default();
+            assert_eq!(force.starts_with("Replace existing files"), writers.contains(name.as_str()), "{name}");
+        }
+    }
+
+    /// Runs a command in this process, with `DIR` for a folder, and a last word.
+    fn run_with(words: &str, folder: &Path, last: &Path) -> Result<Finding> {
+        let folder = folder.to_str().expect("it is text");
+        let words = words.split(' ').map(|word| OsString::from(word.replace("DIR", folder)));
+        let words = ["weeder".into()].into_iter().chain(words).chain([last.into()]);
+        run(parse(words.collect()).unwrap_or_else(|error| panic!("{error}")).command)
+    }
+
+    #[test]
+    fn no_command_replaces_a_file_that_is_there_before_it_is_told_to() {
+        let folder = tempfile::tempdir().expect("there is room for a folder");
+        let path = |name: &str| folder.path().join(name);
+        fs::write(path("small.toml"), "[plot]\nrows = 1\nrow_m = 6\n").unwrap();
+        fs::write(path("log.csv"), "time_ms,kind,line\n0,connected,0.2.0\n").unwrap();
+        let filled = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/trial-example.csv");
+        fs::copy(filled, path("filled.csv")).unwrap();
+        for words in ["trial --speeds 2 --spacings 50", "sweep --x k=1..1:1"] {
+            let part = path(words.split(' ').next().unwrap()).with_extension("part");
+            let words = format!("{words} --field DIR/small.toml --shard 1/1 --out");
+            run_with(&words, folder.path(), &part).expect("it computes a part");
+        }
+        let assert_kept = |words: &str, there: &Path, named: &Path| {
+            fs::write(there, "mine").unwrap();
+            let error = run_with(words, folder.path(), named).expect_err(words).to_string();
+            let right =
+                format!("{} is there already: choose another name, or have --force replace it", there.display());
+            assert_eq!(error, right, "{words}");
+            assert_eq!(fs::read_to_string(there).unwrap(), "mine", "{words}");
+            fs::remove_file(there).unwrap();
+        };
+        for (_, words, names) in WRITERS {
+            if names.is_empty() {
+                assert_kept(words, &path("there"), &path("there"));
+            }
+            for name in names {
+                fs::create_dir_all(path("reports")).unwrap();
+                assert_kept(words, &path("reports").join(name), &path("reports"));
+            }
+        }
+        for (_, words, endings) in BY_ENDING {
+            for ending in endings {
+                let there = path("there").with_extension(ending);
+                assert_kept(words, &there, &there);
+            }
+        }
+        // Told to, it does; and what is empty holds nothing.
+        let table = path("plan.csv");
+        fs::write(&table, "mine").unwrap();
+        run_with("plan --force --out", folder.path(), &table).expect("it is told to");
+        assert!(fs::read_to_string(&table).unwrap().contains("plot,replication"));
+        fs::write(&table, "").unwrap();
+        run_with("plan --out", folder.path(), &table).expect("nothing is lost");
+        let report = path("reports/report.html");
+        fs::write(&report, "mine").unwrap();
+        run_with("merge DIR/trial.part --brief --force --out", folder.path(), &path("reports")).expect("it is told to");
+        assert!(fs::read_to_string(&report).unwrap().contains("<svg"));
     }
 
     #[test]

@@ -1,17 +1,17 @@
 //! `weeder map`: records with a satellite receiver as a map, and what they come to.
 
-use crate::destination::FileName;
-use crate::gps::AntennaArguments;
+use crate::destination::{FileName, Replace};
 use crate::numbers::number_within;
 use crate::output::{print, say, tell};
+use crate::receiver::AntennaArguments;
 use crate::source;
 use anyhow::Result;
 use clap::Args;
 use comfy_table::{Table, presets};
+use gps::job::{self, Wanted};
+use gps::summary::{Stand, Summary};
+use gps::{Job, map, picture};
 use link::log;
-use places::job::{self, Wanted};
-use places::summary::{Stand, Summary};
-use places::{Job, map, picture};
 use serde_json::json;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -19,12 +19,13 @@ use std::path::{Path, PathBuf};
 /// What the user asks of the map.
 #[derive(Args)]
 #[command(after_help = "\
-It is GeoJSON (WGS84), which QGIS opens as it is: a point for each plant, weed, swing, alarm and label, and lines of the ground weeded and \
-not weeded. docs/map.md says what error to expect. What you say of the antenna here counts instead of what the record says.\n\n\
+It writes GeoJSON (WGS84) for QGIS: a point for each plant, weed, swing, alarm and label.\n\
+Lines are the ground weeded and not weeded. docs/map.md has the expected error.\n\
+Antenna options replace those of the record.\n\n\
 Examples:
   weeder map field.csv -o field.geojson --svg field.svg
   weeder map monday.csv tuesday.csv -o field.geojson --row-spacing 750 --table field-table.csv
-  weeder map field.csv -o field.geojson --beam-ahead 610 --gps-delay 120     measured better since")]
+  weeder map field.csv -o field.geojson --beam-ahead 610 --gps-delay 120    a better measurement")]
 pub struct Arguments {
     /// Records, as `weeder record --gps` writes them; - for standard input.
     #[arg(value_name = "LOG.csv", required = true, value_parser = source::file)]
@@ -32,24 +33,26 @@ pub struct Arguments {
     /// The map.
     #[arg(long, short, value_name = "FILE.geojson")]
     out: FileName,
-    /// Draw it too.
+    /// Also draw it.
     #[arg(long, value_name = "FILE.svg")]
     svg: Option<FileName>,
-    /// Write the count as a table, a line a record.
+    /// Write the counts as a table, with a line for each record.
     #[arg(long, value_name = "FILE.csv")]
     table: Option<FileName>,
-    /// From row to row in mm, 50 to 5000, for the area.
+    #[command(flatten)]
+    replace: Replace,
+    /// Row spacing in mm, 50 to 5000, for the area.
     #[arg(long, value_name = "MM", default_value = "600", value_parser = number_within(50.0..=5000.0))]
     row_spacing: f64,
-    /// From plant to plant in mm, 20 to 5000, to count missing plants; left out, the median of those found.
+    /// Plant spacing in mm, 20 to 5000, to count missing plants. Default: the median.
     #[arg(long, value_name = "MM", value_parser = number_within(20.0..=5000.0))]
     spacing: Option<f64>,
-    /// The longest way without a fix over which places are interpolated, in m, 0 to 1000.
+    /// Longest distance without a fix for interpolated positions, in m, 0 to 1000.
     #[arg(long, value_name = "M", default_value = "20", value_parser = number_within(0.0..=1000.0))]
     longest_outage: f64,
     #[command(flatten)]
     antenna: AntennaArguments,
-    /// Print the count as JSON.
+    /// Print the counts as JSON.
     #[arg(long)]
     json: bool,
 }
@@ -59,9 +62,10 @@ pub struct Arguments {
 /// # Errors
 /// Where a record cannot be read, or a file not be written.
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let out = arguments.out.check()?;
-    let svg = arguments.svg.as_ref().map(FileName::check).transpose()?;
-    let table = arguments.table.as_ref().map(FileName::check).transpose()?;
+    let replace = arguments.replace;
+    let out = arguments.out.check(replace)?;
+    let svg = arguments.svg.as_ref().map(|svg| svg.check(replace)).transpose()?;
+    let table = arguments.table.as_ref().map(|table| table.check(replace)).transpose()?;
     let stand = Stand { row_spacing_mm: arguments.row_spacing, spacing_mm: arguments.spacing };
     let mut jobs = Vec::new();
     for path in &arguments.logs {

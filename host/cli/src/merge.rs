@@ -2,42 +2,47 @@
 //!
 //! It computes nothing anew: the parts hold all outcomes, which go to the code that shows those of an undivided study.
 
+use crate::destination::Replace;
 use crate::finding::Finding;
 use crate::{part, soak, sweep, trial};
 use anyhow::{Context, Result, bail, ensure};
 use clap::{Args, builder::PossibleValuesParser};
+use experiments::shard::{self, Header, PartError};
+use experiments::sweep::Results;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 use std::ffi::OsString;
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
-use study::shard::{self, Header, PartError};
-use study::sweep::Results;
 
 /// What the user asks for.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
-  weeder trial --shard 1/2 --out 1.part && weeder trial --shard 2/2 --out 2.part && weeder merge 1.part 2.part --out report
+  weeder trial --shard 1/2 --out 1.part
+  weeder trial --shard 2/2 --out 2.part
+  weeder merge 1.part 2.part --out report
   weeder merge parts/*.part --json
-What is printed and written is what the undivided command would have printed and written, and so is the status. Parts are of \
-`weeder trial`, `weeder sweep` or `weeder soak` with --shard; the shards may be computed anywhere and in any order, by the same program. \
-The manual's page on studies has a script for Slurm.")]
+Output and status are those of the undivided command. Parts come from `weeder trial`, `weeder sweep`
+or `weeder soak` with --shard. Compute them anywhere, in any order, with the same program.
+docs/studies.md has a script for Slurm.")]
 pub struct Arguments {
-    /// The parts, all of one study, in any order.
+    /// The parts of one study, in any order.
     #[arg(required = true, value_name = "PART")]
     parts: Vec<PathBuf>,
-    /// A trial's folder for its report, or a sweep's file, as the --out of the command itself.
+    /// The folder for a trial's report, or the file for a sweep, as --out of that command.
     #[arg(long, value_name = "FOLDER|FILE.csv")]
     out: Option<OsString>,
-    /// Print JSON for programs instead of tables or words.
+    #[command(flatten)]
+    replace: Replace,
+    /// Print JSON instead of tables or words.
     #[arg(long)]
     json: bool,
-    /// Print what counts most of a trial's table, and nothing else.
+    /// Print only the most important columns of a trial.
     #[arg(long, conflicts_with = "json")]
     brief: bool,
-    /// The result that a sweep's table with two axes shows; left out, plant_damage.
+    /// The result to show for a sweep with two axes. Default: plant_damage.
     #[arg(long, value_parser = PossibleValuesParser::new(Results::NAMES))]
     result: Option<String>,
 }
@@ -51,8 +56,8 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     let headers: Vec<(String, Header)> = headers.collect::<Result<_>>()?;
     shard::together(&headers, &part::program()?)?;
     let (_, header) = headers.into_iter().next().context("no part is named")?;
-    let Arguments { parts, out, json, brief, result } = arguments;
-    let (json, brief, settings) = (*json, *brief, header.settings);
+    let Arguments { parts, out, replace, json, brief, result } = arguments;
+    let (replace, json, brief, settings) = (*replace, *json, *brief, header.settings);
     let of = |what: &str| format!("these are parts of a {what}");
     ensure!(!brief || header.command == trial::COMMAND, "{}: --brief is for those of a trial", of(&header.command));
     ensure!(
@@ -62,12 +67,12 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     );
     match header.command.as_str() {
         trial::COMMAND => {
-            let shown = trial::Shown { out: out.clone().map(Into::into), json, brief };
+            let shown = trial::Shown { out: out.clone().map(Into::into), replace, json, brief };
             trial::merge(read(settings)?, outcomes(parts)?, &shown)
         }
         sweep::COMMAND => {
             let result = result.clone().unwrap_or_else(|| sweep::RESULT.to_owned());
-            let shown = sweep::Shown { out: out.clone().map(Into::into), json, result };
+            let shown = sweep::Shown { out: out.clone().map(Into::into), replace, json, result };
             sweep::merge(&read(settings)?, &outcomes(parts)?, &shown).map(|()| Finding::Good)
         }
         soak::COMMAND => {
@@ -102,5 +107,5 @@ fn outcomes<T: DeserializeOwned>(parts: &[PathBuf]) -> Result<Vec<T>> {
 }
 
 fn read<T: DeserializeOwned>(settings: Value) -> Result<T> {
-    serde_json::from_value(settings).context("the parts' settings are none that this program writes: compute them anew")
+    serde_json::from_value(settings).context("this program did not write the parts' settings: compute them again")
 }

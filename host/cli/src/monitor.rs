@@ -14,27 +14,70 @@ use crate::ports::Ports;
 use crate::record::{self, Logs};
 use anyhow::Result;
 use clap::Args;
+use link::row_names::ALL;
 use std::path::PathBuf;
 
 /// What the user asks of the monitor.
 #[derive(Args)]
 #[command(after_help = "\
-Keys: Esc has every row hold, whatever is being typed; Page Up and Page Down choose the row to which commands go, or all; Tab completes, \
-Up and Down go through the history, Ctrl-C ends. It is no emergency stop: that one cuts the power.\n\nExamples:\n  \
+Keys:\n  \
+    Esc                  HOLD to every row; drops the line that you are typing\n  \
+    Page Up, Page Down   select the row for commands, or all; `left: status` does it for one command\n  \
+    Tab, Up, Down        complete, recall earlier lines\n  \
+    Ctrl-C               end\n\
+HOLD is no emergency stop: that one cuts the power.\n\nExamples:\n  \
     weeder monitor                                     watch the only Uno, and type commands\n  \
-    weeder monitor --log row.csv                       and keep a log, for `weeder replay row.csv`\n  \
+    weeder monitor --log row.csv                       also keep a log, for `weeder replay`\n  \
     weeder monitor --all                               every row of a machine at a glance\n  \
-    echo status | weeder monitor --plain               one command from a script; status 1 if it is refused\n  \
-    echo left: status | weeder monitor --plain --all   to one row; without a name and a colon to all")]
+    echo status | weeder monitor --plain               from a script; status 1 if refused\n  \
+    echo left: status | weeder monitor --plain --all   to one row; without a name, to all")]
 pub struct Arguments {
     #[command(flatten)]
     ports: Ports,
-    /// Lines in, lines out, for pipes; ends when the input does and the last answer has come.
+    /// Read and write lines, for pipes; end after the input's last answer.
     #[arg(long)]
     plain: bool,
-    /// Write all that happens to this log; with several rows, to a folder in which each has a log of its name.
+    /// Write a log to this file; with several rows, to a folder with a log for each row.
     #[arg(long, value_name = "FILE.csv|FOLDER")]
     log: Option<PathBuf>,
+}
+
+/// To which rows a line goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum To {
+    /// It names none: to those that are chosen.
+    Chosen,
+    /// To all of them.
+    All,
+    /// To one.
+    Row(usize),
+}
+
+/// What a typed line says: of several rows, the one that stands before a colon or all, and the command.
+///
+/// # Errors
+/// Where there is no such row, or the rest is no command; in words.
+fn addressed<'a>(line: &'a str, names: &[String]) -> Result<(To, &'a str), String> {
+    let (to, command) = match line.split_once(':').map(|(name, command)| (row(name.trim(), names), command.trim())) {
+        Some((Ok(to), command)) => (to, command),
+        Some((Err(why), _)) if names.len() > 1 => return Err(why),
+        _ => (To::Chosen, line.trim()),
+    };
+    match link::is_command(command) {
+        true => Ok((to, command)),
+        false => Err(format!(
+            "{command:?} is no command: it has to be one line of at most {} printable ASCII characters",
+            link::COMMAND_LENGTH
+        )),
+    }
+}
+
+fn row(name: &str, names: &[String]) -> Result<To, String> {
+    match names.iter().position(|known| known == name) {
+        Some(row) => Ok(To::Row(row)),
+        None if name == ALL => Ok(To::All),
+        None => Err(format!("there is no row {name}: there are {}", names.join(", "))),
+    }
 }
 
 /// Watches until the user has seen enough.

@@ -3,15 +3,15 @@
 //! A part tells by which program it was computed: by the version, and by a check sum of the program's own file, since what is not
 //! released yet has the version of what was.
 
-use crate::destination::{FileName, OutFile};
+use crate::destination::{FileName, OutFile, Replace};
 use crate::output::{say, tell};
 use anyhow::{Context, Result};
+use experiments::shard::{self, Header, Numbered, Program, Shard};
 use serde::Serialize;
 use std::env;
 use std::fs;
 use std::path::Path;
 use std::time::Instant;
-use study::shard::{self, Header, Numbered, Program, Shard};
 
 /// A part that is to be written, to a file that could be written when it was checked.
 pub struct Part<'a> {
@@ -26,8 +26,8 @@ impl<'a> Part<'a> {
     ///
     /// # Errors
     /// Where the file could not be written, or this program cannot be read.
-    pub fn new(shard: Shard, out: &'a FileName) -> Result<Self> {
-        Ok(Self { shard, out: out.check()?, program: program()?, began: Instant::now() })
+    pub fn new(shard: Shard, out: &'a FileName, replace: Replace) -> Result<Self> {
+        Ok(Self { shard, out: out.check(replace)?, program: program()?, began: Instant::now() })
     }
 
     /// Which one it is.
@@ -62,7 +62,7 @@ impl<'a> Part<'a> {
 /// Where its file cannot be read.
 pub fn program() -> Result<Program> {
     let file = env::current_exe().context("the running program cannot be found")?;
-    Ok(Program { version: env!("CARGO_PKG_VERSION").to_owned(), build: check_sum(&file)? })
+    Ok(Program { version: env!("WEEDER_VERSION").to_owned(), build: check_sum(&file)? })
 }
 
 /// A file's check sum, CRC-32 as of zip: it tells builds apart that differ by accident.

@@ -1,12 +1,12 @@
 //! `weeder plan`: draws the plan of a field trial by lot, as the table to be filled in.
 
-use crate::destination::FileName;
+use crate::destination::{FileName, Replace};
 use crate::numbers::{number_within, whole_within};
 use crate::output::{self, print, say};
 use anyhow::Result;
 use clap::Args;
-use study::plan::Plan;
-use study::sweep::{SPACINGS_CM, SPEEDS_KM_H};
+use experiments::plan::Plan;
+use experiments::sweep::{SPACINGS_CM, SPEEDS_KM_H};
 
 /// What the user asks of a plan.
 #[derive(Args)]
@@ -14,7 +14,7 @@ use study::sweep::{SPACINGS_CM, SPEEDS_KM_H};
 Examples:
   weeder plan --out trial.csv                       the paper's speeds and spacings in three blocks
   weeder plan --speeds 1,2 --spacings 50 --blocks 5 --seed 7
-  weeder evaluate trial.csv                         once it has been filled in")]
+  weeder evaluate trial.csv                         after you have filled it in")]
 pub struct Arguments {
     /// Forward speeds in km/h, each 0.1 to 8.
     #[arg(long, value_delimiter = ',', default_value = "1,1.5,2,2.5", value_parser = number_within(SPEEDS_KM_H.0..=SPEEDS_KM_H.1))]
@@ -22,21 +22,23 @@ pub struct Arguments {
     /// Plant spacings in cm, each 5 to 500.
     #[arg(long, value_delimiter = ',', default_value = "50,60", value_parser = number_within(SPACINGS_CM.0..=SPACINGS_CM.1))]
     spacings: Vec<f64>,
-    /// Blocks, 2 to 100: each has every speed with every spacing once. They are the table's replications.
+    /// Blocks, 2 to 100: each has every speed with every spacing once. The table calls them replications.
     #[arg(long, default_value = "3", value_parser = whole_within(2..=100_u32))]
     blocks: u32,
-    /// Working width of the machine in m, 0.01 to 50, to go into the table.
+    /// Working width of the machine in m, 0.01 to 50, for the table.
     #[arg(long, value_parser = number_within(0.01..=50.0))]
     width: Option<f64>,
-    /// Power that it needs in hp, 0.001 to 1000, to go into the table.
+    /// Power that it needs in hp, 0.001 to 1000, for the table.
     #[arg(long, value_parser = number_within(0.001..=1000.0))]
     power: Option<f64>,
-    /// Which of all the possible orders, 0 to 18446744073709551615: the same seed draws the same one.
+    /// Random seed, 0 to 18446744073709551615.
     #[arg(long, default_value = "1", value_parser = whole_within(0..=u64::MAX))]
     seed: u64,
     /// Write the table into this file instead of printing it.
     #[arg(long, value_name = "FILE.csv")]
     out: Option<FileName>,
+    #[command(flatten)]
+    replace: Replace,
 }
 
 /// Draws the plan and prints or writes it.
@@ -44,7 +46,7 @@ pub struct Arguments {
 /// # Errors
 /// Where the file cannot be written.
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let out = arguments.out.as_ref().map(FileName::check).transpose()?;
+    let out = arguments.out.as_ref().map(|out| out.check(arguments.replace)).transpose()?;
     let plan = Plan {
         speeds_km_h: distinct(&arguments.speeds),
         spacings_cm: distinct(&arguments.spacings),

@@ -21,7 +21,7 @@ const FILE: &str = "weeder/rows.toml";
 /// The file in which the rows' names are.
 #[derive(Args)]
 pub struct NamesFile {
-    /// The file with the rows' names; `weeder/rows.toml` in the user's folder for settings where none is named.
+    /// File with the rows' names. Default: `weeder/rows.toml` in your settings folder.
     #[arg(long, value_name = "FILE.toml")]
     rows_file: Option<PathBuf>,
 }
@@ -60,27 +60,63 @@ impl NamesFile {
 /// Where the Unos of one row or several are.
 #[derive(Args)]
 pub struct Ports {
-    /// An Uno's serial port, such as /dev/ttyACM0 or COM3, or a row's name, or a name to call it by and its port; once for each row.
-    /// Found by itself where there is only one Uno.
+    /// Serial port of an Uno (/dev/ttyACM0, COM3), a row's name, or NAME=PORT; once for each row. Default: the only
+    /// Uno.
     #[arg(long, value_name = "[NAME=]PORT", value_parser = named)]
     port: Vec<Named>,
-    /// Take every row that `weeder rows` has named, and every other Uno at a USB port.
+    /// Take every named row, and every other Uno at a USB port.
     #[arg(long, conflicts_with = "port")]
     all: bool,
     #[command(flatten)]
     names: NamesFile,
 }
 
-/// A row's port, and the name by which it is shown.
+/// Where the only Uno is that a command talks to.
+#[derive(Args)]
+pub struct Port {
+    /// Serial port of the Uno (/dev/ttyACM0, COM3), or a row's name. Default: the only Uno.
+    #[arg(long, value_name = "PORT")]
+    port: Option<String>,
+    #[command(flatten)]
+    names: NamesFile,
+}
+
+impl Port {
+    /// The board there.
+    ///
+    /// # Errors
+    /// Where the file of the names cannot be read.
+    pub fn board(&self) -> Result<Board> {
+        match &self.port {
+            Some(port) if may_be_name(port) => Ok(board(port, Some(&self.names.read()?))),
+            Some(port) => Ok(board(port, None)),
+            None => Ok(Board::Only),
+        }
+    }
+
+    /// The machine there.
+    ///
+    /// # Errors
+    /// Where there is none, or another than a weeder.
+    pub fn open(&self) -> Result<Link> {
+        Ok(self.board()?.open()?)
+    }
+}
+
+/// A port, and a row's name.
 #[derive(Clone, Debug, PartialEq, Eq)]
-struct Named {
+pub struct Named {
     /// Where one was given.
-    name: Option<String>,
-    port: String,
+    pub name: Option<String>,
+    /// The port.
+    pub port: String,
 }
 
 /// Reads `NAME=PORT`, or a port or a row's name alone.
-fn named(text: &str) -> Result<Named, String> {
+///
+/// # Errors
+/// Where it is neither, in words.
+pub fn named(text: &str) -> Result<Named, String> {
     let (name, port) = match text.split_once('=') {
         // A path may have the sign in it.
         Some((name, port)) if !name.contains(['/', '\\']) => (Some(name.trim().to_owned()), port),
@@ -109,14 +145,16 @@ impl Ports {
     /// # Errors
     /// Where there is none, two have a name, or the file of the names cannot be read.
     pub fn choose(&self) -> Result<Chosen> {
-        // A path is no name, and needs no file.
-        let may_be_name = |machine: &Named| !machine.port.contains(['/', '\\']);
         let rows = if self.all {
             every_row(&self.names.read()?)?
         } else if self.port.is_empty() {
             vec![Row { name: "Uno".to_owned(), board: Board::Only }]
         } else {
-            let names = if self.port.iter().any(may_be_name) { Some(self.names.read()?) } else { None };
+            let names = if self.port.iter().any(|machine| may_be_name(&machine.port)) {
+                Some(self.names.read()?)
+            } else {
+                None
+            };
             self.port.iter().map(|machine| row(machine, names.as_ref())).collect::<Result<_>>()?
         };
         let mut seen = HashSet::new();
@@ -130,10 +168,20 @@ impl Ports {
     }
 }
 
+/// Whether it may be a row's name: a path is none, and needs no file of names.
+fn may_be_name(port: &str) -> bool {
+    !port.contains(['/', '\\'])
+}
+
+/// The board of the row that has this name, or else the one at this port.
+fn board(port: &str, names: Option<&Names>) -> Board {
+    let known = names.and_then(|names| names.find(port));
+    known.map_or_else(|| Board::Port(port.to_owned()), |row| row.board.clone())
+}
+
 /// What `--port` means.
 fn row(machine: &Named, names: Option<&Names>) -> Result<Row> {
-    let known = names.and_then(|names| names.find(&machine.port));
-    let board = known.map_or_else(|| Board::Port(machine.port.clone()), |row| row.board.clone());
+    let board = board(&machine.port, names);
     let name = match &machine.name {
         Some(name) => name.clone(),
         None => Path::new(&machine.port).file_name().unwrap_or_default().to_string_lossy().into_owned(),
@@ -206,9 +254,23 @@ impl Chosen {
         Ok(())
     }
 
+    /// The name of a row's own file, where there may be several.
+    pub fn name_in(row: &Row, ending: &str) -> String {
+        format!("{}.{ending}", row.name)
+    }
+
     /// A row's own file, where there may be several: in a folder, by the row's name.
     pub fn file_in(folder: &Path, row: &Row, ending: &str) -> PathBuf {
-        folder.join(format!("{}.{ending}", row.name))
+        folder.join(Self::name_in(row, ending))
+    }
+
+    /// The row of this name.
+    ///
+    /// # Errors
+    /// Where there is none.
+    pub fn find(&self, name: &str) -> Result<usize> {
+        let found = self.rows.iter().position(|row| row.name == name);
+        found.with_context(|| format!("there is no row {name}: there are {}", self.names().join(", ")))
     }
 
     /// What is said of a row, under its name where there may be several.

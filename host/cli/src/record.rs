@@ -1,15 +1,15 @@
 //! `weeder record`: what the machine does, in a file; of several rows a file for each.
 
-use crate::destination::FolderName;
-use crate::gps::GpsArguments;
+use crate::destination::{FolderName, Replace};
 use crate::output::tell;
 use crate::ports::{Chosen, Ports};
+use crate::receiver::GpsArguments;
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
+use gps::recorder::Lines;
 use link::log::{LogError, LogWriter};
 use link::rows::{Rows, What};
 use link::session::Happening;
-use places::recorder::Lines;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -21,15 +21,17 @@ const LOOK: Duration = Duration::from_millis(20);
 /// What the user asks of the recording.
 #[derive(Args)]
 #[command(after_help = "\
-Plants, swings and alarms are written down as they come, and the status ten times a second, until Ctrl-C. A cable that is pulled \
-and plugged in again does not end it, and keeps no other row from being recorded. On most Unos opening the port is a reset: begin \
-before you work. With a satellite receiver, `weeder map` draws a map of one row; docs/map.md says how the antenna is measured.\n\n\
+It records plants, swings and alarms, and the status ten times a second, until Ctrl-C.\n\
+It continues after a pulled cable, and goes on with the other rows meanwhile.\n\
+Opening the port resets most Unos: start before you work.\n\
+With a satellite receiver, `weeder map` draws a map of one row; see docs/map.md.\n\n\
 Examples:\n  \
     weeder record --out row.csv && weeder replay row.csv\n  \
     weeder record --out field --all                      every row, a log for each in the folder field\n  \
-    weeder record --out field.csv --gps /dev/ttyUSB0 --gps-baud 38400 --beam-ahead 620 --beam-right -40")]
+    weeder record --out field --all --gps left=/dev/ttyUSB0    with a receiver in left.csv\n  \
+    weeder record --out field.csv --gps /dev/ttyUSB0 --gps-baud 38400 --beam-ahead 620")]
 pub struct Arguments {
-    /// The log; one that exists is continued. With several rows, a folder in which each has a log of its name.
+    /// The log; an existing one is continued. With several rows, a folder with a log for each row.
     #[arg(long, value_name = "FILE.csv|FOLDER")]
     out: PathBuf,
     #[command(flatten)]
@@ -44,17 +46,15 @@ pub struct Arguments {
 /// Where there is no Uno or no receiver to begin with, or a file cannot be written.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let chosen = arguments.ports.choose()?;
-    let mut gps = arguments.gps.open()?;
-    ensure!(
-        gps.is_none() || !chosen.are_several,
-        "--gps goes with one row: record the others by another `weeder record`"
-    );
+    let gps = arguments.gps.open(&chosen)?;
     let mut logs = Logs::open(&arguments.out, &chosen)?;
-    if let Some((_, lines)) = &mut gps {
-        let lines = std::mem::take(lines);
-        logs.lines_at(0, |_| lines)?;
-    }
-    let mut gps = gps.map(|(receiver, _)| receiver);
+    let mut gps = match gps {
+        Some((receiver, lines)) => {
+            logs.lines_at(receiver.row, |_| lines)?;
+            Some(receiver)
+        }
+        None => None,
+    };
     let (rows, _) = open(&chosen)?;
     let stop = Arc::new(AtomicBool::new(false));
     let asked_to_stop = Arc::clone(&stop);
@@ -63,22 +63,20 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     while !stop.load(Ordering::Relaxed) {
         if let Some(gps) = &mut gps {
             let mut said = Vec::new();
-            logs.lines_at(0, |time_ms| {
+            let written = logs.lines_at(gps.row, |time_ms| {
                 said = gps.turn(time_ms, Instant::now());
                 said.clone()
-            })?;
+            });
+            logs.go_on_after(written, gps.row, &chosen)?;
             for (_, line) in said.iter().filter(|(kind, _)| kind.is_for_the_operator()) {
                 tell!("Receiver: {line}");
             }
         }
         let Some(heard) = rows.next(LOOK) else { continue };
         let What::Happened(happening) = heard.what else { continue };
-        if let Err(error) = logs.write(heard.row, &happening) {
-            // The other rows' logs are still written.
-            tell!("error: {}", chosen.under_name(heard.row, &format!("{:#}", anyhow::Error::from(error))));
-            ensure!(logs.are_any_written(), "no log can be written any more");
-        }
-        if let Some(gps) = &mut gps {
+        let written = logs.write(heard.row, &happening);
+        logs.go_on_after(written, heard.row, &chosen)?;
+        if let Some(gps) = gps.as_mut().filter(|gps| gps.row == heard.row) {
             gps.happened(logs.now_ms(heard.row), &happening);
         }
         match happening {
@@ -136,7 +134,8 @@ impl Logs {
     pub fn open(out: &std::path::Path, chosen: &Chosen) -> Result<Self> {
         if chosen.are_several {
             let folder = FolderName::from(out.as_os_str().to_owned());
-            folder.check()?;
+            // A log that is there is gone on with.
+            folder.check([""; 0], Replace::default())?;
             folder.make()?;
         }
         let path = |row| if chosen.are_several { Chosen::file_in(out, row, "csv") } else { out.to_owned() };
@@ -161,19 +160,30 @@ impl Logs {
         self.logs.get(row).map_or(0, |log| log.writer.now_ms())
     }
 
-    /// Writes the lines that this gives for the present into a row's log.
+    /// Writes the lines that this gives for the present into a row's log. After a log could not be written it is left as it is.
     ///
     /// # Errors
-    /// Where it cannot be written.
+    /// Where it cannot be written for the first time.
     fn lines_at(&mut self, row: usize, lines: impl FnOnce(u64) -> Lines) -> Result<(), LogError> {
         let Some(log) = self.logs.get_mut(row) else { return Ok(()) };
         let time_ms = log.writer.now_ms();
-        log.writer.lines_at(time_ms, &lines(time_ms))
+        let lines = lines(time_ms);
+        if !log.is_written {
+            return Ok(());
+        }
+        log.writer.lines_at(time_ms, &lines).inspect_err(|_| log.is_written = false)
     }
 
-    /// Whether any is still written.
-    fn are_any_written(&self) -> bool {
-        self.logs.iter().any(|log| log.is_written)
+    /// Tells of a log that could not be written: the other rows' logs still are.
+    ///
+    /// # Errors
+    /// Where none is written any more.
+    fn go_on_after(&self, written: Result<(), LogError>, row: usize, chosen: &Chosen) -> Result<()> {
+        if let Err(error) = written {
+            tell!("error: {}", chosen.under_name(row, &format!("{:#}", anyhow::Error::from(error))));
+            ensure!(self.logs.iter().any(|log| log.is_written), "no log can be written any more");
+        }
+        Ok(())
     }
 
     /// Says what is in them.

@@ -12,10 +12,10 @@ use std::path::PathBuf;
 /// What the user asks to be replayed.
 #[derive(Args)]
 #[command(after_help = "\
-The status is 1 where log and replay differ; the first difference is shown. A swing may differ by 12 ticks and by 25 ms of the \
-machine's way, because the log has the speed only ten times a second.\n\nExample:\n  weeder replay row.csv --json | jq .difference")]
+It shows the first difference between log and replay, and the status is then 1.\n\
+A swing may differ by 12 ticks plus the distance of 25 ms: the log has the speed ten times a second.\n\nExample:\n  weeder replay row.csv --json | jq .difference")]
 pub struct Arguments {
-    /// A log, as `weeder record` and `weeder monitor --log` write it; - for standard input.
+    /// A log of `weeder record` or `weeder monitor --log`; - for standard input.
     #[arg(value_name = "LOG.csv", value_parser = source::file)]
     log: PathBuf,
     /// Print the result as JSON.

@@ -13,12 +13,12 @@ use serde_json::{Value, json};
 #[command(
     args_conflicts_with_subcommands = true,
     after_help = "\
-A row is known by its board's USB serial number, at whichever port the board is; a board without one, by the place where it is \
-plugged in. `weeder monitor`, `record`, `serve` and `settings` take its name as --port, and all rows by --all.\n\n\
+A row is recognised by its board's USB serial number, at any port, or else by its USB socket.\n\
+`weeder monitor`, `record`, `serve` and `settings` take its name as --port, and all rows with --all.\n\n\
 Examples:\n  \
-    weeder rows                                  the rows with a name, and the other Unos that are plugged in\n  \
-    weeder rows name left /dev/ttyACM0           call the board at this port so\n  \
-    weeder rows forget left                      and no more"
+    weeder rows                                  the named rows, and the other connected Unos\n  \
+    weeder rows name left /dev/ttyACM0           name the row of the board at this port\n  \
+    weeder rows forget left                      remove the name"
 )]
 pub struct Arguments {
     #[command(subcommand)]
@@ -32,13 +32,13 @@ pub struct Arguments {
 
 #[derive(Subcommand)]
 enum Action {
-    /// Give a row's name to the board at a port; the rows are listed in the order in which they were named.
+    /// Name the row of the board at a port. Rows are listed in the order of naming.
     #[command(after_help = "Example: weeder rows name left /dev/ttyACM0")]
     Name {
-        /// The row's name: 1 to 24 characters that can be a file's name.
+        /// The row's name: 1 to 24 characters, valid as a file name.
         #[arg(value_name = "NAME")]
         name: String,
-        /// The port at which its board is now.
+        /// The board's present port.
         #[arg(value_name = "PORT")]
         port: String,
         #[command(flatten)]

@@ -9,7 +9,8 @@ use serve::page::Page;
 use serve::{Server, Setup};
 use std::env;
 use std::net::Ipv4Addr;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use trial::firmware;
@@ -20,31 +21,35 @@ const HTTP_PORT: u16 = 8866;
 /// What the user asks of the server.
 #[derive(Args)]
 #[command(after_help = "\
-At this computer alone the page may do whatever `weeder monitor` may. Over the network, by --lan, it is shown to nobody without the \
-code that is printed; with the code it shows the machine and has it hold, and nothing else that moves the tool or changes the machine. \
-The manual's docs/serve.md has the whole table. http is not encrypted: use a network whose members you know. Opening a port resets \
-most Unos: begin before you work. A port that is not there is waited for. Ctrl-C ends it.
+At this computer, the page may do the same as `weeder monitor`. In the network (--lan), it needs the
+printed code. With the code, it shows the machine and sends HOLD, and nothing else that moves the tool.
+docs/serve.md has the complete table. http is not encrypted: use a network whose members you know.
+Opening a port resets most Unos: start before you work. It waits for missing ports. Ctrl-C ends it.
 
 Examples:
   weeder serve                                       the only Uno, at http://127.0.0.1:8866/
-  weeder serve --lan                                 and for a phone in this computer's network
-  weeder serve --lan 192.168.4.1 --allow-start       which may start the machine
+  weeder serve --open                                also opens it in the browser; it needs no Uno
+  weeder serve --lan                                 also for a phone in this computer's network
+  weeder serve --lan 192.168.4.1 --allow-start       a phone may start the machine
   weeder serve --port left=/dev/ttyACM0 --port right=/dev/ttyACM1
-  weeder serve --all                                 every row that `weeder rows` has named, and every other Uno
+  weeder serve --all                                 every named row, and every other Uno
   weeder serve --port uno --page weeder-release/page --http-port 8080")]
 pub struct Arguments {
     #[command(flatten)]
     ports: Ports,
-    /// Serve it in the network too, at this address of this computer, or at the only one that it has.
+    /// Also serve it in the network, at this address of the computer, or at its only one.
     #[arg(long, value_name = "ADDRESS", num_args = 0..=1)]
     lan: Option<Option<Ipv4Addr>>,
-    /// Let paired phones `start` the machine and `clear` its alarms: somebody has to see the machine then.
+    /// Allow paired phones to `start` the machine and `clear` its alarms. The operator has to see the machine.
     #[arg(long, requires = "lan")]
     allow_start: bool,
-    /// The page's folder; found by itself beside the command, as `page`, or where the repository's build has put it.
+    /// Open the page in this computer's browser.
+    #[arg(long)]
+    open: bool,
+    /// The page's folder. Default: the page inside a release's command, or the repository's build.
     #[arg(long, value_name = "FOLDER")]
     page: Option<PathBuf>,
-    /// The TCP port, a whole number from 0 to 65535; 0 takes one that is free.
+    /// The TCP port, a whole number from 0 to 65535; 0 takes a free one.
     #[arg(long, value_name = "NUMBER", default_value_t = HTTP_PORT, value_parser = whole_within(0..=u16::MAX))]
     http_port: u16,
 }
@@ -54,7 +59,11 @@ pub struct Arguments {
 /// # Errors
 /// Where there is no page, two machines have a name, or an address cannot be had.
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let page = Page::read(&page_folder(arguments.page.as_deref()))?;
+    let page = match (&arguments.page, Page::inside()) {
+        (Some(folder), _) => Page::read(folder)?,
+        (None, Some(inside)) => inside,
+        (None, None) => Page::read(&firmware::workspace_root().join("page/dist"))?,
+    };
     let lan = match arguments.lan {
         Some(Some(address)) => Some(address),
         Some(None) => Some(serve::find_lan()?),
@@ -77,18 +86,24 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         say!("http://{address}/#{} is the page for a phone in the network.", code.text())?;
         say!("The code, where it is asked for: {}", code.spelled())?;
     }
+    if arguments.open {
+        open_in_browser(&format!("http://{}/", server.here()));
+    }
     server.run(&stop);
     Ok(())
 }
 
-/// Where the page is: as it was said, beside this command, as in a release, or where the repository's build puts it.
-fn page_folder(named: Option<&Path>) -> PathBuf {
-    if let Some(named) = named {
-        return named.to_owned();
-    }
-    let beside = env::current_exe().ok().and_then(|command| Some(command.parent()?.join("page")));
-    match beside {
-        Some(beside) if beside.join("index.html").is_file() => beside,
-        _ => firmware::workspace_root().join("page/dist"),
+/// Opens an address in the user's browser.
+fn open_in_browser(address: &str) {
+    let mut words = match env::consts::OS {
+        "macos" => vec!["open"],
+        "windows" => vec!["cmd", "/C", "start"],
+        _ => vec!["xdg-open"],
+    };
+    words.push(address);
+    // It may go on for as long as the browser does.
+    let opened = Command::new(words[0]).args(&words[1..]).stdin(Stdio::null()).stdout(Stdio::null()).spawn();
+    if let Err(error) = opened {
+        tell!("No browser can be opened from here ({}: {error}): open the address by hand.", words[0]);
     }
 }

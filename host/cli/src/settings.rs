@@ -1,6 +1,6 @@
 //! `weeder settings`: the machine's settings as a file that can be kept, compared, and given to the next machine.
 
-use crate::destination::{FileName, FolderName};
+use crate::destination::{FileName, FolderName, Replace};
 use crate::finding::Finding;
 use crate::output::say;
 use crate::ports::{Chosen, Ports};
@@ -8,8 +8,9 @@ use crate::source;
 use anyhow::{Result, ensure};
 use clap::{Args, Subcommand};
 use comfy_table::{Table, presets};
+use field::conditions::Conditions;
 use link::settings::{self, Setting, Settings, name, unit};
-use link::{Link, settings_file};
+use link::settings_file;
 use serde_json::{Map, Value, json};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -18,9 +19,10 @@ use std::path::{Path, PathBuf};
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     weeder settings pull machine.toml           write the machine's settings into a file\n  \
-    weeder settings push machine.toml           set them on a machine, which keeps them for good\n  \
-    weeder settings diff machine.toml           say what differs; ends with status 1 if anything does\n  \
-    weeder settings pull rows --all             of every row, a file for each in the folder rows\n  \
+    weeder settings push machine.toml           set and save them on a machine\n  \
+    weeder settings push set-up                 start with the simulated machine's, except its margin\n  \
+    weeder settings diff machine.toml           list the differences\n  \
+    weeder settings pull rows --all             every row, a file for each in the folder rows\n  \
     weeder settings push machine.toml --port left --port right")]
 pub struct Arguments {
     #[command(subcommand)]
@@ -29,13 +31,15 @@ pub struct Arguments {
 
 #[derive(Subcommand)]
 enum Action {
-    /// Write the machine's settings into a TOML file; one that is there keeps its comments.
+    /// Write the machine's settings into a TOML file; --force keeps the comments of an existing one.
     #[command(after_help = "Example: weeder settings pull --json | jq .wheel_mm")]
     Pull {
-        /// The file; with several rows, a folder in which each gets a file of its name.
+        /// The file; with several rows, a folder with a file for each row.
         #[arg(value_name = "FILE.toml|FOLDER", required_unless_present = "json")]
         file: Option<FileName>,
-        /// Print them as JSON as well.
+        #[command(flatten)]
+        replace: Replace,
+        /// Also print them as JSON.
         #[arg(long)]
         json: bool,
         #[command(flatten)]
@@ -43,28 +47,29 @@ enum Action {
     },
     /// Set a file's settings on the machine and save them there; nothing is sent unless all of them can be right.
     #[command(after_help = "\
-Opening the port is a reset on most Unos, and so is a loss of power: what is not saved is gone then.\n\n\
+Opening the port resets most Unos, and unsaved settings are lost.\n\n\
 Example: weeder settings push machine.toml --port /dev/ttyACM0")]
     Push {
-        /// The file, the same for all rows; - for standard input; or, with several rows, a folder in which each has a file of its name.
-        #[arg(value_name = "FILE.toml|FOLDER", value_parser = source::file)]
+        /// A file for all rows, or a folder with a file for each row; - for standard input. Or a preset of `weeder
+        /// trial`, such as set-up, without its margin.
+        #[arg(value_name = "FILE.toml|FOLDER|PRESET", value_parser = source::file)]
         file: PathBuf,
-        /// Do not `save` them on the machine: they are lost at its next reset, which on most Unos is the next opening of the port.
+        /// Do not `save` them: the next reset loses them. On most Unos, opening the port is a reset.
         #[arg(long)]
         no_save: bool,
-        /// Does nothing, as the settings are saved anyway; older scripts say it.
+        /// No effect; for older scripts. The settings are always saved.
         #[arg(long, hide = true, conflicts_with = "no_save")]
         save: bool,
-        /// Print which were set as JSON.
+        /// Print the settings that were set as JSON.
         #[arg(long)]
         json: bool,
         #[command(flatten)]
         ports: Ports,
     },
-    /// Say which of a file's settings differ on the machine; the status is 1 where one does.
+    /// List the settings that differ between file and machine; the status is 1 if one does.
     #[command(after_help = "Example: weeder settings diff machine.toml && echo the same")]
     Diff {
-        /// The file, the same for all rows; - for standard input; or, with several rows, a folder in which each has a file of its name.
+        /// A file for all rows, or a folder with a file for each row; - for standard input.
         #[arg(value_name = "FILE.toml|FOLDER", value_parser = source::file)]
         file: PathBuf,
         /// Print the differences as JSON.
@@ -75,41 +80,26 @@ Example: weeder settings push machine.toml --port /dev/ttyACM0")]
     },
 }
 
-/// Where the Uno is.
-#[derive(Args)]
-pub struct Port {
-    /// The Uno's serial port, such as /dev/ttyACM0 or COM3; found by itself where there is only one Uno.
-    #[arg(long)]
-    pub port: Option<String>,
-}
-
-impl Port {
-    /// The machine there.
-    ///
-    /// # Errors
-    /// Where there is none, or another than a weeder.
-    pub fn open(&self) -> Result<Link> {
-        Ok(Link::open(self.port.as_deref())?)
-    }
-}
-
 /// Pulls, pushes or compares.
 ///
 /// # Errors
 /// Where file or machine cannot be used; each says what would be right.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     match &arguments.action {
-        Action::Pull { file, json, ports } => pull(file.as_ref(), *json, &ports.choose()?),
+        Action::Pull { file, replace, json, ports } => pull(file.as_ref(), *replace, *json, &ports.choose()?),
         Action::Push { file, no_save, save: _, json, ports } => push(file, !no_save, *json, &ports.choose()?),
         Action::Diff { file, json, ports } => diff(file, *json, &ports.choose()?),
     }
 }
 
-fn pull(file: Option<&FileName>, json: bool, chosen: &Chosen) -> Result<Finding> {
+fn pull(file: Option<&FileName>, replace: Replace, json: bool, chosen: &Chosen) -> Result<Finding> {
     let folder = file.filter(|_| chosen.are_several).map(FolderName::from);
     match (&folder, file) {
-        (Some(folder), _) => folder.check().map(|_| ())?,
-        (None, Some(file)) => file.check().map(|_| ())?,
+        (Some(folder), _) => {
+            let names = chosen.rows.iter().map(|row| Chosen::name_in(row, "toml"));
+            folder.check(names, replace).map(|_| ())?;
+        }
+        (None, Some(file)) => file.check(replace).map(|_| ())?,
         (None, None) => {}
     }
     let pulled = chosen.each(|_, link| Ok(settings::read(link)?));
@@ -225,8 +215,23 @@ impl Chosen {
     }
 }
 
-/// A file's settings, at least one.
+/// The settings of a preset of the simulated field, to begin from. The margin is not among them: it covers only what was measured.
+fn of_preset(file: &Path) -> Option<Result<Vec<(Setting, u16)>>> {
+    let conditions = Conditions::preset(file.to_str()?).filter(|_| !file.exists())?;
+    let settings = |conditions: Conditions| {
+        let find = |(name, value): (String, u16)| Some((Setting::find(name.as_bytes())?, value));
+        conditions.settings.into_iter().filter_map(find).filter(|&(setting, _)| setting != Setting::MarginMm).collect()
+    };
+    Some(conditions.map(settings).map_err(Into::into))
+}
+
+/// A file's settings, or a preset's, at least one.
 fn wanted(file: &Path) -> Result<Vec<(Setting, u16)>> {
+    if let Some(wanted) = of_preset(file) {
+        let wanted = wanted?;
+        ensure!(!wanted.is_empty(), "the preset {} sets nothing: the factory settings are its own", file.display());
+        return Ok(wanted);
+    }
     let wanted = settings_file::read(file)?;
     ensure!(!wanted.is_empty(), "{} names no setting: `weeder settings pull` writes them all", file.display());
     Ok(wanted)

@@ -1,7 +1,7 @@
 //! `weeder sim`: the real firmware on a virtual Uno, on a simulated row or on a recording of a real encoder.
 
 use crate::course::CourseArguments;
-use crate::destination::{FileName, FolderName, OutFile, OutFolder};
+use crate::destination::{FileName, FolderName, OutFile, OutFolder, Replace};
 use crate::finding::Finding;
 use crate::output::{print, say};
 use crate::progress::Progress;
@@ -11,14 +11,14 @@ use clap::Args;
 use field::motion::mm_s;
 use field::row::Row;
 use field::trial::Trial;
-use field::verdict::{Timing, Verdict};
+use field::verdict::Verdict;
 use field::wiring;
 use serde_json::{Value, json};
-use signal::PinChange;
 use std::path::PathBuf;
 use trial::Outcome;
 use trial::replay::{Counted, replay};
-use trial::{firmware, picture, report};
+use trial::{animation, firmware, picture, report};
+use uno::PinChange;
 use uno::capture::Capture;
 use uno::waveform;
 
@@ -27,26 +27,29 @@ use uno::waveform;
 #[command(after_help = "\
 Examples:
   weeder sim --speed 1 --spacing 600 --plants 30 --weeds 8    another row, at another speed
-  weeder sim --row field.csv --out report                     your own plants, with tables and a picture
+  weeder sim --field from-the-box                             the machine straight from the box
+  weeder sim --row field.csv --out report                     your own plants, with tables and pictures
   weeder sim --json | jq .in_row_weeded_percent               for a script
   weeder sim --capture logic.vcd --channel-a D2 --channel-b D3    a logic analyser's recording
-The status is 1 where a plant was damaged.")]
+The status is 1 if a plant was damaged.")]
 pub struct Arguments {
     #[command(flatten)]
     course: CourseArguments,
-    /// Command each swing where it should be done, as the paper does, without leads for the servo's time.
-    #[arg(long)]
+    /// Command each swing without leads for the servo's time, as the paper does: `--field paper`.
+    #[arg(long, conflicts_with = "field")]
     paper: bool,
-    /// Write the tables as CSV and a picture of the row into this folder, which is made where there is none.
+    /// Write tables (CSV), a picture and an animation of the row into this folder, and create it if needed.
     #[arg(long, value_name = "FOLDER")]
     out: Option<FolderName>,
     /// Write the levels on the virtual Uno's pins, for PulseView or GTKWave.
     #[arg(long, value_name = "FILE.vcd")]
     vcd: Option<FileName>,
-    /// Run this firmware instead of building the one in this repository.
+    #[command(flatten)]
+    replace: Replace,
+    /// Run this ELF instead of building the firmware of this repository.
     #[arg(long, value_name = "FILE.elf")]
     elf: Option<PathBuf>,
-    /// Play a logic analyser's recording to the encoder's pins instead of a row, and say what the firmware counts; - for standard
+    /// Play a logic analyser's recording to the encoder's pins, and print what the firmware counts; - for standard
     /// input.
     #[arg(long, value_name = "FILE.vcd", value_parser = source::file, requires_all = ["channel_a", "channel_b"], conflicts_with_all = ["row", "out", "paper"])]
     capture: Option<PathBuf>,
@@ -59,21 +62,25 @@ pub struct Arguments {
     /// The recording's channel for the beam, low = broken.
     #[arg(long, value_name = "NAME", requires = "capture")]
     channel_beam: Option<String>,
-    /// Print the totals alone, without a line for each plant.
+    /// Print only the totals.
     #[arg(long, conflicts_with_all = ["json", "capture"])]
     totals: bool,
-    /// Print JSON for programs instead of tables.
+    /// Print JSON instead of tables.
     #[arg(long)]
     json: bool,
 }
+
+/// The files of a report.
+const REPORT: [&str; 5] = ["row.svg", "weeding.svg", "row.csv", "plants.csv", "weeds.csv"];
 
 /// Runs it and prints the result.
 ///
 /// # Errors
 /// Where an argument or a file is wrong, or the firmware cannot be run.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
-    let folder = arguments.out.as_ref().map(FolderName::check).transpose()?;
-    let vcd = arguments.vcd.as_ref().map(FileName::check).transpose()?;
+    let replace = arguments.replace;
+    let folder = arguments.out.as_ref().map(|out| out.check(REPORT, replace)).transpose()?;
+    let vcd = arguments.vcd.as_ref().map(|vcd| vcd.check(replace)).transpose()?;
     match (&arguments.capture, &arguments.channel_a, &arguments.channel_b) {
         (Some(path), Some(a), Some(b)) => {
             let mut channels = vec![(wiring::ENCODER_A, a.as_str()), (wiring::ENCODER_B, b.as_str())];
@@ -95,8 +102,12 @@ impl Arguments {
 }
 
 fn weed(arguments: &Arguments, row: Row, folder: Option<&OutFolder>, vcd: Option<&OutFile>) -> Result<Finding> {
-    let timing = if arguments.paper { Timing::as_in_the_paper() } else { Timing::default() };
-    let trial = Trial::at_speed(row, arguments.course.machine(), timing, mm_s(arguments.course.speed));
+    let course = &arguments.course;
+    let conditions = course.conditions_of(if arguments.paper { "paper" } else { &course.field })?;
+    let mut trial =
+        Trial::at_speed(row, course.machine(&conditions), conditions.timing(), mm_s(arguments.course.speed));
+    trial.settings = conditions.firmware_settings();
+    trial.motion = trial.motion.with_slip(|| conditions.ground.slip_percent / 100.0);
     let elf = arguments.firmware()?;
     if !arguments.json {
         let manner = if arguments.paper { ", swings as in the paper" } else { "" };
@@ -116,9 +127,10 @@ fn weed(arguments: &Arguments, row: Row, folder: Option<&OutFolder>, vcd: Option
         print(format_args!("{}\n\n{totals}", report::table(&outcome)))
     };
     if let Some(folder) = folder {
-        write_folder(folder, &trial, &outcome)?;
+        write_folder(folder, &trial, &outcome, mm_s(arguments.course.speed))?;
         if !arguments.json {
-            say!("Written     row.svg, row.csv, plants.csv and weeds.csv in {}", folder.path().display())?;
+            let [files @ .., last] = REPORT;
+            say!("Written     {} and {last} in {}", files.join(", "), folder.path().display())?;
         }
     }
     write_waveform(arguments, vcd, &outcome.changes)?;
@@ -126,16 +138,19 @@ fn weed(arguments: &Arguments, row: Row, folder: Option<&OutFolder>, vcd: Option
     if outcome.judgement.count(Verdict::Damaged) == 0 { Ok(Finding::Good) } else { Ok(Finding::Bad) }
 }
 
-fn write_folder(folder: &OutFolder, trial: &Trial, outcome: &Outcome) -> Result<()> {
-    folder.write("row.csv", |to| trial.row.write_csv(to))?;
-    folder.write("plants.csv", |to| report::write_plants_csv(outcome, to))?;
-    folder.write("weeds.csv", |to| report::write_weeds_csv(outcome, to))?;
-    folder.write("row.svg", |to| svg::write(to, &picture::draw(&trial.row, &outcome.judgement)))
+fn write_folder(folder: &OutFolder, trial: &Trial, outcome: &Outcome, speed_mm_s: f64) -> Result<()> {
+    let [drawing, moving, row, plants, weeds] = REPORT;
+    folder.write(row, |to| trial.row.write_csv(to))?;
+    folder.write(plants, |to| report::write_plants_csv(outcome, to))?;
+    folder.write(weeds, |to| report::write_weeds_csv(outcome, to))?;
+    folder.write(drawing, |to| svg::write(to, &picture::draw(&trial.row, &outcome.judgement)))?;
+    let animation = animation::draw(&trial.row, &trial.machine, &outcome.judgement, speed_mm_s);
+    folder.write(moving, |to| svg::write(to, &animation))
 }
 
 fn write_waveform(arguments: &Arguments, vcd: Option<&OutFile>, changes: &[PinChange]) -> Result<()> {
     let Some(vcd) = vcd else { return Ok(()) };
-    vcd.write(|to| waveform::write_to(to, &wiring::WIRES, changes.iter().copied()))?;
+    vcd.write(|to| waveform::write(to, &wiring::WIRES, changes.iter().copied()))?;
     if arguments.json { Ok(()) } else { say!("Waveform    {}", vcd.path().display()) }
 }
 

@@ -1,6 +1,6 @@
 //! `weeder soak`: hours of the decisions and minutes of the real firmware, with everything going wrong now and then.
 
-use crate::destination::FileName;
+use crate::destination::{FileName, Replace};
 use crate::finding::Finding;
 use crate::numbers::whole_within;
 use crate::output::{say, tell};
@@ -8,11 +8,11 @@ use crate::part::{self, Part};
 use crate::progress::Progress;
 use anyhow::{Result, ensure};
 use clap::Args;
+use experiments::shard::{Numbered, Shard};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use study::shard::{Numbered, Shard};
 use trial::firmware;
 use trial::soak::{self, Plan, SoakError, Tally};
 
@@ -24,33 +24,35 @@ pub const COMMAND: &str = "soak";
 #[command(after_help = "\
 Examples:
   weeder soak                                        a day of the decisions, half an hour of the firmware
-  weeder soak --hours 0 --uno-minutes 6 --faults 900    the firmware alone, with a fault every four seconds
+  weeder soak --hours 0 --uno-minutes 6 --faults 900    only the firmware, a fault every 4 s
   weeder soak --hours 1 --uno-minutes 0 --json | jq .parts[0].alarms
   weeder soak --hours 240 --shard 2/4 --out 2.part   the second of four parts, for `weeder merge`
-The status is 1 where something happened that must not.")]
+The status is 1 if a plant was harmed, or another rule was broken.")]
 pub struct Arguments {
-    /// Simulated hours of the decision core on the host, 0 to 10000; 0 leaves it out.
+    /// Simulated hours of the native run, 0 to 10000; 0 for none.
     #[arg(long, default_value = "24", value_parser = whole_within(0..=10_000_u32))]
     hours: u32,
-    /// Simulated minutes of the firmware on the virtual Uno, 0 to 10000; 0 leaves it out.
+    /// Simulated minutes of the firmware on the virtual Uno, 0 to 10000; 0 for none.
     #[arg(long, default_value = "30", value_parser = whole_within(0..=10_000_u32))]
     uno_minutes: u32,
-    /// Which of all the possible soaks, 0 to 18446744073709551615: the same seed gives the same one.
+    /// Random seed, 0 to 18446744073709551615.
     #[arg(long, default_value = "1", value_parser = whole_within(0..=u64::MAX))]
     seed: u64,
     /// Faults in a simulated hour, on average, 0 to 10000.
     #[arg(long, default_value = "120", value_parser = whole_within(0..=10_000_u32))]
     faults: u32,
-    /// Run this firmware instead of building the one in this repository.
+    /// Run this ELF instead of building the firmware of this repository.
     #[arg(long, value_name = "FILE.elf")]
     elf: Option<PathBuf>,
-    /// Run only the hours and rows of this shard, the Ith of N, and write their result to the file of --out.
+    /// Run only this shard, the Ith of N, and write its result to the file of --out.
     #[arg(long, value_name = "I/N", requires = "out", conflicts_with = "json")]
     shard: Option<Shard>,
-    /// The file for the part of --shard.
+    /// The file for --shard.
     #[arg(long, value_name = "FILE", requires = "shard")]
     out: Option<FileName>,
-    /// Print JSON for programs instead of words.
+    #[command(flatten)]
+    replace: Replace,
+    /// Print JSON instead of words.
     #[arg(long)]
     json: bool,
 }
@@ -87,7 +89,8 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
         hours > 0 || uno_minutes > 0,
         "with --hours 0 and --uno-minutes 0 nothing is tried: one of them has to be above 0"
     );
-    let part = arguments.shard.zip(arguments.out.as_ref()).map(|(shard, out)| Part::new(shard, out)).transpose()?;
+    let part = arguments.shard.zip(arguments.out.as_ref());
+    let part = part.map(|(shard, out)| Part::new(shard, out, arguments.replace)).transpose()?;
     let elf = match &arguments.elf {
         _ if uno_minutes == 0 => None,
         Some(path) => Some(path.clone()),

@@ -1,5 +1,10 @@
-//! Where a command reads a file: `-` is standard input, as everywhere.
+//! Where a command reads a file: `-` is standard input, as everywhere. And words that are no file but known names, which a shell that
+//! completes is told.
 
+use clap::builder::{PossibleValue, TypedValueParser};
+use clap::{Arg, Command};
+use field::conditions::presets;
+use std::ffi::OsStr;
 use std::path::PathBuf;
 
 /// Standard input as a file, where the system has one.
@@ -25,5 +30,36 @@ pub fn named(name: &str) -> Result<String, String> {
         #[cfg(not(unix))]
         "-" => Err("standard input cannot be read here: name a file".to_owned()),
         _ => Ok(name.to_owned()),
+    }
+}
+
+/// A field's preset, or a file; a shell that completes offers the presets.
+pub fn preset_or_file() -> impl TypedValueParser<Value = String> {
+    offering(|| presets().collect(), named)
+}
+
+/// What `parser` reads, with names of which a shell that completes offers those that fit. Other words are read as well.
+pub fn offering<P: TypedValueParser>(
+    names: fn() -> Vec<&'static str>,
+    parser: P,
+) -> impl TypedValueParser<Value = P::Value> {
+    Offering { names, parser }
+}
+
+#[derive(Clone)]
+struct Offering<P> {
+    names: fn() -> Vec<&'static str>,
+    parser: P,
+}
+
+impl<P: TypedValueParser> TypedValueParser for Offering<P> {
+    type Value = P::Value;
+
+    fn parse_ref(&self, command: &Command, argument: Option<&Arg>, value: &OsStr) -> Result<P::Value, clap::Error> {
+        self.parser.parse_ref(command, argument, value)
+    }
+
+    fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
+        Some(Box::new((self.names)().into_iter().map(PossibleValue::new)))
     }
 }

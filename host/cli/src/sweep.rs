@@ -1,22 +1,24 @@
 //! `weeder sweep`: a result of the simulated trial against one or two of its parameters.
 
-use crate::destination::{FileName, OutFile};
+use crate::destination::{FileName, OutFile, Replace};
 use crate::numbers::{number_within, whole_within};
 use crate::output::{print, say};
 use crate::part::Part;
 use crate::progress::Progress;
-use crate::source;
+use crate::source::{self, offering};
 use anyhow::Result;
-use clap::{Args, ValueEnum, builder::PossibleValuesParser};
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::{Args, ValueEnum};
 use comfy_table::{CellAlignment, Table, presets};
+use experiments::experiment::{PlotOutcome, Treatment};
+use experiments::shard::Shard;
+use experiments::sweep::{Axis, Point, Results, SPACINGS_CM, SPEEDS_KM_H, Sweep};
 use field::conditions::{Conditions, PARAMETERS};
 use link::settings::{self, Setting};
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
 use std::fs;
-use study::experiment::{PlotOutcome, Treatment};
-use study::shard::Shard;
-use study::sweep::{Axis, Point, Results, SPACINGS_CM, SPEEDS_KM_H, Sweep};
+use std::sync::LazyLock;
 
 /// What the parts of a sweep say that they are of.
 pub const COMMAND: &str = "sweep";
@@ -37,24 +39,46 @@ An axis is `speed` in km/h, `spacing` in cm, a parameter of the field as in its 
 
 /// The examples, and all that an axis can be.
 fn long_help() -> String {
+    let lines = axes();
+    let longest = |part: fn(&AxisHelp) -> &str| lines.iter().map(|line| part(line).len()).max().unwrap_or(0);
+    let (name_width, range_width) = (longest(|line| &line.name), longest(|line| &line.range));
     let mut text = format!("{EXAMPLES}\n\nWhat an axis can be:\n");
-    // Writing to a String cannot fail.
-    let mut line = |name: &str, range: String, meaning: &str| {
-        let _ = writeln!(text, "  {name:<28}{range:<16}{meaning}");
-    };
-    for (name, (least, greatest), meaning) in
-        [("speed", SPEEDS_KM_H, "forward speed in km/h"), ("spacing", SPACINGS_CM, "plant spacing in cm")]
-    {
-        line(name, format!("{least} to {greatest}"), meaning);
-    }
-    for parameter in PARAMETERS {
-        line(parameter.name, format!("{} to {}", parameter.least, parameter.greatest), parameter.meaning);
-    }
-    for setting in Setting::all() {
-        let range = setting.description();
-        line(&settings::name(setting), format!("{} to {}", range.least, range.greatest), &settings::help(setting));
+    for AxisHelp { name, range, meaning } in &lines {
+        // Writing to a String cannot fail.
+        let _ = writeln!(text, "  {name:<name_width$}  {range:<range_width$}  {meaning}");
     }
     text
+}
+
+/// What is said of an axis in the help.
+struct AxisHelp {
+    name: String,
+    range: String,
+    meaning: String,
+}
+
+/// All that an axis can be.
+fn axes() -> Vec<AxisHelp> {
+    let line = |name: &str, least: f64, greatest: f64, meaning: &str| AxisHelp {
+        name: name.to_owned(),
+        range: format!("{least} to {greatest}"),
+        meaning: meaning.to_owned(),
+    };
+    let speed = line("speed", SPEEDS_KM_H.0, SPEEDS_KM_H.1, "forward speed in km/h");
+    let spacing = line("spacing", SPACINGS_CM.0, SPACINGS_CM.1, "plant spacing in cm");
+    let parameters = PARAMETERS.iter().map(|known| line(known.name, known.least, known.greatest, known.meaning));
+    let settings = Setting::all().map(|setting| {
+        let range = setting.description();
+        line(&settings::name(setting), range.least.into(), range.greatest.into(), &settings::help(setting))
+    });
+    [speed, spacing].into_iter().chain(parameters).chain(settings).collect()
+}
+
+/// An axis; a shell that completes offers the names.
+fn axis() -> impl TypedValueParser<Value = Axis> {
+    static NAMES: LazyLock<Vec<String>> =
+        LazyLock::new(|| axes().into_iter().map(|axis| format!("{}=", axis.name)).collect());
+    offering(|| NAMES.iter().map(String::as_str).collect(), |text: &str| text.parse::<Axis>())
 }
 
 /// What the user asks of a sweep.
@@ -62,36 +86,38 @@ fn long_help() -> String {
 #[command(after_help = format!("{EXAMPLES} `weeder sweep --help` lists them all."), after_long_help = long_help())]
 pub struct Arguments {
     /// The parameter along the first axis, and its values.
-    #[arg(long, value_name = "NAME=FROM..TO:STEP")]
+    #[arg(long, value_name = "NAME=FROM..TO:STEP", value_parser = axis(), hide_possible_values = true)]
     x: Axis,
     /// The parameter along the second axis, and its values.
-    #[arg(long, value_name = "NAME=FROM..TO:STEP")]
+    #[arg(long, value_name = "NAME=FROM..TO:STEP", value_parser = axis(), hide_possible_values = true)]
     y: Option<Axis>,
-    /// The result that a table with two axes shows.
+    /// The result to show for two axes.
     #[arg(long, default_value = RESULT, value_parser = PossibleValuesParser::new(Results::NAMES))]
     result: String,
-    /// Who weeds: the firmware, the firmware without its leads, the paper's controller, or a controller that knows every plant.
+    /// The controller: the firmware, the firmware without leads, the paper's, or the ideal controller.
     #[arg(long, value_enum, default_value = "firmware")]
     controller: ControllerName,
-    /// The field's conditions: a preset, or a TOML file, as of `weeder trial`.
-    #[arg(long, value_name = "PRESET|FILE.toml", value_parser = source::named, default_value = "transplanted")]
+    /// The field: a preset or a TOML file, as for `weeder trial`.
+    #[arg(long, value_name = "PRESET|FILE.toml", value_parser = source::preset_or_file(), hide_possible_values = true, default_value = "transplanted")]
     field: String,
-    /// Forward speed in km/h, 0.1 to 8, where no axis has it.
+    /// Forward speed in km/h, 0.1 to 8, if no axis has it.
     #[arg(long, default_value = "2.5", value_parser = number_within(SPEEDS_KM_H.0..=SPEEDS_KM_H.1))]
     speed: f64,
-    /// Plant spacing in cm, 5 to 500, where no axis has it.
+    /// Plant spacing in cm, 5 to 500, if no axis has it.
     #[arg(long, default_value = "50", value_parser = number_within(SPACINGS_CM.0..=SPACINGS_CM.1))]
     spacing: f64,
-    /// Which of all the possible fields, 0 to 18446744073709551615.
+    /// Random seed, 0 to 18446744073709551615.
     #[arg(long, default_value = "1", value_parser = whole_within(0..=u64::MAX))]
     seed: u64,
-    /// Write all results of all points to this file as well; with --shard, the part.
+    /// Also write all results of all points to this file; with --shard, the part.
     #[arg(long, value_name = "FILE.csv")]
     out: Option<FileName>,
-    /// Weed only at the points of this shard, the Ith of N, and write what came of them to the file of --out.
+    #[command(flatten)]
+    replace: Replace,
+    /// Compute only the points of this shard, the Ith of N, and write them to the file of --out.
     #[arg(long, value_name = "I/N", requires = "out", conflicts_with = "json")]
     shard: Option<Shard>,
-    /// Print JSON for programs instead of a table: all results of all points.
+    /// Print all results of all points as JSON instead of a table.
     #[arg(long)]
     json: bool,
 }
@@ -102,7 +128,8 @@ enum ControllerName {
     Firmware,
     WithoutLookAhead,
     Paper,
-    AllKnowing,
+    #[value(alias = "all-knowing")]
+    Ideal,
 }
 
 impl From<ControllerName> for Treatment {
@@ -111,7 +138,7 @@ impl From<ControllerName> for Treatment {
             ControllerName::Firmware => Self::Firmware,
             ControllerName::WithoutLookAhead => Self::WithoutLookAhead,
             ControllerName::Paper => Self::Paper,
-            ControllerName::AllKnowing => Self::AllKnowing,
+            ControllerName::Ideal => Self::Ideal,
         }
     }
 }
@@ -120,10 +147,18 @@ impl From<ControllerName> for Treatment {
 pub struct Shown {
     /// Where they are written.
     pub out: Option<FileName>,
+    /// Whether what is there is replaced.
+    pub replace: Replace,
     /// Whether for programs.
     pub json: bool,
     /// Which of the results, where there are two axes.
     pub result: String,
+}
+
+impl Shown {
+    fn out(&self) -> Result<Option<OutFile<'_>>> {
+        self.out.as_ref().map(|out| out.check(self.replace)).transpose()
+    }
 }
 
 /// Runs it and prints the result, or writes a part of it.
@@ -131,7 +166,7 @@ pub struct Shown {
 /// # Errors
 /// Where an axis or the field is wrong, or the file cannot be written.
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let Arguments { out, json, result, .. } = arguments;
+    let &Arguments { ref out, replace, json, ref result, .. } = arguments;
     let sweep = Sweep {
         x: arguments.x.clone(),
         y: arguments.y.clone(),
@@ -142,14 +177,14 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         seed: arguments.seed,
     };
     if let Some((shard, out)) = arguments.shard.zip(out.as_ref()) {
-        let part = Part::new(shard, out)?;
+        let part = Part::new(shard, out, replace)?;
         let bar = Progress::new("sweeping");
         let outcomes = sweep.run_shard(shard, |share| bar.show(share))?;
         bar.finish();
         return part.write(COMMAND, sweep.size(), &sweep, outcomes);
     }
-    let shown = Shown { out: out.clone(), json: *json, result: result.clone() };
-    let out = shown.out.as_ref().map(FileName::check).transpose()?;
+    let shown = Shown { out: out.clone(), replace, json, result: result.clone() };
+    let out = shown.out()?;
     let bar = Progress::new("sweeping");
     let points = sweep.run(|share| bar.show(share))?;
     bar.finish();
@@ -161,7 +196,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 /// # Errors
 /// Where the file cannot be written.
 pub fn merge(sweep: &Sweep, outcomes: &[PlotOutcome], shown: &Shown) -> Result<()> {
-    let out = shown.out.as_ref().map(FileName::check).transpose()?;
+    let out = shown.out()?;
     show(sweep, &sweep.points(outcomes)?, shown, out.as_ref())
 }
 
@@ -271,4 +306,18 @@ fn write(out: &OutFile, sweep: &Sweep, points: &[Point]) -> Result<()> {
         }
         Ok::<(), csv::Error>(writer.flush()?)
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn in_the_help_blanks_stand_between_an_axis_s_name_its_range_and_what_it_is() {
+        let help = long_help();
+        let (_, list) = help.split_once("What an axis can be:\n").expect("there is a list");
+        let mut columns = list.lines().map(|line| line.trim_start().split("  ").filter(|part| !part.is_empty()));
+        assert!(columns.clone().count() > 60);
+        assert!(columns.all(|parts| parts.count() == 3), "{list}");
+    }
 }

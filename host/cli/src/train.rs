@@ -1,48 +1,49 @@
 //! `weeder train`: makes an example table of labelled objects, and says how well it tells plants from weeds.
 
-use crate::destination::{FileName, OutFile};
+use crate::destination::{FileName, OutFile, Replace};
 use crate::finding::Finding;
 use crate::numbers::whole_within;
 use crate::output::{say, tell};
-use crate::source;
+use crate::source::{self, offering};
 use anyhow::{Result, bail};
-use clap::Args;
+use clap::builder::TypedValueParser;
+use clap::{ArgGroup, Args};
+use experiments::training::synthetic::{CROPS, Crop};
+use experiments::training::{
+    self, Beside, Confusion, DEFAULT_MOST_EXAMPLES, Labelled, MOST_EXAMPLES, Training, listing, regions, synthetic,
+    table,
+};
 use link::examples::CAPACITY;
 use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::str::FromStr;
-use study::training::synthetic::{CROPS, Crop};
-use study::training::{
-    self, Beside, Confusion, DEFAULT_MOST_EXAMPLES, Labelled, MOST_EXAMPLES, Training, listing, regions, synthetic,
-    table,
-};
 
 /// What the user asks of a training.
 #[derive(Args)]
-#[command(after_help = "\
+#[command(group = ArgGroup::new("objects").required(true).args(["files", "synthetic"]), after_help = "\
 Examples:
-  weeder train field.csv --picture field.svg                    say how well it would do, and draw it
-  weeder train field.csv --out control/src/ground/examples/table.rs    have the next `weeder flash` take it along
+  weeder train field.csv --picture field.svg                    print its error rates, and draw it
+  weeder train field.csv --force --out control/src/ground/examples/table.rs    for the next `weeder flash`
   weeder train --synthetic                                      the built-in table, from simulated rows
   weeder train --synthetic --crop maize --beside --out maize.csv    examples for `weeder examples push`")]
 pub struct Arguments {
-    /// CSV files with the columns speed_mm_s,spacing_mm,delay_mm,hold_mm,actuation_mm,label; label is plant or weed;
-    /// - for standard input.
-    #[arg(value_name = "FILE.csv", value_parser = source::file, required_unless_present = "synthetic", conflicts_with = "synthetic")]
+    /// CSV files with the columns speed_mm_s,spacing_mm,delay_mm,hold_mm,actuation_mm,label (plant or weed); - for
+    /// standard input.
+    #[arg(value_name = "FILE.csv", value_parser = source::file)]
     files: Vec<PathBuf>,
-    /// Learn from simulated rows at four speeds and two spacings instead.
+    /// Learn from simulated rows at four speeds and two spacings.
     #[arg(long)]
     synthetic: bool,
     /// The crop of the simulated rows: chilli, broccoli or maize.
-    #[arg(long, value_name = "CROP", default_value = "chilli", value_parser = crop, conflicts_with = "files")]
+    #[arg(long, value_name = "CROP", default_value = "chilli", value_parser = crop(), hide_possible_values = true, conflicts_with = "files")]
     crop: &'static Crop,
-    /// Which of all the possible simulated fields, 0 to 18446744073709551615: the same seed gives the same table.
+    /// Random seed, 0 to 18446744073709551615.
     #[arg(long, default_value = "1", value_parser = whole_within(0..=u64::MAX), conflicts_with = "files")]
     seed: u64,
-    /// Write the table: as Rust source for the firmware (.rs), or as a table of examples (.csv).
+    /// Write the table as Rust source for the firmware (.rs), or as examples (.csv).
     #[arg(long, value_name = "FILE.rs|FILE.csv")]
     out: Option<FileName>,
-    /// Examples that vote: 1 to 15, or `auto` for those that do best.
+    /// Examples that vote: 1 to 15, or `auto` for the best number.
     #[arg(long, value_name = "auto|N", default_value = "auto")]
     k: Votes,
     #[arg(
@@ -53,14 +54,15 @@ pub struct Arguments {
         help = format!("Most examples that the table may have, 0 to {MOST_EXAMPLES}: flash has no room for more")
     )]
     max: usize,
-    /// Choose at most 32 that a machine can be taught by `weeder examples push` beside its built-in table, instead of a table for the
-    /// firmware.
+    /// Select at most 32 examples for `weeder examples push`, instead of a table for the firmware.
     #[arg(long, conflicts_with_all = ["max", "picture"])]
     beside: bool,
-    /// Draw what the table decides.
+    /// Draw the table's decisions.
     #[arg(long, value_name = "FILE.svg")]
     picture: Option<FileName>,
-    /// Print JSON for programs instead of words.
+    #[command(flatten)]
+    replace: Replace,
+    /// Print JSON instead of words.
     #[arg(long)]
     json: bool,
 }
@@ -72,8 +74,13 @@ enum Votes {
     Given(u8),
 }
 
+/// A crop; a shell that completes offers the names.
+fn crop() -> impl TypedValueParser<Value = &'static Crop> {
+    offering(|| CROPS.iter().map(|crop| crop.name).collect(), find_crop)
+}
+
 /// A crop by its name.
-fn crop(name: &str) -> Result<&'static Crop, String> {
+fn find_crop(name: &str) -> Result<&'static Crop, String> {
     CROPS.iter().find(|crop| crop.name == name).ok_or_else(|| {
         let names: Vec<&str> = CROPS.iter().map(|crop| crop.name).collect();
         format!(
@@ -100,8 +107,9 @@ impl FromStr for Votes {
 /// # Errors
 /// Where a file or its contents are wrong, or the table would not fit.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
-    let table = arguments.out.as_ref().map(Destination::of).transpose()?;
-    let picture = arguments.picture.as_ref().map(FileName::check).transpose()?;
+    let replace = arguments.replace;
+    let table = arguments.out.as_ref().map(|out| Destination::of(out, replace)).transpose()?;
+    let picture = arguments.picture.as_ref().map(|picture| picture.check(replace)).transpose()?;
     let objects = arguments.objects()?;
     let k = match arguments.k {
         Votes::Auto => None,
@@ -114,7 +122,7 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     let another_field = match arguments.synthetic {
         true => {
             let seed = arguments.seed.wrapping_add(1);
-            Some((seed, training.model().judge(&synthetic::objects(arguments.crop, seed)?)))
+            Some((seed, training.model().classify(&synthetic::objects(arguments.crop, seed)?)))
         }
         false => None,
     };
@@ -186,8 +194,8 @@ fn beside(arguments: &Arguments, table: Option<&Destination>, objects: &[Labelle
             json!({
                 "objects": objects.len(),
                 "examples": chosen.len(),
-                "built_in_alone": judged_in_json(&before),
-                "with_these": judged_in_json(&after),
+                "built_in_alone": counts_in_json(&before),
+                "with_these": counts_in_json(&after),
             })
         ),
         false => say!(
@@ -206,7 +214,7 @@ fn beside(arguments: &Arguments, table: Option<&Destination>, objects: &[Labelle
     Ok(Finding::Good)
 }
 
-/// What is said of a training; `another_field` are the seed of another field and how its objects were judged.
+/// What is said of a training; `another_field` are the seed of another field and how its objects were classified.
 fn report(training: &Training, objects: &[Labelled], another_field: Option<&(u64, Confusion)>) -> Result<()> {
     say!("Objects     {}", objects.len())?;
     say!("k           {}", training.k)?;
@@ -217,10 +225,10 @@ fn report(training: &Training, objects: &[Labelled], another_field: Option<&(u64
     }
     say!("Taken out   {} as noise", training.edited_out)?;
     say!("Examples    {} kept", training.kept.len())?;
-    say!("\nBefore condensing: each object judged by all others\n\n{}", training.leave_one_out)?;
-    say!("\nAfter condensing: all objects judged by the table\n\n{}", training.by_table)?;
-    if let Some((seed, judged)) = another_field {
-        say!("\nObjects of another field (seed {seed}), judged by the table\n\n{judged}")?;
+    say!("\nBefore condensing: each object classified by all others\n\n{}", training.leave_one_out)?;
+    say!("\nAfter condensing: all objects classified by the table\n\n{}", training.by_table)?;
+    if let Some((seed, classified)) = another_field {
+        say!("\nObjects of another field (seed {seed}), classified by the table\n\n{classified}")?;
     }
     say!("")
 }
@@ -235,14 +243,14 @@ fn in_json(training: &Training, objects: &[Labelled], another_field: Option<&(u6
         "scale": Value::Object(scale.collect()),
         "taken_out": training.edited_out,
         "examples": training.kept.len(),
-        "before_condensing": judged_in_json(&training.leave_one_out),
-        "after_condensing": judged_in_json(&training.by_table),
-        "another_field": another_field.map(|(_, judged)| judged_in_json(judged)),
+        "before_condensing": counts_in_json(&training.leave_one_out),
+        "after_condensing": counts_in_json(&training.by_table),
+        "another_field": another_field.map(|(_, classified)| counts_in_json(classified)),
     })
 }
 
-fn judged_in_json(judged: &Confusion) -> Value {
-    json!({ "objects": judged.total(), "plants_taken_for_weeds": judged.plants_taken_for_weeds() })
+fn counts_in_json(classified: &Confusion) -> Value {
+    json!({ "objects": classified.total(), "plants_taken_for_weeds": classified.plants_taken_for_weeds() })
 }
 
 /// How a table is written.
@@ -259,12 +267,12 @@ struct Destination<'a> {
 
 impl<'a> Destination<'a> {
     /// A file that says by its name's ending how the table is written.
-    fn of(name: &'a FileName) -> Result<Self> {
+    fn of(name: &'a FileName, replace: Replace) -> Result<Self> {
         let form = match name.path().extension().and_then(|ending| ending.to_str()) {
             Some("rs") => Form::Rust,
             Some("csv") => Form::Csv,
             _ => bail!("{}: a table is written as Rust (.rs) or as CSV (.csv)", name.path().display()),
         };
-        Ok(Self { file: name.check()?, form })
+        Ok(Self { file: name.check(replace)?, form })
     }
 }

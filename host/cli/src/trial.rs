@@ -1,6 +1,6 @@
 //! `weeder trial`: the paper's experiment in a simulated field, with its report.
 
-use crate::destination::{FileName, FolderName, OutFolder};
+use crate::destination::{FileName, FolderName, OutFolder, Replace};
 use crate::examples;
 use crate::finding::Finding;
 use crate::numbers::{number_within, whole_within};
@@ -11,19 +11,21 @@ use crate::source;
 use anyhow::{Result, ensure};
 use clap::{Args, Command, FromArgMatches, ValueEnum};
 use comfy_table::{CellAlignment, Table, presets};
-use field::conditions::Conditions;
+use experiments::evaluation::{Analysis, published};
+use experiments::experiment::{self, Engine, Experiment, PlotOutcome, Total, Treatment};
+use experiments::page::{Page, RowPicture};
+use experiments::shard::{Numbered, Shard};
+use experiments::statistics::Share;
+use experiments::sweep::{SPACINGS_CM, SPEEDS_KM_H};
+use field::budget;
+use field::conditions::{Conditions, presets};
 use field::tool_path::{Effect, WeedCount, unweeded_strip_mm};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::PathBuf;
 use std::time::Instant;
-use study::evaluation::{Analysis, published};
-use study::experiment::{self, Engine, Experiment, PlotOutcome, Total, Treatment};
-use study::page::{Page, RowPicture};
-use study::shard::{Numbered, Shard};
-use study::statistics::Share;
-use study::sweep::{SPACINGS_CM, SPEEDS_KM_H};
 use trial::{firmware, picture};
 
 /// What the parts of a trial say that they are of.
@@ -36,17 +38,17 @@ const MOST_PLANTS: f64 = 2e9;
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
-  weeder trial                                       the paper's speeds and spacings, three replications
-  weeder trial --field soft-ground --out report      with its report as a page, report/report.html
-  weeder trial --field set-up --rivals paper         the machine set up by the manual, beside the paper's controller
-  weeder trial --brief                               what counts most, as a short table
+  weeder trial                                       the machine that is set up, at the paper's speeds and spacings
+  weeder trial --field soft-ground --out report      with a report, report/report.html
+  weeder trial --field from-the-box --baselines paper   the machine straight from the box, beside the paper's controller
+  weeder trial --brief                               the most important columns
   weeder trial --engine uno --replications 1         with the real firmware on the virtual Uno
   weeder trial --field my-field.toml --speeds 1,3 --spacings 30,40,50
   weeder trial --replications 1000 --shard 2/4 --out 2.part    the second of four parts, for `weeder merge`
-The status is 1 where the firmware damaged a plant, or an alarm stopped it; with --shard, `weeder merge` says so.")]
+The status is 1 if the firmware damaged a plant, or an alarm stopped it; with --shard, `weeder merge` has it.")]
 pub struct Arguments {
-    /// What runs the firmware: its code compiled for this computer, or the ELF on the virtual Uno, hundreds of times slower.
-    #[arg(long, value_enum, default_value = "twin")]
+    /// The firmware's code compiled for this computer, or its ELF on the virtual Uno, hundreds of times slower.
+    #[arg(long, value_enum, default_value = "native")]
     engine: EngineName,
     /// Plots of each speed and spacing, 1 to 1000.
     #[arg(long, default_value = "3", value_parser = whole_within(1..=1000_u32))]
@@ -57,33 +59,43 @@ pub struct Arguments {
     /// Plant spacings in cm, each 5 to 500.
     #[arg(long, value_delimiter = ',', default_value = "50,60", value_parser = number_within(SPACINGS_CM.0..=SPACINGS_CM.1))]
     spacings: Vec<f64>,
-    /// The field's conditions: a preset (transplanted, even-stand, direct-sown, weedy, soft-ground, heavy-soil, dusty, hand-steered,
-    /// set-up, chilli, broccoli, maize), or a TOML file that says what differs from the first of them; - for standard input.
-    #[arg(long, value_name = "PRESET|FILE.toml", value_parser = source::named, default_value = "transplanted")]
+    #[arg(
+        long,
+        value_name = "PRESET|FILE.toml",
+        value_parser = source::preset_or_file(),
+        hide_possible_values = true,
+        default_value = "set-up",
+        help = format!(
+            "The field: a preset, or a TOML file with the differences from the first preset; - for standard input. Presets: {}.",
+            presets().collect::<Vec<_>>().join(", ")
+        )
+    )]
     field: String,
-    /// A table of examples to teach the firmware beforehand, as `weeder examples push` would; - for standard input.
+    /// Examples to teach the firmware first, as with `weeder examples push`; - for standard input.
     #[arg(long, value_name = "FILE.csv", value_parser = source::file)]
     examples: Option<PathBuf>,
-    /// Who weeds the same ground beside the firmware.
-    #[arg(long, value_enum, value_delimiter = ',', default_values_t = [Rival::Queue, Rival::Paper, Rival::AllKnowing])]
-    rivals: Vec<Rival>,
-    /// Which of all the possible fields, 0 to 18446744073709551615: the same seed gives the same one.
+    /// The baselines on the same ground.
+    #[arg(long, alias = "rivals", value_enum, value_delimiter = ',', default_values_t = [Baseline::Queue, Baseline::Paper, Baseline::Ideal])]
+    baselines: Vec<Baseline>,
+    /// Random seed, 0 to 18446744073709551615.
     #[arg(long, default_value = "1", value_parser = whole_within(0..=u64::MAX))]
     seed: u64,
-    /// Run this firmware instead of building the one in this repository.
+    /// Run this ELF instead of building the firmware of this repository.
     #[arg(long, value_name = "FILE.elf")]
     elf: Option<PathBuf>,
-    /// Write report.html, trial.csv and controllers.csv into this folder, which is made where there is none; with --shard, the part
-    /// to this file.
+    /// Write report.html, trial.csv and controllers.csv into this folder, and create it if needed; with --shard, the
+    /// part to this file.
     #[arg(long, value_name = "FOLDER")]
     out: Option<FolderName>,
-    /// Weed only the plots of this shard, the Ith of N, and write what came of them to the file of --out.
+    #[command(flatten)]
+    replace: Replace,
+    /// Weed only the plots of this shard, the Ith of N, and write the result to the file of --out.
     #[arg(long, value_name = "I/N", requires = "out", conflicts_with_all = ["json", "brief"])]
     shard: Option<Shard>,
-    /// Print what counts most of the table, and nothing else.
+    /// Print only the most important columns.
     #[arg(long, conflicts_with = "json")]
     brief: bool,
-    /// Print JSON for programs instead of tables.
+    /// Print JSON instead of tables.
     #[arg(long)]
     json: bool,
 }
@@ -93,30 +105,32 @@ pub struct Arguments {
 #[serde(rename_all = "kebab-case")]
 enum EngineName {
     /// The firmware's code, compiled for this computer.
-    Twin,
+    #[value(alias = "twin")]
+    Native,
     /// The firmware itself, on the virtual Uno.
     Uno,
 }
 
-/// The firmware's rivals by their names.
+/// The firmware's baselines by their names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Rival {
-    /// The firmware's queue of windows, without look-ahead.
+enum Baseline {
+    /// Keep-out zones without look-ahead.
     Queue,
-    /// The paper's controller: one window, and a loop that polls.
+    /// The paper's controller: one slot, and a polling loop.
     Paper,
-    /// One that is told where each plant stands.
-    AllKnowing,
+    /// A controller that knows every plant.
+    #[value(alias = "all-knowing")]
+    Ideal,
 }
 
 impl Arguments {
-    /// The firmware and its rivals, in the order in which they are shown.
+    /// The firmware and its baselines, in the order in which they are shown.
     fn controllers(&self) -> Vec<Treatment> {
         let takes_part = |controller: &Treatment| match controller {
             Treatment::Firmware => true,
-            Treatment::WithoutLookAhead => self.rivals.contains(&Rival::Queue),
-            Treatment::Paper => self.rivals.contains(&Rival::Paper),
-            Treatment::AllKnowing => self.rivals.contains(&Rival::AllKnowing),
+            Treatment::WithoutLookAhead => self.baselines.contains(&Baseline::Queue),
+            Treatment::Paper => self.baselines.contains(&Baseline::Paper),
+            Treatment::Ideal => self.baselines.contains(&Baseline::Ideal),
         };
         Treatment::ALL.into_iter().filter(takes_part).collect()
     }
@@ -150,7 +164,7 @@ impl Arguments {
             ("--spacings", list(&self.spacings, f64::to_string)),
             ("--field", Some(self.field.clone())),
             ("--examples", path(&self.examples)),
-            ("--rivals", list(&self.rivals, name)),
+            ("--baselines", list(&self.baselines, name)),
             ("--seed", Some(self.seed.to_string())),
             ("--elf", path(&self.elf)),
         ]
@@ -184,10 +198,21 @@ pub struct PlotPart {
 pub struct Shown {
     /// Where its report goes.
     pub out: Option<FolderName>,
+    /// Whether what is there is replaced.
+    pub replace: Replace,
     /// Whether for programs.
     pub json: bool,
     /// Whether what counts most is enough.
     pub brief: bool,
+}
+
+/// The files of a report.
+const REPORT: [&str; 3] = ["report.html", "trial.csv", "controllers.csv"];
+
+impl Shown {
+    fn folder(&self) -> Result<Option<OutFolder<'_>>> {
+        self.out.as_ref().map(|out| out.check(REPORT, self.replace)).transpose()
+    }
 }
 
 /// Runs it and prints the result, or writes a part of it.
@@ -195,11 +220,11 @@ pub struct Shown {
 /// # Errors
 /// Where the field is wrong, the firmware cannot be built or run, or a file cannot be written.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
-    let &Arguments { json, brief, .. } = arguments;
+    let &Arguments { replace, json, brief, .. } = arguments;
     let file = arguments.out.as_ref().map(FileName::from);
-    let part = arguments.shard.zip(file.as_ref()).map(|(shard, file)| Part::new(shard, file)).transpose()?;
-    let shown = Shown { out: arguments.out.clone().filter(|_| part.is_none()), json, brief };
-    let folder = shown.out.as_ref().map(FolderName::check).transpose()?;
+    let part = arguments.shard.zip(file.as_ref()).map(|(shard, file)| Part::new(shard, file, replace)).transpose()?;
+    let shown = Shown { out: arguments.out.clone().filter(|_| part.is_none()), replace, json, brief };
+    let folder = shown.folder()?;
     let experiment = Experiment {
         speeds_km_h: ascending(&arguments.speeds),
         spacings_cm: ascending(&arguments.spacings),
@@ -215,12 +240,12 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
         "this trial has some {plants:.0} plants, but has to have at most {MOST_PLANTS}: ask for fewer or shorter rows, or fewer replications"
     );
     let engine = match (arguments.engine, &arguments.elf) {
-        (EngineName::Twin, _) => Engine::Twin,
+        (EngineName::Native, _) => Engine::Native,
         (EngineName::Uno, Some(path)) => Engine::Uno(path.clone()),
         (EngineName::Uno, None) => Engine::Uno(firmware::build()?),
     };
     let firmware = match &engine {
-        Engine::Twin => None,
+        Engine::Native => None,
         Engine::Uno(elf) => Some(part::check_sum(elf)?),
     };
     let (field, words) = (arguments.field.clone(), arguments.words()?);
@@ -252,7 +277,7 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
 /// # Errors
 /// Where a file cannot be written.
 pub fn merge(study: Study, mut plots: Vec<PlotPart>, shown: &Shown) -> Result<Finding> {
-    let folder = shown.out.as_ref().map(FolderName::check).transpose()?;
+    let folder = shown.folder()?;
     let picture = plots.first_mut().and_then(|plot| plot.picture.take());
     let outcomes: Vec<PlotOutcome> = plots.into_iter().flat_map(|plot| plot.by_controller).collect();
     show(&study, &outcomes, shown, folder.as_ref(), || Ok(picture))
@@ -275,18 +300,20 @@ fn show(
     let &Shown { json, brief, .. } = shown;
     let totals = experiment::totals(outcomes);
     let analysis = Analysis::of(experiment::records(outcomes, Treatment::Firmware))?;
-    let mut summary = summary(&study.experiment, &totals);
-    summary.extend(against_the_paper(outcomes));
+    let summary = summary(&study.experiment, &totals);
     let printed = if json {
         say!("{:#}", json!({ "summary": summary, "plots": outcomes.iter().map(in_json).collect::<Vec<_>>() }))
     } else if brief {
-        say!("{}", by_speed(&totals, true))
+        say!("{}", by_speed(&totals, Brief))
     } else {
-        say!("{}\n\n{}", by_speed(&totals, false), summary.join("\n"))
+        let [plants, ground] = [Plants, Ground].map(|contents| by_speed(&totals, contents));
+        say!("{plants}\n{ground}\n\n{WHERE_IT_GOES}\n{}\n\n{}", where_it_goes(&totals), summary.join("\n"))
     };
     let alarms: u32 = of(&totals, Treatment::Firmware).map(|total| total.alarms).sum();
     let damaged: u32 = of(&totals, Treatment::Firmware).map(|total| total.effect.injured()).sum();
     if let Some(folder) = folder {
+        // What it has to say of the paper is for those who read on.
+        let summary = [summary, against_the_paper(outcomes)].concat();
         let findings = Findings { outcomes, totals, analysis, summary };
         write_report(folder, study, picture()?, &findings)?;
         if !json {
@@ -327,26 +354,50 @@ fn of(totals: &[Total], controller: Treatment) -> impl Iterator<Item = &Total> {
     totals.iter().filter(move |total| total.controller == controller)
 }
 
-/// A column of the table: its heading, how a total fills it, and whether it is one of those that count most.
-type Column = (&'static str, fn(&Total) -> String, bool);
+/// A column: its heading, how a total fills it, and the tables that have it.
+type Column = (&'static str, fn(&Total) -> String, &'static [Contents]);
 
-const COLUMNS: [Column; 11] = [
-    ("km/h", |total| total.speed_km_h.to_string(), true),
-    ("controller", |total| total.controller.title().to_owned(), true),
-    ("plants\ndamaged, %", |total| format!("{:.1} ({})", total.plant_damage_percent(), total.damage()), true),
-    ("canopies\nreached, %", |total| format!("{:.1}", total.canopies_reached_percent()), true),
-    ("margins\ncut, %", |total| format!("{:.1}", total.margins_cut_percent()), false),
-    ("ground of the\nrow weeded, %", |total| weeded(total), true),
-    ("with all margins\nkept at most, %", |total| format!("{:.1}", 100.0 * total.weedable_share), false),
-    ("undamaged\nat most, %", |total| format!("{:.1}", 100.0 * total.undamaged_share), false),
-    ("weeds gone\nin the row, %", |total| gone(total.effect.in_row), true),
-    ("in the whole\nplot, %", |total| gone(total.effect.in_plot), false),
-    ("rows with\nan alarm", |total| total.alarms.to_string(), false),
+/// The tables of a trial, each with a line for each speed and controller.
+#[derive(Clone, Copy, PartialEq)]
+enum Contents {
+    /// The most important columns, for `--brief`.
+    Brief,
+    /// What happened to the plants.
+    Plants,
+    /// What was weeded.
+    Ground,
+}
+
+use Contents::{Brief, Ground, Plants};
+
+const COLUMNS: [Column; 12] = [
+    ("km/h", |total| total.speed_km_h.to_string(), &[Brief, Plants, Ground]),
+    ("controller", |total| name(total.controller).to_owned(), &[Brief, Plants, Ground]),
+    (
+        "plants\ndamaged, %",
+        |total| format!("{:.1} ({})", total.plant_damage_percent(), total.damage()),
+        &[Brief, Plants],
+    ),
+    ("zones\nreached, %", |total| format!("{:.1}", total.zones_reached_percent()), &[Brief, Plants]),
+    ("margins\ncut, %", |total| format!("{:.1}", total.margins_cut_percent()), &[Plants]),
+    ("rows with\nan alarm", |total| total.alarms.to_string(), &[Plants]),
+    ("row ground\nweeded, %", |total| weeded(total), &[Brief, Ground]),
+    ("most\nlost to, %", |total| most_lost(total), &[Brief, Ground]),
+    ("with all\nmargins\nkept at\nmost, %", |total| format!("{:.1}", 100.0 * total.weedable_share), &[Ground]),
+    ("undamaged\nat most, %", |total| format!("{:.1}", 100.0 * total.undamaged_share), &[Ground]),
+    ("weeds\ngone in\nrow, %", |total| gone(total.effect.in_row), &[Brief, Ground]),
+    ("weeds\ngone in\nplot, %", |total| gone(total.effect.in_plot), &[Ground]),
 ];
 
-/// A line a speed and controller; if it is to be brief, of what counts most.
-fn by_speed(totals: &[Total], brief: bool) -> Table {
-    let columns = || COLUMNS.iter().filter(|(_, _, counts_most)| *counts_most || !brief);
+/// A controller's title without its article, as a table has it.
+fn name(controller: Treatment) -> &'static str {
+    let title = controller.title();
+    ["a ", "the "].iter().find_map(|article| title.strip_prefix(article)).unwrap_or(title)
+}
+
+/// A table of a trial, which is at most 110 characters wide.
+fn by_speed(totals: &[Total], contents: Contents) -> Table {
+    let columns = || COLUMNS.iter().filter(|(_, _, tables)| tables.contains(&contents));
     let mut table = Table::new();
     table.load_style(presets::UTF8_BORDERS_ONLY).set_header(columns().map(|(heading, _, _)| heading));
     for total in totals {
@@ -356,6 +407,34 @@ fn by_speed(totals: &[Total], brief: bool) -> Table {
         column.set_cell_alignment(if index == 1 { CellAlignment::Left } else { CellAlignment::Right });
     }
     table
+}
+
+/// What stands above the loss budget.
+const WHERE_IT_GOES: &str = "Where the row's ground goes with this firmware, %";
+
+/// The firmware's loss budget, a line a speed: each adds up to 100 %.
+fn where_it_goes(totals: &[Total]) -> Table {
+    let mut table = Table::new();
+    let heading = |part: budget::Part| {
+        let title = part.title();
+        let off_middle = |(at, _): &(usize, &str)| at.abs_diff(title.len() / 2);
+        let at = title.match_indices(' ').min_by_key(off_middle).map_or(title.len(), |(at, _)| at);
+        format!("{}\n{}", &title[..at], title[at..].trim_start())
+    };
+    table.load_style(presets::UTF8_BORDERS_ONLY);
+    table.set_header(std::iter::once("km/h".to_owned()).chain(budget::Part::ALL.map(heading)));
+    for total in of(totals, Treatment::Firmware) {
+        let shares = total.budget.tenths().map(|(_, tenths)| format!("{:.1}", f64::from(tenths) / 10.0));
+        table.add_row(std::iter::once(total.speed_km_h.to_string()).chain(shares));
+    }
+    table.column_iter_mut().for_each(|column| column.set_cell_alignment(CellAlignment::Right));
+    table
+}
+
+/// The part to which most of the row's ground is lost.
+fn most_lost(total: &Total) -> String {
+    let (part, share) = total.budget.largest_loss();
+    format!("{} {:.1}", part.key(), 100.0 * share)
 }
 
 /// The share of the row's ground that was weeded, and how far its mean may be off.
@@ -376,29 +455,33 @@ fn summary(experiment: &Experiment, totals: &[Total]) -> Vec<String> {
     let alarms: u32 = of(totals, Treatment::Firmware).map(|total| total.alarms).sum();
     if alarms > 0 {
         sentences.push(format!(
-            "In {alarms} of {} rows an alarm took the firmware's tool out for the rest of the row: its figures are no good there.",
+            "In {alarms} of {} rows an alarm took the firmware's tool out for the rest of the row. Exclude those rows.",
             experiment.rows()
         ));
     }
     let short_of_bound = of(totals, Treatment::Firmware).map(|total| total.weedable_share - total.weeded_share);
+    let zone = match experiment.conditions.timing().stem_zone_mm {
+        0 => "canopy".to_owned(),
+        zone_mm => format!("zone of {zone_mm} mm round the stem"),
+    };
     sentences.push(format!(
-        "With every canopy and its margin kept, this servo could weed at most {:.1} points more of the row's ground than the \
+        "With each plant's {zone} and its margin kept, this servo could weed at most {:.1} points more of the row's ground than the \
          firmware did.",
         100.0 * short_of_bound.fold(0.0, f64::max)
     ));
     let mut weeds = Effect::default();
     of(totals, Treatment::Firmware).for_each(|total| weeds += total.effect);
-    let Effect { swept, neighbours, .. } = weeds;
-    if swept + neighbours > 0 {
+    let Effect { damaged, unseen, swept, neighbours, .. } = weeds;
+    if damaged + swept + neighbours > 0 {
         sentences.push(format!(
-            "Of the plants that the firmware's machine damaged, sweeps cut {swept}, since it strays, and the tool that swung aside cut \
-             {neighbours} in the next row."
+            "Of the plants that the firmware's machine damaged, the tool hit {damaged}: the beam cannot see {unseen} of them. Sweeps cut \
+             {swept}, where the machine strays. The tool cut {neighbours} in the next row, where it swung aside."
         ));
     }
     let strip_mm = unweeded_strip_mm(&experiment.conditions.machine(0), &experiment.conditions.machine);
     if strip_mm > 0.0 {
         sentences.push(format!(
-            "Between tool and sweeps a strip of {strip_mm:.1} mm on either side of the row is weeded by nobody: a tool of {:.0} mm would fill it.",
+            "Between tool and sweeps a strip of {strip_mm:.1} mm on either side of the row is not weeded: a tool of {:.0} mm would fill it.",
             2.0 * experiment.conditions.machine.sweep_from_mm
         ));
     }
@@ -437,11 +520,11 @@ fn damage(totals: &[Total], controller: Treatment) -> String {
 fn write_report(folder: &OutFolder, study: &Study, picture: Option<String>, findings: &Findings) -> Result<()> {
     let Study { experiment, field, .. } = study;
     let engine_name = match study.engine {
-        EngineName::Twin => "the firmware's code, compiled for the host",
+        EngineName::Native => "the firmware's code, compiled for the host",
         EngineName::Uno => "the firmware on the virtual Uno",
     };
     let mut parameters = vec![
-        ("version".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
+        ("version".to_owned(), env!("WEEDER_VERSION").to_owned()),
         ("engine".to_owned(), engine_name.to_owned()),
         ("field".to_owned(), field.clone()),
         ("seed".to_owned(), experiment.seed.to_string()),
@@ -466,9 +549,10 @@ fn write_report(folder: &OutFolder, study: &Study, picture: Option<String>, find
         row: row.as_ref(),
     };
     let html = page.html()?;
-    folder.write("report.html", |to| to.write_all(html.as_bytes()))?;
-    folder.write("trial.csv", |to| experiment::write_csv(findings.outcomes, &[Treatment::Firmware], to))?;
-    folder.write("controllers.csv", |to| experiment::write_csv(findings.outcomes, &experiment.controllers, to))
+    let [report, plots, controllers] = REPORT;
+    folder.write(report, |to| to.write_all(html.as_bytes()))?;
+    folder.write(plots, |to| experiment::write_csv(findings.outcomes, &[Treatment::Firmware], to))?;
+    folder.write(controllers, |to| experiment::write_csv(findings.outcomes, &experiment.controllers, to))
 }
 
 fn in_json(outcome: &PlotOutcome) -> serde_json::Value {
@@ -483,11 +567,13 @@ fn in_json(outcome: &PlotOutcome) -> serde_json::Value {
         "in_row_bound_percent": 100.0 * outcome.weedable_share,
         "undamaged_bound_percent": 100.0 * outcome.undamaged_share,
         "damaged_by_tool": outcome.effect.damaged,
+        "damaged_unseen": outcome.effect.unseen,
         "damaged_by_sweeps": outcome.effect.swept,
         "damaged_in_next_row": outcome.effect.neighbours,
-        "canopies": outcome.canopies.all,
-        "canopies_reached": outcome.canopies.reached,
-        "margins_cut": outcome.canopies.margins_cut,
+        "zones": outcome.zones.all,
+        "zones_reached": outcome.zones.reached,
+        "margins_cut": outcome.zones.margins_cut,
         "alarms": outcome.alarms,
+        "loss_budget_percent": outcome.budget.shares().map(|(part, share)| (part.key(), 100.0 * share)).collect::<BTreeMap<_, _>>(),
     })
 }

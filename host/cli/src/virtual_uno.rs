@@ -1,6 +1,7 @@
 //! `weeder virtual-uno`: an Uno without an Uno, at a pseudo terminal that any serial program opens.
 
 use crate::course::CourseArguments;
+use crate::flash;
 use crate::numbers::{number_within, whole_within};
 use crate::output::{say, tell};
 use anyhow::{Context, Result, anyhow};
@@ -19,76 +20,76 @@ use uno::hex::{Bootloader, HexError};
 /// What the user asks of the virtual Uno.
 #[derive(Args)]
 #[command(after_help = "\
-The firmware runs as on a real Uno, with a machine around it that rolls along the row again and again. Opening the port
-resets it, as on a real one. Try, in another terminal:
+The firmware runs as on a real Uno, with a simulated machine that rolls along the row repeatedly.
+Opening the port resets it, as on a real Uno. In another terminal:
 
   weeder virtual-uno --link /tmp/uno --eeprom uno.eeprom
   picocom -b 115200 /tmp/uno        (type `help`, `clear`, `start`, `status`)
 
-An Uno with an empty flash and a bootloader, to be flashed by avrdude:
+An Uno with an empty flash and a bootloader, for avrdude:
 
   weeder virtual-uno --link /tmp/uno --bootloader optiboot
   weeder flash --port /tmp/uno
 
-With a satellite receiver half a metre behind the beam, at a port of its own:
+With a satellite receiver half a metre behind the beam, at its own port:
 
   weeder virtual-uno --no-reset --link /tmp/uno --gps-link /tmp/gps --gps-trouble
   weeder record --port /tmp/uno --gps /tmp/gps --beam-ahead 500 --out field.csv
 
-Or with the old bootloader, as Debian's arduino-core-avr has it:
+With the old bootloader, from Debian's arduino-core-avr:
 
   weeder virtual-uno --link /tmp/uno --bootloader ATmegaBOOT_168_atmega328.hex
   weeder flash --port /tmp/uno --old-bootloader
 
-A machine with six rows, an Uno for each, and one wheel whose encoder all of them count, at the ports row1 to row6; and what
-that costs this computer, in their own time:
+A machine with six rows, with one wheel and encoder for all, at the ports row1 to row6.
+The second command prints what that costs this computer:
 
   weeder virtual-uno --rows 6 --link row
   weeder virtual-uno --rows 6 --fast --for 10
 
-What avrdude says of TIOCMGET means that a pseudo terminal has no modem lines; it does no harm.")]
+Ignore avrdude's TIOCMGET warning: a pseudo terminal has no modem lines.")]
 pub struct Arguments {
     #[command(flatten)]
     course: CourseArguments,
-    /// A machine with so many rows, 1 to 64: an Uno and plants for each, one wheel for all. Files and links get the row's number at
-    /// their end.
+    /// Number of rows, 1 to 64: an Uno and plants for each, one wheel for all. Files and links get the row's number
+    /// at their end.
     #[arg(long, value_name = "NUMBER", default_value = "1", value_parser = whole_within(1..=64_usize))]
     rows: usize,
-    /// End after so many seconds of the Unos' own time, 1 to 86400, and say how long that took.
+    /// End after this many seconds of the Unos' own time, 1 to 86400, and print how long that took.
     #[arg(long = "for", value_name = "SECONDS", value_parser = whole_within(1..=86_400_u64))]
     seconds: Option<u64>,
-    /// Have the machine stand still, not roll along the row.
+    /// The machine stands still.
     #[arg(long)]
     stand: bool,
-    /// Start this bootloader at every reset, with an empty flash before it unless --elf is given too: a file's, or
-    /// `optiboot`, the Uno's own, which is compiled for it.
+    /// Start this bootloader at every reset: a file, or `optiboot`, the Uno's own. The flash is empty unless --elf is
+    /// given.
     #[arg(long, value_name = "optiboot|FILE.hex")]
     bootloader: Option<PathBuf>,
-    /// Run this firmware instead of building the one in this repository.
+    /// Run this ELF instead of building the firmware of this repository.
     #[arg(long, value_name = "FILE.elf")]
     elf: Option<PathBuf>,
-    /// Keep the EEPROM in this file from one run to the next; it is made where it does not exist.
+    /// Keep the EEPROM in this file from one run to the next.
     #[arg(long, value_name = "FILE")]
     eeprom: Option<PathBuf>,
-    /// Make a symbolic link to the port here, and remove it at the end.
+    /// Make a symbolic link to the port, and remove it at the end.
     #[arg(long, value_name = "PATH")]
     link: Option<PathBuf>,
-    /// Put a satellite receiver on the machine, which speaks NMEA 0183 at a pseudo terminal of its own, with a symbolic link here.
+    /// Add a satellite receiver (NMEA 0183) at its own serial port, with this symbolic link.
     #[arg(long, value_name = "PATH", conflicts_with = "bootloader")]
     gps_link: Option<PathBuf>,
-    /// Its fixes a second, 1 to 10.
+    /// The receiver's fixes a second, 1 to 10.
     #[arg(long, value_name = "HZ", default_value = "5", value_parser = number_within(1.0..=10.0), requires = "gps_link")]
     gps_rate: f64,
-    /// The standard deviation of its fixes in mm, 0 to 10000.
+    /// Standard deviation of the fixes in mm, 0 to 10000.
     #[arg(long, value_name = "MM", default_value = "15", value_parser = number_within(0.0..=10_000.0), requires = "gps_link")]
     gps_error: f64,
-    /// Have it lose its fix, jump and send damaged lines each minute.
+    /// The receiver loses its fix, jumps, and sends damaged lines each minute.
     #[arg(long, requires = "gps_link")]
     gps_trouble: bool,
-    /// Leave the chip alone when a program opens the port, as an Uno whose RESET-EN trace is cut.
+    /// Opening the port does not reset the chip, as on an Uno with a cut RESET-EN trace.
     #[arg(long)]
     no_reset: bool,
-    /// Run as fast as this computer can, not in real time. A bootloader would not wait for avrdude then.
+    /// Run at full speed, not in real time. A bootloader would not wait for avrdude then.
     #[arg(long, conflicts_with = "bootloader")]
     fast: bool,
 }
@@ -106,7 +107,14 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let bootloader = arguments.bootloader.as_deref().map(bootloader).transpose()?;
     let count = arguments.rows;
     let rows = (0..count as u64).map(|number| arguments.course.nth_row(number)).collect::<Result<Vec<_>>>()?;
-    let courses = Course::of_rows(rows, arguments.course.machine(), mm_s(arguments.course.speed));
+    let conditions = arguments.course.conditions_of(&arguments.course.field)?;
+    let courses = Course::of_rows(rows, arguments.course.machine(&conditions), mm_s(arguments.course.speed))
+        .into_iter()
+        .map(|course| course.slipping(conditions.ground.slip_percent / 100.0))
+        .collect::<Vec<_>>();
+    if !arguments.stand {
+        tell!("The machine rolls {:.0} mm each time.", courses[0].rolls_mm());
+    }
     let elf = match (&arguments.elf, &bootloader) {
         (Some(elf), _) => Some(elf.clone()),
         (None, Some(_)) => None,
@@ -139,7 +147,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         say!("{}", path.display())?;
     }
     let ports = if count == 1 { "Uno's port stands" } else { "Unos' ports stand" };
-    tell!("The virtual {ports} above: open it at 115200 baud. Ctrl-C ends it.");
+    tell!("The virtual {ports} above: 115200 baud. Ctrl-C ends it.");
+    let bootloader_alone = bootloader.as_ref().filter(|_| arguments.elf.is_none());
+    tell!("Next, in another terminal: {}", next_command(&unos.paths(), bootloader_alone)?);
     let ran = unos.run(&stop, arguments.seconds.map(Duration::from_secs)).map_err(|(row, error)| match count {
         1 => anyhow!(error),
         _ => anyhow!(error).context(format!("row {}", row + 1)),
@@ -148,6 +158,20 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         say!("{}", cost(ran, count))?;
     }
     Ok(())
+}
+
+/// What to type next: an Uno that has only a bootloader asks for a firmware.
+fn next_command(ports: &[&Path], bootloader: Option<&Bootloader>) -> Result<String> {
+    let is_old = |bootloader: &Bootloader| usize::from(bootloader.start()) == flash::OLD_AVAILABLE_BYTES;
+    let (begin, ports): (&[&str], _) = match bootloader {
+        None => (&["weeder", "monitor"], ports),
+        // One at a time.
+        Some(bootloader) if is_old(bootloader) => (&["weeder", "flash", "--old-bootloader"], &ports[..1]),
+        Some(_) => (&["weeder", "flash"], &ports[..1]),
+    };
+    let ports: Vec<String> = ports.iter().map(|port| port.to_string_lossy().into_owned()).collect();
+    let ports = ports.iter().flat_map(|port| ["--port", port]);
+    Ok(shlex::try_join(begin.iter().copied().chain(ports))?)
 }
 
 /// A row's own file or link: the number is at its end where there are several.

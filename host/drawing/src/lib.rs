@@ -106,7 +106,7 @@ impl Legend {
         const LETTER_WIDTH: f64 = 6.4;
         self.drawn.append(mark(self.x, self.y));
         self.drawn.append(words(self.x + MARK_SIZE + 5.0, self.y + MARK_SIZE - 2.0, meaning, INK));
-        self.x += MARK_SIZE + 30.0 + LETTER_WIDTH * meaning.len() as f64;
+        self.x += MARK_SIZE + 30.0 + LETTER_WIDTH * meaning.chars().count() as f64;
     }
 
     /// The legend as a part of a picture.

@@ -114,12 +114,12 @@ impl Conditions {
         let Mechanism { beam_to_tool_mm, second_beam_mm, .. } = self.machine;
         let least = f64::from(SECOND_BEAM_LEAST_MM);
         let is_too_far = beam_to_tool_mm.round() > f64::from(SLIPPING_BEAM_TO_TOOL_MM);
-        let (least, greatest) = if is_too_far { (0.0, 0.0) } else { (least, beam_to_tool_mm.round() - 1.0) };
+        let (least, greatest) = if is_too_far { (0.0, 0.0) } else { (least, beam_to_tool_mm.round() - least) };
         if second_beam_mm == 0.0 || (least..=greatest).contains(&second_beam_mm.round()) {
             return Ok(());
         }
         let meaning = format!(
-            "0 for none, behind the first beam and ahead of the tool, which may be {SLIPPING_BEAM_TO_TOOL_MM} mm behind the first then"
+            "0 for none, so far behind the first beam and ahead of the tool, which may be {SLIPPING_BEAM_TO_TOOL_MM} mm behind the first then"
         );
         Err(WrongValue::OutOfRange { name: NAME.to_owned(), value: second_beam_mm, least, greatest, meaning })
     }
@@ -174,14 +174,14 @@ impl Conditions {
         }
     }
 
-    /// Margin and leads that the firmware is told.
+    /// Margin, leads and zone that the firmware is told.
     pub fn timing(&self) -> Timing {
-        let default = Timing::default();
-        let of = |setting: Setting, otherwise: u32| self.setting_or(setting, f64::from(otherwise)) as u32;
+        let of = |setting: Setting| self.setting_or(setting, setting.description().default.into()) as u32;
         Timing {
-            margin_mm: of(Setting::MarginMm, default.margin_mm),
-            lead_out_ms: of(Setting::LeadOutMs, default.lead_out_ms),
-            lead_in_ms: of(Setting::LeadInMs, default.lead_in_ms),
+            margin_mm: of(Setting::MarginMm),
+            lead_out_ms: of(Setting::LeadOutMs),
+            lead_in_ms: of(Setting::LeadInMs),
+            stem_zone_mm: of(Setting::StemZoneMm),
         }
     }
 
@@ -230,7 +230,7 @@ mod tests {
     #[test]
     fn margin_and_leads_are_told_once_as_the_timing() {
         let conditions = parse("[settings]\nlead_out_ms = 200\nmargin_mm = 40\n").unwrap();
-        assert_eq!(conditions.timing(), Timing { lead_out_ms: 200, margin_mm: 40, ..Timing::default() });
+        assert_eq!(conditions.timing(), Timing { lead_out_ms: 200, margin_mm: 40, ..Conditions::default().timing() });
         assert!(conditions.firmware_settings().is_empty());
     }
 
@@ -247,7 +247,7 @@ mod tests {
             ),
             (
                 "[machine]\nsecond_beam_mm = 400\n",
-                "field.toml, line 2: machine.second_beam_mm is 400, but has to be 50 to 399",
+                "field.toml, line 2: machine.second_beam_mm is 400, but has to be 72 to 328",
             ),
             (
                 "[machine]\nbeam_to_tool_mm = 1001\nsecond_beam_mm = 200\n",

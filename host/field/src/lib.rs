@@ -4,22 +4,26 @@
 //!   some [`conditions`], [`stand`] grows what beam and tools meet, [`sight`] says what a beam sees of it, [`driving`] rolls through it
 //!   and [`steering`] off its line.
 //! - **The machine**: [`motion`] is how it rolls, [`machine`] turns motion and row into levels on the Uno's pins, [`servo`] is
-//!   what pulses do to the tool, and [`wiring`] says which pin is wired to what.
-//! - **Who weeds**: a [`trial`] is a row, a machine and the firmware's settings. The [`twin`] weeds it by the firmware's own decisions,
-//!   compiled for the host, and its [`rivals`] are models.
-//! - **What became of it**: [`verdict`] judges canopies and margins, [`tool_path`] counts stems and weeds, and [`bound`] says what nobody
-//!   could do better.
+//!   what pulses do to the tool, and [`wiring`] says which pin is wired to what. In a [`rolling`] machine they are joined, for as long
+//!   as it rolls.
+//! - **Who weeds**: a [`trial`] is a row, a machine and the firmware's settings. The [`native`] run weeds it by the firmware's own decisions,
+//!   compiled for the host, and its [`baselines`] are models.
+//! - **What became of it**: [`verdict`] judges canopies and margins, [`tool_path`] counts stems and weeds, and [`optimum`] says what no
+//!   controller can do better.
 //!
 //! The firmware's ELF is not run here, and no file is opened: texts are given, and the crate is at home in a browser as well.
 
-pub mod bound;
+pub mod baselines;
+pub mod budget;
 pub mod conditions;
 pub mod driving;
 pub mod ground;
 pub mod machine;
 pub mod motion;
+pub mod native;
+pub mod optimum;
 pub mod planting;
-pub mod rivals;
+pub mod rolling;
 pub mod row;
 pub mod servo;
 pub mod sight;
@@ -27,8 +31,8 @@ pub mod stand;
 pub mod steering;
 pub mod tool_path;
 pub mod trial;
-pub mod twin;
 pub mod verdict;
+pub mod wheel;
 pub mod wiring;
 mod words;
 

@@ -18,9 +18,9 @@ use crate::sight::half_covered;
 use crate::wiring;
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
-use signal::{CYCLES_PER_SECOND, Pin, PinChange};
 use std::f64::consts::PI;
 use std::ops::Range;
+use uno::{CYCLES_PER_SECOND, Pin, PinChange};
 
 /// Dimensions of the machine.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -165,7 +165,7 @@ impl Machine {
     /// The level of a beam that stands so far behind the first.
     fn level_before(&self, pin: Pin, behind_mm: f64, row: &Row, motion: &Motion) -> PinChange {
         let ground_mm = motion.start_mm() - behind_mm;
-        let broken = self.seen_mm(row).iter().any(|block| block.contains(&ground_mm));
+        let broken = self.seen_mm(row.blocks_mm()).iter().any(|block| block.contains(&ground_mm));
         PinChange { cycle: 0, pin, high: !broken }
     }
 
@@ -174,9 +174,9 @@ impl Machine {
         self.second_beam_mm > 0.0
     }
 
-    /// The stretches over which the sensor has the beam broken.
-    fn seen_mm(&self, row: &Row) -> Vec<Range<f64>> {
-        half_covered(row.blocks_mm(), self.beam_mm)
+    /// The stretches over which the sensor has the beam broken by these leaves, a [`union`](crate::ground::union).
+    pub(crate) fn seen_mm(&self, leaves_mm: Vec<Range<f64>>) -> Vec<Range<f64>> {
+        half_covered(leaves_mm, self.beam_mm)
     }
 
     /// What the encoder and the beam do to their pins while the machine rolls past the row, in order of time.
@@ -192,19 +192,31 @@ impl Machine {
 
     /// Quadrature: forward is AB = 00, 10, 11, 01, 00, a count an edge.
     fn encoder_changes(&self, motion: &Motion, start_cycle: u64) -> Vec<PinChange> {
-        let mut ticks = 0_i64;
+        self.encoder_changes_since(&mut 0, 0.0, motion, start_cycle)
+    }
+
+    /// As above, in the pieces of the motion that begin at a time or later. `ticks` are the counts of a clean encoder before them,
+    /// and then behind them.
+    pub(crate) fn encoder_changes_since(
+        &self,
+        ticks: &mut i64,
+        from_s: f64,
+        motion: &Motion,
+        start_cycle: u64,
+    ) -> Vec<PinChange> {
         motion
-            .mark_passings(self.tick_mm())
+            .mark_passings_since(self.tick_mm(), from_s)
             .into_iter()
             .filter_map(|passing| {
-                let before = ticks;
-                ticks += if passing.forward { 1 } else { -1 };
-                let (phase, cycle) = (ticks.rem_euclid(PULSE_TICKS), cycle_at(start_cycle, passing.time_s));
-                if channel_a(before.rem_euclid(PULSE_TICKS)) == channel_a(phase) {
-                    return Some(PinChange { cycle, pin: wiring::ENCODER_B, high: channel_b(phase) });
+                let before = *ticks;
+                *ticks += if passing.forward { 1 } else { -1 };
+                let (a, b) = channels(*ticks);
+                let cycle = cycle_at(start_cycle, passing.time_s);
+                if channels(before).0 == a {
+                    return Some(PinChange { cycle, pin: wiring::ENCODER_B, high: b });
                 }
-                let hidden = self.dirt.hides(ticks.min(before).div_euclid(PULSE_TICKS));
-                (!hidden).then_some(PinChange { cycle, pin: wiring::ENCODER_A, high: channel_a(phase) })
+                let hidden = self.dirt.hides(before.min(*ticks).div_euclid(PULSE_TICKS));
+                (!hidden).then_some(PinChange { cycle, pin: wiring::ENCODER_A, high: a })
             })
             .collect()
     }
@@ -229,48 +241,72 @@ impl Machine {
         motion: &Motion,
         start_cycle: u64,
     ) -> Vec<PinChange> {
-        let response_s = self.beam_response_ms / 1000.0;
-
-        // Each end of a leaf that is passed toggles the beam, in whatever direction.
-        let mut toggles_s: Vec<f64> = self
-            .seen_mm(row)
-            .into_iter()
-            .flat_map(|block| [block.start, block.end])
-            .flat_map(|end_mm| motion.passings(end_mm + behind_mm))
-            .map(|passing| passing.time_s)
-            .collect();
-        toggles_s.sort_by(f64::total_cmp);
-        let mut reported_s: Vec<f64> = Vec::with_capacity(toggles_s.len());
-        for time_s in toggles_s {
-            match reported_s.last() {
-                // The sensor had not yet reported the change that this one takes back.
-                Some(last_s) if time_s - last_s < response_s => {
-                    reported_s.pop();
-                }
-                _ => reported_s.push(time_s),
-            }
-        }
-
-        reported_s
-            .into_iter()
-            .enumerate()
-            .map(|(index, time_s)| PinChange {
-                cycle: cycle_at(start_cycle, time_s + response_s),
-                pin: before.pin,
-                high: before.high == (index % 2 == 1),
-            })
-            .collect()
+        let mut sensor = Sensor::new(self, before, behind_mm);
+        sensor.changes(&self.seen_mm(row.blocks_mm()), motion, 0.0..f64::INFINITY, start_cycle)
     }
 }
 
-/// Level of channel A in the four phases of forward motion.
-fn channel_a(phase: i64) -> bool {
-    matches!(phase, 1 | 2)
+/// The sensor of a beam: it reports what passes the beam, each change later by its response.
+#[derive(Clone, Debug)]
+pub(crate) struct Sensor {
+    /// Its pin, with the level that it has reported last.
+    pub last: PinChange,
+    /// How far it stands behind the first.
+    pub behind_mm: f64,
+    response_s: f64,
+    /// When the beam changed, where that is not reported yet.
+    changed_s: Option<f64>,
 }
 
-/// Level of channel B in the four phases of forward motion.
-fn channel_b(phase: i64) -> bool {
-    matches!(phase, 2 | 3)
+impl Sensor {
+    /// One that stands so far behind the first, and has reported this before the motion begins.
+    pub(crate) fn new(machine: &Machine, before: PinChange, behind_mm: f64) -> Self {
+        Self { last: before, behind_mm, response_s: machine.beam_response_ms / 1000.0, changed_s: None }
+    }
+
+    /// What it reports during a time while the pieces of the motion that begin then roll past these leaves.
+    pub(crate) fn changes(
+        &mut self,
+        leaves_mm: &[Range<f64>],
+        motion: &Motion,
+        during_s: Range<f64>,
+        start_cycle: u64,
+    ) -> Vec<PinChange> {
+        // Each end of a leaf that is passed changes the beam, forward or back.
+        let mut changes_s: Vec<f64> = leaves_mm
+            .iter()
+            .flat_map(|leaf| [leaf.start, leaf.end])
+            .flat_map(|end_mm| motion.passings_since(end_mm + self.behind_mm, during_s.start))
+            .map(|passing| passing.time_s)
+            .collect();
+        changes_s.sort_by(f64::total_cmp);
+        let mut reports = Vec::with_capacity(changes_s.len() + 1);
+        let mut report = |last: &mut PinChange, time_s: f64| {
+            *last = PinChange { cycle: cycle_at(start_cycle, time_s), pin: last.pin, high: !last.high };
+            reports.push(*last);
+        };
+        for time_s in changes_s {
+            match self.changed_s.take() {
+                // It had not yet reported the change that this one takes back.
+                Some(changed_s) if time_s - changed_s < self.response_s => continue,
+                Some(changed_s) => report(&mut self.last, changed_s + self.response_s),
+                None => {}
+            }
+            self.changed_s = Some(time_s);
+        }
+        let due_s = self.changed_s.map(|changed_s| changed_s + self.response_s);
+        if let Some(due_s) = due_s.filter(|&due_s| due_s <= during_s.end) {
+            self.changed_s = None;
+            report(&mut self.last, due_s);
+        }
+        reports
+    }
+}
+
+/// Levels of the channels A and B at a count, in the four phases of forward motion.
+pub(crate) fn channels(ticks: i64) -> (bool, bool) {
+    let phase = ticks.rem_euclid(PULSE_TICKS);
+    (matches!(phase, 1 | 2), matches!(phase, 2 | 3))
 }
 
 /// The cycle of the Uno's clock at a motion's time.

@@ -6,7 +6,10 @@
 //! exact times.
 //!
 //! A driven wheel turns farther than the machine rolls: its slip is the share of the wheel's way that is lost. Below 0 it is that
-//! of a dragged wheel that skids, and turns less far. Each piece of the motion may have its own ([`Motion::with_slip`]).
+//! of a dragged wheel that skids, and turns less far. Each piece of the motion may have its own ([`Motion::with_slip`], or
+//! [`Motion::slipping`] from some time on).
+//!
+//! A motion that is not decided yet is cut where it is to become another one ([`Motion::until`]), and what follows is put behind it.
 //!
 //! It knows no machine: what position 0 means is the user's choice.
 
@@ -34,6 +37,9 @@ pub struct Motion {
     end_s: f64,
     end_mm: f64,
     end_speed_mm_s: f64,
+    /// Where the wheel's rim is at the end, and how far it turns while the machine rolls a millimetre from there on.
+    wheel_end_mm: f64,
+    wheel_mm_a_mm: f64,
 }
 
 /// A stretch of constant acceleration in which the direction does not change.
@@ -83,7 +89,15 @@ impl Piece {
 impl Motion {
     /// The machine stands at `start_mm`.
     pub fn starting_at(start_mm: f64) -> Self {
-        Self { start_mm, pieces: Vec::new(), end_s: 0.0, end_mm: start_mm, end_speed_mm_s: 0.0 }
+        Self {
+            start_mm,
+            pieces: Vec::new(),
+            end_s: 0.0,
+            end_mm: start_mm,
+            end_speed_mm_s: 0.0,
+            wheel_end_mm: start_mm,
+            wheel_mm_a_mm: 1.0,
+        }
     }
 
     /// From standstill at `start_mm` with `acceleration_mm_s2` to a constant speed, and on to `end_mm`.
@@ -96,14 +110,6 @@ impl Motion {
         let end_mm = self.end_mm + self.end_speed_mm_s * duration_s;
         let speed_mm_s = self.end_speed_mm_s;
         self.then(duration_s, 0.0, end_mm, speed_mm_s)
-    }
-
-    /// Rolls for a time from a speed on, with an acceleration that does not turn it round. The speed should be the one reached: it is
-    /// given so that errors of rounding do not add up.
-    pub fn roll_for(self, duration_s: f64, speed_mm_s: f64, acceleration_mm_s2: f64) -> Self {
-        let end_mm = self.end_mm + speed_mm_s * duration_s + acceleration_mm_s2 * duration_s.powi(2) / 2.0;
-        let from = Self { end_speed_mm_s: speed_mm_s, ..self };
-        from.then(duration_s, acceleration_mm_s2, end_mm, speed_mm_s + acceleration_mm_s2 * duration_s)
     }
 
     /// Changes to a speed, negative for rolling back, with an acceleration whose sign does not matter.
@@ -155,16 +161,68 @@ impl Motion {
             end_mm,
             speed_mm_s: self.end_speed_mm_s,
             acceleration_mm_s2,
-            wheel_start_mm: self.end_mm,
-            wheel_mm_a_mm: 1.0,
+            wheel_start_mm: self.wheel_end_mm,
+            wheel_mm_a_mm: self.wheel_mm_a_mm,
         };
         if duration_s > 0.0 {
             self.end_s = piece.end_s;
             self.end_mm = end_mm;
+            self.wheel_end_mm = piece.wheel_mm(end_mm);
             self.pieces.push(piece);
         }
         self.end_speed_mm_s = end_speed_mm_s;
         self
+    }
+
+    /// The same motion as far as a time, at which it goes on at the speed reached.
+    pub fn until(mut self, time_s: f64) -> Self {
+        let kept = self.pieces.partition_point(|piece| piece.start_s <= time_s);
+        self.pieces.truncate(kept);
+        let Some(last) = self.pieces.last_mut().filter(|last| time_s < last.end_s) else {
+            let more_s = time_s - self.end_s;
+            return self.go_on_for(more_s);
+        };
+        last.end_mm = last.position_mm(time_s);
+        last.end_s = time_s;
+        let Piece { start_s, end_mm, speed_mm_s, acceleration_mm_s2, .. } = *last;
+        let wheel_end_mm = last.wheel_mm(end_mm);
+        let end_speed_mm_s = speed_mm_s + acceleration_mm_s2 * (time_s - start_s);
+        Self { end_s: time_s, end_mm, end_speed_mm_s, wheel_end_mm, ..self }
+    }
+
+    /// What follows has the wheel lose this share of its way, below 1.
+    pub fn slipping(self, share: f64) -> Self {
+        Self { wheel_mm_a_mm: 1.0 / (1.0 - share), ..self }
+    }
+
+    /// The same motion without what was over before a time: of those times nothing may be asked any more.
+    pub fn forget(&mut self, time_s: f64) {
+        self.pieces.drain(..self.pieces.partition_point(|piece| piece.end_s <= time_s));
+    }
+
+    /// Makes one of its last two pieces where the machine rolled, or stood, alike in both: who adds to a motion again and again for hours
+    /// does not fill the memory.
+    pub fn join(&mut self) {
+        let [.., before, last] = self.pieces.as_mut_slice() else { return };
+        let alike = |piece: &Piece| (piece.speed_mm_s, piece.acceleration_mm_s2, piece.wheel_mm_a_mm);
+        if last.acceleration_mm_s2 == 0.0 && alike(before) == alike(last) {
+            (before.end_s, before.end_mm) = (last.end_s, last.end_mm);
+            self.pieces.pop();
+        }
+    }
+
+    /// What there is of it from a time on, as a motion of its own whose time begins there. Its wheel does not slip.
+    pub fn since(&self, time_s: f64) -> Self {
+        let first = self.pieces.partition_point(|piece| piece.end_s <= time_s);
+        self.pieces[first..].iter().fold(Self::starting_at(self.position_mm(time_s)), |motion, piece| {
+            let late_s = (time_s - piece.start_s).max(0.0);
+            // Its own speed, not the one before it, so that errors of rounding do not add up.
+            let end_speed_mm_s = piece.speed_mm_s + piece.acceleration_mm_s2 * late_s;
+            let duration_s = piece.end_s - piece.start_s - late_s;
+            let after_mm_s = end_speed_mm_s + piece.acceleration_mm_s2 * duration_s;
+            let end_mm = piece.end_mm;
+            Self { end_speed_mm_s, ..motion }.then(duration_s, piece.acceleration_mm_s2, end_mm, after_mm_s)
+        })
     }
 
     /// The same motion of a machine whose wheel slips: `slip` is asked for the share of the wheel's way that is lost, below 1,
@@ -176,7 +234,7 @@ impl Motion {
             piece.wheel_mm_a_mm = 1.0 / (1.0 - slip());
             wheel_mm = piece.wheel_mm(piece.end_mm);
         }
-        self
+        Self { wheel_end_mm: wheel_mm, ..self }
     }
 
     /// Where the motion began.
@@ -189,9 +247,19 @@ impl Motion {
         self.end_mm
     }
 
+    /// The speed at which the motion ended, negative backwards.
+    pub fn end_speed_mm_s(&self) -> f64 {
+        self.end_speed_mm_s
+    }
+
     /// How long the motion takes.
     pub fn duration_s(&self) -> f64 {
         self.end_s
+    }
+
+    /// How far the machine rolls from the end on while a point on the wheel's rim moves by a millimetre.
+    pub fn ground_mm_a_wheel_mm(&self) -> f64 {
+        1.0 / self.wheel_mm_a_mm
     }
 
     /// The position at a time. Before its beginning and after its end the machine stands.
@@ -205,10 +273,10 @@ impl Motion {
 
     /// Where a point on the wheel's rim is, counted as if it had rolled on the ground without slip.
     pub fn wheel_mm(&self, time_s: f64) -> f64 {
-        match (self.piece_at(time_s), self.pieces.last()) {
-            (Some(piece), _) => piece.wheel_mm(piece.position_mm(time_s)),
-            (None, Some(last)) if time_s >= 0.0 => last.wheel_mm(last.end_mm),
-            _ => self.start_mm,
+        match self.piece_at(time_s) {
+            Some(piece) => piece.wheel_mm(piece.position_mm(time_s)),
+            None if time_s < 0.0 => self.start_mm,
+            None => self.wheel_end_mm,
         }
     }
 
@@ -241,10 +309,15 @@ impl Motion {
 
     /// Every passing of a place, in order of time.
     pub fn passings(&self, place_mm: f64) -> impl Iterator<Item = Passing> + Clone {
+        self.passings_since(place_mm, 0.0)
+    }
+
+    /// As [`passings`](Self::passings), in the pieces that begin at a time or later.
+    pub fn passings_since(&self, place_mm: f64, from_s: f64) -> impl Iterator<Item = Passing> + Clone {
         // A place belongs to what lies ahead of it: it is passed forward on arrival and backward on leaving, so that a
         // machine that stops on it exactly and turns has passed it twice, not once.
         let is_past = move |position_mm: f64| position_mm >= place_mm;
-        self.pieces
+        self.pieces_since(from_s)
             .iter()
             .filter(move |piece| is_past(piece.start_mm) != is_past(piece.end_mm))
             .map(move |piece| Passing { time_s: piece.time_at(place_mm), forward: is_past(piece.end_mm) })
@@ -270,9 +343,14 @@ impl Motion {
     ///
     /// The motion begins half way between two marks.
     pub fn mark_passings(&self, pitch_mm: f64) -> Vec<Passing> {
+        self.mark_passings_since(pitch_mm, 0.0)
+    }
+
+    /// As [`mark_passings`](Self::mark_passings), in the pieces that begin at a time or later.
+    pub fn mark_passings_since(&self, pitch_mm: f64, from_s: f64) -> Vec<Passing> {
         let marks_to = |wheel_mm: f64| marks(wheel_mm - self.start_mm, pitch_mm);
         let mut passings = Vec::new();
-        for piece in &self.pieces {
+        for piece in self.pieces_since(from_s) {
             let (from, to) = (marks_to(piece.wheel_start_mm), marks_to(piece.wheel_mm(piece.end_mm)));
             let at = |mark: i64| Passing {
                 time_s: piece.time_at(piece.place_at(self.start_mm + (mark as f64 - 0.5) * pitch_mm)),
@@ -285,6 +363,10 @@ impl Motion {
             }
         }
         passings
+    }
+
+    fn pieces_since(&self, from_s: f64) -> &[Piece] {
+        &self.pieces[self.pieces.partition_point(|piece| piece.start_s < from_s)..]
     }
 
     fn piece_at(&self, time_s: f64) -> Option<&Piece> {
@@ -312,7 +394,7 @@ impl<'a> Course<'a> {
             end_mm: motion.end_mm,
             speed_mm_s: 0.0,
             acceleration_mm_s2: 0.0,
-            wheel_start_mm: motion.wheel_mm(motion.end_s),
+            wheel_start_mm: motion.wheel_end_mm,
             wheel_mm_a_mm: 1.0,
         };
         let mut to_come = motion.pieces.iter();
@@ -392,6 +474,62 @@ mod tests {
         assert_eq!(passings.len(), 200);
         let hundredth = motion.position_mm(passings[99].time_s);
         assert!((hundredth - 995.0 * 0.95).abs() < 1e-6, "{hundredth} mm");
+    }
+
+    #[test]
+    fn a_motion_that_is_cut_goes_on_as_it_was_and_may_become_another_one() {
+        let whole = to_and_fro();
+        for time_s in [0.0, 0.3, 2.0, 5.5, whole.duration_s() - 0.1] {
+            let cut = whole.clone().until(time_s);
+            assert_eq!((cut.duration_s(), cut.end_mm()), (time_s, whole.position_mm(time_s)));
+            let on = cut.clone().until(time_s + 0.5);
+            let expected_mm = whole.position_mm(time_s) + whole.speed_mm_s(time_s) * 0.5;
+            assert!((on.end_mm() - expected_mm).abs() < 1e-9, "at {time_s} s");
+            let back = cut.change_speed(-250.0, 500.0).until(time_s + 20.0);
+            assert_eq!(back.speed_mm_s(time_s + 19.0), -250.0);
+            assert_eq!(back.position_mm(time_s / 2.0), whole.position_mm(time_s / 2.0));
+        }
+    }
+
+    #[test]
+    fn a_wheel_slips_from_when_it_is_said_on() {
+        let motion = Motion::starting_at(0.0).change_speed(500.0, 1000.0).until(0.25).slipping(0.05);
+        let motion = motion.change_speed(500.0, 1000.0).until(3.0);
+        let before_mm = 500.0 * 0.25 * 0.25;
+        assert!((motion.end_mm() - (125.0 + 500.0 * 2.5)).abs() < 1e-9);
+        let wheel_mm = before_mm + (motion.end_mm() - before_mm) / 0.95;
+        assert!((motion.wheel_mm(3.0) - wheel_mm).abs() < 1e-9);
+        assert!((motion.until(4.0).wheel_mm(4.0) - wheel_mm - 500.0 / 0.95).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_motion_that_goes_on_alike_is_of_one_piece() {
+        let mut motion = Motion::starting_at(0.0);
+        for step in 1..=4000_i32 {
+            let speed_mm_s = if step <= 1000 { 0.0 } else { 700.0 };
+            motion = motion.slipping(0.05).change_speed(speed_mm_s, 1e6).until(f64::from(step) / 1000.0);
+            motion.join();
+        }
+        assert_eq!(motion.pieces.len(), 3, "it stood, got its speed, and rolled");
+        assert!((motion.position_mm(2.5) - 1050.0).abs() < 0.5);
+        assert!((motion.wheel_mm(2.5) - motion.position_mm(2.5) / 0.95).abs() < 1e-6);
+    }
+
+    #[test]
+    fn what_is_left_of_a_motion_rolls_as_the_whole_does() {
+        let whole = to_and_fro();
+        for from_s in [0.0, 0.2, 3.3, 7.0] {
+            let left = whole.since(from_s);
+            let mut kept = whole.clone();
+            kept.forget(from_s);
+            for step in 0..100 {
+                let time_s = f64::from(step) / 100.0 * (whole.duration_s() - from_s);
+                assert!((left.position_mm(time_s) - whole.position_mm(from_s + time_s)).abs() < 1e-9);
+                assert!((left.speed_mm_s(time_s) - whole.speed_mm_s(from_s + time_s)).abs() < 1e-9);
+                assert_eq!(kept.position_mm(from_s + time_s), whole.position_mm(from_s + time_s));
+            }
+            assert!((left.duration_s() + from_s - whole.duration_s()).abs() < 1e-9);
+        }
     }
 
     #[test]

@@ -4,7 +4,7 @@
 //! on every machine. Scatter is spread evenly, so that it has limits that a test can state.
 
 use crate::counted;
-use crate::row::{Problem, Row, Thing};
+use crate::row::{Kind, Problem, Row, Thing};
 use rand::seq::SliceRandom;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -140,6 +140,54 @@ impl Planting {
     }
 }
 
+/// A row without an end, which is sown ahead of the machine. What is to come may be changed on the way.
+#[derive(Clone, Debug)]
+pub struct Sowing {
+    /// Spacing, canopies and their scatter. It has no number of plants or weeds.
+    pub planting: Planting,
+    /// Share of the gaps between plants in which a tall weed stands.
+    pub weed_share: f64,
+    first_mm: f64,
+    rng: ChaCha8Rng,
+}
+
+impl Sowing {
+    /// One whose first plant's centre is at a place. The same seed gives the same row for the same changes.
+    pub fn new(planting: Planting, weed_share: f64, first_mm: f64, seed: u64) -> Self {
+        Self { planting, weed_share, first_mm, rng: ChaCha8Rng::seed_from_u64(seed) }
+    }
+
+    /// Sows behind what stands in a row already, until it reaches a place.
+    pub fn sow(&mut self, row: &mut Vec<Thing>, until_mm: f64) {
+        let Self { planting, weed_share, first_mm, rng } = self;
+        loop {
+            let last = row.last().filter(|last| last.kind == Kind::Plant);
+            let (last_mm, gap_from_mm) =
+                last.map_or((f64::NEG_INFINITY, f64::NEG_INFINITY), |last| (last.position_mm, last.span_mm().end));
+            if last_mm >= until_mm {
+                return;
+            }
+            let spacing_mm = planting.spacing_mm + scatter(rng, planting.spacing_scatter_mm);
+            let width_mm = planting.canopy_mm + scatter(rng, planting.canopy_scatter_mm);
+            let position_mm = if last.is_some() { last_mm + spacing_mm } else { *first_mm };
+            // A canopy that would reach into the one before it stands right behind that.
+            let position_mm = position_mm.max(gap_from_mm + 1.0 + width_mm / 2.0);
+            let plant = Thing::plant(position_mm, width_mm);
+            let (weed_mm, where_in_room, grows) = (
+                rng.random_range(WEED_WIDTHS_MM),
+                rng.random_range(0.0..1.0),
+                rng.random_bool(weed_share.clamp(0.0, 1.0)),
+            );
+            let room_mm = plant.span_mm().start - gap_from_mm - 2.0 * WEED_MARGIN_MM - weed_mm;
+            if grows && room_mm.is_finite() && room_mm > 0.0 {
+                let start_mm = gap_from_mm + WEED_MARGIN_MM + where_in_room * room_mm;
+                row.push(Thing::weed(start_mm + weed_mm / 2.0, weed_mm));
+            }
+            row.push(plant);
+        }
+    }
+}
+
 /// The narrowest gap between two things that takes a weed of any width and its margins.
 const NARROWEST_GAP_MM: f64 = 2.0 * WEED_MARGIN_MM + WEED_WIDTHS_MM.end;
 
@@ -166,7 +214,6 @@ pub(crate) fn leaves(rng: &mut impl Rng, canopy_mm: Range<f64>) -> Vec<Range<f64
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::row::Kind;
 
     #[test]
     fn the_same_seed_grows_the_same_row_and_another_seed_another() {
@@ -189,6 +236,32 @@ mod tests {
                 let gap_mm = pair[1].span_mm().start - pair[0].span_mm().end;
                 assert!(gap_mm >= WEED_MARGIN_MM - 1e-9, "{gap_mm} mm");
             }
+        }
+    }
+
+    #[test]
+    fn a_row_without_an_end_is_sown_in_order_and_apart_whatever_is_asked_of_it() {
+        let tight = Planting {
+            spacing_mm: 150.0,
+            spacing_scatter_mm: 80.0,
+            canopy_mm: 200.0,
+            canopy_scatter_mm: 100.0,
+            ..Planting::default()
+        };
+        for planting in [Planting::default(), tight] {
+            let sown = |step_mm: f64| {
+                let mut sowing = Sowing::new(planting, 1.0, 500.0, 5);
+                let mut row = Vec::new();
+                (1..)
+                    .map(|step| f64::from(step) * step_mm)
+                    .take_while(|&until_mm| until_mm <= 20_000.0)
+                    .for_each(|until_mm| sowing.sow(&mut row, until_mm));
+                row
+            };
+            let row = sown(1000.0);
+            assert_eq!(row, sown(20_000.0));
+            assert!(row.len() > 30 && row[row.len() - 1].position_mm >= 20_000.0);
+            assert_eq!(Row::new(row.clone()).map(|row| row.things().to_vec()), Ok(row));
         }
     }
 

@@ -237,6 +237,11 @@ impl Row {
         &self.things
     }
 
+    /// The stretches over which dust breaks the beam.
+    pub fn dust_mm(&self) -> &[Range<f64>] {
+        &self.dust_mm
+    }
+
     /// The crop plants, in ascending order of place.
     pub fn plants(&self) -> impl Iterator<Item = &Thing> {
         self.things.iter().filter(|thing| thing.kind == Kind::Plant)

@@ -13,8 +13,8 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use signal::{CYCLES_PER_SECOND, Pulse};
 use std::ops::{Range, RangeInclusive};
+use uno::{CYCLES_PER_SECOND, Pulse};
 
 /// A hobby servo and how it is set up.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -15,7 +15,8 @@ use crate::row::{Kind, Problem, Row, Thing};
 use crate::sight::width_at;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, LogNormal, Poisson};
+use rand_distr::{Distribution, LogNormal, Normal, Poisson};
+use std::f64::consts::SQRT_2;
 use std::ops::Range;
 
 /// A crop plant's stem, and the zone round it.
@@ -27,6 +28,8 @@ pub struct Stem {
     pub across_mm: f64,
     /// Radius of the zone that no tool may enter.
     pub protected_mm: f64,
+    /// Whether its plant breaks the beam.
+    pub is_seen: bool,
 }
 
 /// A weed, of whatever height.
@@ -74,16 +77,23 @@ impl Stand {
         let span_mm = 0.0..plot.row_m * 1000.0;
         // Each has random numbers of its own, so that a parameter of one leaves the others as they are.
         let [mut leaf_rng, mut weed_rng, mut dust_rng] = [(); 3].map(|()| ChaCha8Rng::from_rng(rng));
-        let [mut height_rng, mut stem_rng, mut size_rng, mut next_rng] = [1, 2, 3, 4].map(|stream| {
+        let of_stream = |stream| {
             let mut rng = leaf_rng.clone();
             rng.set_stream(stream);
             rng
-        });
+        };
+        let [mut height_rng, mut stem_rng, mut size_rng, mut next_rng] = [1, 2, 3, 4].map(of_stream);
+        let [mut sown_rng, mut sown_next_rng] = [5, 6].map(of_stream);
+        // The distance between two places has the deviation of both.
+        let sown = |rng: &mut ChaCha8Rng, at_mm: f64| match Normal::new(at_mm, crop.spacing_sd_mm / SQRT_2) {
+            Ok(normal) if crop.spacing_sd_mm > 0.0 => normal.sample(rng).clamp(span_mm.start, span_mm.end),
+            _ => at_mm,
+        };
         let mut stems = Vec::new();
         let mut things = Vec::new();
         let places = (span_mm.end / spacing_mm).floor() as u32;
         for place in 0..places {
-            let at_mm = (f64::from(place) + 0.5) * spacing_mm;
+            let at_mm = sown(&mut sown_rng, (f64::from(place) + 0.5) * spacing_mm);
             // One stands in any case: a row without a plant is none.
             let is_missing = chance(rng, crop.missing_percent) && (place + 1 < places || !stems.is_empty());
             let plants = if is_missing { 0 } else { 1 + usize::from(chance(rng, crop.double_percent)) };
@@ -96,12 +106,13 @@ impl Stand {
                 if chance(&mut leaf_rng, crop.ragged_percent) {
                     plant.leaves = leaves(&mut leaf_rng, plant.span_mm());
                 }
-                if !chance(rng, sensors.unseen_percent) && seen_mm.is_some() {
+                let is_seen = !chance(rng, sensors.unseen_percent) && seen_mm.is_some();
+                if is_seen {
                     things.push(plant);
                 }
                 let across_mm = scatter(rng, crop.across_scatter_mm);
                 let stem_mm = along_mm + scatter(&mut stem_rng, crop.stem_off_mm);
-                stems.push(Stem { along_mm: stem_mm, across_mm, protected_mm: crop.protected_mm / 2.0 });
+                stems.push(Stem { along_mm: stem_mm, across_mm, protected_mm: crop.protected_mm / 2.0, is_seen });
                 along_mm += rng.random_range(DOUBLE_MM);
             }
         }
@@ -137,9 +148,10 @@ impl Stand {
         let row = Row::new(grown_together(things))?.with_dust(dust_mm).on_ground(span_mm.clone());
         // The next row is sown or planted by itself: its places are the same, its chance is not.
         let next_to = |place: u32| {
-            let at_mm = (f64::from(place) + 0.5) * spacing_mm + scatter(&mut next_rng, crop.spacing_scatter_mm);
+            let at_mm = sown(&mut sown_next_rng, (f64::from(place) + 0.5) * spacing_mm)
+                + scatter(&mut next_rng, crop.spacing_scatter_mm);
             let across_mm = plot.row_spacing_mm + scatter(&mut next_rng, crop.across_scatter_mm);
-            Stem { along_mm: at_mm, across_mm, protected_mm: crop.protected_mm / 2.0 }
+            Stem { along_mm: at_mm, across_mm, protected_mm: crop.protected_mm / 2.0, is_seen: true }
         };
         let neighbours = (0..places).map(next_to).collect();
         let counted_m = plot.counted_m2 / f64::from(plot.rows) / (plot.row_spacing_mm / 1000.0);
@@ -207,6 +219,10 @@ fn grown_together(mut things: Vec<Thing>) -> Vec<Thing> {
 mod tests {
     use super::*;
 
+    /// What the presets say of themselves, with plants 20 and 25 cm apart.
+    const MAIZE_SD_MM: [f64; 2] = [73.0, 88.0];
+    const MAIZE_UNEVEN_SD_MM: [f64; 2] = [114.0, 128.0];
+
     fn grow(conditions: &Conditions, seed: u64) -> Stand {
         Stand::grow(conditions, 500.0, &mut ChaCha8Rng::seed_from_u64(seed)).expect("a row")
     }
@@ -236,6 +252,38 @@ mod tests {
         // 2000 places less 12 %, a tenth of which are double; three standard deviations are about 60.
         let expected = 2000.0 * 0.88 * 1.1;
         assert!((stand.stems.len() as f64 - expected).abs() < 60.0, "{}", stand.stems.len());
+    }
+
+    /// The standard deviation of the distances from a plant to the next.
+    fn spacing_sd_mm(stand: &Stand) -> f64 {
+        let distances: Vec<f64> = stand.stems.windows(2).map(|pair| pair[1].along_mm - pair[0].along_mm).collect();
+        let mean = distances.iter().sum::<f64>() / distances.len() as f64;
+        let squares: f64 = distances.iter().map(|distance| (distance - mean).powi(2)).sum();
+        (squares / (distances.len() - 1) as f64).sqrt()
+    }
+
+    #[test]
+    fn plants_are_sown_as_unevenly_as_the_deviation_of_their_spacing_says() {
+        let mut conditions = Conditions::preset("even-stand").unwrap().unwrap();
+        conditions.set("plot.row_m", 1000.0).unwrap();
+        for sd_mm in [0.0, 20.0, 60.0] {
+            conditions.set("crop.spacing_sd_mm", sd_mm).unwrap();
+            let sown_mm = spacing_sd_mm(&grow(&conditions, 5));
+            assert!((sown_mm - sd_mm).abs() <= 0.05 * sd_mm, "{sown_mm} mm, not {sd_mm}");
+        }
+    }
+
+    #[test]
+    fn the_maize_presets_stand_as_unevenly_as_they_say() {
+        for (preset, sd_mm) in [("maize", MAIZE_SD_MM), ("maize-uneven", MAIZE_UNEVEN_SD_MM)] {
+            let mut conditions = Conditions::preset(preset).unwrap().unwrap();
+            conditions.set("plot.row_m", 1000.0).unwrap();
+            for (spacing_mm, sd_mm) in [200.0, 250.0].into_iter().zip(sd_mm) {
+                let stand = Stand::grow(&conditions, spacing_mm, &mut ChaCha8Rng::seed_from_u64(5)).unwrap();
+                let sown_mm = spacing_sd_mm(&stand);
+                assert!((sown_mm - sd_mm).abs() < 4.0, "{preset} at {spacing_mm} mm: {sown_mm} mm");
+            }
+        }
     }
 
     #[test]

@@ -20,8 +20,8 @@ use crate::servo::Stroke;
 use crate::stand::{Stand, Stem, Weed};
 use crate::steering::Steering;
 use serde::{Deserialize, Serialize};
-use signal::Pulse;
 use std::ops::{AddAssign, Range};
+use uno::Pulse;
 
 /// A sweep that is in a zone by less than this touches it.
 const TOUCH_MM: f64 = 1e-6;
@@ -59,6 +59,8 @@ pub struct Effect {
     pub plants: u32,
     /// Crop plants through whose protected zone the tool passed.
     pub damaged: u32,
+    /// Those of them that the beam cannot see: lower than it, bent, eaten, or planted late.
+    pub unseen: u32,
     /// Crop plants through whose protected zone a sweep passed, but not the tool.
     pub swept: u32,
     /// Crop plants of the next row through whose protected zone the tool passed that swung aside.
@@ -82,6 +84,7 @@ impl AddAssign for Effect {
     fn add_assign(&mut self, other: Self) {
         self.plants += other.plants;
         self.damaged += other.damaged;
+        self.unseen += other.unseen;
         self.swept += other.swept;
         self.neighbours += other.neighbours;
         self.in_row += other.in_row;
@@ -120,6 +123,7 @@ pub fn effect(
     for stem in &stand.stems {
         if tools.damage(stem) {
             effect.damaged += 1;
+            effect.unseen += u32::from(!stem.is_seen);
         } else if tools.sweep_cuts(stem) {
             effect.swept += 1;
         }
@@ -154,7 +158,7 @@ impl Tools<'_> {
     fn sweep_cuts(&self, stem: &Stem) -> bool {
         let Mechanism { sweeps_a_side, sweep_width_mm, sweep_from_mm, .. } = *self.mechanism;
         let to_mm = sweep_from_mm + f64::from(sweeps_a_side) * sweep_width_mm;
-        let Stem { along_mm, across_mm, protected_mm } = *stem;
+        let Stem { along_mm, across_mm, protected_mm, .. } = *stem;
         let steps = protected_mm.ceil() as i32;
         (-steps..=steps).any(|step| {
             let beside_mm = protected_mm * f64::from(step) / f64::from(steps);
@@ -173,7 +177,7 @@ impl Tools<'_> {
     }
 
     fn damage(&self, stem: &Stem) -> bool {
-        let Stem { along_mm, across_mm, protected_mm } = *stem;
+        let Stem { along_mm, across_mm, protected_mm, .. } = *stem;
         let zone = along_mm - protected_mm..along_mm + protected_mm;
         let x_mm = self.machine.beam_to_tool_mm;
         let enters = |time_s: f64| {
@@ -223,15 +227,15 @@ mod tests {
     use super::*;
     use crate::row::{Row, Thing};
     use rand::SeedableRng;
-    use signal::CYCLES_PER_SECOND;
+    use uno::CYCLES_PER_SECOND;
 
     /// A stem at 1000 mm on the row's line, and weeds before it, beside it and between the rows.
     fn stand() -> Stand {
         let weed = |along_mm, across_mm| Weed { along_mm, across_mm };
         Stand {
             row: Row::new(vec![Thing::plant(1000.0, 150.0)]).unwrap(),
-            stems: vec![Stem { along_mm: 1000.0, across_mm: 0.0, protected_mm: 40.0 }],
-            neighbours: vec![Stem { along_mm: 1000.0, across_mm: 400.0, protected_mm: 40.0 }],
+            stems: vec![Stem { along_mm: 1000.0, across_mm: 0.0, protected_mm: 40.0, is_seen: true }],
+            neighbours: vec![Stem { along_mm: 1000.0, across_mm: 400.0, protected_mm: 40.0, is_seen: true }],
             weeds: vec![weed(500.0, 10.0), weed(1000.0, -20.0), weed(1000.0, 100.0), weed(500.0, 35.0)],
             counted_mm: 900.0..1100.0,
             span_mm: 0.0..2000.0,
@@ -304,7 +308,11 @@ mod tests {
     #[test]
     fn a_tool_that_does_not_swing_in_time_damages_the_plant_and_takes_the_weed() {
         let effect = effect_of(1200.0, 1500.0);
-        assert_eq!(effect.damaged, 1);
+        assert_eq!((effect.damaged, effect.unseen), (1, 0));
+        let mut unseen = stand();
+        unseen.stems[0].is_seen = false;
+        let of_unseen = steered(&unseen, &Steering::default(), 1200.0, 1500.0);
+        assert_eq!((of_unseen.damaged, of_unseen.unseen), (1, 1));
         assert_eq!(effect.in_row, WeedCount { before: 3, after: 1 });
     }
 

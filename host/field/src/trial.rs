@@ -1,8 +1,8 @@
 //! A trial: everything that decides how a row is weeded, but for who weeds it.
 //!
 //! The machine's motion does not depend on the firmware, so that a trial is told in full before anything runs: row, machine,
-//! motion, and what the firmware is set to. Who weeds it is for others to say: the [`twin`](crate::twin), its
-//! [`rivals`](crate::rivals), or the real firmware, which is not here.
+//! motion, and what the firmware is set to. Who weeds it is for others to say: the [native run](crate::native), its
+//! [`baselines`](crate::baselines), or the real firmware, which is not here.
 
 use crate::machine::Machine;
 use crate::motion::Motion;
@@ -82,7 +82,7 @@ impl Trial {
     /// The settings that the firmware gets, in an order in which machine and timing do not contradict each other on the way.
     pub fn firmware_settings(&self) -> Vec<(Setting, u16)> {
         let Machine { wheel_mm, ticks_per_rev, beam_to_tool_mm, second_beam_mm, servo, .. } = self.machine;
-        let Timing { margin_mm, lead_out_ms, lead_in_ms } = self.timing;
+        let Timing { margin_mm, lead_out_ms, lead_in_ms, .. } = self.timing;
         let notice_mm = beam_to_tool_mm - f64::from(margin_mm) - 2.0;
         // As the firmware counts: the lead, an eighth of it, and what the sensor may take.
         let notice_s = f64::from(lead_out_ms) * 1.125e-3 + 0.002;

@@ -16,9 +16,9 @@ use crate::machine::{Machine, time_at_s};
 use crate::motion::Motion;
 use crate::row::{Row, Thing};
 use crate::servo::{Command, Stroke};
-use signal::Pulse;
 use std::fmt;
 use std::ops::Range;
+use uno::Pulse;
 
 /// A margin that is short by less than this still counts as kept.
 pub const MARGIN_TOLERANCE_MM: f64 = 10.0;
@@ -32,11 +32,14 @@ pub struct Timing {
     pub lead_out_ms: u32,
     /// Time by which the command to come back comes ahead.
     pub lead_in_ms: u32,
+    /// The zone that is kept of a single plant, where its leaves may be worked under; 0 for all of its canopy.
+    pub stem_zone_mm: u32,
 }
 
 impl Default for Timing {
+    /// For the servo of [`Machine::default`], which nothing loads: the firmware's own default is for one in the soil.
     fn default() -> Self {
-        Self { margin_mm: 50, lead_out_ms: 180, lead_in_ms: 40 }
+        Self { margin_mm: 50, lead_out_ms: 180, lead_in_ms: 40, stem_zone_mm: 0 }
     }
 }
 
@@ -44,6 +47,19 @@ impl Timing {
     /// The paper's schedule: swings are commanded where they should be done (Eq. 1 to 3).
     pub fn as_in_the_paper() -> Self {
         Self { lead_out_ms: 0, lead_in_ms: 0, ..Self::default() }
+    }
+
+    /// What the tool has to keep off of a plant, less the margin: its canopy, or with a zone as much of that as the firmware keeps of a
+    /// plant that the beam has seen whole.
+    fn kept_mm(&self, plant: &Thing) -> Range<f64> {
+        let (span, zone_mm) = (plant.span_mm(), f64::from(self.stem_zone_mm));
+        let trim_mm = ((span.end - span.start - zone_mm) / 2.0).clamp(0.0, 3.0 / 16.0 * zone_mm);
+        span.start + trim_mm..span.end - trim_mm
+    }
+
+    /// How wide that is across the row.
+    fn kept_across_mm(&self, plant: &Thing) -> f64 {
+        if self.stem_zone_mm == 0 { plant.across_mm } else { plant.across_mm.min(self.stem_zone_mm.into()) }
     }
 }
 
@@ -73,10 +89,12 @@ impl fmt::Display for Verdict {
 pub struct PlantOutcome {
     /// The plant.
     pub plant: Thing,
-    /// From the place where the tool was fully out to the canopy's leading end; negative inside the canopy. `None` where
+    /// What the tool had to keep off: its canopy, or the zone round its stem.
+    pub kept_mm: Range<f64>,
+    /// From the place where the tool was fully out to the leading end of that; negative inside it. `None` where
     /// the tool was out from the beginning.
     pub clearance_before_mm: Option<f64>,
-    /// From the canopy's trailing end to the place where the tool began to come back; negative inside the canopy. `None`
+    /// From its trailing end to the place where the tool began to come back; negative inside the canopy. `None`
     /// where it stayed out to the end.
     pub clearance_behind_mm: Option<f64>,
     /// How often the tool was swung out over it.
@@ -93,12 +111,12 @@ pub struct PlantOutcome {
 impl PlantOutcome {
     /// Where along the row the tool was fully out before the plant.
     pub fn clear_mm(&self) -> Option<f64> {
-        self.clearance_before_mm.map(|clearance_mm| self.plant.span_mm().start - clearance_mm)
+        self.clearance_before_mm.map(|clearance| self.kept_mm.start - clearance)
     }
 
     /// Where along the row the tool began to come back behind the plant.
     pub fn back_mm(&self) -> Option<f64> {
-        self.clearance_behind_mm.map(|clearance_mm| self.plant.span_mm().end + clearance_mm)
+        self.clearance_behind_mm.map(|clearance| self.kept_mm.end + clearance)
     }
 }
 
@@ -122,6 +140,8 @@ pub struct Judgement {
     pub windows_mm: Vec<Range<f64>>,
     /// Ground over which the tool was fully out.
     pub clear_mm: Vec<Range<f64>>,
+    /// Ground over which the tool worked the row's line.
+    pub weeded_mm: Vec<Range<f64>>,
     /// The tool's angle over the ground below it: places and degrees between which straight lines run.
     pub path: Vec<(f64, f64)>,
     /// Swings out that passed no plant, the first way into the row left out.
@@ -153,7 +173,7 @@ pub fn weedable_share(row: &Row, machine: &Machine, motion: &Motion, timing: Tim
     let swing_s = machine.idle_share_of_stroke() * machine.stroke_s();
     let margin_mm = f64::from(timing.margin_mm);
     let lost = row.plants().map(|plant| {
-        let span = plant.span_mm();
+        let span = timing.kept_mm(plant);
         let swing_mm = |ground_mm: f64| {
             let first = motion.passings(ground_mm + machine.beam_to_tool_mm).next();
             first.map_or(0.0, |passing| motion.speed_mm_s(passing.time_s).abs()) * swing_s
@@ -211,7 +231,10 @@ pub fn judge(
     }
 
     let margin_mm = f64::from(timing.margin_mm);
-    let window = |plant: &Thing| plant.span_mm().start - margin_mm..plant.span_mm().end + margin_mm;
+    let window = |plant: &Thing| {
+        let kept = timing.kept_mm(plant);
+        kept.start - margin_mm..kept.end + margin_mm
+    };
     Judgement {
         plants,
         windows_mm: union(row.plants().map(window).collect()),
@@ -220,6 +243,7 @@ pub fn judge(
         path: path(machine, motion, &stroke),
         idle_swings,
         weeded_share: share_of(&row.span_mm(), &weeded),
+        weeded_mm: weeded,
         weedable_share: weedable_share(row, machine, motion, timing),
     }
 }
@@ -270,12 +294,12 @@ struct SwingError<'a> {
 
 impl SwingError<'_> {
     fn out_ticks(&self, time_s: f64, plant: &Thing) -> Option<f64> {
-        let window_mm = plant.span_mm().start - f64::from(self.timing.margin_mm);
+        let window_mm = self.timing.kept_mm(plant).start - f64::from(self.timing.margin_mm);
         self.ticks(time_s, window_mm, self.timing.lead_out_ms)
     }
 
     fn in_ticks(&self, time_s: f64, plant: &Thing) -> Option<f64> {
-        let window_mm = plant.span_mm().end + f64::from(self.timing.margin_mm);
+        let window_mm = self.timing.kept_mm(plant).end + f64::from(self.timing.margin_mm);
         self.ticks(time_s, window_mm, self.timing.lead_in_ms)
     }
 
@@ -289,7 +313,7 @@ impl SwingError<'_> {
 
 /// Clearances and verdict of a plant, given the ground over which the tool was not fully out.
 fn plant_outcome(plant: &Thing, closed: &[Range<f64>], machine: &Machine, timing: Timing) -> PlantOutcome {
-    let span = plant.span_mm();
+    let span = timing.kept_mm(plant);
     // What was done before the plant and what was done behind it part in the canopy's middle, or where a swing ended or
     // began that reached beyond the middle.
     let across = closed.iter().find(|ground| ground.contains(&plant.position_mm));
@@ -307,7 +331,7 @@ fn plant_outcome(plant: &Thing, closed: &[Range<f64>], machine: &Machine, timing
         closed.iter().find(|ground| ground.end > parting_mm).map(|ground| ground.start.max(span.start) - span.end);
     let narrowest_mm = [clearance_before_mm, clearance_behind_mm].into_iter().flatten().fold(f64::INFINITY, f64::min);
     // A stroke that ends within the canopy is no way out of it.
-    let verdict = if narrowest_mm < 0.0 || machine.room_mm() < plant.across_mm / 2.0 {
+    let verdict = if narrowest_mm < 0.0 || machine.room_mm() < timing.kept_across_mm(plant) / 2.0 {
         Verdict::Damaged
     } else if narrowest_mm < f64::from(timing.margin_mm) - MARGIN_TOLERANCE_MM {
         Verdict::MarginCut
@@ -316,6 +340,7 @@ fn plant_outcome(plant: &Thing, closed: &[Range<f64>], machine: &Machine, timing
     };
     PlantOutcome {
         plant: plant.clone(),
+        kept_mm: span,
         clearance_before_mm,
         clearance_behind_mm,
         swings: 0,
@@ -358,7 +383,7 @@ mod tests {
     use super::*;
     use crate::machine::cycle_at;
     use crate::motion::mm_s;
-    use signal::CYCLES_PER_SECOND;
+    use uno::CYCLES_PER_SECOND;
 
     const START_CYCLE: u64 = 16_000_000;
 

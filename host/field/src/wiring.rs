@@ -4,8 +4,8 @@
 //! firmware is tested on, so that a pin that is wrong here fails there. Supply and ground are no contacts of the table: the
 //! diagram shows them.
 
-use signal::{Pin, Wire};
 use std::fmt::Write;
+use uno::{Pin, Wire};
 
 /// Encoder channel A.
 pub const ENCODER_A: Pin = Pin::D2;
@@ -110,7 +110,7 @@ pub const CONNECTIONS: [Connection; 9] = [
         contact: Contact::Pin(ENCODER_B),
         goes_to: "encoder B",
         pull_up: PullUp::External,
-        note: "change it for A where the position counts backwards",
+        note: "swap A and B if the position counts backwards",
     },
     Connection {
         contact: Contact::Pin(WORK_SWITCH),
@@ -122,13 +122,13 @@ pub const CONNECTIONS: [Connection; 9] = [
         contact: Contact::Pin(END_SWITCH),
         goes_to: "end switch to ground, optional",
         pull_up: PullUp::Internal,
-        note: "closed = tool out; `set end_switch on` has it watched",
+        note: "closed = tool out; `set end_switch on` enables it",
     },
     Connection {
         contact: Contact::Pin(BEAM),
         goes_to: "beam's output",
         pull_up: PullUp::External,
-        note: "low = broken; never above 5 V, else by an optocoupler",
+        note: "low = broken; never above 5 V, or use an optocoupler",
     },
     Connection {
         contact: Contact::Pin(SERVO),
@@ -140,19 +140,19 @@ pub const CONNECTIONS: [Connection; 9] = [
         contact: Contact::Pin(SECOND_BEAM),
         goes_to: "second beam's output, optional",
         pull_up: PullUp::External,
-        note: "low = broken; `set second_beam_mm` has it watched",
+        note: "low = broken; `set second_beam_mm` enables it",
     },
     Connection {
         contact: Contact::Pin(LED),
         goes_to: "the Uno's own LED",
         pull_up: PullUp::None,
-        note: "steady at work, a flash a second in hold, flashes in a row = an alarm's code",
+        note: "on = work; one flash a second = hold; groups of flashes = alarm code",
     },
     Connection {
         contact: Contact::Serial,
         goes_to: "serial, 115200 baud 8N1",
         pull_up: PullUp::None,
-        note: "through the Uno's USB; leave the contacts free",
+        note: "through the Uno's USB; connect nothing else",
     },
 ];
 

@@ -46,6 +46,15 @@ pub fn check(path: &Path) -> io::Result<()> {
     }
 }
 
+/// Whether a file could be made in this folder now, of any name. Nothing is left behind.
+///
+/// # Errors
+/// Those of the system where none could.
+pub fn check_folder(folder: &Path) -> io::Result<()> {
+    // The probe's own name is drawn at random: it meets nothing that is there.
+    temporary_in(folder).map(drop)
+}
+
 /// The file itself, where a link leads to one.
 fn target(path: &Path) -> Cow<'_, Path> {
     path.canonicalize().map_or(Cow::Borrowed(path), Cow::Owned)
@@ -58,7 +67,11 @@ fn is_device(path: &Path) -> bool {
 
 /// A file in the same folder that is gone again unless it takes the name.
 fn temporary(path: &Path) -> io::Result<NamedTempFile> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    temporary_in(path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new(".")))
+}
+
+/// A file in a folder that is gone again unless it takes a name.
+fn temporary_in(folder: &Path) -> io::Result<NamedTempFile> {
     #[cfg_attr(not(unix), expect(unused_mut, reason = "only the permissions change it"))]
     let mut builder = Builder::new();
     // A temporary file is its owner's alone, which a report is not: the system's mask decides, as for any file.

@@ -2,21 +2,27 @@
 
 use control::alarm::{Alarm, Warning};
 
+/// What an alarm is called everywhere: the digits that the LED blinks and its name, `3-1 too_fast`.
+pub fn name(alarm: Alarm) -> String {
+    let (first, second) = alarm.code();
+    format!("{first}-{second} {}", alarm.text())
+}
+
 /// What to look at when an alarm is latched, and before it is cleared.
 pub fn alarm(alarm: Alarm) -> &'static str {
     match alarm {
         Alarm::BeamBlocked => "clear the beam, align it, or raise `max_width_mm`",
         Alarm::BeamFlickers => "clean the beam's lenses, see to its plug and wires",
-        Alarm::BeamEdgesLost => "see to the beam's wires and supply: its signal chatters",
+        Alarm::BeamEdgesLost => "see to the beam's wires and supply: it chatters",
         Alarm::BeamBlind => "see to the first beam's wire at D8, its lens and aim",
-        Alarm::SecondBeamBlind => "see to the second beam's wire at D10, its lens and aim",
-        Alarm::EncoderSilent => "see to the encoder's coupling; hold when you stop in wind",
+        Alarm::SecondBeamBlind => "see to the second beam: wire at D10, lens, aim",
+        Alarm::EncoderSilent => "see to the encoder's coupling; hold to stop in wind",
         Alarm::EncoderChannelDead => "see to the wires at D2 and D3 and their pull-ups",
         Alarm::EncoderJumps => "see to the encoder's screen, ground and pull-ups",
-        Alarm::TooFast => "drive slower, or set the beam farther ahead and raise the limit",
+        Alarm::TooFast => "drive slower, or beam farther ahead and raise the limit",
         Alarm::RolledBackTooFar => "roll forward to where you stopped, then `clear`",
         Alarm::ScheduleFull => "set the beam nearer, or raise `merge_gap_mm`",
-        Alarm::CropUnknown => "are they the crop? `label plant`; else raise `misfit_after`",
+        Alarm::CropUnknown => "the crop? `label plant`; else raise `misfit_after`",
         Alarm::ToolStuck => "stop; look for a stone, a dead servo, a loose switch",
         Alarm::SettingsLost => "check `get`, set what differs, `save`, `clear`",
         Alarm::SettingsContradict => "`start` says which; change one of them, `save`",
@@ -29,6 +35,7 @@ pub fn warning(warning: Warning) -> &'static str {
     match warning {
         Warning::LateCommand => "drive evenly, look at the plant, or raise `lead_out_ms`",
         Warning::NoPlants => "see whether the beam is as high as the canopy, and clean",
+        Warning::SlipUnknown => "plants too near for these beams: a smaller `second_beam_mm`, or a wider margin",
     }
 }
 
@@ -39,8 +46,7 @@ mod tests {
     #[test]
     fn an_alarm_and_what_to_do_fit_on_a_line_of_80_characters() {
         for alarm in (0..).map_while(Alarm::from_index) {
-            let line =
-                format!("alarm {}: {}", alarm.text().bytes().map(char::from).collect::<String>(), super::alarm(alarm));
+            let line = format!("alarm {}: {}", name(alarm), super::alarm(alarm));
             assert!(line.len() <= 80, "{line}");
         }
     }

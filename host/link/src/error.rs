@@ -22,12 +22,12 @@ pub enum LinkError {
     SeveralUnos(Vec<String>),
     /// A row's board is not there.
     #[error(
-        "the board with the serial number {0} is not plugged in: plug it in, or name the row's board anew by `weeder rows name`"
+        "the board with the serial number {0} is not plugged in: plug it in, or name the row's board again with `weeder rows name`"
     )]
     Unplugged(String),
     /// Several boards say that they are the row's.
     #[error(
-        "{} are both of the serial number {number}: name the rows anew by `weeder rows name`, which knows them by their ports then",
+        "{} are both of the serial number {number}: name the rows again with `weeder rows name`, which then knows them by their ports",
         .ports.join(" and ")
     )]
     Twins {
@@ -40,12 +40,12 @@ pub enum LinkError {
     #[error("there is no port {0}: plug the Uno in, or leave --port out to have it found")]
     Absent(String),
     /// Somebody else has the port.
-    #[error("{0} is in use: close the serial monitor or whatever else has it open")]
+    #[error("{0} is in use: close the serial monitor, or the other program that has it open")]
     Busy(String),
     /// The user may not open the port.
     #[error(
         "{0} may not be opened: add yourself to the port's group (on Debian and Ubuntu `sudo usermod -aG dialout $USER`) \
-         and log in anew"
+         and log in again"
     )]
     Forbidden(String),
     /// The port cannot be opened for another reason.
@@ -72,7 +72,9 @@ pub enum LinkError {
         received: String,
     },
     /// What comes is not text.
-    #[error("what comes from the port is no text: see that nothing else is wired to D0 and D1, and flash the Uno anew")]
+    #[error(
+        "what comes from the port is no text: see that nothing else is wired to D0 and D1, and flash the Uno again"
+    )]
     Noise,
     /// Something else answers.
     #[error("it is not the weeder's firmware that answers, but {0:?}: put it on the Uno by `weeder flash`")]

@@ -10,7 +10,7 @@ use control::ground::class::Class;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EventLine {
     /// An object was seen in full and classified.
-    Object {
+    Detection {
         /// What it was taken for.
         class: Class,
         /// Where the beam broke, in ticks.
@@ -145,6 +145,11 @@ impl<'a> Values<'a> {
         self.text(key)?.parse().ok()
     }
 
+    /// The name of the alarm in a status line; a log of 0.1 has it behind another key.
+    pub fn alarm(&self) -> Option<&'a str> {
+        self.text("name").or_else(|| self.text("alarm"))
+    }
+
     fn out(&self) -> Option<bool> {
         match self.text("tool")? {
             "out" => Some(true),
@@ -163,7 +168,7 @@ impl EventLine {
         let (name, rest) = line.split_once(' ')?;
         let values = Values(rest);
         let object = |class| {
-            Some(Self::Object {
+            Some(Self::Detection {
                 class,
                 position: values.number("pos")?,
                 votes: values.number("votes")?,
@@ -216,7 +221,7 @@ impl Status {
         let values = Values(line);
         Some(Self {
             mode: Mode::find(values.text("state")?)?,
-            alarm: values.text("alarm").and_then(|name| Alarm::find(name.as_bytes())),
+            alarm: values.alarm().and_then(|name| Alarm::find(name.as_bytes())),
             tool_out: values.out()?,
             reason: values.text("for").map(str::to_owned),
             position: values.number("pos")?,
@@ -232,7 +237,7 @@ impl Status {
 mod tests {
     use super::*;
     use control::ground::class::Vote;
-    use control::ground::schedule::Plan;
+    use control::ground::keep_out::Plan;
     use control::operate::calibration::{Outcome, SwingTimes};
     use control::operate::event::Event;
     use control::operate::state::State;
@@ -252,8 +257,8 @@ mod tests {
         let plan = Plan { delay: Ticks(668), hold: Ticks(477) };
         for (class, votes) in [(Class::Plant, 3), (Class::Weed, 2), (Class::Unknown, 0)] {
             let vote = Vote { class, votes };
-            let event = Event::Object { vote, leading: Position::new(-70_000), spacing: Ticks(1146), plan };
-            let expected = EventLine::Object {
+            let event = Event::Detection { vote, leading: Position::new(-70_000), spacing: Ticks(1146), plan };
+            let expected = EventLine::Detection {
                 class,
                 position: -70_000,
                 votes,
@@ -273,7 +278,12 @@ mod tests {
         assert_eq!(EventLine::parse(&line(Event::State(State::Work))), Some(EventLine::State(Mode::Work)));
         for alarm in (0..).map_while(Alarm::from_index) {
             let event = Event::Alarm { alarm, position: Position::new(1) };
-            assert_eq!(EventLine::parse(&line(event)), Some(EventLine::Alarm { alarm, position: 1 }));
+            let (first, second) = alarm.code();
+            let told = line(event);
+            let named = format!("alarm code={first}-{second} name={} pos=1", alarm.text());
+            assert_eq!((EventLine::parse(&told), &told), (Some(EventLine::Alarm { alarm, position: 1 }), &named));
+            let old = format!("alarm name={} code={first}{second} pos=1", alarm.text());
+            assert_eq!(EventLine::parse(&old), Some(EventLine::Alarm { alarm, position: 1 }), "a log of 0.1");
             assert_eq!(EventLine::parse(&line(Event::State(State::Alarm(alarm)))), Some(EventLine::State(Mode::Alarm)));
         }
         let measured = Outcome::Measured(SwingTimes { out_ms: 150, in_ms: 40 });
@@ -311,7 +321,7 @@ mod tests {
             "swing tool=up pos=1",
             "swing tool=out pos=99999999999",
             "state=work tool=in pos=1",
-            "alarm name=boredom code=11 pos=1",
+            "alarm code=1-1 name=boredom pos=1",
             "warning name=",
             "pos=1 swing tool=out",
             "plant pos=1 votes=300 spacing=1 delay=1 hold=1 actuation=1",
@@ -322,7 +332,7 @@ mod tests {
 
     #[test]
     fn a_status_is_read_with_and_without_its_alarm() {
-        let line = "state=alarm alarm=beam_blocked tool=out pos=-5 speed_mm_s=-3 windows=2 unseen_mm=400";
+        let rest = "tool=out pos=-5 speed_mm_s=-3 windows=2 unseen_mm=400";
         let expected = Status {
             mode: Mode::Alarm,
             alarm: Some(Alarm::BeamBlocked),
@@ -334,7 +344,10 @@ mod tests {
             unseen_mm: 400,
             slip_permille: None,
         };
-        assert_eq!(Status::parse(line), Some(expected));
+        // As it is, and as a log of 0.1 has it.
+        for alarm in ["code=1-1 name=beam_blocked", "alarm=beam_blocked"] {
+            assert_eq!(Status::parse(&format!("state=alarm {alarm} {rest}")).as_ref(), Some(&expected));
+        }
         let slips = |told: &str| {
             let line = format!("state=hold tool=out pos=1 speed_mm_s=2 windows=1 unseen_mm=0 slip_permille={told}");
             Status::parse(&line).and_then(|status| status.slip_permille)

@@ -4,7 +4,7 @@
 //! [`example_of`] the bytes. Both mean something only where this program has the firmware's table, so the built-in examples
 //! that the firmware lists are compared first. Nothing is sent where not all of it can be taught.
 
-use super::{Class, Link, LinkError, Mode, Said, settings};
+use super::{Class, ConsoleLine, Link, LinkError, Mode, settings};
 use control::ground::class::{Classifier, label};
 use control::ground::examples::{EXAMPLES, SCALE};
 use control::ground::features::{COUNT, Features};
@@ -72,6 +72,25 @@ pub struct Pushed {
     pub forgotten: usize,
 }
 
+/// What stands in the columns of the answer to `examples`.
+pub const HEAD: &str = "source number class, and five features of 0 to 255: speed spacing delay hold actuation";
+
+/// Puts [`HEAD`] before each list of examples: the firmware has no flash for it.
+#[derive(Clone, Debug, Default)]
+pub struct Heading {
+    is_in_list: bool,
+}
+
+impl Heading {
+    /// What belongs before this line of an answer.
+    pub fn before(&mut self, line: &str) -> Option<&'static str> {
+        let is_example = matches!(ConsoleLine::parse(line), ConsoleLine::Example { .. });
+        let begins = is_example && !self.is_in_list;
+        self.is_in_list = is_example;
+        begins.then_some(HEAD)
+    }
+}
+
 /// Reads the examples that the machine was taught, with their numbers.
 ///
 /// # Errors
@@ -79,7 +98,7 @@ pub struct Pushed {
 pub fn read(link: &mut Link) -> Result<Vec<(u16, Taught)>, ExamplesError> {
     let (mut built_in, mut taught) = (Vec::new(), Vec::new());
     for line in link.ask("examples")? {
-        let Said::Example { from_field, number, label, features } = Said::parse(&line) else { continue };
+        let ConsoleLine::Example { from_field, number, label, features } = ConsoleLine::parse(&line) else { continue };
         let label = if label == Class::Plant { label::PLANT } else { label::WEED };
         let example = Example::new(features, label);
         if from_field {

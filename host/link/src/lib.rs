@@ -2,7 +2,7 @@
 //!
 //! [`Link::open`] opens an Uno's port, real or virtual, waits out the reset that opening a real one causes, and makes sure
 //! that the weeder's firmware answers. [`Link::ask`] types a command and waits for its answer; [`Link::next_line`] hears
-//! what the machine says by itself, and a [`session`] does both for as long as one likes. [`Said`] is what a line means, and
+//! what the machine says by itself, and a [`session`] does both for as long as one likes. [`ConsoleLine`] is what a line means, and
 //! [`settings`] and [`settings_file`] move all settings at once, [`examples`] all that was taught.
 //!
 //! Whatever comes from the port is suspect: noise, lines without an end, a firmware that is not the weeder's. What is kept
@@ -14,6 +14,7 @@
 
 pub mod advice;
 pub mod completion;
+mod console_line;
 mod error;
 mod event_line;
 pub mod examples;
@@ -26,18 +27,17 @@ pub mod replay;
 pub mod row_names;
 #[cfg(not(target_arch = "wasm32"))]
 pub mod rows;
-mod said;
 pub mod session;
 pub mod set_up;
 pub mod settings;
 pub mod settings_file;
 
+pub use self::console_line::{ConsoleLine, SettingValue};
 pub use self::error::LinkError;
 pub use self::event_line::{EventLine, Mode, Status, Timed, Values};
 pub use self::lines::LineReader;
 #[cfg(not(target_arch = "wasm32"))]
-pub use self::port::{find_uno, listen, try_port};
-pub use self::said::{Said, Shown};
+pub use self::port::{find_uno, listen, open_other, try_port};
 pub use control::ground::class::Class;
 
 use std::collections::VecDeque;
@@ -123,8 +123,8 @@ impl Link {
             link.wait_until_quiet()?;
         }
         let answer = answer?;
-        match answer.last().map(|line| Said::parse(line)) {
-            Some(Said::Version(version)) => link.version = version,
+        match answer.last().map(|line| ConsoleLine::parse(line)) {
+            Some(ConsoleLine::Version(version)) => link.version = version,
             _ => return Err(LinkError::NotTheWeeder(answer.join(" "))),
         }
         Ok(link)
@@ -156,12 +156,14 @@ impl Link {
                 }
                 Received::Line(line) => line,
             };
-            match Said::parse(&line) {
-                Said::Done => return Ok(answer),
-                Said::Refused(_) => return Err(LinkError::Refused { command: command.to_owned(), answer: line }),
-                Said::Greeting { .. } => return Err(LinkError::Restarted(command.to_owned())),
+            match ConsoleLine::parse(&line) {
+                ConsoleLine::Done => return Ok(answer),
+                ConsoleLine::Refused(_) => {
+                    return Err(LinkError::Refused { command: command.to_owned(), answer: line });
+                }
+                ConsoleLine::Greeting { .. } => return Err(LinkError::Restarted(command.to_owned())),
                 // Events come before an answer, and never within it.
-                Said::Event(_) if answer.is_empty() => self.events.push_back(line),
+                ConsoleLine::Event(_) if answer.is_empty() => self.events.push_back(line),
                 _ => answer.push(line),
             }
         }
@@ -254,7 +256,7 @@ pub fn is_command(line: &str) -> bool {
 
 /// Whether a line is the one by which the firmware says that it has started.
 pub fn is_greeting(line: &str) -> bool {
-    matches!(Said::parse(line), Said::Greeting { .. })
+    matches!(ConsoleLine::parse(line), ConsoleLine::Greeting { .. })
 }
 
 /// Whether a read ended without a byte, but may be repeated.

@@ -236,7 +236,15 @@ pub struct Entry {
 /// # Errors
 /// Names the file, the line and what would be right.
 pub fn read(path: &Path) -> Result<Vec<Entry>, FileError> {
-    let table = CsvTable::read(path, &HEADER.split(',').collect::<Vec<_>>())?;
+    parse(path, files::csv_table::bytes(path)?)
+}
+
+/// The lines in a log's text.
+///
+/// # Errors
+/// As [`read`].
+pub fn parse(path: &Path, text: Vec<u8>) -> Result<Vec<Entry>, FileError> {
+    let table = CsvTable::parse(path, text, &HEADER.split(',').collect::<Vec<_>>())?;
     table
         .lines()
         .map(|line| {
@@ -248,6 +256,90 @@ pub fn read(path: &Path) -> Result<Vec<Entry>, FileError> {
             Ok(Entry { number: line.number(), time_ms, kind, text: line.text("line").to_owned() })
         })
         .collect()
+}
+
+/// Reads a log in pieces, so that its text need not be held as a whole.
+pub struct Pieces {
+    path: PathBuf,
+    /// All up to the header's end, below which each piece is read.
+    head: String,
+    has_header: bool,
+    /// The beginning of a line whose end has not come.
+    cut: Vec<u8>,
+    /// Lines that were read.
+    lines: u64,
+    is_empty: bool,
+}
+
+impl Pieces {
+    /// A log of which nothing is read yet. The path is for errors.
+    pub fn new(path: &Path) -> Self {
+        Self { path: path.into(), head: String::new(), has_header: false, cut: Vec::new(), lines: 0, is_empty: true }
+    }
+
+    /// The lines that end in the next bytes of the log, without those that are not wanted.
+    ///
+    /// # Errors
+    /// As [`read`], but for a log without lines.
+    pub fn take(&mut self, bytes: &[u8], is_wanted: impl FnMut(&str) -> bool) -> Result<Vec<Entry>, FileError> {
+        let end = |bytes: &[u8]| bytes.iter().rposition(|&byte| byte == b'\n').map_or(0, |end| end + 1);
+        let whole = end(bytes);
+        self.cut.extend_from_slice(&bytes[..whole]);
+        let mut text = if whole == 0 { Vec::new() } else { std::mem::take(&mut self.cut) };
+        // The next line tells whether a quotation mark is not closed in the last.
+        let last = end(&text[..text.len().saturating_sub(1)]);
+        if text[last..].iter().filter(|&&byte| byte == b'"').count() % 2 == 1 {
+            self.cut = text.split_off(last);
+        }
+        self.cut.extend_from_slice(&bytes[whole..]);
+        self.lines(text, is_wanted)
+    }
+
+    /// The last line, where no line feed ends it.
+    ///
+    /// # Errors
+    /// As [`read`].
+    pub fn end(mut self, is_wanted: impl FnMut(&str) -> bool) -> Result<Vec<Entry>, FileError> {
+        let last = std::mem::take(&mut self.cut);
+        let entries = self.lines(last, is_wanted)?;
+        // Without a line, it says what is missing.
+        if self.is_empty { parse(&self.path, self.head.into_bytes()) } else { Ok(entries) }
+    }
+
+    fn lines(&mut self, text: Vec<u8>, mut is_wanted: impl FnMut(&str) -> bool) -> Result<Vec<Entry>, FileError> {
+        let no_text = "this is not text: a log is a CSV file in UTF-8";
+        let failed = |line, problem| FileError::Line { path: self.path.clone(), line, problem };
+        let text = String::from_utf8(text).map_err(|_| failed(self.lines + 1, no_text.to_owned()))?;
+        let text = if text.contains('\r') { text.replace("\r\n", "\n").replace('\r', "\n") } else { text };
+        let mut below = String::with_capacity(text.len());
+        let (mut above, mut any) = (self.lines, false);
+        for line in text.split_inclusive('\n') {
+            self.lines += 1;
+            let is_told = line != "\n" && !line.starts_with('#');
+            // A comment stands in the place of what is not read, so that lines keep their numbers.
+            if !self.has_header {
+                self.head.push_str(if is_told { line } else { "#\n" });
+                self.has_header = is_told;
+                above = self.lines;
+            } else if is_told && is_wanted(line) {
+                below.push_str(line);
+                any = true;
+            } else {
+                below.push_str("#\n");
+            }
+        }
+        if !any {
+            return Ok(Vec::new());
+        }
+        self.is_empty = false;
+        let head = self.head.bytes().filter(|&byte| byte == b'\n').count() as u64;
+        let numbered = |line: u64| if line > head { line - head + above } else { line };
+        let entries = parse(&self.path, (self.head.clone() + &below).into_bytes()).map_err(|error| match error {
+            FileError::Line { path, line, problem } => FileError::Line { path, line: numbered(line), problem },
+            file @ FileError::File { .. } => file,
+        })?;
+        Ok(entries.into_iter().map(|entry| Entry { number: numbered(entry.number), ..entry }).collect())
+    }
 }
 
 #[cfg(test)]
@@ -268,6 +360,47 @@ mod tests {
         let entries: Vec<(u64, Kind, String)> =
             read(&path).unwrap().into_iter().map(|entry| (entry.number, entry.kind, entry.text)).collect();
         assert_eq!(entries, [(2, Kind::Answer, answer.to_owned()), (3, Kind::Lost, r"no\nport".to_owned())]);
+    }
+
+    #[test]
+    fn a_log_in_pieces_is_that_log_and_its_errors_are_in_the_same_lines() {
+        let whole = "# monday\n\nkind,time_ms,line\n# early\nlost,0,\"a, b\"\n\nstatus,1,x\nstatus,2,y\nevent,3,z";
+        for text in [whole.to_owned(), whole.replace('\n', "\r\n"), whole.replace('\n', "\r")] {
+            for text in [text.clone(), format!("{text}\n"), text.replace("lost", "gossip"), text.replace("y", "\"y")] {
+                let as_one = parse(Path::new("log"), text.clone().into_bytes()).map_err(|error| error.to_string());
+                for length in [1, 2, 7, 40, 1000] {
+                    let mut pieces = Pieces::new(Path::new("log"));
+                    let in_pieces = || {
+                        let mut entries = Vec::new();
+                        for piece in text.as_bytes().chunks(length) {
+                            entries.extend(pieces.take(piece, |_| true)?);
+                        }
+                        entries.extend(pieces.end(|_| true)?);
+                        Ok(entries)
+                    };
+                    assert_eq!(
+                        in_pieces().map_err(|error: FileError| error.to_string()),
+                        as_one,
+                        "{text:?} by {length}"
+                    );
+                }
+            }
+        }
+        for nothing in ["", "# a comment\n", "time_ms,kind,line\n#\n"] {
+            let mut pieces = Pieces::new(Path::new("log"));
+            assert!(pieces.take(nothing.as_bytes(), |_| true).unwrap().is_empty());
+            assert!(pieces.end(|_| true).is_err(), "{nothing:?}");
+        }
+    }
+
+    #[test]
+    fn lines_that_are_not_wanted_are_left_out_and_the_others_keep_their_numbers() {
+        let mut pieces = Pieces::new(Path::new("log"));
+        let is_wanted = |line: &str| !line.contains(",status,");
+        let text = format!("{HEADER}\n0,status,a\n1,event,b\n2,status,c\n3,event,d\n");
+        let taken = pieces.take(text.as_bytes(), is_wanted).unwrap();
+        assert_eq!(taken.iter().map(|entry| entry.number).collect::<Vec<_>>(), [3, 5]);
+        assert!(pieces.end(is_wanted).unwrap().is_empty());
     }
 
     #[test]

@@ -75,6 +75,14 @@ pub(super) fn open(name: &str) -> Result<(Box<dyn SerialPort>, bool), LinkError>
     Ok((port, resets))
 }
 
+/// Opens the port of an Uno with another firmware than the weeder's, such as the tester's.
+///
+/// # Errors
+/// As [`try_port`].
+pub fn open_other(name: &str) -> Result<Box<dyn crate::Port>, LinkError> {
+    open(name).map(|(port, _)| Box::new(port) as Box<dyn crate::Port>)
+}
+
 /// Opens the port of something that only talks, such as a satellite receiver, at so many bits in a second.
 ///
 /// # Errors
@@ -152,6 +160,6 @@ mod tests {
     fn who_may_not_open_a_port_is_told_of_its_group() {
         let denied = serialport::Error::new(ErrorKind::Io(io::ErrorKind::PermissionDenied), "Permission denied");
         let error = explain("/dev/ttyACM0", denied).to_string();
-        assert!(error.contains("`sudo usermod -aG dialout $USER`) and log in anew"), "{error}");
+        assert!(error.contains("`sudo usermod -aG dialout $USER`) and log in again"), "{error}");
     }
 }

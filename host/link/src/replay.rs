@@ -2,16 +2,16 @@
 //!
 //! A log holds where the beam broke and cleared, place and speed ten times a second, the settings, the examples and what was
 //! typed. From these [`replay`] rebuilds the machine's way and the beam's edges, tick by tick, has
-//! [`control::weeder::Controller`] decide anew, and compares what it tells with what the log tells: each object with its
+//! [`control::weeder::Controller`] decide anew, and compares what it tells with what the log tells: each detection with its
 //! class and votes, each swing with its place, each alarm.
 //!
 //! # How near it is
 //!
-//! - An object's edges are right to [`OBJECT_TICKS`]. A swing leads by the speed, and the log has that only now and then: it may
+//! - A detection's edges are right to [`DETECTION_TICKS`]. A swing leads by the speed, and the log has that only now and then: it may
 //!   differ by [`SWING_TICKS`], and by [`SWING_MS`] of the machine's way, which at 2.5 km/h is another 17 mm. Whether the ground between
 //!   two windows is long enough to come into the row rests on the speed too. So all is replayed at three paces, as even, as slow and
 //!   as fast as the log allows, and a swing differs where none of them has it like the log.
-//! - An object's vote rests on the speed class, which the line does not tell: it is the same where one of the classes that the machine
+//! - A detection's vote rests on the speed class, which the line does not tell: it is the same where one of the classes that the machine
 //!   may have been in gives it. What was seen before the log began is believed.
 //! - Where the state changed is not in the log. The swing that follows says it, and is not judged by its place. Without one the tool was
 //!   out already, and the statuses around it say enough. The time at which a command was typed does not: a busy host is late.
@@ -21,13 +21,13 @@
 //! - A replay ends where the bench was used (`servo`, `calibrate`, `test`), examples were forgotten, or a second beam was set. A log of
 //!   a machine that has one already is not replayed.
 
+mod classifier;
 mod compare;
-mod judge;
 mod player;
 mod replayed;
 mod stretch;
 
-pub use self::replayed::{Difference, OBJECT_TICKS, ReplayError, Replayed, SWING_MS, SWING_TICKS};
+pub use self::replayed::{DETECTION_TICKS, Difference, ReplayError, Replayed, SWING_MS, SWING_TICKS};
 
 use self::compare::{Bounds, Heard, compare};
 use self::player::{Pace, Player};
@@ -43,6 +43,15 @@ use files::in_a_line;
 /// # Errors
 /// Where it holds no machine, or a line says what cannot be.
 pub fn replay(log: &[Entry]) -> Result<Replayed, ReplayError> {
+    replay_with(log, |_| {})
+}
+
+/// As [`replay`], and tells how far it is, from 0 to 1, a hundred times at most.
+///
+/// # Errors
+/// As [`replay`].
+pub fn replay_with(log: &[Entry], tell: impl FnMut(f64)) -> Result<Replayed, ReplayError> {
+    let mut progress = Progress { done: 0, all: Pace::ALL.len() * log.len(), tell };
     let mut replayed = Replayed::default();
     let mut stretches = 0;
     let mut rest = log;
@@ -53,11 +62,30 @@ pub fn replay(log: &[Entry]) -> Result<Replayed, ReplayError> {
         let stretch = Stretch::read(&rest[..end])?;
         if let Some(stretch) = stretch {
             stretches += 1;
-            replay_stretch(&stretch, &mut replayed)?;
+            replay_stretch(&stretch, &mut replayed, &mut progress)?;
         }
         rest = &rest[end..];
     }
     if stretches == 0 { Err(ReplayError::Nothing) } else { Ok(replayed) }
+}
+
+/// How far a replay is.
+struct Progress<Tell> {
+    /// Lines replayed, of so many at all paces.
+    done: usize,
+    all: usize,
+    tell: Tell,
+}
+
+impl<Tell: FnMut(f64)> Progress<Tell> {
+    /// Another line is replayed.
+    fn advance(&mut self) {
+        let percent = |done: usize| 100 * done / self.all.max(1);
+        if percent(self.done) < percent(self.done + 1) {
+            (self.tell)((self.done + 1) as f64 / self.all as f64);
+        }
+        self.done += 1;
+    }
 }
 
 /// What came of a stretch at one pace.
@@ -71,7 +99,11 @@ struct Played {
 }
 
 /// Replays a stretch, and adds what comes of it.
-fn replay_stretch(stretch: &Stretch, replayed: &mut Replayed) -> Result<(), ReplayError> {
+fn replay_stretch(
+    stretch: &Stretch,
+    replayed: &mut Replayed,
+    progress: &mut Progress<impl FnMut(f64)>,
+) -> Result<(), ReplayError> {
     if stretch.settings.get(Setting::SecondBeamMm) > 0 {
         replayed
             .notes
@@ -87,7 +119,7 @@ fn replay_stretch(stretch: &Stretch, replayed: &mut Replayed) -> Result<(), Repl
 
     let mut played = Vec::new();
     for pace in Pace::ALL {
-        played.push(play(stretch, pace)?);
+        played.push(play(stretch, pace, progress)?);
     }
     let heard: Vec<&[Heard]> = played.iter().map(|played| played.replayed.as_slice()).collect();
     // What the log says is the same at every pace.
@@ -99,7 +131,7 @@ fn replay_stretch(stretch: &Stretch, replayed: &mut Replayed) -> Result<(), Repl
 }
 
 /// Has the decisions made anew at a pace.
-fn play(stretch: &Stretch, pace: Pace) -> Result<Played, ReplayError> {
+fn play(stretch: &Stretch, pace: Pace, progress: &mut Progress<impl FnMut(f64)>) -> Result<Played, ReplayError> {
     let mut player = Player::new(stretch, pace);
     let mut logged: Vec<Heard> = Vec::new();
     let mut last = (stretch.first.clone(), stretch.happened.first().map_or(0, |(entry, _)| entry.time_ms));
@@ -107,6 +139,7 @@ fn play(stretch: &Stretch, pace: Pace) -> Result<Played, ReplayError> {
     // Whether the start that is carried out next takes unseen ground for bare.
     let mut starts_now = false;
     for (place, (entry, happened)) in stretch.happened.iter().enumerate() {
+        progress.advance();
         match happened {
             Happened::Status(status) => {
                 player.roll(&last.0, status, entry.time_ms.saturating_sub(last.1)).map_err(|()| {
@@ -160,7 +193,7 @@ mod tests {
     /// The log of a machine that rolls at half a metre a second over bare ground. At each of the statuses, ten a second, something
     /// is typed and answered, or told.
     fn log(statuses: u64, happens: impl Fn(u64) -> Vec<(Kind, &'static str)>) -> Vec<Entry> {
-        let mut lines = vec![(0, Kind::Connected, "0.1.0".to_owned())];
+        let mut lines = vec![(0, Kind::Connected, "0.2.0".to_owned())];
         for status in 0..statuses {
             let (time_ms, position) = (100 * status, status as i64 * 95);
             let unseen_mm = 400_u64.saturating_sub(50 * status);

@@ -8,7 +8,7 @@
 
 use super::session::{Happening, Session};
 use super::settings::SettingsError;
-use super::{Link, LinkError, Said};
+use super::{ConsoleLine, Link, LinkError};
 use std::collections::VecDeque;
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender, TryRecvError};
 use std::thread;
@@ -202,15 +202,15 @@ impl Talk {
                 }
             }
             Happening::Answer(line) => {
-                let said = Said::parse(line);
-                if matches!(said, Said::Done | Said::Refused(_))
+                let said = ConsoleLine::parse(line);
+                if matches!(said, ConsoleLine::Done | ConsoleLine::Refused(_))
                     && let Some(command) = self.typed.pop_front()
                 {
                     let is_hold = command == super::session::HOLD;
                     if is_hold && self.hold == Owed::Answer {
                         self.hold = Owed::Nothing;
                     }
-                    let refusal = (said != Said::Done).then(|| line.clone());
+                    let refusal = (said != ConsoleLine::Done).then(|| line.clone());
                     answered = Some(What::Answered { command, refusal });
                 }
             }

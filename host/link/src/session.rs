@@ -7,7 +7,7 @@
 //! command that was not answered.
 
 use super::settings::{self, Settings, SettingsError};
-use super::{EventLine, Link, LinkError, Said, Status, is_greeting};
+use super::{ConsoleLine, EventLine, Link, LinkError, Status, is_greeting};
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
@@ -246,23 +246,23 @@ impl Session {
 
     /// Takes a line, and knows whose it is.
     fn take(&mut self, line: String) {
-        let said = Said::parse(&line);
-        if let Said::Event(event) = said {
+        let said = ConsoleLine::parse(&line);
+        if let ConsoleLine::Event(event) = said {
             self.settings_changed |= matches!(event, EventLine::Calibrated { .. });
             self.happened.push_back(Happening::Event(event, line));
             return;
         }
-        let is_end = matches!(said, Said::Done | Said::Refused(_));
+        let is_end = matches!(said, ConsoleLine::Done | ConsoleLine::Refused(_));
         // The end of an answer that was given up is nobody's.
         let Some(asked) = self.asked.front_mut() else { return };
         match &mut asked.question {
             Question::Status => {
-                if let Said::Status(status) = said {
+                if let ConsoleLine::Status(status) = said {
                     self.happened.push_back(Happening::Status(status, line));
                 }
             }
             Question::Command => {
-                self.settings_changed |= said == Said::Done && changes_settings(&asked.line);
+                self.settings_changed |= said == ConsoleLine::Done && changes_settings(&asked.line);
                 self.happened.push_back(Happening::Answer(line));
             }
             Question::Settings(lines) if is_end => match settings::shown_by(lines) {

@@ -1,34 +1,48 @@
-//! Setting a machine up, one thing after the other: the servo's times, the wheel's slip, then the margin, which pays for what these two
-//! leave unknown.
+//! Setting a machine up: the steps of the manual's page, what is to be measured next, and how small the margin may be.
 //!
-//! [`SetUp`] listens to a session. It counts what was measured, and tells the next [`Step`]: to measure once more, to set the lead that
-//! was worst, or how small the margin may be and what the tool keeps of it then. It begins with the first `calibrate` and asks for
-//! nothing before: who has a machine that is set up is left alone. It sets nothing itself.
+//! [`SetUp`] listens to a session, or reads the lines of one. It counts what was measured and tells the next [`Step`]: to measure once
+//! more, to set the lead that was worst, or how small the margin may be and what it then covers. It begins with the first `calibrate`
+//! and asks for nothing before: a machine that is set up is left alone. It sets nothing itself.
 //!
-//! The margin that is needed is a sum: the slip's scatter over the way from where the plant was last seen to the tool, what is rolled
-//! in the servo's scatter at the paper's fastest speed, and the firmware's own worst. What was not measured twice has no scatter, so
-//! nothing is said of a margin before.
+//! The margin is a sum: the slip's scatter over the distance from where the plant was last seen to the tool, what is rolled in the
+//! servo's scatter at the paper's fastest speed, and the firmware's own worst; half of it beside a stem's zone. The margin covers only what
+//! was measured: where
+//! something is missing there is no sum, and the default margin stays. A few measurements do not show the worst, so that each
+//! scatter has a least value. What was timed over another stroke than the present one does not count.
+
+mod steps;
+
+pub use steps::{ManualStep, Task, steps};
 
 use super::session::Happening;
-use super::{EventLine, Said, Timed};
+use super::settings::shown;
+use super::{EventLine, Timed};
 use control::settings::{Setting, Settings};
 use std::{collections::VecDeque, fmt};
 
 /// Times that the servo is to be timed, with three swings each, and that the wheel is to be measured.
 const TIMINGS: usize = 2;
-const STRETCHES: usize = 3;
+const STRETCHES: usize = SetUp::STRETCHES;
 
 /// Plants that tell how much the slip scatters where a second beam measures it; the newest of them count.
 const PLANTS: usize = 12;
 
-/// What the servo scatters by where somebody has looked at it: two frames of a phone's slow motion, and as much of the servo.
-const BY_EYE_MS: u16 = 15;
+/// What the servo scatters by at the least. By eye: two frames of a phone's slow motion, and as much of the servo. By an end switch: six
+/// swings leave up to 12 ms of the default servo's slowest unseen, and the pulse on the line adds 2.
+const SERVO_MS: u16 = 15;
+
+/// What a wheel's slip scatters by at the least within some metres, as a share: stretches of 10 m level it out. As assumed for the
+/// simulated field (`ground.slip_scatter_percent`).
+const SLIP: f64 = 0.03;
 
 /// The paper's fastest speed, 2.5 km/h.
 const SPEED_M_S: f64 = 2.5 / 3.6;
 
 /// The firmware's own worst swing, in millimetres: what `weeder bench-uno` measures, rounded up.
 const FIRMWARE_MM: f64 = 5.0;
+
+/// Share of the worst sum that a margin beside a stem's zone covers.
+const STEM_SHARE: f64 = 0.5;
 
 /// What is to be done next.
 #[derive(Clone, Debug, PartialEq)]
@@ -54,14 +68,35 @@ pub struct Margin {
     pub slip_mm: f64,
     /// The servo's.
     pub servo_mm: f64,
+    /// Whether it is added to a zone round the stem, not to the whole canopy.
+    pub keeps_stems: bool,
     /// The margin in use.
     pub in_use_mm: u16,
 }
 
 impl Margin {
-    /// The least margin that pays for all of it, in whole millimetres.
+    /// The least margin that pays for all of it, in whole millimetres; for half of it beside a stem's zone.
+    ///
+    /// The sum is the worst of all three at once. Beside a canopy it is needed: a canopy is then never reached. The tool may enter half
+    /// of it beside a stem's zone, because it meets leaves there. A plant is damaged only where the other half is used up and its stem
+    /// stands off the middle on that very side; trials of the field `set-up` hold this.
     pub fn least_mm(&self) -> u16 {
-        (self.slip_mm + self.servo_mm + FIRMWARE_MM).ceil() as u16
+        let sum_mm = self.slip_mm + self.servo_mm + FIRMWARE_MM;
+        let share = if self.keeps_stems { STEM_SHARE } else { 1.0 };
+        (share * sum_mm).ceil() as u16
+    }
+}
+
+impl Step {
+    /// What it is, in two or three words.
+    fn name(&self) -> &'static str {
+        match self {
+            Self::TimeServo(_) => "time the servo",
+            Self::SetLead(..) => "set the worst lead",
+            Self::MeasureWheel(_) => "measure the wheel",
+            Self::PassPlants(_) => "pass some plants",
+            Self::SetMargin(_) | Self::Ready(_) => "set the margin",
+        }
     }
 }
 
@@ -88,44 +123,127 @@ impl fmt::Display for Step {
 impl fmt::Display for Margin {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { slip_mm, servo_mm, .. } = self;
-        write!(f, "slip {slip_mm:.0} + servo {servo_mm:.0} + {FIRMWARE_MM:.0} mm at 2.5 km/h")
+        let sum = format!("slip {slip_mm:.0} + servo {servo_mm:.0} + {FIRMWARE_MM:.0}");
+        if self.keeps_stems { write!(f, "({sum})/2 mm, 2.5 km/h") } else { write!(f, "{sum} mm at 2.5 km/h") }
     }
 }
 
+/// The servo, timed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Timing {
+    /// The leads in milliseconds, out and in; none where the operator has looked.
+    leads: Option<(u16, u16)>,
+    /// The pulses between which it swung.
+    pulses: (u16, u16),
+}
+
 /// What was measured of a machine, as a session has told it.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct SetUp {
     /// Whether the line that is being answered measures the wheel.
     measures_the_wheel: bool,
-    /// The leads of each timing in milliseconds, out and in; none where somebody has looked.
-    timings: Vec<Option<(u16, u16)>>,
+    /// Whether the margin was set in this session.
+    sets_margin: bool,
+    /// The servo's pulses in use.
+    pulses: (u16, u16),
+    timings: Vec<Timing>,
     ticks_per_m: Vec<u16>,
     slip_permille: VecDeque<i32>,
 }
 
+impl Default for SetUp {
+    fn default() -> Self {
+        Self {
+            measures_the_wheel: false,
+            sets_margin: false,
+            pulses: pulses(&Settings::new()),
+            timings: Vec::new(),
+            ticks_per_m: Vec::new(),
+            slip_permille: VecDeque::new(),
+        }
+    }
+}
+
+fn pulses(settings: &Settings) -> (u16, u16) {
+    (settings.get(Setting::ServoInUs), settings.get(Setting::ServoOutUs))
+}
+
 impl SetUp {
+    /// Times that the wheel is to be measured.
+    pub const STRETCHES: usize = 3;
+
+    /// Times that it has been.
+    pub fn stretches(&self) -> usize {
+        self.ticks_per_m.len()
+    }
+
+    /// What these lines of a session tell: `> ` stands before what was typed.
+    pub fn of_lines<'a>(lines: impl IntoIterator<Item = &'a str>) -> Self {
+        let mut set_up = Self::default();
+        lines.into_iter().for_each(|line| set_up.take_line(line));
+        set_up
+    }
+
+    /// Listens to a line of a session: `> ` stands before what was typed.
+    pub fn take_line(&mut self, line: &str) {
+        match (line.strip_prefix("> "), EventLine::parse(line)) {
+            (Some(typed), _) => self.take_command(typed),
+            (None, Some(event)) => self.take_event(&event),
+            (None, None) => self.take_answer(line),
+        }
+    }
+
+    /// The lines from which [`SetUp::of_lines`] makes the same measurements.
+    pub fn lines(&self) -> Vec<String> {
+        let mut lines = Vec::new();
+        for Timing { leads, pulses: (in_us, out_us) } in &self.timings {
+            lines.extend([format!("servo_in_us={in_us}"), format!("servo_out_us={out_us}")]);
+            lines.push(leads.map_or("calibrated by=eye, as seen".to_owned(), |(out_ms, in_ms)| {
+                format!("calibrated lead_out_ms={out_ms} lead_in_ms={in_ms} set=yes")
+            }));
+        }
+        for ticks in &self.ticks_per_m {
+            lines.extend(["> calibrate 10000".to_owned(), format!("ticks_per_m={ticks}")]);
+        }
+        lines.extend(self.slip_permille.iter().map(|permille| format!("slip permille={permille}")));
+        lines
+    }
+
     /// Listens to what happened.
     pub fn take(&mut self, happening: &Happening) {
         match happening {
-            Happening::Command(line) => {
-                let words: Vec<&str> = line.split_whitespace().collect();
-                self.measures_the_wheel =
-                    matches!(words[..], ["calibrate", length, ..] if length.parse::<u16>().is_ok());
+            Happening::Connected { settings, .. } | Happening::Settings(settings) => self.pulses = pulses(settings),
+            Happening::Command(line) => self.take_command(line),
+            Happening::Answer(line) => self.take_answer(line),
+            Happening::Event(event, _) => self.take_event(event),
+            _ => {}
+        }
+    }
+
+    fn take_command(&mut self, line: &str) {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        self.measures_the_wheel = matches!(words[..], ["calibrate", length, ..] if length.parse::<u16>().is_ok());
+        self.sets_margin |= matches!(words[..], ["set", "margin_mm", _]);
+    }
+
+    fn take_answer(&mut self, line: &str) {
+        match shown(line) {
+            Some((Setting::TicksPerM, ticks)) if self.measures_the_wheel => self.ticks_per_m.push(ticks),
+            Some((Setting::ServoInUs, in_us)) => self.pulses.0 = in_us,
+            Some((Setting::ServoOutUs, out_us)) => self.pulses.1 = out_us,
+            _ => {}
+        }
+    }
+
+    fn take_event(&mut self, event: &EventLine) {
+        let pulses = self.pulses;
+        match *event {
+            EventLine::Calibrated { by: Timed::EndSwitch { out_ms, in_ms }, .. } => {
+                self.timings.push(Timing { leads: Some((out_ms, in_ms)), pulses });
             }
-            Happening::Answer(line) if self.measures_the_wheel => {
-                if let Said::Setting(shown) = Said::parse(line)
-                    && shown.name.as_bytes() == Setting::TicksPerM.text().to_string().as_bytes()
-                {
-                    self.ticks_per_m.push(shown.value);
-                }
-            }
-            Happening::Event(EventLine::Calibrated { by, .. }, _) => match *by {
-                Timed::EndSwitch { out_ms, in_ms } => self.timings.push(Some((out_ms, in_ms))),
-                Timed::Eye => self.timings.push(None),
-                Timed::None => {}
-            },
-            Happening::Event(EventLine::Slip { permille }, _) => {
-                self.slip_permille.push_back(*permille);
+            EventLine::Calibrated { by: Timed::Eye, .. } => self.timings.push(Timing { leads: None, pulses }),
+            EventLine::Slip { permille } => {
+                self.slip_permille.push_back(permille);
                 if self.slip_permille.len() > PLANTS {
                     self.slip_permille.pop_front();
                 }
@@ -134,44 +252,100 @@ impl SetUp {
         }
     }
 
+    /// The servo's timings over the present stroke.
+    fn timed(&self, settings: &Settings) -> Vec<Timing> {
+        self.timings.iter().copied().filter(|timing| timing.pulses == pulses(settings)).collect()
+    }
+
+    /// What is missing until the margin can be lowered, in the order in which it is best done.
+    pub fn missing(&self, settings: &Settings) -> Vec<Step> {
+        let mut missing = Vec::new();
+        let timings = self.timed(settings);
+        if timings.len() < TIMINGS {
+            missing.push(Step::TimeServo(timings.len()));
+        } else {
+            let (outs, ins) = extremes(&timings);
+            let longest = outs.max().filter(|&longest| longest > settings.get(Setting::LeadOutMs));
+            let shortest = ins.min().filter(|&shortest| shortest < settings.get(Setting::LeadInMs));
+            missing.extend(longest.map(|worst| Step::SetLead(Setting::LeadOutMs, worst)));
+            missing.extend(shortest.map(|worst| Step::SetLead(Setting::LeadInMs, worst)));
+        }
+        // With a second beam too: until two plants have told the slip, the wheel alone counts. Where the machine has forgotten what was
+        // measured, that was of another wheel.
+        let is_in_use = settings.get(Setting::TicksPerM) > 0;
+        let stretches = if is_in_use { self.ticks_per_m.len() } else { 0 };
+        if stretches < STRETCHES {
+            missing.push(Step::MeasureWheel(stretches));
+        }
+        if settings.get(Setting::SecondBeamMm) > 0 && self.slip_permille.len() < PLANTS {
+            missing.push(Step::PassPlants(self.slip_permille.len()));
+        }
+        missing
+    }
+
+    /// What the margin has to cover.
+    ///
+    /// # Errors
+    /// What is missing, where it was not all measured.
+    pub fn margin(&self, settings: &Settings) -> Result<Margin, Vec<Step>> {
+        let missing = self.missing(settings);
+        if !missing.is_empty() {
+            return Err(missing);
+        }
+        let beam_to_tool_mm = f64::from(settings.get(Setting::BeamToToolMm));
+        let second_beam_mm = f64::from(settings.get(Setting::SecondBeamMm));
+        let slip_mm = if second_beam_mm > 0.0 {
+            // What is told is the median of three plants: the slip of one may be as far off it as the medians are from each other.
+            let scatter = f64::from(range(self.slip_permille.iter().copied())) / 1000.0;
+            scatter.max(SLIP) * (beam_to_tool_mm - second_beam_mm)
+        } else {
+            let in_use = settings.get(Setting::TicksPerM);
+            let farthest = self.ticks_per_m.iter().map(|ticks| ticks.abs_diff(in_use)).max().unwrap_or(0);
+            (f64::from(farthest) / f64::from(in_use.max(1)) + SLIP) * beam_to_tool_mm
+        };
+        let timings = self.timed(settings);
+        let (outs, ins) = extremes(&timings);
+        let scatter_ms = range(outs).max(range(ins)).max(SERVO_MS);
+        let servo_mm = f64::from(scatter_ms) * SPEED_M_S;
+        let keeps_stems = settings.get(Setting::StemZoneMm) > 0;
+        Ok(Margin { slip_mm, servo_mm, keeps_stems, in_use_mm: settings.get(Setting::MarginMm) })
+    }
+
     /// What is to be done next with these settings in use; nothing before the first thing was measured by `calibrate`.
     pub fn next(&self, settings: &Settings) -> Option<Step> {
         if self.timings.is_empty() && self.ticks_per_m.is_empty() {
             return None;
         }
-        if self.timings.len() < TIMINGS {
-            return Some(Step::TimeServo(self.timings.len()));
-        }
-        let timed = || self.timings.iter().flatten();
-        let (outs, ins) = (timed().map(|&(out_ms, _)| out_ms), timed().map(|&(_, in_ms)| in_ms));
-        let longest = outs.clone().max().filter(|&longest| longest > settings.get(Setting::LeadOutMs));
-        let shortest = ins.clone().min().filter(|&shortest| shortest < settings.get(Setting::LeadInMs));
-        let lead = longest.map(|worst| Step::SetLead(Setting::LeadOutMs, worst));
-        if let Some(lead) = lead.or(shortest.map(|worst| Step::SetLead(Setting::LeadInMs, worst))) {
-            return Some(lead);
-        }
-        let beam_to_tool_mm = f64::from(settings.get(Setting::BeamToToolMm));
-        let second_beam_mm = f64::from(settings.get(Setting::SecondBeamMm));
-        let slip_mm = if second_beam_mm > 0.0 {
-            if self.slip_permille.len() < PLANTS {
-                return Some(Step::PassPlants(self.slip_permille.len()));
-            }
-            // What is told is the median of three plants: the slip of one may be as far off it as the medians are from each other.
-            f64::from(range(self.slip_permille.iter().copied())) / 1000.0 * (beam_to_tool_mm - second_beam_mm)
-        } else {
-            let &[.., in_use] = &self.ticks_per_m[..] else { return Some(Step::MeasureWheel(0)) };
-            if self.ticks_per_m.len() < STRETCHES {
-                return Some(Step::MeasureWheel(self.ticks_per_m.len()));
-            }
-            let farthest = self.ticks_per_m.iter().map(|ticks| ticks.abs_diff(in_use)).max().unwrap_or(0);
-            f64::from(farthest) / f64::from(in_use.max(1)) * beam_to_tool_mm
-        };
-        let scatter_ms = if self.timings.contains(&None) { BY_EYE_MS } else { range(outs).max(range(ins)) };
-        let servo_mm = f64::from(scatter_ms) * SPEED_M_S;
-        let margin = Margin { slip_mm, servo_mm, in_use_mm: settings.get(Setting::MarginMm) };
-        let is_least = margin.in_use_mm == margin.least_mm();
-        Some(if is_least { Step::Ready(margin) } else { Step::SetMargin(margin) })
+        Some(match self.margin(settings) {
+            Err(missing) => missing.into_iter().next()?,
+            Ok(margin) if margin.in_use_mm == margin.least_mm() => Step::Ready(margin),
+            Ok(margin) => Step::SetMargin(margin),
+        })
     }
+
+    /// A warning where this session has set a margin that is less than what was measured covers.
+    pub fn warning(&self, settings: &Settings) -> Option<String> {
+        if !self.sets_margin {
+            return None;
+        }
+        let in_use_mm = settings.get(Setting::MarginMm);
+        let safe_mm = Setting::MarginMm.description().default;
+        match self.margin(settings) {
+            Ok(margin) => (in_use_mm < margin.least_mm()).then(|| {
+                format!("margin_mm {in_use_mm} is too small: what was measured asks for {}", margin.least_mm())
+            }),
+            Err(missing) => (in_use_mm < safe_mm).then(|| {
+                let missing: Vec<&str> = missing.iter().map(Step::name).collect();
+                format!("margin_mm {in_use_mm} is not measured: {} first; {safe_mm} is safe", missing.join(" and "))
+            }),
+        }
+    }
+}
+
+/// The leads out and in that were timed.
+fn extremes(timings: &[Timing]) -> (impl Iterator<Item = u16> + Clone, impl Iterator<Item = u16> + Clone) {
+    let leads = || timings.iter().filter_map(|timing| timing.leads);
+    (leads().map(|(out_ms, _)| out_ms), leads().map(|(_, in_ms)| in_ms))
 }
 
 /// The greatest of some values less the least.
@@ -192,20 +366,6 @@ mod tests {
         settings
     }
 
-    /// A session in which these lines were typed, told or answered.
-    fn after(lines: &[&str]) -> SetUp {
-        let mut set_up = SetUp::default();
-        for line in lines {
-            let happening = match (line.strip_prefix("> "), EventLine::parse(line)) {
-                (Some(typed), _) => Happening::Command(typed.to_owned()),
-                (None, Some(event)) => Happening::Event(event, (*line).to_owned()),
-                (None, None) => Happening::Answer((*line).to_owned()),
-            };
-            set_up.take(&happening);
-        }
-        set_up
-    }
-
     const TIMED: [&str; 2] =
         ["calibrated lead_out_ms=150 lead_in_ms=52 set=yes", "calibrated lead_out_ms=158 lead_in_ms=56 set=yes"];
 
@@ -221,7 +381,7 @@ mod tests {
 
     #[test]
     fn a_machine_of_which_nothing_was_measured_is_left_alone() {
-        let set_up = after(&["> get", MEASURED[1], "slip permille=12"]);
+        let set_up = SetUp::of_lines(["> get", MEASURED[1], "slip permille=12"]);
         assert_eq!(set_up.next(&Settings::new()), None);
     }
 
@@ -229,45 +389,80 @@ mod tests {
     fn servo_wheel_and_margin_come_one_after_the_other() {
         let mut lines = vec![TIMED[0]];
         let leads = [(Setting::LeadOutMs, 150), (Setting::LeadInMs, 56)];
-        assert_eq!(after(&lines).next(&settings(&leads)), Some(Step::TimeServo(1)));
+        assert_eq!(SetUp::of_lines(lines.iter().copied()).next(&settings(&leads)), Some(Step::TimeServo(1)));
         lines.push(TIMED[1]);
-        assert_eq!(after(&lines).next(&settings(&leads)), Some(Step::SetLead(Setting::LeadOutMs, 158)));
+        assert_eq!(
+            SetUp::of_lines(lines.iter().copied()).next(&settings(&leads)),
+            Some(Step::SetLead(Setting::LeadOutMs, 158))
+        );
         let leads = [(Setting::LeadOutMs, 158), (Setting::LeadInMs, 56)];
-        assert_eq!(after(&lines).next(&settings(&leads)), Some(Step::SetLead(Setting::LeadInMs, 52)));
+        assert_eq!(
+            SetUp::of_lines(lines.iter().copied()).next(&settings(&leads)),
+            Some(Step::SetLead(Setting::LeadInMs, 52))
+        );
         let leads = [(Setting::LeadOutMs, 158), (Setting::LeadInMs, 52)];
-        assert_eq!(after(&lines).next(&settings(&leads)), Some(Step::MeasureWheel(0)));
+        assert_eq!(SetUp::of_lines(lines.iter().copied()).next(&settings(&leads)), Some(Step::MeasureWheel(0)));
         lines.extend(MEASURED);
-        assert_eq!(after(&lines).next(&settings(&leads)), Some(Step::MeasureWheel(2)));
+        let leads = [leads[0], leads[1], (Setting::TicksPerM, 1920)];
+        assert_eq!(SetUp::of_lines(lines.iter().copied()).next(&settings(&leads)), Some(Step::MeasureWheel(2)));
         lines.extend(["> calibrate 10000", "ticks_per_m=1920 from 0 to 20000, default 0, not saved"]);
-        // 10 of 1920 ticks over 400 mm, 8 ms at 0.694 m/s, and the firmware's 5 mm.
-        let step = after(&lines).next(&settings(&leads));
+        // 10 of 1920 ticks and 3 % over 400 mm, 15 ms at 0.694 m/s, and the firmware's 5 mm.
+        let step = SetUp::of_lines(lines.iter().copied()).next(&settings(&leads));
         let Some(Step::SetMargin(margin)) = step else { panic!("{step:?}") };
         assert!(
-            (margin.slip_mm - 400.0 * 10.0 / 1920.0).abs() < 1e-9 && (margin.servo_mm - 8.0 * SPEED_M_S).abs() < 1e-9
+            (margin.slip_mm - 400.0 * (10.0 / 1920.0 + 0.03)).abs() < 1e-9
+                && (margin.servo_mm - 15.0 * SPEED_M_S).abs() < 1e-9
         );
-        assert_eq!(margin.least_mm(), 13);
+        assert_eq!(margin.least_mm(), 30);
         assert_eq!(
             Step::SetMargin(margin).to_string(),
-            "lower the margin: `set margin_mm 13`: slip 2 + servo 6 + 5 mm at 2.5 km/h"
+            "lower the margin: `set margin_mm 30`: slip 14 + servo 10 + 5 mm at 2.5 km/h"
         );
-        let ready = [leads[0], leads[1], (Setting::MarginMm, 13)];
-        assert!(matches!(after(&lines).next(&settings(&ready)), Some(Step::Ready(_))));
-        let low = [leads[0], leads[1], (Setting::MarginMm, 12)];
-        let step = after(&lines).next(&settings(&low)).expect("something is to be done").to_string();
-        assert!(step.starts_with("raise the margin: `set margin_mm 13`"), "{step}");
+        let ready = [leads[0], leads[1], leads[2], (Setting::MarginMm, 30)];
+        assert!(matches!(SetUp::of_lines(lines.iter().copied()).next(&settings(&ready)), Some(Step::Ready(_))));
+        let low = [leads[0], leads[1], leads[2], (Setting::MarginMm, 29)];
+        let step =
+            SetUp::of_lines(lines.iter().copied()).next(&settings(&low)).expect("something is to be done").to_string();
+        assert!(step.starts_with("raise the margin: `set margin_mm 30`"), "{step}");
     }
 
     #[test]
-    fn with_a_second_beam_plants_measure_the_wheel() {
+    fn with_a_second_beam_plants_tell_what_is_left_of_the_slip() {
         let leads = [(Setting::LeadOutMs, 158), (Setting::LeadInMs, 52), (Setting::SecondBeamMm, 200)];
-        let mut lines = TIMED.to_vec();
+        let mut lines = [&TIMED[..], &MEASURED, &MEASURED].concat();
+        assert_eq!(
+            SetUp::of_lines(lines.iter().copied()).missing(&settings(&leads)),
+            [Step::MeasureWheel(0), Step::PassPlants(0)],
+            "the wheel as it is set was not measured"
+        );
+        let leads = [&leads[..], &[(Setting::TicksPerM, 1930)]].concat();
         lines.extend(["slip permille=40"; 5]);
-        assert_eq!(after(&lines).next(&settings(&leads)), Some(Step::PassPlants(5)));
+        assert_eq!(SetUp::of_lines(lines.iter().copied()).next(&settings(&leads)), Some(Step::PassPlants(5)));
         // What was long ago does not count.
-        lines.extend(["slip permille=50", "slip permille=70"].repeat(PLANTS / 2));
-        let step = after(&lines).next(&settings(&leads));
+        lines.extend(["slip permille=50", "slip permille=90"].repeat(PLANTS / 2));
+        let step = SetUp::of_lines(lines.iter().copied()).next(&settings(&leads));
         let Some(Step::SetMargin(margin)) = step else { panic!("{step:?}") };
-        assert!((margin.slip_mm - 4.0).abs() < 1e-9, "a fiftieth of 200 mm: {margin:?}");
+        assert!((margin.slip_mm - 8.0).abs() < 1e-9, "a twenty-fifth of 200 mm: {margin:?}");
+    }
+
+    #[test]
+    fn beside_a_stem_s_zone_the_margin_covers_half_of_the_worst() {
+        let third = ["> calibrate 10000", "ticks_per_m=1930"];
+        let mut lines = [&TIMED[..], &MEASURED, &third].concat();
+        lines.extend(["slip permille=12"; PLANTS]);
+        let beam = [
+            (Setting::LeadOutMs, 158),
+            (Setting::LeadInMs, 52),
+            (Setting::TicksPerM, 1930),
+            (Setting::SecondBeamMm, 200),
+        ];
+        let with_zone = |zone_mm| settings(&[&beam[..], &[(Setting::StemZoneMm, zone_mm)]].concat());
+        let margin_mm = |zone_mm| {
+            let margin = SetUp::of_lines(lines.iter().copied()).margin(&with_zone(zone_mm)).expect("all was measured");
+            margin.least_mm()
+        };
+        // 3 % of 200 mm, 15 ms at 2.5 km/h and the firmware's 5 mm: 21.4.
+        assert_eq!((margin_mm(0), margin_mm(100)), (22, 11));
     }
 
     #[test]
@@ -277,14 +472,63 @@ mod tests {
         let mut lines = vec![by_eye, failed, by_eye];
         lines.extend(MEASURED);
         lines.extend(MEASURED);
-        let step = after(&lines).next(&Settings::new());
+        let step = SetUp::of_lines(lines.iter().copied()).next(&settings(&[(Setting::TicksPerM, 1930)]));
         let Some(Step::SetMargin(margin)) = step else { panic!("{step:?}") };
-        assert!((margin.servo_mm - f64::from(BY_EYE_MS) * SPEED_M_S).abs() < 1e-9);
+        assert!((margin.servo_mm - f64::from(SERVO_MS) * SPEED_M_S).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_servo_that_was_timed_over_another_stroke_is_to_be_timed_again() {
+        let lines = [&["servo_out_us=1795"][..], &TIMED, &MEASURED, &MEASURED].concat();
+        let set_up = SetUp::of_lines(lines);
+        let leads = [(Setting::LeadOutMs, 158), (Setting::LeadInMs, 52), (Setting::TicksPerM, 1930)];
+        for (out_us, missing) in [(1795, vec![]), (1800, vec![Step::TimeServo(0)]), (1700, vec![Step::TimeServo(0)])] {
+            let settings = settings(&[&leads[..], &[(Setting::ServoOutUs, out_us)]].concat());
+            assert_eq!(set_up.missing(&settings), missing, "{out_us}");
+        }
+    }
+
+    #[test]
+    fn another_wheel_was_not_measured() {
+        let set_up = SetUp::of_lines([&TIMED[..], &MEASURED, &MEASURED].concat());
+        let leads = [(Setting::LeadOutMs, 158), (Setting::LeadInMs, 52)];
+        assert_eq!(set_up.missing(&settings(&leads)), [Step::MeasureWheel(0)]);
+    }
+
+    #[test]
+    fn a_margin_below_what_was_measured_is_warned_of() {
+        let ready = [(Setting::LeadOutMs, 158), (Setting::LeadInMs, 52), (Setting::TicksPerM, 1920)];
+        let with_margin = |margin_mm| settings(&[&ready[..], &[(Setting::MarginMm, margin_mm)]].concat());
+        let third = ["> calibrate 10000", "ticks_per_m=1920"];
+        let typed = ["> set margin_mm 13"];
+        let measured = SetUp::of_lines([&TIMED[..], &MEASURED, &third, &typed].concat());
+        assert_eq!(measured.warning(&with_margin(30)), None);
+        let warning = measured.warning(&with_margin(29)).expect("it is too small");
+        assert_eq!(warning, "margin_mm 29 is too small: what was measured asks for 30");
+        let in_part = SetUp::of_lines([&TIMED[..], &typed].concat());
+        let warning = in_part.warning(&with_margin(49)).expect("the wheel was not measured");
+        assert_eq!(warning, "margin_mm 49 is not measured: measure the wheel first; 50 is safe");
+        assert_eq!(in_part.warning(&with_margin(50)), None);
+        let nothing = SetUp::of_lines(typed).warning(&with_margin(13)).expect("nothing was measured");
+        assert_eq!(nothing, "margin_mm 13 is not measured: time the servo and measure the wheel first; 50 is safe");
+        // A machine that was set up before is left alone.
+        assert_eq!(SetUp::of_lines(["> get"]).warning(&with_margin(13)), None);
+    }
+
+    #[test]
+    fn what_was_measured_is_the_same_behind_its_lines() {
+        let by_eye = "calibrated by=eye, set lead_out_ms and lead_in_ms to what you saw";
+        let heard = [&["servo_out_us=1795"][..], &TIMED, &MEASURED, &[by_eye, "slip permille=-4"]].concat();
+        let (set_up, settings) = (SetUp::of_lines(heard), settings(&[(Setting::ServoOutUs, 1795)]));
+        let lines = set_up.lines();
+        let again = SetUp::of_lines(lines.iter().map(String::as_str));
+        assert_eq!((again.lines(), again.missing(&settings)), (lines, set_up.missing(&settings)));
+        assert_eq!(again.missing(&settings), [Step::MeasureWheel(0)]);
     }
 
     #[test]
     fn every_step_fits_on_a_line_of_80_characters() {
-        let margin = Margin { slip_mm: 123.0, servo_mm: 123.0, in_use_mm: 50 };
+        let margin = Margin { slip_mm: 123.0, servo_mm: 123.0, keeps_stems: true, in_use_mm: 50 };
         let steps = [
             Step::TimeServo(1),
             Step::SetLead(Setting::LeadOutMs, 158),

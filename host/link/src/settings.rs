@@ -73,8 +73,13 @@ pub fn explain(contradiction: Contradiction) -> String {
             "servo_in_us and servo_out_us are equal, and the tool would not move: let them differ".to_owned()
         }
         Contradiction::SecondBeamAstray => {
-            "a second beam stands 50 mm or more behind the first and ahead of the tool, and beam_to_tool_mm is then 1000 at most: \
+            "a second beam stands 72 mm or more behind the first and ahead of the tool, and beam_to_tool_mm is 1000 at most: \
              change second_beam_mm or beam_to_tool_mm"
+                .to_owned()
+        }
+        Contradiction::EncoderTooCoarse => {
+            "a wheel has to give 900 ticks a metre or more, or a failing encoder is found too late: ticks_per_m, and what ticks_per_rev \
+             and wheel_mm give, are to be that many; take an encoder with more counts"
                 .to_owned()
         }
         Contradiction::BeamTooNear { needed_mm } => format!(

@@ -156,7 +156,7 @@ mod tests {
         settings.set(Setting::EndSwitch, 1).unwrap();
         let text = updated(Path::new("machine.toml"), HEAD, &settings).unwrap();
         assert!(text.starts_with(HEAD), "{text}");
-        let wheel = "\n# diameter of the ground wheel\n# 200 to 800 mm, default 400\nwheel_mm = 405\n";
+        let wheel = "\n# wheel diameter\n# 200 to 800 mm, default 400\nwheel_mm = 405\n";
         assert!(text.contains(wheel), "{text}");
         assert!(text.ends_with("# true or false, default false\nend_switch = true\n"), "{text}");
         let all: Vec<(Setting, u16)> = Setting::all().map(|setting| (setting, settings.get(setting))).collect();

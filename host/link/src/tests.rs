@@ -6,7 +6,7 @@ use control::ground::class::label;
 use control::ground::examples::EXAMPLES;
 use control::ground::features::Features;
 use control::ground::nearest::Nearest;
-use control::measure::readings::{Readings, WakeUp};
+use control::measure::readings::{Readings, Startup};
 use control::measure::reset::Cause;
 use control::memory::Volatile;
 use control::say::{self, command, line::Line};
@@ -57,7 +57,7 @@ fn script<F: FnMut(&str) -> Vec<u8>>(greeting: &str, answer: F) -> Script<F> {
 fn link(answer: impl Fn(&str) -> Vec<u8> + 'static) -> Link {
     let answer = move |line: &str| match line {
         "" => Vec::new(),
-        "version" => b"weeder 0.1.0\r\nok\r\n".to_vec(),
+        "version" => b"weeder 0.2.0\r\nok\r\n".to_vec(),
         line => answer(line),
     };
     Link::over(script("", answer), false).expect("the firmware answers")
@@ -76,10 +76,10 @@ fn an_uno_that_starts_while_it_is_asked_is_asked_again() {
     let mut lines = 0;
     let answer = move |_: &str| {
         lines += 1;
-        let greeting = b"weeder 0.1.0, reset by button, state hold\r\n".to_vec();
-        if lines <= 2 { greeting } else { b"weeder 0.1.0\r\nok\r\n".to_vec() }
+        let greeting = b"weeder 0.2.0, reset by button, state hold\r\n".to_vec();
+        if lines <= 2 { greeting } else { b"weeder 0.2.0\r\nok\r\n".to_vec() }
     };
-    assert_eq!(Link::over(script("", answer), false).unwrap().version(), "0.1.0");
+    assert_eq!(Link::over(script("", answer), false).unwrap().version(), "0.2.0");
 }
 
 #[test]
@@ -125,7 +125,7 @@ fn another_firmware_is_recognised() {
 
 #[test]
 fn a_reset_while_it_is_asked_is_an_error() {
-    let mut link = link(|_| b"weeder 0.1.0, reset by brown_out, state hold\r\nok\r\n".to_vec());
+    let mut link = link(|_| b"weeder 0.2.0, reset by brown_out, state hold\r\nok\r\n".to_vec());
     assert!(matches!(link.ask("save"), Err(LinkError::Restarted(command)) if command == "save"));
 }
 
@@ -159,13 +159,13 @@ fn a_port_that_goes_away_says_so() {
 
 /// A link to the firmware's decisions in HOLD, with its built-in examples, after these lines were typed.
 fn link_to_machine(typed: &[&str]) -> Link {
-    let wake_up = WakeUp {
+    let startup = Startup {
         readings: Readings::new(Instant::new(0), Position::new(0)),
         beam_broken: false,
         cause: Cause::PowerOn,
     };
     let nearest = Nearest::new(&EXAMPLES[..], Volatile::new());
-    let machine = RefCell::new(Controller::new(nearest, Volatile::new(), wake_up));
+    let machine = RefCell::new(Controller::new(nearest, Volatile::new(), startup));
     let answer = move |line: &str| {
         let mut machine = machine.borrow_mut();
         let mut answer = say::execute(command::parse(line.as_bytes()), &mut machine);

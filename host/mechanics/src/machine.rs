@@ -233,7 +233,11 @@ sections! {
     swing: SwingInputs {
         /// Widest canopy that the tool has to clear.
         widest_canopy: Length = 190.0, MM, 5.0 to 1000.0;
-        /// Room between the tool that is out and that canopy: plants off the row's line, and a machine that strays.
+        /// Width round a stem that no tool may enter; 0 where whole canopies are kept.
+        protected: Length = 0.0, MM, 0.0 to 200.0;
+        /// How far a stem stands off the middle of its canopy, along the row.
+        stem_off: Length = 10.0, MM, 0.0 to 100.0;
+        /// Room between the tool that is out and that canopy or zone: plants off the row's line, and a machine that strays.
         room: Length = 10.0, MM, 0.0 to 300.0;
         /// From the row's line to the nearest sweep's edge.
         sweep_from: Length = 50.0, MM, 5.0 to 1000.0;

@@ -1,11 +1,13 @@
-//! The swing of the tool in the row: the smallest angle that clears the widest canopy, the pulse for it, the time that it takes
-//! by the servo's torque-speed line, and the lead that follows. A shorter stroke takes less time, and leaves more ground weeded.
+//! The swing of the tool in the row: the smallest angle that clears the widest canopy, or the zone round a stem, the pulse for it, the time
+//! that it takes by the servo's torque-speed line, and the lead that follows. A shorter stroke takes less time, and leaves more ground
+//! weeded. Where the zone is kept, the settings for it follow as well: the zone is longer than the protected width by what a stem
+//! stands off the middle, and the margin pays for a wheel and a servo that nobody has measured yet.
 //!
 //! The arm swings sideways about a pivot beside the row: at an angle the tool's middle is `arm * sin(angle)` from the row's
 //! line. A servo turns at full speed without load, and falls in a straight line to nothing at the torque at which it stalls. What it
 //! has to turn against is the torque of the whole blade in the soil (above Eq. 10), which the paper sizes its servo by.
 
-use crate::machine::Machine;
+use crate::machine::{Machine, SwingInputs};
 use crate::unit::{KG_CM, MM};
 use serde::Serialize;
 use uom::si::f64::Torque;
@@ -17,10 +19,17 @@ const PULSE_AND_GAP_MS: f64 = 6.0;
 /// Pulses are told in whole steps of this, us, rounded outwards.
 const PULSE_STEP_US: f64 = 5.0;
 
+/// What a margin pays for beside the servo, mm: 2 % of slip over the 400 mm from beam to tool, and the firmware's own worst swing.
+const SLIP_AND_FIRMWARE_MM: f64 = 8.0 + 5.0;
+
 /// A swing, as it has to be.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Swing {
-    /// Smallest angle at which the tool's edge has cleared the canopy, degrees.
+    /// What is kept of a single plant along the row, mm; 0 for its canopy.
+    pub stem_zone_mm: u32,
+    /// The margin beside it until wheel and servo have been measured, mm.
+    pub margin_mm: u32,
+    /// Smallest angle at which the tool's edge has cleared the canopy or the protected width, degrees.
     pub angle_degrees: f64,
     /// Pulse with the tool in the row, us.
     pub servo_in_us: u32,
@@ -47,7 +56,7 @@ pub struct Swing {
 pub enum NoSwing {
     /// The arm is too short.
     #[error(
-        "an arm of {arm_mm:.0} mm cannot bring the tool {aside_mm:.0} mm aside, which the canopy asks for: take a longer one"
+        "an arm of {arm_mm:.0} mm cannot bring the tool {aside_mm:.0} mm aside, which the plant asks for: take a longer one"
     )]
     ShortArm {
         /// Its length.
@@ -81,7 +90,7 @@ impl Swing {
     pub fn with_tool(machine: &Machine, torque: Torque, tool_mm: f64) -> Result<Self, NoSwing> {
         let inputs = machine.swing;
         let arm_mm = MM.value(machine.intra_row.shank_length);
-        let aside_mm = MM.value(inputs.widest_canopy) / 2.0 + MM.value(inputs.room) + tool_mm / 2.0;
+        let aside_mm = kept_mm(machine) / 2.0 + MM.value(inputs.room) + tool_mm / 2.0;
         if aside_mm >= arm_mm {
             return Err(NoSwing::ShortArm { arm_mm, aside_mm });
         }
@@ -99,7 +108,12 @@ impl Swing {
         let dead_ms = |time: uom::si::f64::Time| 1000.0 * time.get::<second>();
         let from_mm = MM.value(inputs.sweep_from);
         let lead_out_ms = dead_ms(inputs.most_dead_time.max(inputs.least_dead_time)) + loaded_ms + PULSE_AND_GAP_MS;
+        let protected_mm = MM.value(inputs.protected);
+        let stem_zone_mm = if protected_mm > 0.0 { protected_mm + MM.value(inputs.stem_off) } else { 0.0 };
+        let scatter_s = (inputs.most_dead_time - inputs.least_dead_time).abs();
         Ok(Self {
+            stem_zone_mm: stem_zone_mm.ceil() as u32,
+            margin_mm: (MM.value(machine.weeder.speed * scatter_s) + SLIP_AND_FIRMWARE_MM).ceil() as u32,
             angle_degrees,
             servo_in_us: inputs.pulse_in.round() as u32,
             servo_out_us: (inputs.pulse_in + stroke_us).round() as u32,
@@ -114,22 +128,27 @@ impl Swing {
     }
 
     /// The settings that follow, as lines for the firmware's console.
-    pub fn set_lines(&self) -> [String; 4] {
-        let Self { servo_in_us, servo_out_us, lead_out_ms, lead_in_ms, .. } = self;
-        [
+    pub fn set_lines(&self) -> Vec<String> {
+        let Self { servo_in_us, servo_out_us, lead_out_ms, lead_in_ms, stem_zone_mm, margin_mm, .. } = self;
+        let mut lines = vec![
             format!("set servo_in_us {servo_in_us}"),
             format!("set servo_out_us {servo_out_us}"),
             format!("set lead_out_ms {lead_out_ms}"),
             format!("set lead_in_ms {lead_in_ms}"),
-        ]
+        ];
+        if *stem_zone_mm > 0 {
+            lines.extend([format!("set stem_zone_mm {stem_zone_mm}"), format!("set margin_mm {margin_mm}")]);
+        }
+        lines
     }
 
     /// What it is, in sentences. `torque` is what it was calculated with.
     pub fn sentences(&self, machine: &Machine, torque: Torque) -> Vec<String> {
         let mut said = vec![
             format!(
-                "The tool clears a canopy of {:.0} mm at {:.1} degrees, {} us of the pulse away from the row.",
-                MM.value(machine.swing.widest_canopy),
+                "The tool clears a {} of {:.0} mm at {:.1} degrees, {} us of the pulse away from the row.",
+                if self.stem_zone_mm > 0 { "stem's zone" } else { "canopy" },
+                kept_mm(machine),
                 self.angle_degrees,
                 self.servo_out_us.abs_diff(self.servo_in_us)
             ),
@@ -146,7 +165,7 @@ impl Swing {
         }
         let wider = Self::with_tool(machine, torque, self.filling_tool_mm);
         said.push(format!(
-            "Between tool and sweeps {:.1} mm on either side of the row are weeded by nobody: a tool of {:.0} mm would fill that{}.",
+            "Between tool and sweeps {:.1} mm on either side of the row are not weeded: a tool of {:.0} mm would fill that{}.",
             self.unweeded_strip_mm,
             self.filling_tool_mm,
             wider.map_or_else(
@@ -155,5 +174,34 @@ impl Swing {
             )
         ));
         said
+    }
+}
+
+/// Width of what the tool has to clear.
+fn kept_mm(machine: &Machine) -> f64 {
+    let SwingInputs { protected, widest_canopy, .. } = machine.swing;
+    let protected_mm = MM.value(protected);
+    if protected_mm > 0.0 { protected_mm } else { MM.value(widest_canopy) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stem_s_zone_needs_a_shorter_stroke_than_its_canopy_and_comes_with_its_settings() {
+        let torque = KG_CM.of(10.0);
+        let canopy = Swing::with_tool(&Machine::default(), torque, 100.0).expect("it swings");
+        assert_eq!((canopy.servo_out_us, canopy.set_lines().len()), (1795, 4));
+        let mut machine = Machine::default();
+        machine.swing.protected = MM.of(90.0);
+        let stem = Swing::with_tool(&machine, torque, 100.0).expect("it swings");
+        // 45 + 10 + 50 mm of an arm of 350 are 17.5 degrees; 30 ms at 2.5 km/h are 21 mm.
+        let lines = ["set servo_out_us 1695", "set lead_out_ms 143", "set stem_zone_mm 100", "set margin_mm 34"];
+        assert!(lines.iter().all(|line| stem.set_lines().iter().any(|set| set == line)), "{:?}", stem.set_lines());
+        assert!(
+            stem.sentences(&machine, torque)[0].starts_with("The tool clears a stem's zone of 90 mm at 17."),
+            "{stem:?}"
+        );
     }
 }

@@ -2,32 +2,32 @@
 
 use control::ground::class::Class;
 use link::settings::{Setting, Settings, explain, name, steps};
-use link::{EventLine, Said, Shown, Status, Timed, Values};
+use link::{ConsoleLine, EventLine, SettingValue, Status, Timed, Values};
 use serde::Deserialize;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
 /// What a line says, as `page/src/link/grammar.ts` has it.
 pub fn read(line: &str) -> Value {
-    match Said::parse(line) {
-        Said::Greeting { version, cause } => json!({ "is": "greeting", "version": version, "cause": cause }),
-        Said::Version(version) => json!({ "is": "version", "version": version }),
-        Said::Done => json!({ "is": "end" }),
-        Said::Refused(error) => json!({ "is": "end", "error": error }),
-        Said::Status(status) => json!({ "is": "status", "status": shown_status(&status, line) }),
-        Said::Setting(setting) => json!({ "is": "setting", "setting": shown_setting(&setting) }),
-        Said::Help { name, help } => json!({ "is": "help", "name": name, "help": help }),
-        Said::Example { from_field, number, label, .. } => {
+    match ConsoleLine::parse(line) {
+        ConsoleLine::Greeting { version, cause } => json!({ "is": "greeting", "version": version, "cause": cause }),
+        ConsoleLine::Version(version) => json!({ "is": "version", "version": version }),
+        ConsoleLine::Done => json!({ "is": "end" }),
+        ConsoleLine::Refused(error) => json!({ "is": "end", "error": error }),
+        ConsoleLine::Status(status) => json!({ "is": "status", "status": shown_status(&status, line) }),
+        ConsoleLine::Setting(setting) => json!({ "is": "setting", "setting": shown_setting(&setting) }),
+        ConsoleLine::Help { name, help } => json!({ "is": "help", "name": name, "help": help }),
+        ConsoleLine::Example { from_field, number, label, .. } => {
             json!({ "is": "example", "fromField": from_field, "number": number, "label": class(label) })
         }
-        Said::Event(event) => read_event(&event, line),
-        Said::Other => json!({ "is": "other" }),
+        ConsoleLine::Event(event) => read_event(&event, line),
+        ConsoleLine::Other => json!({ "is": "other" }),
     }
 }
 
 fn read_event(event: &EventLine, line: &str) -> Value {
     match *event {
-        EventLine::Object { class: taken_for, position, votes, spacing, delay, hold, .. } => json!({
+        EventLine::Detection { class: taken_for, position, votes, spacing, delay, hold, .. } => json!({
             "is": "object",
             "seen": {
                 "class": class(taken_for),
@@ -42,7 +42,7 @@ fn read_event(event: &EventLine, line: &str) -> Value {
         EventLine::Slip { permille } => json!({ "is": "slip", "permille": permille }),
         EventLine::Guarded { .. } => json!({ "is": "guarded" }),
         EventLine::State(mode) => json!({ "is": "state", "mode": mode.name() }),
-        EventLine::Alarm { .. } => json!({ "is": "alarm", "name": Values(line).text("name") }),
+        EventLine::Alarm { .. } => json!({ "is": "alarm", "name": Values(line).alarm() }),
         EventLine::Warning(_) => json!({ "is": "warning", "name": Values(line).text("name") }),
         EventLine::Calibrated { by, is_set } => {
             let by = match by {
@@ -66,7 +66,7 @@ fn shown_status(status: &Status, line: &str) -> Value {
         "windows": status.windows,
         "unseenMm": status.unseen_mm,
     });
-    for (key, text) in [("alarm", Values(line).text("alarm")), ("reason", status.reason.as_deref())] {
+    for (key, text) in [("alarm", Values(line).alarm()), ("reason", status.reason.as_deref())] {
         if let Some(text) = text {
             shown[key] = text.into();
         }
@@ -74,7 +74,7 @@ fn shown_status(status: &Status, line: &str) -> Value {
     shown
 }
 
-fn shown_setting(setting: &Shown) -> Value {
+fn shown_setting(setting: &SettingValue) -> Value {
     let (least, greatest) = setting.range.unwrap_or((0, 1));
     let mut shown = json!({
         "name": setting.name,
@@ -89,6 +89,17 @@ fn shown_setting(setting: &Shown) -> Value {
         shown["saved"] = saved.into();
     }
     shown
+}
+
+/// The firmware of these sources: its version, with the commit where a release is built (`control/src/say/version.rs`), and its settings'
+/// names.
+pub fn firmware() -> Value {
+    let number = env!("CARGO_PKG_VERSION");
+    let version = match option_env!("WEEDER_COMMIT") {
+        Some(commit) if !commit.is_empty() => format!("{number} ({commit})"),
+        _ => number.to_owned(),
+    };
+    json!({ "version": version, "settings": Setting::all().map(name).collect::<Vec<_>>() })
 }
 
 fn class(class: Class) -> &'static str {
@@ -127,7 +138,7 @@ impl Change {
 }
 
 /// Settings with some values set, and the values that could not be.
-fn settings(mut settings: Settings, values: &BTreeMap<String, u16>) -> (Settings, Vec<(String, u16)>) {
+pub fn settings(mut settings: Settings, values: &BTreeMap<String, u16>) -> (Settings, Vec<(String, u16)>) {
     let mut unknown = Vec::new();
     for (name, &value) in values {
         let is_set = Setting::find(name.as_bytes()).is_some_and(|setting| settings.set(setting, value).is_ok());
@@ -147,9 +158,9 @@ mod tests {
         for (line, said) in [
             ("ok", json!({ "is": "end" })),
             ("error: no", json!({ "is": "end", "error": "no" })),
-            ("alarm name=too_fast code=3-1 pos=7", json!({ "is": "alarm", "name": "too_fast" })),
+            ("alarm code=3-1 name=too_fast pos=7", json!({ "is": "alarm", "name": "too_fast" })),
             (
-                "state=alarm alarm=boredom tool=out pos=1 speed_mm_s=-2 windows=3 unseen_mm=4",
+                "state=alarm code=9-9 name=boredom tool=out pos=1 speed_mm_s=-2 windows=3 unseen_mm=4",
                 json!({ "is": "status", "status": {
                     "mode": "alarm", "alarm": "boredom", "toolOut": true, "position": 1, "speedMmS": -2, "windows": 3,
                     "unseenMm": 4,

@@ -1,7 +1,10 @@
 //! The door of the WebAssembly module: one buffer, in which a question is put and its answer is found.
 //!
 //! `room` makes room for a question and says where, `answer` answers what stands there and says where the answer is, and `length`
-//! how long. Each place holds until the next call. No binding generator has a part in it.
+//! how long. `read` takes what stands there as the next bytes of a log instead. `table` and `table_length` say where a table of its
+//! picture is. `roll` and `hear` are the machine's that rolls, and `trial_table` and `trial_table_length` say where its tables are. Each
+//! place holds until the next call. While an answer takes long, the module calls `progress`, which the page gives.
+//! No binding generator has a part in it.
 
 use std::cell::RefCell;
 
@@ -9,7 +12,18 @@ thread_local! {
     static BUFFER: RefCell<Vec<u8>> = const { RefCell::new(Vec::new()) };
 }
 
-// SAFETY: the three names are this module's alone: it is linked with nothing but Rust's own library, which exports none of them.
+#[link(wasm_import_module = "page")]
+unsafe extern "C" {
+    fn progress_is(share: f64);
+}
+
+/// Tells the page how far a long answer is, from 0 to 1.
+pub fn progress(share: f64) {
+    // SAFETY: the page gives a function with this name, which takes one number and calls nothing of this module.
+    unsafe { progress_is(share) }
+}
+
+// SAFETY: these names are this module's alone: it is linked with nothing but Rust's own library, which exports none of them.
 #[unsafe(no_mangle)]
 extern "C" fn room(length: usize) -> *mut u8 {
     BUFFER.with_borrow_mut(|buffer| {
@@ -31,4 +45,46 @@ extern "C" fn answer() -> *const u8 {
 #[unsafe(no_mangle)]
 extern "C" fn length() -> usize {
     BUFFER.with_borrow(Vec::len)
+}
+
+// SAFETY: as above.
+#[unsafe(no_mangle)]
+extern "C" fn read() {
+    crate::record::take(&BUFFER.take());
+}
+
+// SAFETY: as above.
+#[unsafe(no_mangle)]
+extern "C" fn table(number: usize) -> *const f64 {
+    crate::record::table(number, <[f64]>::as_ptr)
+}
+
+// SAFETY: as above.
+#[unsafe(no_mangle)]
+extern "C" fn table_length(number: usize) -> usize {
+    crate::record::table(number, <[f64]>::len)
+}
+
+// SAFETY: as above.
+#[unsafe(no_mangle)]
+extern "C" fn roll(cycle: f64) {
+    crate::roll(cycle);
+}
+
+// SAFETY: as above.
+#[unsafe(no_mangle)]
+extern "C" fn hear(rise: f64, fall: f64) {
+    crate::hear(rise, fall);
+}
+
+// SAFETY: as above.
+#[unsafe(no_mangle)]
+extern "C" fn trial_table(number: usize) -> *const f64 {
+    crate::trial_table(number, <[f64]>::as_ptr)
+}
+
+// SAFETY: as above.
+#[unsafe(no_mangle)]
+extern "C" fn trial_table_length(number: usize) -> usize {
+    crate::trial_table(number, <[f64]>::len)
 }

@@ -127,12 +127,12 @@ mod tests {
     #[test]
     fn a_page_begins_with_how_all_machines_are_and_hears_what_comes_after() {
         let hub = Hub::new(2);
-        hub.there(0, "0.1.0");
+        hub.there(0, "0.2.0");
         hub.status(0, "state=hold".to_owned());
         let (now, mut later) = hub.listen();
         let now: Vec<Value> = now.iter().map(|message| serde_json::from_str(message).unwrap()).collect();
         let expected = [
-            json!({ "machine": 0, "is": "there", "version": "0.1.0" }),
+            json!({ "machine": 0, "is": "there", "version": "0.2.0" }),
             json!({ "machine": 0, "is": "status", "line": "state=hold" }),
             json!({ "machine": 1, "is": "lost", "why": "its port is being opened" }),
         ];

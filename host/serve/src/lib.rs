@@ -9,6 +9,7 @@
 
 pub mod door;
 pub mod hub;
+mod lengths;
 pub mod machine;
 pub mod page;
 pub mod pairing;
@@ -18,6 +19,7 @@ pub mod rules;
 
 use self::door::Door;
 use self::hub::Hub;
+use self::lengths::{Counted, Lengths};
 use self::machine::Machine;
 use self::page::Page;
 use self::pairing::{CODE_LENGTH, Code, Pairing};
@@ -25,11 +27,15 @@ use self::places::Places;
 use self::routes::{Served, Visitor, routes};
 use axum::Extension;
 use axum::Router;
+use futures_util::future::select;
 use hyper::server::conn::http1;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
+#[cfg(any(target_os = "linux", target_os = "android"))]
+use socket2::SockRef;
 use std::io;
 use std::net::{Ipv4Addr, SocketAddr};
+use std::pin::pin;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -53,6 +59,9 @@ const UNREAD_BYTES: u32 = 16 * 1024;
 
 /// Time in which a reader has to take at least a byte of what waits for him.
 const READER_TIME: Duration = Duration::from_secs(5);
+
+/// Connections that wait at a door until they are taken: a reader whose first packet is dropped sends it again after a second.
+const BACKLOG: u32 = 1024;
 
 /// Time between two looks at whether to stop.
 const LOOK: Duration = Duration::from_millis(100);
@@ -200,13 +209,13 @@ struct Listening {
 
 fn listen(lan: Option<Ipv4Addr>, port: u16, may_start: bool) -> Result<Listening, ServeError> {
     let (listener, here) = bind(Ipv4Addr::LOCALHOST, port)?;
-    let mut doors = vec![(listener, Door::here(here.port()), Places::for_one())];
+    let mut doors = vec![(listener, Door::here(here.port()), Places::default())];
     let Some(address) = lan else { return Ok(Listening { doors, here, lan: None }) };
     if address.is_unspecified() || address.is_broadcast() || address.is_multicast() || address == Ipv4Addr::LOCALHOST {
         return Err(ServeError::NoAddress(address));
     }
     let (listener, bound) = bind(address, here.port())?;
-    doors.push((listener, Door::lan(address, bound.port(), may_start), Places::for_many()));
+    doors.push((listener, Door::lan(address, bound.port(), may_start), Places::default()));
     Ok(Listening { doors, here, lan: Some(bound) })
 }
 
@@ -221,7 +230,7 @@ fn bind(address: Ipv4Addr, port: u16) -> Result<(TcpListener, SocketAddr), Serve
         // Those that it accepts have the same.
         socket.set_send_buffer_size(UNREAD_BYTES)?;
         socket.bind(asked)?;
-        let listener = socket.listen(64)?;
+        let listener = socket.listen(BACKLOG)?;
         let bound = listener.local_addr()?;
         Ok((listener, bound))
     };
@@ -232,7 +241,7 @@ fn bind(address: Ipv4Addr, port: u16) -> Result<(TcpListener, SocketAddr), Serve
     })
 }
 
-/// Takes connections at a door, as many as there are places.
+/// Takes connections at a door. Each gets a place, and some other connection may lose its own by that.
 async fn attend(listener: TcpListener, door: Arc<Door>, places: Places, routes: Router) {
     loop {
         // One that has gone again is no reason to stop; where there are no more files, some end.
@@ -240,21 +249,26 @@ async fn attend(listener: TcpListener, door: Arc<Door>, places: Places, routes: 
             sleep(LOOK).await;
             continue;
         };
-        let Some(place) = places.take(peer.ip()) else { continue };
-        let visitor = Visitor { address: peer.ip(), door: Arc::clone(&door) };
+        let (place, end) = places.take(peer.ip());
+        let lengths = Arc::<Lengths>::default();
+        let visitor =
+            Visitor { address: peer.ip(), door: Arc::clone(&door), place: place.into(), lengths: Arc::clone(&lengths) };
         let routes = routes.clone().layer(Extension(visitor));
         tokio::spawn(async move {
-            serve(stream, routes).await;
-            drop(place);
+            // What is not served any more is closed.
+            select(pin!(serve(stream, lengths, routes)), end).await;
         });
     }
 }
 
 /// Serves a connection to its end. Whoever sends too slowly or does not read is let go of.
-async fn serve(stream: TcpStream, routes: Router) {
+async fn serve(stream: TcpStream, lengths: Arc<Lengths>, routes: Router) {
     // It is only slower where it fails.
     let _ = stream.set_nodelay(true);
-    let mut stream = TimeoutStream::new(stream);
+    // Without this, what the reader does not take has to fill the system's buffer before the time begins.
+    #[cfg(any(target_os = "linux", target_os = "android"))]
+    let _ = SockRef::from(&stream).set_tcp_user_timeout(Some(READER_TIME));
+    let mut stream = TimeoutStream::new(Counted::new(stream, lengths));
     stream.set_write_timeout(Some(READER_TIME));
     let connection = http1::Builder::new()
         .timer(TokioTimer::new())

@@ -2,7 +2,7 @@
 //! answers back, and has the hub tell all else. It decides nothing: what may be typed is decided before.
 
 use super::hub::Hub;
-use link::Said;
+use link::ConsoleLine;
 use link::rows::Opener;
 use link::session::{Happening, Session};
 use std::collections::VecDeque;
@@ -182,7 +182,7 @@ impl Talk {
             Happening::Status(_, line) => self.hub.status(self.number, line),
             Happening::Event(_, line) => self.hub.event(self.number, &line),
             Happening::Answer(line) => {
-                let is_end = matches!(Said::parse(&line), Said::Done | Said::Refused(_));
+                let is_end = matches!(ConsoleLine::parse(&line), ConsoleLine::Done | ConsoleLine::Refused(_));
                 let Some(asked) = self.asked.front_mut() else { return };
                 if is_end || asked.answer.len() < LINES {
                     asked.answer.push(line);
@@ -261,7 +261,7 @@ mod tests {
                 let setting = |setting: Setting| format!("{}={}\n", name(setting), setting.description().default);
                 let answer = match line.as_str() {
                     "" => continue,
-                    "version" => "weeder 0.1.0\n".to_owned(),
+                    "version" => "weeder 0.2.0\n".to_owned(),
                     "get" => Setting::all().map(setting).collect(),
                     "status" => "state=hold tool=out pos=7 speed_mm_s=0 windows=0 unseen_mm=400\n".to_owned(),
                     "examples" | "events on" => String::new(),

@@ -1,4 +1,4 @@
-//! The page's three files, as they lie in their folder, and the form for the code, which is a part of this program.
+//! The page's three files, as they lie in their folder or as a release has them in this program, and the form for the code, which is a part of this program.
 
 use axum::body::Bytes;
 use std::fs;
@@ -24,11 +24,14 @@ pub struct Page {
     pub js: File,
 }
 
+/// The files that are in this program, if any are.
+const INSIDE: Option<[&[u8]; 3]> = include!(concat!(env!("OUT_DIR"), "/inside.rs"));
+
 /// Why there is no page.
 #[derive(Debug, Error)]
 #[error(
     "{} of the page cannot be read: name a release's folder `page` by --page, or make it in a clone of the repository by \
-     `npm --prefix page ci` and `npm --prefix page run build`",
+     `./setup.sh page`",
     path.display()
 )]
 pub struct NoPage {
@@ -42,18 +45,25 @@ impl Page {
     /// # Errors
     /// Where one of them is not there.
     pub fn read(folder: &Path) -> Result<Self, NoPage> {
-        let read = |name: &str, media| {
+        let read = |name: &str| {
             let path = folder.join(name);
-            match fs::read(&path) {
-                Ok(content) => Ok(File { media, content: content.into() }),
-                Err(source) => Err(NoPage { path, source }),
-            }
+            fs::read(&path).map(Bytes::from).map_err(|source| NoPage { path, source })
         };
-        Ok(Self {
-            html: read("index.html", "text/html; charset=utf-8")?,
-            css: read("page.css", "text/css; charset=utf-8")?,
-            js: read("page.js", "text/javascript; charset=utf-8")?,
-        })
+        Ok(Self::of([read("index.html")?, read("page.css")?, read("page.js")?]))
+    }
+
+    /// The page in this program: a release has one.
+    pub fn inside() -> Option<Self> {
+        INSIDE.map(|files| Self::of(files.map(Bytes::from_static)))
+    }
+
+    fn of(files: [Bytes; 3]) -> Self {
+        let [html, css, js] = files;
+        Self {
+            html: File { media: "text/html; charset=utf-8", content: html },
+            css: File { media: "text/css; charset=utf-8", content: css },
+            js: File { media: "text/javascript; charset=utf-8", content: js },
+        }
     }
 }
 
@@ -72,10 +82,17 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_page_is_inside_where_the_build_was_given_one() {
+        let inside = Page::inside();
+        assert_eq!(inside.is_some(), option_env!("WEEDER_PAGE").is_some());
+        assert!(inside.is_none_or(|page| page.html.content.starts_with(b"<!doctype html>")));
+    }
+
+    #[test]
     fn a_folder_without_a_page_is_said_with_the_way_to_one() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
         let error = Page::read(folder).err().expect("there is no page there").to_string();
         assert!(error.contains("index.html of the page cannot be read"), "{error}");
-        assert!(error.contains("`npm --prefix page run build`"), "{error}");
+        assert!(error.contains("`./setup.sh page`"), "{error}");
     }
 }

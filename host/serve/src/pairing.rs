@@ -6,7 +6,7 @@
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
-use subtle::{Choice, ConstantTimeEq};
+use subtle::ConstantTimeEq;
 
 /// Characters of a code: no I, L, O and U, which are taken for others.
 const ALPHABET: &[u8; 32] = b"0123456789ABCDEFGHJKMNPQRSTVWXYZ";
@@ -84,13 +84,15 @@ pub struct Pairing {
     code: Code,
     wrong: u32,
     locked_until: Option<Instant>,
-    paired: VecDeque<Token>,
+    /// Their numbers, which are not used again, and their tokens as a cookie has them.
+    paired: VecDeque<(u64, String)>,
+    next: u64,
 }
 
 impl Pairing {
     /// Nobody is paired yet.
     pub fn new(code: Code) -> Self {
-        Self { code, wrong: 0, locked_until: None, paired: VecDeque::new() }
+        Self { code, wrong: 0, locked_until: None, paired: VecDeque::new(), next: 0 }
     }
 
     /// Somebody types a code. Where it is right, he is to be given a [`token`](Self::pair).
@@ -117,16 +119,17 @@ impl Pairing {
         if self.paired.len() == PHONES {
             self.paired.pop_front();
         }
-        self.paired.push_back(token);
+        self.paired.push_back((self.next, hexadecimal(&token)));
+        self.next += 1;
         self.paired.len()
     }
 
-    /// Whether this is the token of somebody who is paired, in 64 hexadecimal digits.
-    pub fn is_paired(&self, shown: &str) -> bool {
-        let shown = shown.as_bytes();
+    /// The number of the phone with this token, in 64 hexadecimal digits, if it is paired.
+    pub fn phone(&self, shown: &str) -> Option<u64> {
         // All are compared, to the end.
-        let equal = |token: &Token| hexadecimal(token).as_bytes().ct_eq(shown);
-        self.paired.iter().map(equal).fold(Choice::from(0), |one, other| one | other).into()
+        self.paired.iter().fold(None, |found, (number, token)| {
+            if bool::from(token.as_bytes().ct_eq(shown.as_bytes())) { Some(*number) } else { found }
+        })
     }
 }
 
@@ -204,11 +207,11 @@ mod tests {
     #[test]
     fn who_shows_a_token_is_paired_and_nobody_else() {
         let mut pairing = pairing();
-        assert!(!pairing.is_paired("") && !pairing.is_paired(&"0".repeat(64)));
+        assert_eq!((pairing.phone(""), pairing.phone(&"0".repeat(64))), (None, None));
         assert_eq!((pairing.pair([1; TOKEN_LENGTH]), pairing.pair([2; TOKEN_LENGTH])), (1, 2));
-        assert!(pairing.is_paired(&"01".repeat(32)) && pairing.is_paired(&"02".repeat(32)));
+        assert_eq!((pairing.phone(&"01".repeat(32)), pairing.phone(&"02".repeat(32))), (Some(0), Some(1)));
         for wrong in ["", "01", &"01".repeat(31), &"01".repeat(33), &"03".repeat(32), &"10".repeat(32)] {
-            assert!(!pairing.is_paired(wrong), "{wrong}");
+            assert_eq!(pairing.phone(wrong), None, "{wrong}");
         }
     }
 
@@ -218,8 +221,7 @@ mod tests {
         for number in 0..=PHONES {
             pairing.pair([number as u8; TOKEN_LENGTH]);
         }
-        assert!(!pairing.is_paired(&hexadecimal(&[0; TOKEN_LENGTH])));
-        assert!(pairing.is_paired(&hexadecimal(&[1; TOKEN_LENGTH])));
-        assert!(pairing.is_paired(&hexadecimal(&[PHONES as u8; TOKEN_LENGTH])));
+        let number = |token: usize| pairing.phone(&hexadecimal(&[token as u8; TOKEN_LENGTH]));
+        assert_eq!((number(0), number(1), number(PHONES)), (None, Some(1), Some(PHONES as u64)));
     }
 }

@@ -1,59 +1,131 @@
-//! How many connections there may be at once, so that nobody takes them all: of all together, and of one address.
+//! How many connections a door has, so that HOLD always finds a place.
 //!
-//! It is by hand because the limits of `tower` are of requests, and of all addresses together.
+//! A connection is in one [`Stage`] at a time, and each stage has places of its own. New connections take none from the clients that
+//! are known, event streams take none from questions, and neither takes one from HOLD. No connection is refused: where a stage is
+//! full, the client with the most connections in it loses one. So a client with one connection keeps it.
+//!
+//! It is by hand because the limits of `tower` are of requests, and treat all clients alike.
 
-use std::collections::HashMap;
+use std::convert::Infallible;
 use std::net::IpAddr;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use tokio::sync::oneshot::{self, Receiver, Sender};
 
-/// Connections at a door.
-const ALL: usize = 64;
+/// Connections in a stage. A browser opens six.
+const PLACES: usize = 32;
 
-/// Places that are taken, by address.
-#[derive(Clone)]
-pub struct Places {
-    most_of_one: usize,
-    taken: Arc<Mutex<HashMap<IpAddr, usize>>>,
+/// What a connection does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// It has not sent a whole request of a known client: it is new, half open, or not paired.
+    Opening,
+    /// It has: it waits for an answer, reads it, or is kept for the next request.
+    Asking,
+    /// It hears the events.
+    Listening,
+    /// It has asked for HOLD.
+    Holding,
+}
+
+/// The other end of a connection.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Client {
+    /// An address that has shown nothing yet.
+    Address(IpAddr),
+    /// A paired phone, by its number.
+    Phone(u64),
+    /// The computer that has the serial ports.
+    Here,
+}
+
+/// The places of a door.
+#[derive(Clone, Default)]
+pub struct Places(Arc<Mutex<Table>>);
+
+#[derive(Default)]
+struct Table {
+    next: u64,
+    /// In the order in which they entered their stages.
+    taken: Vec<Taken>,
+}
+
+struct Taken {
+    number: u64,
+    client: Client,
+    stage: Stage,
+    /// The connection ends when this is dropped.
+    _end: Sender<Infallible>,
 }
 
 /// A place, which is free again when this is dropped.
 pub struct Place {
-    address: IpAddr,
+    number: u64,
     places: Places,
 }
 
+/// Completes, with an error, when a connection has lost its place.
+pub type End = Receiver<Infallible>;
+
 impl Places {
-    /// Places of which one address may have all.
-    pub fn for_one() -> Self {
-        Self { most_of_one: ALL, taken: Arc::default() }
+    /// A place for a new connection, and its end.
+    pub fn take(&self, address: IpAddr) -> (Place, End) {
+        let (end, ended) = oneshot::channel();
+        let mut table = self.table();
+        let number = table.next;
+        table.next += 1;
+        table.enter(Taken { number, client: Client::Address(address), stage: Stage::Opening, _end: end });
+        (Place { number, places: self.clone() }, ended)
     }
 
-    /// Places of which one address may have a quarter: a browser has six.
-    pub fn for_many() -> Self {
-        Self { most_of_one: ALL / 4, taken: Arc::default() }
+    fn table(&self) -> MutexGuard<'_, Table> {
+        // Each change of it is whole.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Table {
+    /// Adds a connection as the last of its stage. Where the stage is full, another one goes.
+    fn enter(&mut self, new: Taken) {
+        let stage = new.stage;
+        let others: Vec<&Taken> = self.taken.iter().filter(|taken| taken.stage == stage).collect();
+        if others.len() >= PLACES {
+            let count = |client: Client| {
+                others.iter().map(|taken| taken.client).chain([new.client]).filter(|&one| one == client).count()
+            };
+            let most = others.iter().map(|taken| count(taken.client)).max();
+            let mut those = others.iter().filter(|taken| Some(count(taken.client)) == most);
+            let goes = match stage {
+                // A page that listens already stays with its machines.
+                Stage::Listening => those.next_back(),
+                // One that waits for its client is the oldest soon; one that is just answered is not.
+                Stage::Opening | Stage::Asking | Stage::Holding => those.next(),
+            };
+            if let Some(number) = goes.map(|taken| taken.number) {
+                self.leave(number);
+            }
+        }
+        self.taken.push(new);
     }
 
-    /// A place for a connection from this address, if there is one.
-    pub fn take(&self, address: IpAddr) -> Option<Place> {
-        let mut taken = self.taken.lock().unwrap_or_else(PoisonError::into_inner);
-        let own = taken.get(&address).copied().unwrap_or_default();
-        let is_free = own < self.most_of_one && taken.values().sum::<usize>() < ALL;
-        is_free.then(|| {
-            taken.insert(address, own + 1);
-            Place { address, places: self.clone() }
-        })
+    fn leave(&mut self, number: u64) -> Option<Taken> {
+        let index = self.taken.iter().position(|taken| taken.number == number)?;
+        Some(self.taken.remove(index))
+    }
+}
+
+impl Place {
+    /// The connection is of this client, and enters a stage as its last. One that has lost its place already stays out.
+    pub fn enter(&self, stage: Stage, client: Client) {
+        let mut table = self.places.table();
+        if let Some(taken) = table.leave(self.number) {
+            table.enter(Taken { stage, client, ..taken });
+        }
     }
 }
 
 impl Drop for Place {
     fn drop(&mut self) {
-        let mut taken = self.places.taken.lock().unwrap_or_else(PoisonError::into_inner);
-        match taken.get_mut(&self.address) {
-            Some(own) if *own > 1 => *own -= 1,
-            _ => {
-                taken.remove(&self.address);
-            }
-        }
+        self.places.table().leave(self.number);
     }
 }
 
@@ -61,29 +133,98 @@ impl Drop for Place {
 mod tests {
     use super::*;
     use std::net::Ipv4Addr;
+    use tokio::sync::oneshot::error::TryRecvError;
 
-    fn address(last: u8) -> IpAddr {
-        Ipv4Addr::new(192, 168, 1, last).into()
+    struct Connection(Place, End);
+
+    impl Connection {
+        fn is_open(&mut self) -> bool {
+            self.1.try_recv() == Err(TryRecvError::Empty)
+        }
+
+        fn enter(self, stage: Stage, client: Client) -> Self {
+            self.0.enter(stage, client);
+            self
+        }
+    }
+
+    fn take(places: &Places, last: u8) -> Connection {
+        let (place, end) = places.take(Ipv4Addr::new(192, 168, 1, last).into());
+        Connection(place, end)
+    }
+
+    fn open(connections: &mut [Connection]) -> Vec<usize> {
+        (0..connections.len()).filter(|&number| connections[number].is_open()).collect()
     }
 
     #[test]
-    fn one_address_cannot_take_all_places_and_gets_its_own_back() {
-        let places = Places::for_many();
-        let mut taken: Vec<Place> = (0..ALL / 4).map(|_| places.take(address(1)).unwrap()).collect();
-        assert!(places.take(address(1)).is_none());
-        assert!(places.take(address(2)).is_some());
-        taken.pop();
-        assert!(places.take(address(1)).is_some());
-        drop(taken);
-        assert!(places.taken.lock().unwrap().is_empty());
+    fn the_oldest_new_connection_of_the_address_with_the_most_goes() {
+        let places = Places::default();
+        let mut phone = take(&places, 1);
+        let mut attack: Vec<_> = (0..200).map(|number| take(&places, 2 + number % 4)).collect();
+        assert!(phone.is_open());
+        assert_eq!(open(&mut attack), (200 - (PLACES - 1)..200).collect::<Vec<_>>());
+        drop(attack);
+        let mut alone: Vec<_> = (0..PLACES - 1).map(|_| take(&places, 2)).collect();
+        assert_eq!((phone.is_open(), open(&mut alone).len()), (true, PLACES - 1));
     }
 
     #[test]
-    fn all_addresses_together_have_so_many_and_no_more() {
-        let places = Places::for_many();
-        let taken: Vec<Place> = (0..ALL).map(|number| places.take(address(number as u8)).unwrap()).collect();
-        assert!(places.take(address(200)).is_none());
-        drop(taken);
-        assert!(places.take(address(200)).is_some());
+    fn of_as_many_addresses_as_there_are_places_the_oldest_goes_and_the_newest_stays() {
+        let places = Places::default();
+        let mut connections: Vec<_> = (0..=PLACES as u8).map(|last| take(&places, last)).collect();
+        assert_eq!(open(&mut connections), (1..=PLACES).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn a_stage_takes_no_place_of_another() {
+        use Stage::{Asking, Holding, Listening, Opening};
+        for stage in [Opening, Asking, Listening, Holding] {
+            let places = Places::default();
+            let others = [Opening, Asking, Listening, Holding].into_iter().filter(|&other| other != stage);
+            let mut others: Vec<_> = others.map(|other| take(&places, 1).enter(other, Client::Phone(1))).collect();
+            let mut attack: Vec<_> = (0..200).map(|_| take(&places, 1).enter(stage, Client::Phone(1))).collect();
+            assert_eq!(open(&mut attack).len(), PLACES, "{stage:?}");
+            assert_eq!(open(&mut others).len(), 3, "{stage:?}");
+        }
+    }
+
+    #[test]
+    fn a_phone_keeps_its_connection_whatever_another_opens() {
+        for stage in [Stage::Asking, Stage::Listening, Stage::Holding] {
+            let places = Places::default();
+            let mut phone = take(&places, 1).enter(stage, Client::Phone(1));
+            let mut attack: Vec<_> = (0..200).map(|_| take(&places, 1).enter(stage, Client::Phone(2))).collect();
+            let mut later = take(&places, 1).enter(stage, Client::Phone(1));
+            assert!(phone.is_open() && later.is_open(), "{stage:?}");
+            assert_eq!(open(&mut attack).len(), PLACES - 2, "{stage:?}");
+        }
+    }
+
+    #[test]
+    fn the_stream_that_came_first_stays_and_the_last_gives_way() {
+        let places = Places::default();
+        let mut streams: Vec<_> = (0..200).map(|_| take(&places, 1).enter(Stage::Listening, Client::Here)).collect();
+        assert_eq!(open(&mut streams), (0..PLACES - 1).chain([199]).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn the_connection_that_asked_last_stays_and_the_one_that_asked_first_gives_way() {
+        let places = Places::default();
+        let asking = || take(&places, 1).enter(Stage::Asking, Client::Here);
+        let mut connections: Vec<_> = (0..PLACES).map(|_| asking()).collect();
+        connections[0].0.enter(Stage::Asking, Client::Here);
+        connections.push(asking());
+        assert_eq!(open(&mut connections), [0].into_iter().chain(2..=PLACES).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn a_place_is_free_again_and_one_that_is_lost_does_not_come_back() {
+        let places = Places::default();
+        let mut connections: Vec<_> = (0..=PLACES).map(|_| take(&places, 1)).collect();
+        connections[0].0.enter(Stage::Holding, Client::Phone(1));
+        assert!(!connections[0].is_open());
+        drop(connections);
+        assert!(places.table().taken.is_empty());
     }
 }

@@ -14,17 +14,19 @@
 
 use super::door::{Door, Knock};
 use super::hub::{Hub, Message};
+use super::lengths::Lengths;
 use super::machine::{Machine, Tell, Typed};
 use super::page::{File, Page, form};
 use super::pairing::{Pairing, TOKEN_LENGTH, Token, Try, hexadecimal};
+use super::places::{Client, Place, Stage};
 use super::rules::{self, Forbidden, Order, Reach};
 use axum::Extension;
 use axum::Router;
-use axum::body::{Body, to_bytes};
+use axum::body::{Body, Bytes, to_bytes};
 use axum::extract::{Path, Request, State};
 use axum::http::header::{
-    CACHE_CONTROL, CONTENT_SECURITY_POLICY, CONTENT_TYPE, COOKIE, HOST, HeaderName, LOCATION, ORIGIN, REFERRER_POLICY,
-    RETRY_AFTER, SET_COOKIE, X_CONTENT_TYPE_OPTIONS,
+    CACHE_CONTROL, CONTENT_LENGTH, CONTENT_SECURITY_POLICY, CONTENT_TYPE, COOKIE, HOST, HeaderName, LOCATION, ORIGIN,
+    REFERRER_POLICY, RETRY_AFTER, SET_COOKIE, TRANSFER_ENCODING, X_CONTENT_TYPE_OPTIONS,
 };
 use axum::http::{HeaderMap, HeaderValue, Method, StatusCode, Uri};
 use axum::middleware::{Next, from_fn_with_state};
@@ -34,10 +36,12 @@ use axum::routing::{get, post};
 use futures_util::future::join_all;
 use futures_util::stream::{self, Stream, StreamExt};
 use std::convert::Infallible;
+use std::error::Error;
 use std::net::IpAddr;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 use tokio::sync::broadcast::error::RecvError;
+use tokio::task::yield_now;
 use tokio::time::timeout;
 
 /// Bytes that a request's body has at the most: a command has 80.
@@ -52,9 +56,9 @@ const ANSWER_TIME: Duration = Duration::from_secs(30);
 /// Time after which a page hears that the computer is still there: it waits six times as long before it says that it is not.
 const BEAT: Duration = Duration::from_millis(500);
 
-/// Nothing but this program's own, and nobody may put it into a frame.
-const POLICY: &str = "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; img-src 'self' data:; \
-    connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+/// Nothing but this program's own, and no other page may put it into a frame. The page makes its worker and its maps itself (`blob:`).
+const POLICY: &str = "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; worker-src blob:; style-src 'self'; \
+    img-src 'self' data: blob:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
 /// Cookies are shared by all ports of an address.
 const COOKIE_NAME: &str = "weeder";
@@ -87,11 +91,23 @@ pub struct Visitor {
     pub address: IpAddr,
     /// The door.
     pub door: Arc<Door>,
+    /// The place of the connection.
+    pub place: Arc<Place>,
+    /// Its `Content-Length` lines.
+    pub lengths: Arc<Lengths>,
 }
 
-/// Whether a request may see the page.
+/// The client of a request that may see the page; none where it may not.
 #[derive(Clone, Copy)]
-struct MaySee(bool);
+struct Known(Option<Client>);
+
+impl Known {
+    fn enter(self, place: &Place, stage: Stage) {
+        if let Some(client) = self.0 {
+            place.enter(stage, client);
+        }
+    }
+}
 
 /// All paths.
 pub fn routes(served: Arc<Served>) -> Router {
@@ -115,10 +131,12 @@ pub fn routes(served: Arc<Served>) -> Router {
 async fn admit(
     State(served): State<Arc<Served>>,
     Extension(visitor): Extension<Visitor>,
-    mut request: Request,
+    request: Request,
     next: Next,
 ) -> Response {
-    let is_paired = cookies(request.headers()).any(|token| served.pairing().is_paired(token));
+    // A client that sends many requests ahead lets the others go first.
+    yield_now().await;
+    let phone = cookies(request.headers()).find_map(|token| served.pairing().phone(token));
     let (hosts, origins) = (all(request.headers(), HOST), all(request.headers(), ORIGIN));
     let sites = all(request.headers(), HeaderName::from_static("sec-fetch-site"));
     let knock = Knock {
@@ -128,13 +146,21 @@ async fn admit(
         hosts: &hosts,
         origins: &origins,
         sites: &sites,
-        is_paired,
+        is_paired: phone.is_some(),
     };
     let mut response = match visitor.door.admit(&knock) {
-        Ok(()) => {
-            request.extensions_mut().insert(MaySee(is_paired || visitor.door.reach == Reach::Here));
-            next.run(request).await
-        }
+        Ok(()) => match whole(request, &visitor.lengths).await {
+            Ok(mut request) => {
+                let known = Known(match visitor.door.reach {
+                    Reach::Here => Some(Client::Here),
+                    Reach::Lan { .. } => phone.map(Client::Phone),
+                });
+                known.enter(&visitor.place, Stage::Asking);
+                request.extensions_mut().insert(known);
+                next.run(request).await
+            }
+            Err(problem) => problem,
+        },
         Err(denial) => {
             let status = StatusCode::from_u16(denial.status()).unwrap_or(StatusCode::FORBIDDEN);
             (status, format!("{denial}\n")).into_response()
@@ -170,8 +196,8 @@ fn file(file: &File) -> impl IntoResponse + use<> {
 }
 
 /// The page, or the form for the code.
-async fn front(State(served): State<Arc<Served>>, Extension(MaySee(may_see)): Extension<MaySee>, uri: Uri) -> Response {
-    if !may_see {
+async fn front(State(served): State<Arc<Served>>, Extension(Known(known)): Extension<Known>, uri: Uri) -> Response {
+    if known.is_none() {
         return ([(CONTENT_TYPE, "text/html; charset=utf-8")], form::HTML).into_response();
     }
     // By this the page knows that there is a machine at its other end.
@@ -184,16 +210,13 @@ async fn front(State(served): State<Arc<Served>>, Extension(MaySee(may_see)): Ex
 /// Pairs whoever sends the code.
 async fn pair(
     State(served): State<Arc<Served>>,
-    Extension(Visitor { address, door }): Extension<Visitor>,
-    body: Body,
+    Extension(Visitor { address, door, .. }): Extension<Visitor>,
+    body: Bytes,
 ) -> Response {
     if door.reach == Reach::Here {
-        return (StatusCode::NOT_FOUND, "at this computer nobody needs a code\n").into_response();
+        return (StatusCode::NOT_FOUND, "this computer needs no code\n").into_response();
     }
-    let typed = match text(body).await {
-        Ok(typed) => typed,
-        Err(problem) => return problem,
-    };
+    let Ok(typed) = String::from_utf8(body.into()) else { return no_line() };
     let tried = served.pairing().try_code(&typed, Instant::now());
     match tried {
         Try::Right => {
@@ -242,27 +265,28 @@ async fn machines(
 /// Types a line to a machine, where that may be, and gives its answer.
 async fn command(
     State(served): State<Arc<Served>>,
-    Extension(Visitor { door, .. }): Extension<Visitor>,
+    Extension(Visitor { door, place, .. }): Extension<Visitor>,
+    Extension(known): Extension<Known>,
     Path(number): Path<usize>,
-    body: Body,
+    body: Bytes,
 ) -> Response {
     let Some(machine) = served.machines.get(number) else {
         return refused(StatusCode::NOT_FOUND, "there is no such machine");
     };
-    let line = match text(body).await {
-        Ok(line) => line,
-        Err(problem) => return problem,
-    };
+    let Ok(line) = String::from_utf8(body.into()) else { return no_line() };
     let order = match rules::allow(&line, door.reach) {
         Ok(order) => order,
-        Err(why @ Forbidden::NoLine) => return refused(StatusCode::BAD_REQUEST, &why.to_string()),
+        Err(Forbidden::NoLine) => return no_line(),
         Err(why) => return refused(StatusCode::FORBIDDEN, &why.to_string()),
     };
     if let Some(why) = served.hub.why_lost(number) {
         return refused(StatusCode::SERVICE_UNAVAILABLE, &why);
     }
     let typed = match order {
-        Order::Hold => timeout(ANSWER_TIME, machine.hold()).await,
+        Order::Hold => {
+            known.enter(&place, Stage::Holding);
+            timeout(ANSWER_TIME, machine.hold()).await
+        }
         Order::Type => timeout(ANSWER_TIME, machine.command(line)).await,
     };
     match typed {
@@ -275,7 +299,12 @@ async fn command(
 }
 
 /// Has all machines hold at once, which whoever comes in may: of each why it has not obeyed, or nothing, and the time of the last that has.
-async fn hold_all(State(served): State<Arc<Served>>) -> impl IntoResponse {
+async fn hold_all(
+    State(served): State<Arc<Served>>,
+    Extension(Visitor { place, .. }): Extension<Visitor>,
+    Extension(known): Extension<Known>,
+) -> impl IntoResponse {
+    known.enter(&place, Stage::Holding);
     let since = Instant::now();
     let holds = served.machines.iter().map(|machine| async move {
         let typed = timeout(ANSWER_TIME, machine.hold()).await;
@@ -315,18 +344,41 @@ fn plain() -> [(HeaderName, &'static str); 1] {
     [(CONTENT_TYPE, "text/plain; charset=utf-8")]
 }
 
-/// A short body that is text, or what is wrong with it.
-async fn text(body: Body) -> Result<String, Response> {
-    let bytes = match timeout(BODY_TIME, to_bytes(body, BODY_BYTES)).await {
-        Ok(Ok(bytes)) => bytes,
-        Ok(Err(_)) => return Err(refused(StatusCode::PAYLOAD_TOO_LARGE, &Forbidden::NoLine.to_string())),
-        Err(_) => return Err(refused(StatusCode::REQUEST_TIMEOUT, "the line has not come")),
-    };
-    String::from_utf8(bytes.to_vec()).map_err(|_| refused(StatusCode::BAD_REQUEST, &Forbidden::NoLine.to_string()))
+/// A request with all of its short body, or what is wrong with it.
+async fn whole(request: Request, lengths: &Lengths) -> Result<Request, Response> {
+    let headers = request.headers();
+    if lengths.are_two(headers.get_all(CONTENT_LENGTH).iter().count(), headers.contains_key(TRANSFER_ENCODING)) {
+        return Err(refused(StatusCode::BAD_REQUEST, "send Content-Length or Transfer-Encoding, not both"));
+    }
+    let (head, body) = request.into_parts();
+    match timeout(BODY_TIME, to_bytes(body, BODY_BYTES)).await {
+        Ok(Ok(bytes)) => Ok(Request::from_parts(head, Body::from(bytes))),
+        // Else it is too long.
+        Ok(Err(error)) if is_malformed(&error) => {
+            Err(refused(StatusCode::BAD_REQUEST, "the body is no chunks of HTTP, or ends too soon"))
+        }
+        Ok(Err(_)) => Err(refused(StatusCode::PAYLOAD_TOO_LARGE, &Forbidden::NoLine.to_string())),
+        Err(_) => Err(refused(StatusCode::REQUEST_TIMEOUT, "the line has not come")),
+    }
+}
+
+/// Whether hyper could not read a body.
+fn is_malformed(error: &(dyn Error + 'static)) -> bool {
+    std::iter::successors(Some(error), |&error| error.source()).any(|error| error.is::<hyper::Error>())
+}
+
+/// A line that is none.
+fn no_line() -> Response {
+    refused(StatusCode::BAD_REQUEST, &Forbidden::NoLine.to_string())
 }
 
 /// What all machines are and say, for as long as the page reads it.
-async fn events(State(served): State<Arc<Served>>) -> Sse<impl Stream<Item = Result<Event, Infallible>>> {
+async fn events(
+    State(served): State<Arc<Served>>,
+    Extension(Visitor { place, .. }): Extension<Visitor>,
+    Extension(known): Extension<Known>,
+) -> Sse<impl Stream<Item = Result<Event, Infallible>> + use<>> {
+    known.enter(&place, Stage::Listening);
     Sse::new(heard(&served.hub).map(|message| Ok(Event::default().data(&*message))))
 }
 
@@ -367,7 +419,7 @@ mod tests {
             let mut page = pin!(heard(&hub));
             assert!(page.next().await.unwrap().contains("lost"));
             assert_eq!(page.next().await.as_deref(), Some(r#"{"is":"beat"}"#));
-            hub.there(0, "0.1.0");
+            hub.there(0, "0.2.0");
             assert!(page.next().await.unwrap().contains("there"));
         });
     }

@@ -18,9 +18,10 @@ struct Program {
 
 const FIRMWARE: Program = Program { package: "weeder-firmware", alias: "firmware" };
 const BENCH: Program = Program { package: "knn-bench", alias: "bench-firmware" };
+const TESTER: Program = Program { package: "tester-firmware", alias: "tester-firmware" };
 
 /// What an outer cargo, or a shell, may have set that would change how the firmware is compiled.
-const FOREIGN_SETTINGS: [&str; 7] = [
+const FOREIGN_SETTINGS: [&str; 8] = [
     // Either of the flags replaces the target-cpu of .cargo/config.toml.
     "RUSTFLAGS",
     "CARGO_ENCODED_RUSTFLAGS",
@@ -31,6 +32,8 @@ const FOREIGN_SETTINGS: [&str; 7] = [
     "RUSTC",
     // The workspace's rust-toolchain.toml decides.
     "RUSTUP_TOOLCHAIN",
+    // A release's firmware says its commit: what is measured on another one is true of all.
+    "WEEDER_COMMIT",
 ];
 
 /// Why the firmware could not be built.
@@ -71,6 +74,16 @@ pub fn build() -> Result<PathBuf, BuildError> {
 pub fn build_bench() -> Result<PathBuf, BuildError> {
     static BUILT: OnceLock<Result<PathBuf, BuildError>> = OnceLock::new();
     BUILT.get_or_init(|| BENCH.build()).clone()
+}
+
+/// Builds the firmware of the tester, the Uno that checks another one, and returns the path of its ELF.
+///
+/// # Errors
+///
+/// As [`build`].
+pub fn build_tester() -> Result<PathBuf, BuildError> {
+    static BUILT: OnceLock<Result<PathBuf, BuildError>> = OnceLock::new();
+    BUILT.get_or_init(|| TESTER.build()).clone()
 }
 
 impl Program {

@@ -13,15 +13,16 @@
 //!   program's wrong one goes unnoticed. What no program has read is lost when the next one opens the port.
 //! - **The machine.** It stands, gains its speed ahead of the row, rolls past it and brakes behind it; after a few seconds it does
 //!   so again, forward, with the same row before it. The tool does what the firmware says and the row does not mind.
+//! - **The end switch.** It closes while the arm is fully out, as the machine's servo turns it by the pulses on its line.
 //! - **The receiver.** Where there is a satellite receiver on the machine, it has a pseudo terminal of its own.
 //! - **EEPROM.** It is read from a file at the start, where there is one, and written to it whenever it has changed.
 
 use crate::receiver::{ReceiverSetup, SimulatedReceiver};
-use field::machine::{Machine, cycle_at};
+use field::machine::{Machine, cycle_at, time_at_s};
 use field::motion::Motion;
 use field::row::Row;
+use field::servo::{Servo, Stroke};
 use field::wiring;
-use signal::{CYCLES_PER_SECOND, PinChange};
 use std::collections::VecDeque;
 use std::io::{self, ErrorKind};
 use std::ops::Range;
@@ -33,6 +34,7 @@ use thiserror::Error;
 use uno::elf::EEPROM_BYTES;
 use uno::hex::Bootloader;
 use uno::pty::{Pty, PtyError};
+use uno::{CYCLES_PER_SECOND, PinChange, Pulse};
 use uno::{Uno, UnoError};
 
 mod background;
@@ -69,6 +71,10 @@ pub struct Course {
     speed_mm_s: f64,
     /// The ground on which something stands, in this row or another of the machine.
     span_mm: Range<f64>,
+    /// Share of the wheel's distance that slip takes.
+    slip: f64,
+    /// Time for which it stands before it rolls for the first time, in seconds.
+    stands_first_s: u64,
 }
 
 /// Why a live Uno could not start, or stopped.
@@ -134,7 +140,7 @@ const TICKS_IN_A_PERIOD: f64 = 4.0;
 impl Course {
     /// A machine with one row.
     pub fn new(row: Row, machine: Machine, speed_mm_s: f64) -> Self {
-        Self { span_mm: row.span_mm(), row, machine, speed_mm_s }
+        Self { span_mm: row.span_mm(), row, machine, speed_mm_s, slip: 0.0, stands_first_s: STANDING_S }
     }
 
     /// A machine with several rows and one wheel: a course for each row, all of which roll along the same ground at the same time.
@@ -142,7 +148,26 @@ impl Course {
         let spans = || rows.iter().map(Row::span_mm);
         let start = spans().map(|span| span.start).fold(f64::INFINITY, f64::min);
         let end = spans().map(|span| span.end).fold(f64::NEG_INFINITY, f64::max);
-        rows.into_iter().map(|row| Self { row, machine, speed_mm_s, span_mm: start..end }).collect()
+        rows.into_iter()
+            .map(|row| Self { row, machine, speed_mm_s, span_mm: start..end, slip: 0.0, stands_first_s: STANDING_S })
+            .collect()
+    }
+
+    /// The same, with a wheel that turns farther than the machine rolls by this share of its distance.
+    #[must_use]
+    pub fn slipping(self, slip: f64) -> Self {
+        Self { slip, ..self }
+    }
+
+    /// The same, which stands this long before it rolls for the first time: what needs a machine at rest has time for it.
+    pub fn standing_first(self, stands_first_s: u64) -> Self {
+        Self { stands_first_s, ..self }
+    }
+
+    /// How far the machine rolls each time.
+    pub fn rolls_mm(&self) -> f64 {
+        let motion = self.motion();
+        motion.end_mm() - motion.start_mm()
     }
 
     /// How the machine rolls along the row once. It ends with the encoder's channels as they were.
@@ -151,10 +176,11 @@ impl Course {
         let start_mm = span.start - AHEAD_MM;
         let braking_mm = self.speed_mm_s.powi(2) / (2.0 * ACCELERATION_MM_S2);
         let wanted_mm = span.end + self.machine.beam_to_tool_mm + BEHIND_MM + braking_mm - start_mm;
-        let period_mm = TICKS_IN_A_PERIOD * self.machine.tick_mm();
+        let period_mm = TICKS_IN_A_PERIOD * self.machine.tick_mm() * (1.0 - self.slip);
         let length_mm = (wanted_mm / period_mm).ceil() * period_mm;
         Motion::steady(start_mm, ACCELERATION_MM_S2, self.speed_mm_s, start_mm + length_mm - braking_mm)
             .change_speed(0.0, ACCELERATION_MM_S2)
+            .with_slip(|| self.slip)
     }
 
     /// What the machine does to the pins, beginning at a cycle, the cycle at which it stands again, and how it rolls.
@@ -218,6 +244,63 @@ fn give(pty: &mut Pty, unread: &mut VecDeque<u8>) -> Result<(), LiveError> {
     Ok(())
 }
 
+/// The arm that the servo swings, and the switch at its end.
+struct Arm {
+    servo: Servo,
+    clear_within_degrees: f64,
+    /// When the pulse on the line began.
+    rise: Option<u64>,
+    /// The pulses that asked for another angle than the one before.
+    pulses: Vec<Pulse>,
+    stroke: Option<Stroke>,
+    is_out: bool,
+}
+
+/// Swings that are remembered: enough for a day, after which their chances begin again.
+const SWINGS: usize = 10_000;
+
+impl Arm {
+    fn of(machine: &Machine) -> Self {
+        let Machine { servo, clear_within_degrees, .. } = *machine;
+        Self { servo, clear_within_degrees, rise: None, pulses: Vec::new(), stroke: None, is_out: false }
+    }
+
+    /// Takes the changes of the pins; whether the arm is fully out at a cycle, where that is another answer than before.
+    fn turn(&mut self, changes: &[PinChange], cycle: u64) -> Option<bool> {
+        for change in changes.iter().filter(|change| change.pin == wiring::SERVO) {
+            match (change.high, self.rise.take()) {
+                (true, _) => self.rise = Some(change.cycle),
+                (false, Some(rise)) => self.hear(Pulse { rise, fall: change.cycle }),
+                (false, None) => {}
+            }
+        }
+        let degrees = self.stroke.as_ref()?.degrees(time_at_s(0, cycle));
+        // The firmware may have another stroke than the machine is made for: out is where its pulse for that leads.
+        let out_degrees = self.servo.stroke_degrees().min(self.farthest_degrees());
+        let is_out = degrees >= out_degrees - self.clear_within_degrees;
+        let changes = is_out != self.is_out;
+        self.is_out = is_out;
+        changes.then_some(is_out)
+    }
+
+    /// The greatest angle that was asked for lately.
+    fn farthest_degrees(&self) -> f64 {
+        let last = self.pulses.len().saturating_sub(2);
+        self.servo.commands(&self.pulses[last..]).iter().map(|command| command.degrees).fold(0.0, f64::max)
+    }
+
+    fn hear(&mut self, pulse: Pulse) {
+        if self.pulses.last().is_some_and(|last| (last.width_us() - pulse.width_us()).abs() < 1.0) {
+            return;
+        }
+        if self.pulses.len() == SWINGS {
+            self.pulses.drain(..SWINGS - 2);
+        }
+        self.pulses.push(pulse);
+        self.stroke = Some(self.servo.stroke(&self.servo.commands(&self.pulses), 0));
+    }
+}
+
 /// A virtual Uno at a pseudo terminal.
 pub struct LiveUno {
     uno: Uno,
@@ -227,6 +310,7 @@ pub struct LiveUno {
     link: Option<PathBuf>,
     receiver: Option<Receiver>,
     course: Option<Course>,
+    arm: Option<Arm>,
     way: Way,
     /// When the machine sets off again.
     sets_off: u64,
@@ -261,9 +345,10 @@ impl LiveUno {
             pty: Some(pty),
             link: setup.link,
             receiver: setup.receiver.map(Receiver::start).transpose()?,
+            arm: setup.course.as_ref().map(|course| Arm::of(&course.machine)),
+            sets_off: setup.course.as_ref().map_or(STANDING_S, |course| course.stands_first_s) * CYCLES_PER_SECOND,
             course: setup.course,
             way: Way { before_mm: 0.0, since: None },
-            sets_off: STANDING_S * CYCLES_PER_SECOND,
             eeprom,
             unread: VecDeque::new(),
             resets_when_opened: !setup.keeps_running_when_opened,
@@ -305,8 +390,13 @@ impl LiveUno {
         self.slices += 1;
         // Not so much longer as the last instruction of each slice: several of them share a wheel.
         self.uno.run_until(self.slices * SLICE_MS * (CYCLES_PER_SECOND / 1000))?;
-        // Nobody looks at them, and they would pile up.
-        self.uno.take_changes();
+        // They would pile up.
+        let changes = self.uno.take_changes();
+        if let Some(arm) = &mut self.arm
+            && let Some(is_out) = arm.turn(&changes, self.uno.cycle())
+        {
+            self.uno.set(wiring::END_SWITCH, !is_out);
+        }
         if self.slices.is_multiple_of(EEPROM_SLICES) { self.keep_eeprom() } else { Ok(()) }
     }
 

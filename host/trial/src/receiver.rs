@@ -8,9 +8,9 @@
 //! A real one's error wanders for minutes instead of changing from fix to fix. That a machine sways and turns is left
 //! out too.
 
-use places::plane::{Metres, Place, Plane};
-use places::sentence::DAY_MS;
-use places::track::Offset;
+use gps::plane::{Metres, Place, Plane};
+use gps::sentence::DAY_MS;
+use gps::track::Offset;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};

@@ -7,9 +7,9 @@ use crate::console::Status;
 use crate::run::{TrialError, boot};
 use control::measure::quadrature::{Channels, Quadrature, Step};
 use field::wiring;
-use signal::{CYCLES_PER_SECOND, PinChange};
 use std::path::Path;
 use uno::capture::Capture;
+use uno::{CYCLES_PER_SECOND, PinChange};
 
 /// What the firmware counted, relative to its position when the recording began.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

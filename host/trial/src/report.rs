@@ -76,6 +76,7 @@ fn verdict_cell(verdict: Verdict) -> Cell {
 pub fn totals(trial: &Trial, outcome: &Outcome) -> String {
     let Outcome { judgement, status, .. } = outcome;
     let plants = judgement.plants.len();
+    let kept = if trial.timing.stem_zone_mm == 0 { "canopy" } else { "stem zone" };
     let mut text = String::new();
     // Writing to a String cannot fail.
     let mut line = |label: &str, words: String| {
@@ -92,7 +93,7 @@ pub fn totals(trial: &Trial, outcome: &Outcome) -> String {
         ),
     );
     if let Some(depth_mm) = deepest_mm(&judgement.plants) {
-        line("", format!("the tool reached {depth_mm:.0} mm into the canopy that was hit worst"));
+        line("", format!("the tool reached {depth_mm:.0} mm into the {kept} that was hit worst"));
     }
     if judgement.idle_swings > 0 {
         line("", format!("the tool swung out {} for no plant", counted(judgement.idle_swings, "time")));
@@ -109,7 +110,7 @@ pub fn totals(trial: &Trial, outcome: &Outcome) -> String {
     line(
         "Row weeded",
         format!(
-            "{:.1} % of the row's {:.2} m; with every canopy and its margin kept, this servo allows {:.1} % at most",
+            "{:.1} % of the row's {:.2} m; with every {kept} and its margin kept, this servo allows {:.1} % at most",
             judgement.weeded_share * 100.0,
             (span.end - span.start) / 1000.0,
             judgement.weedable_share * 100.0,
@@ -276,7 +277,7 @@ pub(crate) mod tests {
     use field::motion::mm_s;
     use field::row::Thing;
     use field::verdict::{Timing, judge};
-    use signal::{CYCLES_PER_SECOND, Pulse};
+    use uno::{CYCLES_PER_SECOND, Pulse};
 
     /// A trial in which the tool stayed in the row from one second on, and what came of it.
     pub fn ruined_row() -> (Trial, Outcome) {

@@ -13,10 +13,10 @@ use field::verdict::{Judgement, judge};
 use field::wiring;
 use link::examples;
 use link::settings::name;
-use signal::{CYCLES_PER_SECOND, PinChange, Pulse};
 use std::path::Path;
 use thiserror::Error;
 use uno::elf::Size;
+use uno::{CYCLES_PER_SECOND, PinChange, Pulse};
 use uno::{Uno, UnoError};
 
 /// Why a trial had no outcome.

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 use vcd::{Command, IdCode, Parser, Scope, ScopeItem, TimescaleUnit, Value, Var};
 
-use signal::{CYCLES_PER_SECOND, Pin, PinChange};
+use crate::pins::{CYCLES_PER_SECOND, Pin, PinChange};
 
 /// Why a recording cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -280,7 +280,7 @@ fn find_channel(path: &Path, name: &str, known: &[(String, &Var)]) -> Result<IdC
 #[cfg(test)]
 mod tests {
     use super::*;
-    use signal::Wire;
+    use crate::pins::Wire;
 
     const CHANNELS: [(Pin, &str); 2] = [(Pin::D2, "A"), (Pin::D3, "B")];
 
@@ -292,7 +292,7 @@ mod tests {
     }
 
     fn parse(file: &str, channels: &[(Pin, &str)]) -> Result<Vec<(u64, Pin, bool)>, String> {
-        Capture::parse(Path::new("row.vcd"), file.as_bytes(), channels)
+        Capture::parse(Path::new("pins.vcd"), file.as_bytes(), channels)
             .map(|capture| capture.changes.iter().map(|change| (change.cycle, change.pin, change.high)).collect())
             .map_err(|error| error.to_string())
     }
@@ -320,7 +320,7 @@ mod tests {
         let error = |channels: &[(Pin, &str)]| parse(&file, channels).unwrap_err();
         let with_b = |b| [CHANNELS[0], (Pin::D3, b)];
         let unknown = error(&with_b("C"));
-        assert_eq!(unknown, "row.vcd has no channel `C`; it has `A`, `B`, `bus`");
+        assert_eq!(unknown, "pins.vcd has no channel `C`; it has `A`, `B`, `bus`");
         assert!(error(&with_b("bus")).contains("8 bits wide"));
         assert!(error(&with_b("A")).contains("given for two signals"));
         assert!(error(&[CHANNELS[0], CHANNELS[1], (Pin::D8, "B")]).contains("given for two signals"));
@@ -333,7 +333,7 @@ mod tests {
             .replace("$enddefinitions", "$scope module other $end $var wire 1 $ A $end $upscope $end $enddefinitions");
         assert_eq!(
             parse(&file, &CHANNELS).unwrap_err(),
-            "row.vcd has several channels `A`: write one of `analyser.A`, `other.A`"
+            "pins.vcd has several channels `A`: write one of `analyser.A`, `other.A`"
         );
         let chosen = parse(&file, &[(Pin::D2, "other.A"), CHANNELS[1]]).unwrap();
         assert!(chosen.contains(&(0, Pin::D2, true)));
@@ -343,22 +343,22 @@ mod tests {
     fn a_recording_that_leaves_levels_open_is_refused() {
         let error = |file: &str| parse(file, &CHANNELS).unwrap_err();
         let open = error(&recording("1 us", "#0 0! 0\"\n#5 x!"));
-        assert!(open.contains("channel `A` of row.vcd is `x` at line 9"), "{open}");
+        assert!(open.contains("channel `A` of pins.vcd is `x` at line 9"), "{open}");
         assert!(error(&recording("1 us", "#0 0!")).contains("no samples of channel `B`"));
         assert!(error(&recording("1 us", "#5 0! 0\" #4 1!")).contains("back in time"));
         assert!(error(&recording("1 us", "").replace("$timescale 1 us $end", "")).contains("no $timescale"));
-        assert!(error("").contains("row.vcd could not be read"));
-        assert!(error("position_mm,width_mm,kind\n").contains("row.vcd could not be read"));
+        assert!(error("").contains("pins.vcd could not be read"));
+        assert!(error("position,width\n").contains("pins.vcd could not be read"));
     }
 
     #[test]
     fn a_recording_that_would_never_end_or_is_nested_without_end_is_refused() {
         let endless = parse(&recording("1 s", "#0 0! 0\"\n#18446744073709551615 1!"), &CHANNELS).unwrap_err();
-        assert!(endless.contains("row.vcd goes on beyond 24 h at line 9"), "{endless}");
+        assert!(endless.contains("pins.vcd goes on beyond 24 h at line 9"), "{endless}");
         let nested = "$timescale 1 us $end\n".to_owned() + &"$scope module a $end\n".repeat(100_000);
-        let error = Capture::parse(Path::new("row.vcd"), nested.as_bytes(), &CHANNELS).unwrap_err();
+        let error = Capture::parse(Path::new("pins.vcd"), nested.as_bytes(), &CHANNELS).unwrap_err();
         assert!(std::error::Error::source(&error).unwrap().to_string().contains("more than 50 scopes"), "{error}");
-        let error = Capture::parse(Path::new("row.vcd"), vec![b' '; 2 << 20].as_slice(), &CHANNELS).unwrap_err();
+        let error = Capture::parse(Path::new("pins.vcd"), vec![b' '; 2 << 20].as_slice(), &CHANNELS).unwrap_err();
         assert!(std::error::Error::source(&error).unwrap().to_string().contains("no $enddefinitions"), "{error}");
     }
 
@@ -373,23 +373,22 @@ mod tests {
     #[test]
     fn a_waveform_reads_back_to_the_very_cycles() {
         let wires = [
-            Wire { pin: Pin::D2, name: "encoder_a", high_at_rest: false },
-            Wire { pin: Pin::D3, name: "encoder_b", high_at_rest: false },
-            Wire { pin: Pin::D8, name: "beam", high_at_rest: true },
+            Wire { pin: Pin::D2, name: "clock", high_at_rest: false },
+            Wire { pin: Pin::D3, name: "data", high_at_rest: false },
+            Wire { pin: Pin::D8, name: "button", high_at_rest: true },
         ];
         let mut written = Vec::new();
         for count in 1..500_u64 {
             written.push(PinChange {
                 cycle: count * count * 7919,
                 pin: [Pin::D2, Pin::D3, Pin::D8][count as usize % 3],
-                // The beam begins high, the encoder low.
+                // The button begins high, the others low.
                 high: (count.div_ceil(3) % 2 == 1) != (count % 3 == 2),
             });
         }
-        let path = std::env::temp_dir().join(format!("weeder-waveform-{}.vcd", std::process::id()));
-        crate::waveform::write(&path, &wires, written.iter().rev().copied()).unwrap();
-        let read = Capture::read(&path, &wires.map(|wire| (wire.pin, wire.name)));
-        std::fs::remove_file(&path).unwrap();
+        let mut file = Vec::new();
+        crate::waveform::write(&mut file, &wires, written.iter().rev().copied()).unwrap();
+        let read = Capture::parse(Path::new("pins.vcd"), &*file, &wires.map(|wire| (wire.pin, wire.name)));
 
         let at_rest = wires.map(|wire| PinChange { cycle: 0, pin: wire.pin, high: wire.high_at_rest });
         assert_eq!(read.unwrap().changes, [&at_rest[..], &written].concat());

@@ -18,16 +18,18 @@ use std::ptr::{self, NonNull};
 
 use simavr_ffi as simavr;
 
+use super::adc::{self, ADC_CHANNELS, SUPPLY_MILLIVOLTS};
 use super::eeprom::{self, Eeprom};
 use super::interrupts::{InterruptRecorder, InterruptStatistics, Place};
+use super::output::{Port, TIMER_OUTPUTS};
 use super::recorder::{
-    OUTPUTS, Recorder, Reset, ResetCause, is_output, on_interrupt, on_output, on_reset, on_timer_output, on_transmit,
+    Recorder, Reset, ResetCause, on_direction, on_interrupt, on_port, on_reset, on_sample, on_timer_output, on_transmit,
 };
 use super::timer::{self, Timer1};
 use super::turns::{TurnRecorder, Turns};
 use super::uart;
 use crate::elf::{EEPROM_BYTES, FLASH_BYTES};
-use signal::{CYCLES_PER_SECOND, Pin};
+use crate::pins::{CYCLES_PER_SECOND, Pin};
 
 unsafe extern "C" {
     /// Runs the next instruction. It stands in sim_core.h, which simavr-ffi leaves out of its bindings.
@@ -85,8 +87,8 @@ pub(super) struct Core {
     chip: NonNull<simavr::avr_t>,
     recorder: NonNull<Recorder>,
     input: NonNull<simavr::avr_irq_t>,
-    /// Levels that the inputs are held at from outside, by port (B, D) and bit.
-    held: [HeldLevels; 2],
+    /// Levels that the inputs are held at from outside, by port and bit.
+    held: [HeldLevels; Port::NAMES.len()],
     /// The last step left the chip asleep.
     asleep: bool,
     /// Address in flash at which the main program loops for ever.
@@ -126,6 +128,9 @@ impl Core {
             let sram = (*avr).data.add(SRAM_START.into());
             ptr::write_bytes(sram, SRAM_AT_POWER_UP, (SRAM_END - SRAM_START + 1).into());
             (*avr).cycle = cycle;
+            for voltage in [&raw mut (*avr).vcc, &raw mut (*avr).avcc, &raw mut (*avr).aref] {
+                *voltage = SUPPLY_MILLIVOLTS.into();
+            }
         }
 
         // SAFETY: `avr` was initialised above.
@@ -134,11 +139,14 @@ impl Core {
             chip: avr,
             uart: uart.as_ptr(),
             // SAFETY: `avr` was initialised above.
+            adc: unsafe { adc::find(avr) }.as_ptr(),
+            // SAFETY: as above.
             timer: unsafe { Timer1::of(avr) },
             // SAFETY: as above.
             eeprom: unsafe { Eeprom::of(avr) },
-            d9_high: false,
-            d13_high: false,
+            millivolts: [0; ADC_CHANNELS],
+            timer_levels: Default::default(),
+            driven_high: Default::default(),
             changes: Vec::new(),
             received: Vec::new(),
             resets: Vec::new(),
@@ -155,12 +163,31 @@ impl Core {
             (*avr).custom.data = parameter;
             (*avr).reset = Some(on_reset);
             (*uart.as_ptr()).flags = 0;
-            for pin in OUTPUTS {
-                let irq = pin_irq(avr, pin);
-                simavr::avr_irq_register_notify(irq, Some(on_output), parameter);
+            let port_callbacks: [(simavr::avr_irq_notify_t, simavr::avr_irq_notify_t); 3] = [
+                (Some(on_port::<'B'>), Some(on_direction::<'B'>)),
+                (Some(on_port::<'C'>), Some(on_direction::<'C'>)),
+                (Some(on_port::<'D'>), Some(on_direction::<'D'>)),
+            ];
+            for (name, (on_port, on_direction)) in Port::NAMES.into_iter().zip(port_callbacks) {
+                let line = |kind: u32| simavr::avr_io_getirq(avr, port_request(name), kind as i32);
+                simavr::avr_irq_register_notify(line(simavr::IOPORT_IRQ_REG_PORT), on_port, parameter);
+                simavr::avr_irq_register_notify(line(simavr::IOPORT_IRQ_DIRECTION_ALL), on_direction, parameter);
             }
-            let output_a = simavr::avr_io_getirq(avr, request(b"tmr1"), simavr::TIMER_IRQ_OUT_COMP as i32);
-            simavr::avr_irq_register_notify(output_a, Some(on_timer_output), parameter);
+            let timer_callbacks: [simavr::avr_irq_notify_t; TIMER_OUTPUTS.len()] = [
+                Some(on_timer_output::<0>),
+                Some(on_timer_output::<1>),
+                Some(on_timer_output::<2>),
+                Some(on_timer_output::<3>),
+                Some(on_timer_output::<4>),
+                Some(on_timer_output::<5>),
+            ];
+            for (output, callback) in TIMER_OUTPUTS.iter().zip(timer_callbacks) {
+                let line = (simavr::TIMER_IRQ_OUT_COMP + output.output) as i32;
+                let irq = simavr::avr_io_getirq(avr, request(&output.timer), line);
+                simavr::avr_irq_register_notify(irq, callback, parameter);
+            }
+            let sample = simavr::avr_io_getirq(avr, request(b"adc0"), simavr::ADC_IRQ_OUT_TRIGGER as i32);
+            simavr::avr_irq_register_notify(sample, Some(on_sample), parameter);
             timer::take_over_writes(avr, &raw mut (*recorder.as_ptr()).timer);
             eeprom::take_over_writes(avr, &raw mut (*recorder.as_ptr()).eeprom);
             for vector in 1..=LAST_VECTOR {
@@ -179,7 +206,7 @@ impl Core {
             chip,
             recorder,
             input: NonNull::new(input).expect("the ATmega328P has a UART"),
-            held: [HeldLevels::default(); 2],
+            held: Default::default(),
             asleep: false,
             stalled_at: None,
         };
@@ -263,9 +290,7 @@ impl Core {
         // SAFETY: the chip is valid, this is the only place that runs it, and no reference into it or into the recorder is alive
         // while it does. This is `avr_callback_run_raw` without its two waits on the host's clock.
         unsafe {
-            if self.asleep && (*avr).state as u32 == simavr::cpu_Running {
-                (*avr).cycle += WAKE_UP_CYCLES;
-            }
+            self.init();
             uart::hand_over_received(avr, uart);
             if (*avr).interrupt_state != 0 {
                 simavr::avr_service_interrupts(avr);
@@ -290,7 +315,7 @@ impl Core {
             }
             let until_next_timer = simavr::avr_cycle_timer_process(avr);
             match (*avr).state as u32 {
-                simavr::cpu_Running => self.asleep = false,
+                simavr::cpu_Running => self.init(),
                 simavr::cpu_Sleeping if (*avr).sreg[simavr::S_I as usize] == 0 => {
                     return Err(Stop::Halted);
                 }
@@ -310,6 +335,16 @@ impl Core {
             self.recorder_mut().interrupts.interrupts_enabled(enabled, cycle);
         }
         Ok(())
+    }
+
+    /// Halts the core for a moment if something has woken it: a level at a pin between two steps, or a peripheral in the last one.
+    fn init(&mut self) {
+        // SAFETY: as in `cycle`.
+        let chip = unsafe { self.chip.as_mut() };
+        if self.asleep && chip.state as u32 == simavr::cpu_Running {
+            chip.cycle += WAKE_UP_CYCLES;
+            self.asleep = false;
+        }
     }
 
     /// Pulls the reset pin low for a moment.
@@ -357,6 +392,7 @@ impl Core {
         new.interrupts.reset();
         new.turns = std::mem::take(&mut old.turns);
         new.turns.reset();
+        new.millivolts = old.millivolts;
         self.held = before.held;
         self.hold_inputs();
     }
@@ -365,8 +401,7 @@ impl Core {
     pub(super) fn lose_power(&mut self) {
         let cycle = self.cycle();
         let recorder = self.recorder_mut();
-        recorder.record_level(Pin::D9, false, cycle);
-        recorder.record_level(Pin::D13, false, cycle);
+        recorder.release_pins(cycle);
         recorder.resets.push(Reset { cycle, cause: ResetCause::PowerOn });
     }
 
@@ -378,11 +413,12 @@ impl Core {
         self.asleep = false;
         self.stalled_at = None;
         // SAFETY: as in `cycle`. The watchdog's timer, the only one that can run now, was set from this cycle.
-        unsafe { (*self.chip.as_ptr()).cycle = cycle };
+        unsafe {
+            (*self.chip.as_ptr()).cycle = cycle;
+            timer::stop_all(self.chip.as_ptr(), &self.recorder().timer);
+        }
         let recorder = self.recorder_mut();
-        recorder.timer.stop();
-        recorder.record_level(Pin::D9, false, cycle);
-        recorder.record_level(Pin::D13, false, cycle);
+        recorder.release_pins(cycle);
         recorder.interrupts.reset();
         recorder.turns.reset();
         recorder.eeprom.reset();
@@ -392,7 +428,7 @@ impl Core {
 
     /// Puts the levels that the inputs are held at on a chip that has just started.
     fn hold_inputs(&mut self) {
-        for pin in Pin::ALL.into_iter().filter(|&pin| !is_output(pin)) {
+        for pin in Pin::ALL {
             let (port, bit) = pin.port_and_bit();
             let held = self.held[port_index(port)];
             if held.mask & (1 << bit) != 0 {
@@ -419,11 +455,34 @@ impl Core {
         let avr = self.chip.as_ptr();
         // SAFETY: as in `step`; `external` is what this request takes, and simavr copies it.
         unsafe {
-            // EventLine so, simavr raises the pin to this level, not to its pull-up's, when the firmware writes the port.
+            // Only so, simavr raises the pin to this level, not to its pull-up's, when the firmware writes the port.
             let set_external = request(&[b'i', b'o', b'p', port as u8]);
             simavr::avr_ioctl(avr, set_external, (&raw mut external).cast());
-            simavr::avr_raise_irq(pin_irq(avr, pin), high.into());
+            if Port::named(port).direction(avr) & 1 << bit == 0 {
+                let line = simavr::avr_io_getirq(avr, port_request(port), bit.into());
+                simavr::avr_raise_irq(line, high.into());
+            }
         }
+    }
+
+    /// Puts a voltage on a channel of the ADC from now on.
+    pub(super) fn set_millivolts(&mut self, channel: u8, millivolts: u16) {
+        self.recorder_mut().millivolts[usize::from(channel)] = millivolts;
+    }
+
+    /// The level that the firmware drives the pin to; `None` where it is an input.
+    pub(super) fn output(&self, pin: Pin) -> Option<bool> {
+        let (port, bit) = pin.port_and_bit();
+        // SAFETY: as in `cycle`.
+        let direction = unsafe { Port::named(port).direction(self.chip.as_ptr()) };
+        (direction & 1 << bit != 0).then(|| self.recorder().is_driven_high(pin))
+    }
+
+    /// The level that the firmware reads at an input.
+    pub(super) fn input(&self, pin: Pin) -> bool {
+        let (port, bit) = pin.port_and_bit();
+        // SAFETY: as in `cycle`.
+        unsafe { Port::named(port).pins(self.chip.as_ptr()) & 1 << bit != 0 }
     }
 
     /// Gives the receiver a byte whose stop bit has just ended. Returns whether it had room.
@@ -519,17 +578,11 @@ impl Drop for Core {
     }
 }
 
-/// simavr's line of a pin.
-///
-/// # Safety
-///
-/// `avr` must be an initialised chip.
-unsafe fn pin_irq(avr: *mut simavr::avr_t, pin: Pin) -> *mut simavr::avr_irq_t {
-    let (port, bit) = pin.port_and_bit();
-    // SAFETY: the caller vouches for `avr`.
-    unsafe { simavr::avr_io_getirq(avr, request(&[b'i', b'o', b'g', port as u8]), bit.into()) }
+/// simavr's request code for the lines of a port.
+const fn port_request(name: char) -> u32 {
+    request(&[b'i', b'o', b'g', name as u8])
 }
 
 fn port_index(port: char) -> usize {
-    usize::from(port == 'D')
+    (port as usize) - ('B' as usize)
 }

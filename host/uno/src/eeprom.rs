@@ -11,7 +11,7 @@ use std::ffi::c_void;
 use simavr_ffi as simavr;
 
 use super::io_register::Writer;
-use signal::CYCLES_PER_SECOND;
+use crate::pins::CYCLES_PER_SECOND;
 
 /// Cycles of a write (data sheet, table 8-1): the first half erases the byte, the second writes it.
 pub(super) const WRITE_CYCLES: u64 = CYCLES_PER_SECOND * 34 / 10_000;

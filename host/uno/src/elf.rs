@@ -55,7 +55,7 @@ pub enum ImageError {
         source: std::io::Error,
     },
     /// The file is no ELF, or a broken one.
-    #[error("{path} is not a readable ELF file ({reason}): `cargo firmware` makes one")]
+    #[error("{path} is not a readable ELF file ({reason})")]
     NotElf {
         /// The file.
         path: PathBuf,
@@ -63,7 +63,7 @@ pub enum ImageError {
         reason: object::Error,
     },
     /// The file was made for another processor.
-    #[error("{path} was made for {architecture:?}: an ELF for AVR is needed, `cargo firmware` makes one")]
+    #[error("{path} was made for {architecture:?}: an ELF for AVR is needed")]
     NotAvr {
         /// The file.
         path: PathBuf,

@@ -5,14 +5,13 @@
 //! Nothing here runs one: [`Uno`](crate::Uno) does.
 
 use crate::elf::{FLASH_BYTES, Image, ImageError};
-use files::whole_file;
 use ihex::{Reader, ReaderError, Record};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use thiserror::Error;
 
-/// Sizes in bytes that the fuses can give the boot section (data sheet, table 27-7).
+/// Sizes in bytes that the fuses can give the boot section (data sheet, boot size configuration).
 const BOOT_SECTION_BYTES: [usize; 4] = [512, 1024, 2048, 4096];
 
 /// Optiboot's source, as Debian's arduino-core-avr brings it along.
@@ -27,13 +26,11 @@ const LINE_BYTES: usize = 16;
 /// What is wrong with a file, or with a firmware beside a bootloader.
 #[derive(Debug, Error)]
 pub enum HexError {
-    /// The file could not be read or written.
-    #[error("{path} cannot be {done}")]
-    File {
+    /// The file could not be read.
+    #[error("{path} cannot be read")]
+    Read {
         /// The file.
         path: PathBuf,
-        /// `read` or `written`.
-        done: &'static str,
         /// The operating system's answer.
         source: io::Error,
     },
@@ -62,7 +59,9 @@ pub enum HexError {
     #[error("{0} is empty: take a bootloader's .hex, such as ATmegaBOOT_168_atmega328.hex")]
     Empty(PathBuf),
     /// Optiboot could not be compiled.
-    #[error("optiboot cannot be compiled ({0}): ./setup.sh installs avr-gcc and {OPTIBOOT_SOURCE}")]
+    #[error(
+        "optiboot cannot be compiled ({0}): it takes avr-gcc and {OPTIBOOT_SOURCE}, which Debian has as gcc-avr and arduino-core-avr"
+    )]
     NotCompiled(String),
     /// What was compiled is no ELF that could be read.
     #[error(transparent)]
@@ -90,11 +89,7 @@ impl Bootloader {
     /// # Errors
     /// Where it cannot be read, is not Intel HEX, or does not lie in the chip's boot section.
     pub fn read(path: &Path) -> Result<Bootloader, HexError> {
-        let text = std::fs::read_to_string(path).map_err(|source| HexError::File {
-            path: path.into(),
-            done: "read",
-            source,
-        })?;
+        let text = std::fs::read_to_string(path).map_err(|source| HexError::Read { path: path.into(), source })?;
         let pieces = pieces(&text).map_err(|reason| HexError::NotHex { path: path.into(), reason })?;
         let start = pieces.iter().map(|(address, _)| *address).min();
         let start = start.ok_or_else(|| HexError::Empty(path.into()))?;
@@ -157,22 +152,6 @@ impl Bootloader {
 /// Where it does not.
 pub fn check_room(bytes: usize, available: usize) -> Result<(), HexError> {
     if bytes <= available { Ok(()) } else { Err(HexError::NoRoom { bytes, available }) }
-}
-
-/// Writes what goes into flash from address 0 on as an Intel HEX file.
-///
-/// # Errors
-/// Where the file cannot be written.
-///
-/// # Panics
-/// Where `flash` is longer than the ATmega328P's.
-pub fn write(path: &Path, flash: &[u8]) -> Result<(), HexError> {
-    let text = text(flash);
-    whole_file::write(path, |to| to.write_all(text.as_bytes())).map_err(|source| HexError::File {
-        path: path.into(),
-        done: "written",
-        source,
-    })
 }
 
 /// What goes into flash from address 0 on as Intel HEX.
@@ -273,12 +252,9 @@ mod tests {
 
     #[test]
     fn what_is_written_reads_back() {
-        let path = tempfile::NamedTempFile::new().unwrap();
         let flash: Vec<u8> = (0..=255).cycle().take(1000).collect();
-        write(path.path(), &flash).unwrap();
-        let text = std::fs::read_to_string(path.path()).unwrap();
         let mut read = Vec::new();
-        for (address, bytes) in pieces(&text).unwrap() {
+        for (address, bytes) in pieces(&text(&flash)).unwrap() {
             assert_eq!(address, read.len());
             read.extend(bytes);
         }

@@ -43,11 +43,11 @@ pub enum PtyError {
         source: io::Error,
     },
     /// Something else is where the link should be.
-    #[error("{0} exists already and is no link to a pseudo terminal: name another --link, or remove it")]
+    #[error("{0} exists already and is no link to a pseudo terminal: name another link, or remove it")]
     LinkExists(PathBuf),
     /// The link leads to a pseudo terminal that somebody uses.
     #[error(
-        "{} leads to {}, which {holder} has: end it, or name another --link; if it is none of your virtual Unos, remove the link",
+        "{} leads to {}, which {holder} has: end it, or name another link; if it is none of your virtual Unos, remove the link",
         path.display(), target.display()
     )]
     LinkInUse {

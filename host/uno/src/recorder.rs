@@ -8,12 +8,14 @@ use std::ffi::c_void;
 
 use simavr_ffi as simavr;
 
+use super::adc::{self, ADC_CHANNELS};
 use super::eeprom::Eeprom;
 use super::interrupts::InterruptRecorder;
+use super::output::{self, Port, TIMER_OUTPUTS};
 use super::timer::Timer1;
 use super::turns::TurnRecorder;
 use super::uart;
-use signal::{Pin, PinChange};
+use crate::pins::{Pin, PinChange};
 
 /// Cycles from the end of an instruction to the first one of the vector (data sheet, section 7.7.1).
 const INTERRUPT_ENTRY_CYCLES: u64 = 4;
@@ -52,22 +54,19 @@ pub struct ReceivedByte {
     pub byte: u8,
 }
 
-/// The pins that are recorded as outputs: Timer1's output A, and the board's LED.
-pub(super) const OUTPUTS: [Pin; 2] = [Pin::D9, Pin::D13];
-
-/// Whether the firmware drives the pin.
-pub(super) fn is_output(pin: Pin) -> bool {
-    OUTPUTS.contains(&pin)
-}
-
 /// What simavr's callbacks have seen.
 pub(super) struct Recorder {
     pub(super) chip: *mut simavr::avr_t,
     pub(super) uart: *mut simavr::avr_uart_t,
+    pub(super) adc: *mut simavr::avr_adc_t,
     pub(super) timer: Timer1,
     pub(super) eeprom: Eeprom,
-    pub(super) d9_high: bool,
-    pub(super) d13_high: bool,
+    /// Voltage at each channel of the ADC.
+    pub(super) millivolts: [u16; ADC_CHANNELS],
+    /// Levels of the timers' outputs, in the order of [`TIMER_OUTPUTS`].
+    pub(super) timer_levels: [bool; TIMER_OUTPUTS.len()],
+    /// The pins that the firmware drives high.
+    pub(super) driven_high: [bool; Pin::ALL.len()],
     /// Edges of the output pins, oldest first.
     pub(super) changes: Vec<PinChange>,
     /// Bytes that the firmware has handed to its transmitter, oldest first.
@@ -83,14 +82,42 @@ pub(super) struct Recorder {
 impl Recorder {
     /// Records a level of an output pin, where it differs from the last one.
     pub(super) fn record_level(&mut self, pin: Pin, high: bool, cycle: u64) {
-        let level = match pin {
-            Pin::D9 => &mut self.d9_high,
-            Pin::D13 => &mut self.d13_high,
-            _ => return,
-        };
+        let level = &mut self.driven_high[usize::from(pin.number())];
         if *level != high {
             *level = high;
             self.changes.push(PinChange { cycle, pin, high });
+        }
+    }
+
+    /// Records the levels of a port whose registers hold these values now.
+    ///
+    /// # Safety
+    ///
+    /// The recorder's chip must be initialised.
+    unsafe fn record_port(&mut self, name: char, direction: u8, port: u8) {
+        for bit in 0..8 {
+            let Some(pin) = Pin::at(name, bit) else { continue };
+            // SAFETY: the caller vouches for the chip.
+            let timer = unsafe { output::timer_level(self.chip, pin, &self.timer_levels) };
+            let high = direction & 1 << bit != 0 && timer.unwrap_or(port & 1 << bit != 0);
+            if self.is_driven_high(pin) != high {
+                // SAFETY: as above.
+                let cycle = unsafe { due_cycle(self.chip) };
+                self.record_level(pin, high, cycle);
+            }
+        }
+    }
+
+    /// Whether the firmware drives the pin high.
+    pub(super) fn is_driven_high(&self, pin: Pin) -> bool {
+        self.driven_high[usize::from(pin.number())]
+    }
+
+    /// No pin is driven any more: the chip starts anew, or has no power.
+    pub(super) fn release_pins(&mut self, cycle: u64) {
+        self.timer_levels = Default::default();
+        for pin in Pin::ALL {
+            self.record_level(pin, false, cycle);
         }
     }
 }
@@ -122,30 +149,57 @@ unsafe fn due_cycle(avr: *mut simavr::avr_t) -> u64 {
     }
 }
 
-/// simavr's callback for a level on an output pin's port.
-pub(super) unsafe extern "C" fn on_output(irq: *mut simavr::avr_irq_t, level: u32, recorder: *mut c_void) {
+/// simavr's callback for a write of a port's register, behind the write.
+pub(super) unsafe extern "C" fn on_port<const NAME: char>(_: *mut simavr::avr_irq_t, port: u32, recorder: *mut c_void) {
     // SAFETY: `recorder` is what `Core::new` registered, alive and not borrowed (see the module's text).
-    let recorder = unsafe { &mut *recorder.cast::<Recorder>() };
-    // SAFETY: simavr passes the line that it raises; the recorder's chip is the one that is running.
-    let (bit, cycle) = unsafe { ((*irq).irq, due_cycle(recorder.chip)) };
-    let port_high = level & 1 != 0;
-    if bit == u32::from(Pin::D9.port_and_bit().1) {
-        // SAFETY: as above.
-        let high = unsafe { recorder.timer.pin_is_high(recorder.chip, port_high) };
-        recorder.record_level(Pin::D9, high, cycle);
-    } else {
-        recorder.record_level(Pin::D13, port_high, cycle);
+    unsafe {
+        let recorder = &mut *recorder.cast::<Recorder>();
+        let direction = Port::named(NAME).direction(recorder.chip);
+        recorder.record_port(NAME, direction, port as u8);
     }
 }
 
-/// simavr's callback for a level that Timer1 puts on its output A.
-pub(super) unsafe extern "C" fn on_timer_output(_: *mut simavr::avr_irq_t, level: u32, recorder: *mut c_void) {
-    // SAFETY: as in `on_output`. A timer's output carries a flag beside the level.
+/// simavr's callback for a write of a port's direction register, before the write.
+pub(super) unsafe extern "C" fn on_direction<const NAME: char>(
+    _: *mut simavr::avr_irq_t,
+    direction: u32,
+    recorder: *mut c_void,
+) {
+    // SAFETY: as in `on_port`.
     unsafe {
         let recorder = &mut *recorder.cast::<Recorder>();
-        recorder.timer.output_becomes(level & 1 != 0);
-        let high = recorder.timer.pin_is_high(recorder.chip, recorder.d9_high);
-        recorder.record_level(Pin::D9, high, due_cycle(recorder.chip));
+        let port = Port::named(NAME).port(recorder.chip);
+        recorder.record_port(NAME, direction as u8, port);
+    }
+}
+
+/// simavr's callback for a level that a timer puts on its output, by its index in [`TIMER_OUTPUTS`].
+pub(super) unsafe extern "C" fn on_timer_output<const INDEX: usize>(
+    _: *mut simavr::avr_irq_t,
+    level: u32,
+    recorder: *mut c_void,
+) {
+    // SAFETY: as in `on_port`.
+    unsafe {
+        let recorder = &mut *recorder.cast::<Recorder>();
+        // A timer's output carries a flag beside the level.
+        let (high, pin) = (level & 1 != 0, TIMER_OUTPUTS[INDEX].pin);
+        recorder.timer_levels[INDEX] = high;
+        if pin == Pin::D9 {
+            recorder.timer.output_becomes(high);
+        }
+        let name = pin.port_and_bit().0;
+        let port = Port::named(name);
+        recorder.record_port(name, port.direction(recorder.chip), port.port(recorder.chip));
+    }
+}
+
+/// simavr's callback for a conversion of the ADC that takes its sample.
+pub(super) unsafe extern "C" fn on_sample(_: *mut simavr::avr_irq_t, _: u32, recorder: *mut c_void) {
+    // SAFETY: as in `on_port`; the ADC is part of the chip.
+    unsafe {
+        let recorder = &mut *recorder.cast::<Recorder>();
+        adc::set_right(recorder.chip, recorder.adc, &recorder.millivolts);
     }
 }
 

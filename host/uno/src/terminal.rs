@@ -3,7 +3,7 @@
 //! What the chip has no room for is lost and counted. What the chip sends is in `recorder`.
 
 use crate::core::Core;
-use signal::CYCLES_PER_SECOND;
+use crate::pins::CYCLES_PER_SECOND;
 use std::collections::VecDeque;
 
 /// Bits in a second at which a terminal sends, until it is told to follow the chip.

@@ -1,11 +1,8 @@
-//! Timer1's output A, where simavr differs from the chip: the pin, OCR1A and TCNT1.
+//! Timer1's output A, where simavr differs from the chip: OCR1A and TCNT1.
 //!
 //! simavr's writers of OCR1A and TCNT1 are replaced. In fast PWM a new OCR1A only changes what the next bottom plans (data
 //! sheet, 16.9.3), and TCNT1 moves the counter: simavr's own writer does it, but exactly, with the pins disconnected and with the
 //! compare value that the running period began with. In other modes simavr's writers do their work alone.
-//!
-//! The pin's level is the timer's while the two are connected (data sheet, 16.8), whatever stands in PORTB: simavr copies the
-//! level into PORTB, and a firmware that writes back what it read there before an edge would take the edge back.
 //!
 //! Only the non-inverting output A is dealt with. A counter that is set above its top starts at the bottom, as simavr does it.
 
@@ -15,20 +12,18 @@ use std::ptr::NonNull;
 use simavr_ffi as simavr;
 
 use super::io_register::Writer;
-use signal::Pin;
 
 // Registers by their address in the data space (data sheet, register summary).
-const DDRB: u16 = 0x24;
+const TCNT0: u16 = 0x46;
 const TCCR1A: u16 = 0x80;
 const TCCR1B: u16 = 0x81;
 const TCNT1L: u16 = 0x84;
 const TCNT1H: u16 = 0x85;
 const OCR1AL: u16 = 0x88;
 const OCR1AH: u16 = 0x89;
+const TCNT2: u16 = 0xB2;
 
-/// TCCR1A: what output A is connected to; 0 is PORTB.
-const COM1A: u8 = 0b11 << 6;
-/// TCCR1A: the same of both outputs.
+/// TCCR1A: what the outputs are connected to; 0 is PORTB.
 const COM1: u8 = 0b1111 << 4;
 /// TCCR1B: the clock; 0 is none, and above [`LAST_PRESCALER`] it comes from a pin.
 const CS1: u8 = 0b111;
@@ -39,7 +34,6 @@ pub(super) struct Timer1 {
     timer: NonNull<simavr::avr_timer_t>,
     compare_writer: Writer,
     counter_writer: Writer,
-    output_high: bool,
     /// Cycles from the running period's bottom to the match of output A; 0 where there is none.
     running_compare_cycles: u64,
 }
@@ -58,43 +52,16 @@ impl Timer1 {
             timer: NonNull::new(counter_writer.parameter().cast()).expect("the ATmega328P has a Timer1"),
             compare_writer,
             counter_writer,
-            output_high: false,
             running_compare_cycles: 0,
         }
     }
 
     /// Takes a level of output A. In fast PWM it rises at the bottom, where OCR1A's buffer takes effect.
     pub(super) fn output_becomes(&mut self, high: bool) {
-        self.output_high = high;
         if high {
             // SAFETY: the timer lives as long as its chip, which outlives `self`, and simavr does not change it meanwhile.
             self.running_compare_cycles = unsafe { (*self.timer.as_ptr()).comp[0].comp_cycles };
         }
-    }
-
-    /// Level of D9, whose bit of PORTB is `port_high`.
-    ///
-    /// # Safety
-    ///
-    /// `avr` must be this timer's chip.
-    pub(super) unsafe fn pin_is_high(&self, avr: *mut simavr::avr_t, port_high: bool) -> bool {
-        // SAFETY: the caller vouches for `avr`; both are addresses inside `data`.
-        let (direction, control) = unsafe { (*(*avr).data.add(DDRB.into()), *(*avr).data.add(TCCR1A.into())) };
-        let is_output = direction & 1 << Pin::D9.port_and_bit().1 != 0;
-        let is_connected = control & COM1A != 0;
-        is_output && if is_connected { self.output_high } else { port_high }
-    }
-
-    /// Stops the timer, as a reset does; simavr's reset leaves its mode and its period.
-    pub(super) fn stop(&mut self) {
-        self.output_high = false;
-        // SAFETY: as in `output_becomes`; nothing else refers to the timer.
-        let timer = unsafe { self.timer.as_mut() };
-        timer.mode = timer.wgm_op[0];
-        timer.wgm_op_mode_kind = timer.mode.kind() as i32;
-        timer.cs_div_value = 0;
-        timer.tov_cycles = 0;
-        timer.tov_top = 0;
     }
 
     /// Whether the timer runs from the chip's clock, in fast PWM with a top that is not OCR1A.
@@ -108,6 +75,26 @@ impl Timer1 {
         (1..=LAST_PRESCALER).contains(&(control & CS1))
             && timer.wgm_op_mode_kind == simavr::avr_timer_wgm_fast_pwm as i32
             && timer.mode.top() != simavr::avr_timer_wgm_reg_ocra
+    }
+}
+
+/// Stops all timers, as a reset does; simavr's reset leaves their modes and periods.
+///
+/// # Safety
+///
+/// `avr` must be an initialised chip that is not running.
+pub(super) unsafe fn stop_all(avr: *mut simavr::avr_t, timer1: &Timer1) {
+    // SAFETY: the caller vouches for `avr`. The parameter of simavr's writer of TCNTn is the timer; Timer1's has been replaced.
+    unsafe {
+        let others = [TCNT0, TCNT2].map(|counter| Writer::of(avr, counter).parameter().cast::<simavr::avr_timer_t>());
+        for timer in [timer1.timer.as_ptr()].into_iter().chain(others) {
+            let timer = &mut *timer;
+            timer.mode = timer.wgm_op[0];
+            timer.wgm_op_mode_kind = timer.mode.kind() as i32;
+            timer.cs_div_value = 0;
+            timer.tov_cycles = 0;
+            timer.tov_top = 0;
+        }
     }
 }
 

@@ -4,12 +4,10 @@
 //! 100 ps, of which a cycle of 62.5 ns is exactly 625, so that [`crate::capture`] reads back the very cycles.
 
 use std::io::{self, Write};
-use std::path::{Path, PathBuf};
 
 use vcd::{SimulationCommand, TimescaleUnit, Writer};
 
-use files::whole_file;
-use signal::{CYCLES_PER_SECOND, PinChange, Wire};
+use crate::pins::{CYCLES_PER_SECOND, PinChange, Wire};
 
 /// The file's unit of time: 100 ps.
 const UNITS: (u32, TimescaleUnit) = (100, TimescaleUnit::PS);
@@ -17,32 +15,12 @@ const UNITS: (u32, TimescaleUnit) = (100, TimescaleUnit::PS);
 /// Units of time a cycle.
 const UNITS_PER_CYCLE: u64 = 10_000_000_000 / CYCLES_PER_SECOND;
 
-/// A waveform file that could not be written.
-#[derive(Debug, thiserror::Error)]
-#[error("the waveform {path} could not be written")]
-pub struct WaveformError {
-    /// The file.
-    pub path: PathBuf,
-    /// The operating system's answer.
-    pub source: io::Error,
-}
-
-/// Writes `changes`, in any order, to a VCD file at `path`. Each wire starts at rest; what changes on other pins is left out.
-///
-/// # Errors
-///
-/// Where the file cannot be written.
-pub fn write(path: &Path, wires: &[Wire], changes: impl IntoIterator<Item = PinChange>) -> Result<(), WaveformError> {
-    whole_file::write(path, |to| write_to(to, wires, changes))
-        .map_err(|source| WaveformError { path: path.into(), source })
-}
-
-/// As [`write()`], to whatever takes bytes.
+/// Writes `changes`, in any order, as a VCD file. Each wire starts at rest; what changes on other pins is left out.
 ///
 /// # Errors
 ///
 /// Those of the writer.
-pub fn write_to(file: impl Write, wires: &[Wire], changes: impl IntoIterator<Item = PinChange>) -> io::Result<()> {
+pub fn write(file: impl Write, wires: &[Wire], changes: impl IntoIterator<Item = PinChange>) -> io::Result<()> {
     let mut changes: Vec<PinChange> = changes.into_iter().collect();
     changes.sort_by_key(|change| change.cycle);
     let mut writer = Writer::new(file);
@@ -80,7 +58,7 @@ pub fn write_to(file: impl Write, wires: &[Wire], changes: impl IntoIterator<Ite
 #[cfg(test)]
 mod tests {
     use super::*;
-    use signal::Pin;
+    use crate::pins::Pin;
 
     #[test]
     fn a_cycle_is_a_whole_number_of_the_units() {
@@ -91,11 +69,11 @@ mod tests {
     fn the_file_says_each_pin_by_name_and_each_edge_once() {
         let mut file = Vec::new();
         let wires = [
-            Wire { pin: Pin::D8, name: "beam", high_at_rest: true },
+            Wire { pin: Pin::D8, name: "button", high_at_rest: true },
             Wire { pin: Pin::D9, name: "servo", high_at_rest: false },
         ];
         let changes = [(8, true), (24_008, false)].map(|(cycle, high)| PinChange { cycle, pin: Pin::D9, high });
-        write_to(&mut file, &wires, changes).unwrap();
+        write(&mut file, &wires, changes).unwrap();
         let file = String::from_utf8(file).unwrap();
         assert!(file.contains("$timescale 100 ps $end"), "{file}");
         for wire in wires {

@@ -8,9 +8,9 @@ mod common;
 use std::path::Path;
 
 use common::{boot, compile};
-use signal::{CYCLES_PER_SECOND, Pin, PinChange};
-use uno::elf::{ImageError, Size};
-use uno::{ResetCause, SENT_BYTE_CYCLES, Uno, UnoError};
+use virtual_uno::elf::{ImageError, Size};
+use virtual_uno::{CYCLES_PER_SECOND, Pin, PinChange};
+use virtual_uno::{ResetCause, SENT_BYTE_CYCLES, Uno, UnoError};
 
 /// Bit of MCUSR a cause of reset, as the fixture `memory` sends it.
 const POWER_ON: char = '1';
@@ -63,7 +63,7 @@ fn the_receiver_keeps_three_bytes_and_loses_the_fourth() {
     uno.send(b"12345");
     uno.run_for_ms(1).unwrap();
     assert_eq!(uno.lost_bytes(), 2);
-    // The work switch tells the fixture to read at last; it adds whether the chip reported the loss.
+    // The switch on D4 tells the fixture to read at last; it adds whether the chip reported the loss.
     uno.set(Pin::D4, false);
     assert_eq!(uno.run_until_serial("\n", 5 * MILLISECOND).unwrap(), "lost 123\n");
 }

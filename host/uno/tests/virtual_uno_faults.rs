@@ -4,8 +4,8 @@
 mod common;
 
 use common::boot;
-use signal::{CYCLES_PER_SECOND, Pin};
-use uno::{ResetCause, Uno, UnoError};
+use virtual_uno::{CYCLES_PER_SECOND, Pin};
+use virtual_uno::{ResetCause, Uno, UnoError};
 
 const MILLISECOND: u64 = CYCLES_PER_SECOND / 1000;
 

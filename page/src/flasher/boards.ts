@@ -1,8 +1,11 @@
 // The boards that can be flashed, which differ in their bootloader alone.
 
+import type { Plain } from "../words/words.ts";
+
 export interface Board {
     readonly id: string;
-    readonly name: string;
+    /** What it is called everywhere, or the text that says it. */
+    readonly name: string | { readonly text: Plain };
     /** The bootloader's rate in bits a second, and the flash that it leaves to the firmware, of 32 KiB. */
     readonly baud: number;
     readonly roomBytes: number;
@@ -13,5 +16,5 @@ export interface Board {
 export const BOARDS: readonly Board[] = [
     { id: "uno", name: "Arduino Uno", baud: 115_200, roomBytes: 32_256, isOld: false },
     { id: "nano", name: "Arduino Nano", baud: 115_200, roomBytes: 32_256, isOld: false },
-    { id: "old", name: "Nano or Duemilanove, old bootloader", baud: 57_600, roomBytes: 30_720, isOld: true },
+    { id: "old", name: { text: "oldBoard" }, baud: 57_600, roomBytes: 30_720, isOld: true },
 ];

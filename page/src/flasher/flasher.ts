@@ -1,17 +1,14 @@
 // Flashing, as the operator sees it: a board, a button, how far it is, and what came of it.
 
 import { download, Parts } from "../dom.ts";
-import { choosePort, NO_PORT_CHOSEN, PortError, SerialLine, whyNoSerial } from "../link/serial.ts";
+import { choosePort, PortError, SerialLine, whyNoSerial } from "../link/serial.ts";
+import { sentence } from "../panel/machine.ts";
+import { chosen, keep } from "../preferences.ts";
 import { FLASH_BYTES } from "../uno/chip.ts";
 import { readHex, usedBytes } from "../uno/hex.ts";
+import { english, quantity, say, show, told } from "../words/words.ts";
 import { BOARDS, type Board } from "./boards.ts";
 import { Bootloader, FlashError, PAGE_BYTES, type Progress } from "./stk500.ts";
-
-const PHASES: Readonly<Record<Progress["phase"], string>> = {
-    waiting: "Waiting for the bootloader",
-    writing: "Writing",
-    verifying: "Reading it back",
-};
 
 export class Flasher {
     /** Called before a port is opened for flashing: whoever has it lets go of it. */
@@ -29,16 +26,23 @@ export class Flasher {
         const flash = readHex(hex, FLASH_BYTES);
         // Whole pages: the rest of the last one is erased.
         this.#image = flash.subarray(0, Math.ceil(usedBytes(flash) / PAGE_BYTES) * PAGE_BYTES);
-        parts.write("size", `The firmware takes ${usedBytes(flash)} bytes.`);
+        parts.say("size", () => say("flashSize", { count: usedBytes(flash) }));
         const choice = parts.get("board", HTMLSelectElement);
-        choice.append(...BOARDS.map(({ id, name }) => new Option(name, id)));
+        for (const { id, name } of BOARDS) {
+            const option = new Option("", id);
+            show(option, () => (typeof name === "string" ? name : say(name.text)));
+            choice.append(option);
+        }
+        const last = BOARDS.find(({ id }) => id === chosen("board"));
+        if (last) choice.value = last.id;
+        choice.addEventListener("change", () => keep("board", choice.value));
         parts.button("hex", () => download("weeder.hex", hex, "text/plain"));
         parts.button("to-work", () => this.#flashed && this.onWork(this.#flashed));
         const why = whyNoSerial();
         const start = parts.button("flash", () => void this.#start(choice.value));
         start.disabled = why !== undefined;
         parts.html("no-serial").hidden = why === undefined;
-        parts.write("no-serial", why ?? "");
+        parts.say("no-serial", () => told(why ?? ""));
         globalThis.addEventListener("beforeunload", (event) => {
             if (this.#isBusy) event.preventDefault();
         });
@@ -49,41 +53,40 @@ export class Flasher {
         if (!board || this.#isBusy) return;
         this.#isBusy = true;
         const flash = this.#parts.get("flash", HTMLButtonElement);
-        flash.disabled = true;
+        // It keeps the focus.
+        flash.ariaDisabled = "true";
         this.#parts.html("to-work").hidden = true;
-        this.#say("", "");
+        this.#say("", () => "");
         try {
             const port = await choosePort();
             if (!port) {
-                this.#say("failed", NO_PORT_CHOSEN);
+                this.#say("failed", () => told(english("noPort")));
                 return;
             }
             await this.onBegin(port);
             const startedMs = performance.now();
             await this.#flash(port, board);
-            const seconds = ((performance.now() - startedMs) / 1000).toFixed(1);
+            const seconds = (performance.now() - startedMs) / 1000;
             this.#flashed = port;
-            this.#say(
-                "done",
-                `Done: ${this.#image.length} bytes were written and read back in ${seconds} s.${board.isOld ? OLD : ""}`,
-            );
+            this.#say("done", () => {
+                const done = say("flashed", { count: this.#image.length, time: quantity(seconds, "second", 1) });
+                return board.isOld ? `${done} ${say("oldBootloader")}` : done;
+            });
             this.#parts.html("to-work").hidden = false;
         } catch (error) {
-            this.#say("failed", `Not flashed: ${error instanceof Error ? error.message : error}.`);
+            const why = error instanceof Error ? error.message : String(error);
+            this.#say("failed", () => say("notFlashed", { why: told(why) }));
             if (!(error instanceof PortError || error instanceof FlashError)) throw error;
         } finally {
             this.#isBusy = false;
-            flash.disabled = false;
+            flash.ariaDisabled = null;
             this.#parts.html("progress").hidden = true;
         }
     }
 
     async #flash(port: SerialPort, board: Board): Promise<void> {
         if (this.#image.length > board.roomBytes)
-            throw new FlashError(
-                `the firmware takes ${this.#image.length} bytes, and this board's bootloader leaves ${board.roomBytes}: ` +
-                    "give it the Uno's bootloader, which is smaller",
-            );
+            throw new FlashError(english("tooLarge", { bytes: this.#image.length, room: board.roomBytes }));
         const line = await SerialLine.open(port, board.baud);
         let share = 0;
         try {
@@ -93,9 +96,7 @@ export class Flasher {
             });
         } catch (error) {
             if (error instanceof PortError && share > 0)
-                throw new PortError(
-                    `${error.message}, and flash it again: half a firmware does not run, and the bootloader is still there`,
-                );
+                throw new PortError(english("goneMidway", { why: error.message }));
             throw error;
         } finally {
             await line.close();
@@ -107,21 +108,22 @@ export class Flasher {
         this.#parts.html("progress").hidden = false;
         if (phase === "waiting") bar.removeAttribute("value");
         else bar.value = share;
+        const percent = { share: quantity(share * 100, "percent") };
         this.#parts.write(
             "phase",
-            phase === "waiting" ? PHASES[phase] : `${PHASES[phase]}: ${Math.round(share * 100)} %`,
+            phase === "waiting"
+                ? say("phaseWaiting")
+                : say(phase === "writing" ? "phaseWriting" : "phaseVerifying", percent),
         );
     }
 
-    #say(kind: "done" | "failed" | "", text: string): void {
+    #say(kind: "done" | "failed" | "", text: () => string): void {
         const said = this.#parts.html("flash-said");
         said.className = kind;
         // Commands stand between backticks where they are printed.
-        said.textContent = text.replaceAll("`", "").replace(/\.\.$/, ".");
+        show(said, () => {
+            const plain = text().replaceAll("`", "");
+            return plain === "" ? "" : sentence(plain);
+        });
     }
 }
-
-/** What the old bootloader cannot do. */
-const OLD =
-    " Behind this bootloader the machine does not come back by itself where its watchdog has had to stop it: the tool has no " +
-    "signal until power is taken away and given back. Optiboot, which Arduino's IDE can burn, has no such fault.";

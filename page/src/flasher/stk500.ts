@@ -4,6 +4,7 @@
 // a reset. Addresses are in words. Optiboot and its predecessor erase each page as they write it.
 
 import { type PortError, type SerialLine, wait } from "../link/serial.ts";
+import { english } from "../words/words.ts";
 import type { Board } from "./boards.ts";
 
 /** What is wrong with the flashing, and what to do. */
@@ -34,12 +35,12 @@ export const PAGE_BYTES = 128;
 /** Who answers: an ATmega328P, and chips that are taken for one. */
 const SIGNATURE = "1e950f";
 const OTHERS: Readonly<Record<string, string>> = {
-    "1e9514": "an ATmega328 without P",
-    "1e9516": "an ATmega328PB",
-    "1e9406": "an ATmega168",
-    "1e940b": "an ATmega168P",
-    "1e9587": "an ATmega32U4, as on a Leonardo or Micro",
-    "1e9801": "an ATmega2560, as on a Mega",
+    "1e9514": "ATmega328",
+    "1e9516": "ATmega328PB",
+    "1e9406": "ATmega168",
+    "1e940b": "ATmega168P",
+    "1e9587": "ATmega32U4 (Leonardo, Micro)",
+    "1e9801": "ATmega2560 (Mega)",
 };
 
 /** Longest time that an answer takes: a page is written in 10 ms, and sent in 27 at 57600 baud. */
@@ -96,8 +97,7 @@ export class Bootloader {
             const wrong = page.findIndex((byte, index) => byte !== found[index]);
             if (wrong >= 0)
                 throw new FlashError(
-                    `byte ${at + wrong} reads back as ${found[wrong]}, and ${page[wrong]} was written: flash it again; ` +
-                        "where it stays so, see to the cable and the supply, else the chip's flash is worn out",
+                    english("readsBack", { at: at + wrong, found: found[wrong] ?? "", written: page[wrong] ?? "" }),
                 );
         }
         onProgress({ phase: "verifying", share: 1 });
@@ -154,32 +154,19 @@ export class Bootloader {
     /** Why no bootloader answered, and what to do. */
     #whoIsThere(heard: string): string {
         const { baud, isOld } = this.#board;
-        const other = isOld
-            ? "\u201cArduino Uno\u201d or \u201cArduino Nano\u201d"
-            : "the board with the old bootloader";
+        const other = english(isOld ? "otherIsUno" : "otherIsOld");
         const text = heard.replaceAll(/[^ -~]+/g, " ").trim();
-        if (text.includes("weeder "))
-            return (
-                "the weeder's firmware answers, and no bootloader: the reset did not reach it, or the board has none. " +
-                `Choose ${other}, or press the board's reset at the moment at which you press the button here. ` +
-                "A board without a bootloader is given one by the Arduino IDE and a programmer."
-            );
+        if (text.includes("weeder ")) return english("firmwareAnswers", { other });
         if (text.length > 8 && text.length * 2 > heard.length)
-            return `something else answers at this port: \u201c${text.slice(0, 60)}\u201d. Choose the Uno's port; where it is the Uno's, choose ${other}.`;
-        return (
-            `no bootloader answers at ${baud} baud. Try ${other}; pull D0 and D1 free of other devices; ` +
-            "see that it is the Uno's port that was chosen. A board without a bootloader is given one by the Arduino IDE and a programmer."
-        );
+            return english("deviceAnswers", { text: text.slice(0, 60), other });
+        return english("noBootloader", { baud, other });
     }
 
     async #expectChip(): Promise<void> {
         const signature = await this.#command([READ_SIGNATURE], 3);
         const found = signature.map((byte) => byte.toString(16).padStart(2, "0")).join("");
         if (found === SIGNATURE) return;
-        const chip = OTHERS[found] ?? `a chip that calls itself ${found}`;
-        throw new FlashError(
-            `this board has ${chip}, and the firmware is for the Uno's ATmega328P: nothing was written. Choose an Uno's port.`,
-        );
+        throw new FlashError(english("otherChip", { chip: OTHERS[found] ?? found }));
     }
 
     async #load(at: number): Promise<void> {

@@ -3,6 +3,7 @@
 // Every failure says its cause and the way out. The browser does not tell a port that is busy from one that may not be
 // opened: both are said then. What comes garbled is lost by the port and ends nothing; a pulled cable does.
 
+import { english } from "../words/words.ts";
 import { isServed } from "./served.ts";
 import type { Wire } from "./session.ts";
 
@@ -13,26 +14,11 @@ export class PortError extends Error {}
 const RESET_MS = 250;
 const AFTER_RESET_MS = 50;
 
-/** What can be said where the cable was pulled. */
-const GONE = "the port is gone: its cable was pulled, or the Uno lost its power; plug it in again";
-
 /** Why this browser offers no serial port here, and the way that works; nothing where it does. */
 export function whyNoSerial(): string | undefined {
-    if (isServed())
-        return (
-            "This page comes from weeder serve, which has the machines' ports itself and flashes nothing; and over plain http a " +
-            "browser gives no page a serial port. To flash, end it and run weeder flash there, or open the page's folder on that computer."
-        );
-    if (globalThis.isSecureContext === false)
-        return (
-            "This page came over plain http, and over that a browser gives no page a serial port. " +
-            "Open the page's folder on the computer that has the Uno at its USB port, or serve it by https or from localhost."
-        );
-    if (!("serial" in navigator))
-        return (
-            "This browser has no Web Serial. Chrome, Edge and Opera have it on a computer: open the page in one of them. " +
-            "Without one, avrdude writes the HEX, and any serial monitor at 115200 baud talks to the machine."
-        );
+    if (isServed()) return english("noSerialServed");
+    if (globalThis.isSecureContext === false) return english("noSerialHttp");
+    if (!("serial" in navigator)) return english("noSerial");
     return undefined;
 }
 
@@ -43,30 +29,17 @@ export async function choosePort(): Promise<SerialPort | undefined> {
     } catch (error) {
         if (error instanceof DOMException && error.name === "NotFoundError") return undefined;
         if (error instanceof DOMException && error.name === "SecurityError")
-            throw new PortError("the browser forbids this page its serial ports: allow them in the site's settings");
+            throw new PortError(english("portForbidden"));
         throw error;
     }
 }
 
-/** What to say where nobody chose a port. */
-export const NO_PORT_CHOSEN =
-    "No port was chosen. Where the list has no Uno: plug it in, by a cable that carries data and not power alone.";
-
 function whyNotOpened(error: unknown): PortError {
     const { name, message } = error instanceof Error ? error : { name: "", message: String(error) };
-    if (name === "InvalidStateError")
-        return new PortError("this page has the port open already: disconnect there, then try again");
-    if (name !== "NetworkError")
-        return new PortError(`the port cannot be opened: the browser says \u201c${message}\u201d`);
+    if (name === "InvalidStateError") return new PortError(english("portOpen"));
+    if (name !== "NetworkError") return new PortError(english("portRefused", { text: message }));
     const isLinux = /Linux/.test(navigator.userAgent) && !/Android/.test(navigator.userAgent);
-    return new PortError(
-        "the port cannot be opened. Either another program or another tab has it: close the serial monitor, the Arduino IDE, " +
-            "or whatever else talks to the Uno. " +
-            (isLinux
-                ? "Or you may not open it: `sudo usermod -aG dialout $USER`, then log in anew. "
-                : "Or its driver hangs: ") +
-            "Then pull the cable, plug it in again and choose the port anew.",
-    );
+    return new PortError(english(isLinux ? "portTakenLinux" : "portTaken"));
 }
 
 export class SerialLine {
@@ -92,7 +65,7 @@ export class SerialLine {
 
     private constructor(port: SerialPort) {
         this.#port = port;
-        if (!port.writable) throw new PortError(GONE);
+        if (!port.writable) throw new PortError(english("portGone"));
         this.#writer = port.writable.getWriter();
         this.#listening = this.#listen();
     }
@@ -103,7 +76,7 @@ export class SerialLine {
             await this.#writer.write(bytes);
         } catch {
             this.#lose();
-            throw new PortError(GONE);
+            throw new PortError(english("portGone"));
         }
     }
 
@@ -158,7 +131,7 @@ export class SerialLine {
     #lose(): void {
         if (this.#isClosing) return;
         this.#isClosing = true;
-        this.onEnd(new PortError(GONE));
+        this.onEnd(new PortError(english("portGone")));
     }
 }
 

@@ -4,6 +4,7 @@
 // What may be typed from here is decided there. A computer that falls silent is told as machines that are lost, and asked anew
 // until it answers.
 
+import { english } from "../words/words.ts";
 import type { Wire } from "./session.ts";
 
 /** Time without a word from the computer after which it is taken for gone: it says something twice a second, however still the machines are. */
@@ -11,8 +12,7 @@ const SILENCE_MS = 3000;
 /** Time between two tries to hear it again. */
 const RETRY_MS = 2000;
 
-const SILENT =
-    "the computer that has the machine's port does not answer: see that this device is in its network, and that weeder serve runs there";
+const SILENT = english("servedSilent");
 
 /** What may be typed from here beside `hold` and questions. */
 export interface Allowed {
@@ -109,7 +109,7 @@ export class Served {
                 this.#wires[message.machine]?.tell(message.line);
                 break;
             case "dropped":
-                this.#lose("this page could not keep up with what the machines say: it listens anew");
+                this.#lose(english("servedDropped"));
                 break;
             default:
         }

@@ -33,8 +33,8 @@ const SHARED_PATIENCE_MS = 35_000;
 const LONGEST_TURN_MS = 200;
 /** Time in which the greeting comes after a reset, behind a bootloader: the old ones wait for two seconds. */
 const BOOT_MS = 3000;
-/** How often the firmware's name is asked for again. */
-const TRIES = 1;
+/** How often a machine whose answers do not come, or come garbled, is asked again from the beginning. */
+const TRIES = 2;
 /** How often a question is asked again where others have it dropped: each HOLD of theirs may. */
 const SHARED_TRIES = 20;
 
@@ -90,6 +90,8 @@ export class Session {
     #isShared = false;
     /** Until when a greeting is waited for. */
     #greetingBy: number;
+    /** How often what was asked has been dropped to ask again from the beginning. */
+    #beginnings = 0;
     /** Something that has come and is no weeder's. */
     #strange = "";
 
@@ -110,14 +112,26 @@ export class Session {
         return this.#ask(command, true);
     }
 
-    /** Has the machine hold, before whatever waits: what the operator typed of that is dropped, what the page asks itself is not. */
-    hold(): void {
+    /**
+     * Has the machine hold, before whatever waits: what the operator typed of that is dropped, what the page asks itself is not.
+     * Done when it has obeyed.
+     */
+    hold(): Promise<void> {
         const dropped = this.#waiting.filter(({ isTyped }) => isTyped);
         this.#waiting = this.#waiting.filter(({ isTyped }) => !isTyped);
         for (const { failed } of dropped) failed(new Refused("hold came first, so this was not sent"));
-        if (this.#ended) return;
-        const nothing = () => {};
-        this.#send({ command: "hold", isTyped: true, since: this.#now, answer: [], done: nothing, failed: nothing });
+        return new Promise((done, failed) => {
+            if (this.#ended) failed(new NoMachine("no machine is connected"));
+            else
+                this.#send({
+                    command: "hold",
+                    isTyped: true,
+                    since: this.#now,
+                    answer: [],
+                    done: () => done(),
+                    failed,
+                });
+        });
     }
 
     /** Goes on, at a time. */
@@ -160,32 +174,42 @@ export class Session {
         this.#wire.send(`${question.command}\n`);
     }
 
-    /** Asks who is there. */
+    /** Asks who is there, again where an answer is lost: a computer that is busy, or noise on the wire, takes one now and then. */
     async #begin(): Promise<void> {
         this.isReady = false;
         this.#pollAt = Number.POSITIVE_INFINITY;
-        try {
-            const version = await this.#version();
-            const settings = await this.#settings();
-            const examples = await this.#insist("examples");
-            await this.#insist("events on");
-            this.isReady = true;
-            this.#strange = "";
-            this.onHappening({ is: "connected", version, settings, examples });
-            this.#pollAt = this.#now;
-            await this.#insist("status");
-            const help = new Map<string, string>();
-            for (const { name } of settings)
-                for (const line of await this.#insist(`help ${name}`)) {
-                    const said = read(line);
-                    if (said.is === "help") help.set(said.name, said.help);
+        const beginning = this.#beginnings;
+        for (let tries = 0; ; tries++)
+            try {
+                await this.#introduce();
+                return;
+            } catch (error) {
+                if (this.#ended || beginning !== this.#beginnings) return;
+                if (tries === TRIES) {
+                    this.#end(error instanceof Error ? error.message : String(error));
+                    return;
                 }
-            this.onHappening({ is: "help", help });
-        } catch (error) {
-            // A reset begins anew by itself.
-            if (error instanceof Restarted || this.#ended) return;
-            this.#end(error instanceof Error ? error.message : String(error));
-        }
+            }
+    }
+
+    /** Asks the machine for all that the page shows. */
+    async #introduce(): Promise<void> {
+        const version = await this.#version();
+        const settings = await this.#settings();
+        const examples = await this.#insist("examples");
+        await this.#insist("events on");
+        this.isReady = true;
+        this.#strange = "";
+        this.onHappening({ is: "connected", version, settings, examples });
+        this.#pollAt = this.#now;
+        await this.#insist("status");
+        const help = new Map<string, string>();
+        for (const { name } of settings)
+            for (const line of await this.#insist(`help ${name}`)) {
+                const said = read(line);
+                if (said.is === "help") help.set(said.name, said.help);
+            }
+        this.onHappening({ is: "help", help });
     }
 
     /** Asks for the page itself. A HOLD of others drops what waits where they share the machine, so that is asked again. */
@@ -199,18 +223,13 @@ export class Session {
     }
 
     async #version(): Promise<string> {
-        // Whatever was typed before ends here, and its answer is nobody's.
+        // What was typed before ends here, and its answer belongs to no question.
         this.#wire.send("\n");
-        for (let tries = 0; ; tries++)
-            try {
-                for (const line of await this.#insist("version")) {
-                    const said = read(line);
-                    if (said.is === "version") return said.version;
-                }
-                throw new NoMachine(this.#whoIsThere());
-            } catch (error) {
-                if (error instanceof Restarted || this.#ended || tries === TRIES) throw error;
-            }
+        for (const line of await this.#insist("version")) {
+            const said = read(line);
+            if (said.is === "version") return said.version;
+        }
+        throw new NoMachine(this.#whoIsThere());
     }
 
     async #settings(): Promise<Setting[]> {
@@ -222,11 +241,14 @@ export class Session {
         return settings;
     }
 
+    /** An answer does not come: a machine that was there is asked for all again. */
     #giveUp(question: Question): void {
-        this.#asked.shift();
         const error = new NoMachine(this.#whoIsThere());
-        question.failed(error);
-        if (this.isReady) this.#end(error.message);
+        if (this.isReady) this.#beginAgain(error, error.message);
+        else {
+            this.#asked.shift();
+            question.failed(error);
+        }
     }
 
     /** Why no good answer came, and what to do. */
@@ -236,7 +258,7 @@ export class Session {
         if (strange.length === 0)
             return "nothing answers at this port: choose another, or press the Uno's reset; a new board is to be flashed first";
         if (unreadable * 4 > strange.length)
-            return "what comes from this port is no text: choose another; on an Uno see that D0 and D1 are free, and flash it anew";
+            return "what comes from this port is no text: choose another; on an Uno see that D0 and D1 are free, and flash it again";
         return `it is not the weeder's firmware that answers, but \u201c${this.#strange.trim().slice(0, 60)}\u201d: choose another port, or flash this one`;
     }
 
@@ -284,11 +306,17 @@ export class Session {
 
     /** The Uno has started: nothing that was typed will be answered. */
     #restart(greeting: string): void {
-        const [asked, waiting] = [this.#asked.splice(0), this.#waiting.splice(0)];
-        if (this.isReady) this.onHappening({ is: "lost", why: "the Uno was reset", forGood: false, isWanted: false });
+        this.#beginAgain(new NoMachine("the Uno was reset while it was asked"), "the Uno was reset");
         this.onHappening({ is: "started", line: greeting });
-        for (const { failed } of [...asked, ...waiting]) failed(new Restarted("the Uno was reset while it was asked"));
+    }
+
+    /** Drops what was asked, and asks who is there. */
+    #beginAgain(error: Error, why: string): void {
+        const dropped = [...this.#asked.splice(0), ...this.#waiting.splice(0)];
+        this.#beginnings++;
+        if (this.isReady) this.onHappening({ is: "lost", why, forGood: false, isWanted: false });
         this.isReady = false;
+        for (const { failed } of dropped) failed(error);
         this.#greetingBy = this.#now;
     }
 
@@ -307,6 +335,3 @@ export class Session {
         void this.#wire.close();
     }
 }
-
-/** The Uno started anew while it was asked. */
-class Restarted extends Error {}

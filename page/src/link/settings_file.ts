@@ -1,6 +1,7 @@
 // Settings as the TOML file that `weeder settings` reads and writes: help, range and unit stand above each value. What a file
 // does not name is left alone. Of TOML, a file may have what a settings file needs: a key and its value, and comments.
 
+import { english } from "../words/words.ts";
 import type { Setting } from "./grammar.ts";
 
 /** What is wrong with a settings file, and what would be right. */
@@ -11,8 +12,8 @@ const OLD_MERGE_GAP = "merge_gap_ticks";
 
 /** What a setting may be. */
 export function range({ isSwitched, least, greatest, unit, default: usual }: Setting): string {
-    if (isSwitched) return `true or false, default ${usual === 1}`;
-    return `${least} to ${greatest}${unit && ` ${unit}`}, default ${usual}`;
+    if (isSwitched) return english("rangeSwitched", { usual: String(usual === 1) });
+    return english("range", { least, greatest: `${greatest}${unit && ` ${unit}`}`, usual });
 }
 
 /** The file that says all these settings. */
@@ -33,30 +34,33 @@ export function parse(text: string, settings: readonly Setting[]): Map<string, n
     let oldMergeGap: number | undefined;
     for (const [index, line] of text.split(/\r?\n/).entries()) {
         if (/^\s*(#.*)?$/.test(line)) continue;
-        const refuse = (problem: string) => new SettingsFileError(`line ${index + 1} of the file: ${problem}`);
+        const refuse = (problem: string) =>
+            new SettingsFileError(english("fileLine", { line: index + 1, why: problem }));
         const [, name = "", word = ""] = /^\s*(\w+)\s*=\s*([^\s#]+)\s*(?:#.*)?$/.exec(line) ?? [];
-        if (name === "") throw refuse("it has to be a setting's name, =, and its value");
+        if (name === "") throw refuse(english("fileForm"));
         if (name === OLD_MERGE_GAP) {
-            if (!/^\d{1,4}$/.test(word) || Number(word) > 2000)
-                throw refuse(`${name} has to be a whole number, 0 to 2000; now it is merge_gap_mm, in mm`);
+            if (!/^\d{1,4}$/.test(word) || Number(word) > 2000) throw refuse(english("fileOldGap", { name }));
             oldMergeGap = Number(word);
             continue;
         }
         const setting = settings.find((setting) => setting.name === name);
         if (!setting)
-            throw refuse(`there is no setting ${name}: there are ${settings.map(({ name }) => name).join(", ")}`);
-        if (values.has(name)) throw refuse(`${name} stands there twice`);
+            throw refuse(english("fileUnknown", { name, names: settings.map(({ name }) => name).join(", ") }));
+        if (values.has(name)) throw refuse(english("fileTwice", { name }));
         const value = setting.isSwitched ? ["false", "true"].indexOf(word) : /^\d+$/.test(word) ? Number(word) : -1;
         if (value < setting.least || value > setting.greatest)
             throw refuse(
-                `${name} is ${word}: it has to be ${setting.isSwitched ? "" : "a whole number, "}${range(setting)}`,
+                english(setting.isSwitched ? "fileSwitched" : "fileNumber", {
+                    name,
+                    value: word,
+                    range: range(setting),
+                }),
             );
         values.set(name, value);
     }
     if (oldMergeGap !== undefined && !values.has("merge_gap_mm"))
         values.set("merge_gap_mm", Math.min(1000, Math.round(oldMergeGap / ticksPerMm(values, settings))));
-    if (values.size === 0)
-        throw new SettingsFileError("the file names no setting: is it one that `weeder settings pull` has written?");
+    if (values.size === 0) throw new SettingsFileError(english("fileEmpty"));
     return values;
 }
 

@@ -3,6 +3,7 @@
 import type { Parts } from "../dom.ts";
 import { read, type Said } from "../link/grammar.ts";
 import { type Ask, Refused } from "../link/session.ts";
+import { type Plain, quantity, say, told } from "../words/words.ts";
 import type { Machine } from "./machine.ts";
 
 /** Which of the servo's two places. */
@@ -20,19 +21,15 @@ export class Calibration {
         parts.button("wheel-begin", () => void this.#begin());
         parts.button("wheel-end", () => void this.#end(""));
         parts.button("wheel-force", () => void this.#end(" force"));
-        parts.button("wheel-save", () => void this.#do("wheel-said", "save", "Saved."));
+        parts.button("wheel-save", () => void this.#do("wheel-said", "save", () => say("isSavedNow")));
         const pulse = parts.get("servo-pulse", HTMLInputElement);
         for (const place of ["in", "out"] as const) {
             parts.button(`servo-${place}`, () => void this.#move(place));
-            parts.button(
-                `servo-${place}-is`,
-                () =>
-                    void this.#do(
-                        "servo-said",
-                        `set servo_${place}_us ${pulse.value}`,
-                        `${pulse.value} us is the tool ${place === "in" ? "in the row" : "out"} now. Not saved yet.`,
-                    ),
-            );
+            parts.button(`servo-${place}-is`, () => {
+                const { value } = pulse;
+                const done = () => say(place === "in" ? "pulseIn" : "pulseOut", { pulse: value });
+                void this.#do("servo-said", `set servo_${place}_us ${value}`, done);
+            });
         }
         for (const [name, by] of [
             ["servo-less", -10],
@@ -45,7 +42,7 @@ export class Calibration {
         pulse.addEventListener("change", () => void this.#byHand(pulse.value));
         parts.button("servo-time", () => void this.#time());
         parts.button("servo-leads", () => void this.#leads());
-        parts.button("servo-save", () => void this.#do("servo-said", "save", "Saved."));
+        parts.button("servo-save", () => void this.#do("servo-said", "save", () => say("isSavedNow")));
     }
 
     /** Shows what changes while the machine rolls. */
@@ -55,7 +52,7 @@ export class Calibration {
         const rolledMm = isOn ? (status.position - (this.#from ?? 0)) * tickMm : 0;
         this.#parts.write(
             "wheel-rolled",
-            isOn ? `${(rolledMm / 1000).toFixed(2)} m by the present setting` : "not begun",
+            isOn ? say("rolled", { distance: quantity(rolledMm / 1000, "meter", 2) }) : say("notBegun"),
         );
     }
 
@@ -70,19 +67,16 @@ export class Calibration {
 
     /** What came of timing the servo. */
     take(said: Extract<Said, { is: "calibrated" }>): void {
-        const text = {
-            "end switch": said.isSet
-                ? "The end switch has timed it, and both leads are set. Not saved yet."
-                : "The end switch has timed it, but these leads need the beam farther ahead, or a lower top speed: nothing is set.",
-            eye: "It has swung three times. Put in what you saw, the longest way out and the shortest wait before it came in.",
-            none: "The end switch did not follow: see to it, or set end_switch off and go by eye.",
+        const text: Plain = {
+            "end switch": said.isSet ? ("timedSet" as const) : ("timedNotSet" as const),
+            eye: "timedByEye" as const,
+            none: "notTimed" as const,
         }[said.by];
-        this.#parts.write("servo-said", text);
+        this.#parts.say("servo-said", () => say(text));
     }
 
     async #begin(): Promise<void> {
-        if (!(await this.#do("wheel-said", "calibrate start", "Roll to the other mark, then give the distance.")))
-            return;
+        if (!(await this.#do("wheel-said", "calibrate start", () => say("rollOn")))) return;
         this.#from = this.#machine.status?.position;
     }
 
@@ -93,10 +87,10 @@ export class Calibration {
         try {
             const said = (await this.#ask(`calibrate ${distance}${force}`)).map(read);
             const measured = said.find((said) => said.is === "setting");
-            const counts = measured ? `${measured.setting.value} encoder counts a metre. ` : "";
-            this.#parts.write("wheel-said", `${counts}Not saved yet.`);
+            const counts = () => (measured ? `${say("countsPerMetre", { count: measured.setting.value })} ` : "");
+            this.#parts.say("wheel-said", () => `${counts()}${say("notSavedYet")}`);
         } catch (error) {
-            this.#parts.write("wheel-said", error instanceof Error ? error.message : String(error));
+            this.#parts.say("wheel-said", () => told(error instanceof Error ? error.message : String(error)));
             force_.hidden = !(error instanceof Refused && error.message.includes("force"));
         }
     }
@@ -104,32 +98,32 @@ export class Calibration {
     async #move(place: Place): Promise<void> {
         const pulse = this.#machine.setting(`servo_${place}_us`);
         this.#parts.get("servo-pulse", HTMLInputElement).value = String(pulse);
-        await this.#do("servo-said", `servo ${place}`, `The tool has ${pulse} us.`);
+        await this.#do("servo-said", `servo ${place}`, () => say("toolHas", { pulse: String(pulse) }));
     }
 
     async #byHand(pulse: string): Promise<void> {
-        await this.#do("servo-said", `servo ${pulse}`, `The tool has ${pulse} us.`);
+        await this.#do("servo-said", `servo ${pulse}`, () => say("toolHas", { pulse }));
     }
 
     async #time(): Promise<void> {
-        await this.#do("servo-said", "calibrate servo", "The tool swings in and out three times. Keep clear of it.");
+        await this.#do("servo-said", "calibrate servo", () => say("swingsThree"));
     }
 
     async #leads(): Promise<void> {
         for (const name of ["lead_out_ms", "lead_in_ms"]) {
             const { value } = this.#parts.get(name, HTMLInputElement);
-            if (!(await this.#do("servo-said", `set ${name} ${value}`, "Both leads are set. Not saved yet."))) return;
+            if (!(await this.#do("servo-said", `set ${name} ${value}`, () => say("bothSet")))) return;
         }
     }
 
     /** Types a command and says what came of it; whether it was carried out. */
-    async #do(said: string, command: string, done: string): Promise<boolean> {
+    async #do(said: string, command: string, done: () => string): Promise<boolean> {
         try {
             await this.#ask(command);
-            this.#parts.write(said, done);
+            this.#parts.say(said, done);
             return true;
         } catch (error) {
-            this.#parts.write(said, error instanceof Error ? error.message : String(error));
+            this.#parts.say(said, () => told(error instanceof Error ? error.message : String(error)));
             return false;
         }
     }

@@ -2,8 +2,10 @@
 // pulled and plugged in.
 
 import type { Parts } from "../dom.ts";
-import { choosePort, NO_PORT_CHOSEN, PortError, SerialLine, whyNoSerial, wireOf } from "../link/serial.ts";
+import { choosePort, PortError, SerialLine, whyNoSerial, wireOf } from "../link/serial.ts";
+import { english, say, told } from "../words/words.ts";
 import type { Panel } from "./panel.ts";
+import { Update } from "./update.ts";
 
 /** The firmware's rate. */
 const BAUD = 115_200;
@@ -11,6 +13,8 @@ const BAUD = 115_200;
 const TURN_MS = 20;
 
 export class Connection {
+    /** Called when the machine was let go of, for the operator to flash it. */
+    onFlash: () => void = () => {};
     readonly #parts: Parts;
     readonly #panel: Panel;
     #port: SerialPort | undefined;
@@ -26,18 +30,23 @@ export class Connection {
         parts.button("disconnect", () => void this.disconnect());
         const why = whyNoSerial();
         parts.html("no-serial").hidden = why === undefined;
-        parts.write("no-serial", why ?? "");
+        parts.say("no-serial", () => told(why ?? ""));
         parts.get("connect", HTMLButtonElement).disabled = why !== undefined;
         if (why !== undefined) return;
         navigator.serial.addEventListener("connect", ({ target }) => {
             if (this.#port && !this.#isOpen && (target === this.#port || isAlike(target, this.#port)))
                 void this.connect(target as SerialPort);
         });
+        const update = new Update(parts, panel, async () => {
+            await this.disconnect();
+            this.onFlash();
+        });
         panel.onHappening = (happening) => {
-            if (happening.is === "connected") this.#say(`weeder ${happening.version}`);
+            update.take(happening);
+            if (happening.is === "connected") this.#say(() => `weeder ${happening.version}`);
             if (happening.is !== "lost" || !happening.forGood) return;
             this.#isOpen = false;
-            this.#say("");
+            this.#say(() => "");
             this.#show();
         };
         // A page that was out of sight has lost it.
@@ -60,10 +69,10 @@ export class Connection {
             const line = await SerialLine.open(port, BAUD);
             [this.#port, this.#isOpen] = [port, true];
             this.#panel.connect(wireOf(line), performance.now(), true);
-            this.#say("Waiting for its answer.");
+            this.#say(() => say("waitingForAnswer"));
         } catch (error) {
             if (!(error instanceof PortError)) throw error;
-            this.#say(`Not connected: ${error.message}`);
+            this.#say(() => say("notConnected", { why: told(error.message) }));
         } finally {
             this.#isBusy = false;
             this.#show();
@@ -94,15 +103,15 @@ export class Connection {
         try {
             const port = await choosePort();
             if (port) await this.connect(port);
-            else this.#say(NO_PORT_CHOSEN);
+            else this.#say(() => told(english("noPort")));
         } catch (error) {
             if (!(error instanceof PortError)) throw error;
-            this.#say(`Not connected: ${error.message}`);
+            this.#say(() => say("notConnected", { why: told(error.message) }));
         }
     }
 
-    #say(text: string): void {
-        this.#parts.write("connection-said", text.replaceAll("`", ""));
+    #say(text: () => string): void {
+        this.#parts.say("connection-said", () => text().replaceAll("`", ""));
     }
 
     #show(): void {

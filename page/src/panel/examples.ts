@@ -3,6 +3,7 @@
 import { make, type Parts } from "../dom.ts";
 import { read } from "../link/grammar.ts";
 import { type Ask, Refused } from "../link/session.ts";
+import { quantity, say, show, told } from "../words/words.ts";
 import type { Machine } from "./machine.ts";
 
 /** Places for examples from the field. */
@@ -29,12 +30,15 @@ export class Examples {
     /** Shows the last object. */
     show(): void {
         const [last] = this.#machine.objects;
-        const widthMm = last && Math.round(this.#machine.widthMm(last));
         this.#parts.write(
             "last-object",
             last
-                ? `Last: ${last.class}, ${widthMm} mm wide, ${last.votes} ${last.votes === 1 ? "vote" : "votes"}`
-                : "Nothing was seen yet",
+                ? say("lastObject", {
+                      class: say(last.class),
+                      width: quantity(this.#machine.widthMm(last), "millimeter"),
+                      count: last.votes,
+                  })
+                : say("nothingSeen"),
         );
     }
 
@@ -43,14 +47,19 @@ export class Examples {
         const field = this.#machine.examples
             .map(read)
             .flatMap((said) => (said.is === "example" && said.fromField ? [said] : []));
-        this.#parts.write("examples-count", `${field.length} of ${PLACES} places are taken.`);
+        this.#parts.write("examples-count", say("places", { count: field.length, all: PLACES }));
         this.#parts.html("examples-list").replaceChildren(
             ...field.map(({ number, label }) => {
-                const forget = make("button", "needs-change", "Forget");
+                const forget = make("button", "needs-change", say("forget"));
                 forget.type = "button";
-                forget.ariaLabel = `Forget example ${number}`;
+                forget.ariaLabel = say("forgetOne", { number });
                 forget.addEventListener("click", () => void this.#forget(String(number)));
-                return make("li", "", make("span", "", `${number}: ${label}`), forget);
+                return make(
+                    "li",
+                    "",
+                    make("span", "", `${number}: ${label === "plant" || label === "weed" ? say(label) : label}`),
+                    forget,
+                );
             }),
         );
         this.#parts.get("examples-forget", HTMLButtonElement).disabled = field.length === 0;
@@ -60,15 +69,15 @@ export class Examples {
         this.#refused = undefined;
         try {
             await this.#ask(`label ${label}${force}`);
-            this.#say(`Taught: it was a ${label}.`);
+            this.#say(() => say(label === "plant" ? "taughtPlant" : "taughtWeed"));
             await this.#read();
         } catch (error) {
-            this.#say(error instanceof Error ? error.message : String(error));
+            this.#say(() => told(error instanceof Error ? error.message : String(error)));
             if (error instanceof Refused && error.message.includes("force")) this.#refused = label;
         }
         const insist = this.#parts.get("teach-force", HTMLButtonElement);
         insist.hidden = this.#refused === undefined;
-        insist.textContent = `It is a ${this.#refused ?? label}`;
+        show(insist, () => say((this.#refused ?? label) === "plant" ? "isPlant" : "isWeed"));
     }
 
     async #forget(which: string): Promise<void> {
@@ -76,7 +85,7 @@ export class Examples {
             await this.#ask(`forget ${which}`);
             await this.#read();
         } catch (error) {
-            this.#say(error instanceof Error ? error.message : String(error));
+            this.#say(() => told(error instanceof Error ? error.message : String(error)));
         }
     }
 
@@ -85,7 +94,7 @@ export class Examples {
         this.showExamples();
     }
 
-    #say(text: string): void {
-        this.#parts.write("teach-said", text);
+    #say(text: () => string): void {
+        this.#parts.say("teach-said", text);
     }
 }

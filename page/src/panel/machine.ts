@@ -4,40 +4,45 @@
 import faults from "faults.json";
 import type { Mode, Seen, Setting, Status } from "../link/grammar.ts";
 import type { Happening } from "../link/session.ts";
+import { advice, english, type Plain, quantity, say, told } from "../words/words.ts";
 
 /** Objects that are remembered. */
 const OBJECTS = 50;
 
 /** What the manual says of an alarm or a warning. */
 export interface Fault {
-    /** The digits that the lamp blinks, such as 1-1; empty for a warning. */
-    readonly code: string;
     readonly name: string;
+    /** What it is called everywhere: for an alarm, the digits that the lamp blinks before its name, as in "3-1 too_fast". */
+    readonly title: string;
     readonly cause: string;
     readonly advice: string;
 }
 
 /** What the manual says of an alarm or a warning; what is not in it can still be looked up. */
 export function fault(name: string): Fault {
-    const unknown = { code: "", name, cause: "", advice: "look it up in the manual, docs/faults.md" };
-    return faults.find((fault) => fault.name === name) ?? unknown;
+    const unknown = { name, title: name, cause: "", advice: say("lookItUp") };
+    const found = faults.find((fault) => fault.name === name) ?? unknown;
+    return { ...found, advice: advice(name) ?? found.advice };
 }
 
 /** Why the tool is out at work, in words for the operator. */
-const REASONS: Readonly<Record<string, string>> = {
-    plant: "A plant is at the tool, or comes up.",
-    unseen_ground: "The beam has not seen this ground yet.",
-    too_fast: "Too fast: a plant behind the beam would be reached before the tool is out. Drive slower.",
-    encoder_doubtful: "The encoder says too little: nobody knows how far the machine has rolled.",
+const REASONS: Readonly<Record<string, Plain>> = {
+    plant: "reasonPlant",
+    unseen_ground: "reasonUnseen",
+    too_fast: "reasonTooFast",
+    encoder_doubtful: "reasonEncoder",
 };
+const STATES = { none: "stateNone", hold: "stateHold", work: "stateWork", alarm: "stateAlarm" } as const;
 
 export class Machine {
     /** The firmware's version, where the machine is there. */
     version: string | undefined;
     /** Whether it may be started from here. */
     mayStart = true;
-    /** Why it is not there. */
-    lost = "No machine is connected.";
+    /** Why it is not there, in English. */
+    #lost: string = english("noneConnected");
+    /** Whether it may weed on where no page reaches it. */
+    #mayWeedOn = false;
     mode: Mode = "hold";
     toolOut = true;
     /** The latched alarm's name. */
@@ -66,10 +71,9 @@ export class Machine {
                 break;
             case "lost":
                 this.version = undefined;
-                this.lost = sentence(happening.why);
-                // Whoever is at the machine has to know where HOLD is now.
-                if (happening.forGood && !happening.isWanted && this.mode === "work")
-                    this.lost += " A machine with power of its own weeds on: its work switch takes the tool out.";
+                this.lost = happening.why;
+                // The operator has to know where HOLD is now.
+                this.#mayWeedOn = happening.forGood && !happening.isWanted && this.mode === "work";
                 [this.alarm, this.warning, this.status] = [undefined, undefined, undefined];
                 break;
             case "settings":
@@ -149,29 +153,59 @@ export class Machine {
         return status.position + this.ticks((status.speedMmS * Math.min(nowMs - this.statusMs, 500)) / 1000);
     }
 
-    /** What the machine does, in a word. */
-    get stateWord(): string {
-        return this.version === undefined ? "no machine" : this.mode;
+    /** It is not there, and why, in English. */
+    set lost(why: string) {
+        [this.#lost, this.#mayWeedOn] = [why, false];
     }
 
-    /** What the tool does and why, in a sentence. */
+    /** What the machine does. */
+    get state(): Mode | "none" {
+        return this.version === undefined ? "none" : this.mode;
+    }
+
+    /** The same in a word for the operator. */
+    get stateWord(): string {
+        return say(STATES[this.state]);
+    }
+
+    /**
+     * What a screen reader says of it: the state, and the reason while that lasts. Distances, and swings at plants, would be said
+     * without an end.
+     */
+    get heard(): string {
+        if (this.version !== undefined && this.mode === "work" && !this.#isKeptOut) return sentence(this.stateWord);
+        return `${sentence(this.stateWord)} ${this.#reason}`;
+    }
+
+    /** What the tool does and why, in a sentence or two. */
     get why(): string {
-        if (this.version === undefined) return this.lost;
-        if (this.mode === "alarm") return "The tool is out until the alarm is cleared.";
-        if (this.mode === "hold")
-            return this.toolOut
-                ? `The tool is out: the machine holds until it is started, by the work switch${this.mayStart ? " or here" : ""}.`
-                : "The tool is moved by hand. Keep clear of it.";
-        if (!this.toolOut) return "The tool is in the row, and weeds.";
+        const { status } = this;
+        const isUnseen = this.mode === "work" && this.#isKeptOut && status?.reason === "unseen_ground";
+        return isUnseen
+            ? `${this.#reason} ${say("toGo", { distance: quantity(status.unseenMm / 1000, "meter", 2) })}`
+            : this.#reason;
+    }
+
+    /** Whether the tool is out at work for something else than a plant. */
+    get #isKeptOut(): boolean {
+        return this.toolOut && (this.status?.reason ?? "plant") !== "plant";
+    }
+
+    get #reason(): string {
+        if (this.version === undefined)
+            return `${sentence(told(this.#lost))}${this.#mayWeedOn ? ` ${say("weedsOn")}` : ""}`;
+        if (this.mode === "alarm") return say("outUntilCleared");
+        if (this.mode === "hold" && !this.toolOut) return say("movedByHand");
+        if (this.mode === "hold") return say(this.mayStart ? "outUntilStart" : "outUntilSwitch");
+        if (!this.toolOut) return say("weeds");
         const reason = this.status?.reason ?? "plant";
-        const toGo =
-            reason === "unseen_ground" && this.status ? ` ${(this.status.unseenMm / 1000).toFixed(2)} m to go.` : "";
-        return `The tool is out. ${REASONS[reason] ?? `The machine says: ${reason}.`}${toGo}`;
+        const known = REASONS[reason];
+        return say("toolIsOut", { reason: known ? say(known) : say("reasonOther", { reason }) });
     }
 }
 
 /** A text as a sentence, its commands as they are typed. */
 export function sentence(text: string): string {
     const plain = text.replaceAll("`", "");
-    return `${plain.charAt(0).toUpperCase()}${plain.slice(1)}${/[.!?]$/.test(plain) ? "" : "."}`;
+    return `${plain.charAt(0).toUpperCase()}${plain.slice(1)}${/[.!?।]$/.test(plain) ? "" : "."}`;
 }

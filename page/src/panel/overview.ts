@@ -2,6 +2,7 @@
 
 import { make } from "../dom.ts";
 import type { HeldAll } from "../link/served.ts";
+import { quantity, say, show, told } from "../words/words.ts";
 import { fault } from "./machine.ts";
 import type { Panel } from "./panel.ts";
 
@@ -17,19 +18,16 @@ export class Overview {
             link.addEventListener("click", () => into.parentElement?.children[row + 1]?.scrollIntoView());
             return make("li", "", link, state);
         });
-        const hold = make("button", "hold-all", "HOLD all");
+        const hold = make("button", "hold-all");
         hold.type = "button";
+        show(hold, () => say("holdAll"));
         const said = make("p", "overview-said");
         said.role = "status";
         hold.addEventListener("click", () => {
-            said.textContent = "HOLD: waiting for all to obey.";
+            show(said, () => say("waitingForAll"));
             holdAll().then(
-                (held) => {
-                    said.textContent = told(held);
-                },
-                (error) => {
-                    said.textContent = `HOLD has not come through: ${error instanceof Error ? error.message : error}`;
-                },
+                (held) => show(said, () => inWords(held)),
+                (error: Error) => show(said, () => say("holdFailed", { why: told(error.message) })),
             );
         });
         into.append(make("ul", "", ...rows), make("div", "hold-bar", said, hold));
@@ -40,20 +38,23 @@ export class Overview {
         for (const [row, state] of this.#states.entries()) {
             const machine = panels[row]?.machine;
             if (!machine) continue;
-            const word = machine.stateWord;
-            const text = word === "alarm" && machine.alarm !== undefined ? `alarm ${fault(machine.alarm).name}` : word;
+            const { alarm, stateWord: word } = machine;
+            const text = machine.state === "alarm" && alarm !== undefined ? `${word} ${fault(alarm).title}` : word;
             if (state.textContent !== text) state.textContent = text;
-            const kind = word.replace(" ", "-");
-            if (state.dataset.state !== kind) state.dataset.state = kind;
+            if (state.dataset.state !== machine.state) state.dataset.state = machine.state;
         }
     }
 }
 
 /** What came of a HOLD to all, those first that have not obeyed. */
-function told({ machines, lastMs }: HeldAll): string {
+function inWords({ machines, lastMs }: HeldAll): string {
     const failed = machines.filter(({ error }) => error !== null);
     const obeyed = machines.length - failed.length;
-    const time = lastMs === null ? "" : `, the last after ${lastMs} ms`;
-    const not = failed.map(({ name, error }) => `${name} NOT: ${error}`).join("; ");
-    return `${not === "" ? "" : `${not}. `}HOLD obeyed by ${obeyed} of ${machines.length}${time}.`;
+    const not = failed.map(({ name, error }) => say("notObeyed", { name, why: told(error ?? "") })).join("; ");
+    const all = machines.length;
+    const have =
+        lastMs === null
+            ? say("obeyed", { obeyed, all })
+            : say("obeyedAfter", { obeyed, all, time: quantity(lastMs, "millisecond") });
+    return `${not === "" ? "" : `${not}. `}${have}`;
 }

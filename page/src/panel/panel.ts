@@ -7,15 +7,21 @@ import { download, Parts } from "../dom.ts";
 import { Log } from "../link/log.ts";
 import type { Allowed } from "../link/served.ts";
 import { type Ask, type Happening, NoMachine, Session, type Wire } from "../link/session.ts";
+import { signal } from "../signals.ts";
+import { english, number, onLanguage, quantity, say, told, translate } from "../words/words.ts";
 import { Calibration } from "./calibration.ts";
 import { Console } from "./console.ts";
 import { Examples } from "./examples.ts";
 import { fault, Machine, sentence } from "./machine.ts";
+import { SetUp } from "./set_up.ts";
 import { SettingsForm } from "./settings.ts";
 import { drawStrip } from "./strip.ts";
 
 /** At a machine's own port. */
 const EVERYTHING: Allowed = { mayStart: true, mayChange: true };
+
+/** Time for which a reason has to last before a screen reader says it; a state is said at once. */
+const LASTING_MS = 1000;
 
 /** What stands beside what is needed at work, a tab each. */
 const TABS = ["settings", "calibrate", "examples", "console"] as const;
@@ -24,30 +30,43 @@ export class Panel {
     /** Told of all that happens, after the panel. */
     onHappening: (happening: Happening) => void = () => {};
     readonly machine = new Machine();
+    /** What is read out before the machine's state, where there are several. */
+    readonly #row: string;
     readonly #parts: Parts;
     readonly #console: Console;
     readonly #settings: SettingsForm;
     readonly #calibration: Calibration;
+    readonly #setUp: SetUp;
     readonly #examples: Examples;
     readonly #strip: SVGSVGElement;
     #log = new Log();
+    /** What a screen reader says next, the state that it tells, and when that state began. */
+    #heard = { text: "", state: "", sinceMs: 0 };
+    /** Whether the next state is this page's own HOLD, which its answer tells. */
+    #isHolding = false;
     #session: Session | undefined;
     #now = 0;
 
-    /** Fills an element. `name` tells it from the page's other panels, `allowed` says what may be typed from here. */
-    constructor(into: HTMLElement, name: string, allowed = EVERYTHING) {
+    /**
+     * Fills an element. `name` tells it from the page's other panels, `allowed` says what may be typed from here, and `row` is read out
+     * before what happens to this one of several machines.
+     */
+    constructor(into: HTMLElement, name: string, allowed = EVERYTHING, row = "") {
+        this.#row = row === "" ? "" : `${row}: `;
         const template = document.getElementById("panel");
         if (!(template instanceof HTMLTemplateElement)) throw new Error("the page has no template #panel");
         into.append(template.content.cloneNode(true));
+        translate(into);
         const parts = new Parts(into);
         this.#parts = parts;
         const ask: Ask = (command) => this.ask(command);
-        this.#console = new Console(parts, (line) => void ask(line).catch((error) => this.#cannot(error)));
+        this.#console = new Console(parts, (line) => void this.#type(line));
         this.#settings = new SettingsForm(parts, this.machine, ask, allowed.mayChange);
         this.#calibration = new Calibration(parts, this.machine, ask);
+        this.#setUp = new SetUp(parts, this.machine, ask);
         this.#examples = new Examples(parts, this.machine, ask);
         this.#strip = parts.get("strip", SVGSVGElement);
-        parts.button("hold", () => this.#session?.hold());
+        parts.button("hold", () => this.hold());
         parts.button("start", () => void ask("start").catch((error) => this.#say(error)));
         parts.button("clear", () => void ask("clear").catch((error) => this.#say(error)));
         parts.button("log-save", () => download("weeder-log.csv", this.#log.text(), "text/csv"));
@@ -61,18 +80,36 @@ export class Panel {
         into.classList.toggle("may-not-start", !allowed.mayStart);
         into.classList.toggle("may-not-change", !allowed.mayChange);
         parts.html("limits").hidden = allowed.mayChange;
-        parts.write("limits", limits(allowed));
+        parts.say("limits", () => say(allowed.mayStart ? "watchAndStart" : "watchOnly"));
         this.#wireTabs(
             name,
             TABS.filter((tab) => allowed.mayChange || tab !== "calibrate"),
         );
         this.#showConnected();
+        onLanguage(() => {
+            this.#settings.show();
+            this.#examples.showExamples();
+            this.#setUp.show();
+        });
+        if (into.classList.contains("alone")) followDock(parts.html("dock"));
+    }
+
+    /** Has the machine hold, before all that waits. */
+    hold(): void {
+        const session = this.#session;
+        if (!session || this.machine.version === undefined) return;
+        this.#isHolding = this.machine.mode === "work";
+        session.hold().then(
+            () => signal("held"),
+            // A machine that is lost has said so.
+            () => {},
+        );
     }
 
     /** Talks to the machine at the other end of a wire from now on. */
     connect(wire: Wire, nowMs: number, resets: boolean): void {
         this.#now = nowMs;
-        this.machine.lost = "Waiting for the machine to answer.";
+        this.machine.lost = english("waitingForMachine");
         const session = new Session(wire, nowMs, resets);
         session.onHappening = (happening) => {
             if (session === this.#session) this.#take(happening);
@@ -87,8 +124,15 @@ export class Panel {
     }
 
     ask(command: string): Promise<string[]> {
-        if (!this.#session) return Promise.reject(new NoMachine("no machine is connected"));
+        if (!this.#session) return Promise.reject(new NoMachine(english("noneConnected")));
         return this.#session.ask(command);
+    }
+
+    /** Has the machine save these settings, and takes back the alarm that they were lost; whether it has taken all. */
+    async putBack(values: ReadonlyMap<string, number>): Promise<boolean> {
+        if (!(await this.#settings.putBack(values))) return false;
+        if (this.machine.alarm === "settings_lost") await this.ask("clear");
+        return true;
     }
 
     /** Goes on, at the wire's time. */
@@ -101,14 +145,15 @@ export class Panel {
     show(): void {
         const { machine } = this;
         const parts = this.#parts;
-        parts.root.dataset.state = machine.stateWord.replace(" ", "-");
+        parts.root.dataset.state = machine.state;
         parts.write("state", machine.stateWord);
         parts.write("why", machine.why);
-        parts.write("speed", machine.status ? (machine.status.speedMmS * 0.0036).toFixed(1) : "-");
-        parts.write("tool", machine.version === undefined ? "-" : machine.toolOut ? "out" : "in the row");
+        this.#tell();
+        parts.write("speed", machine.status ? number(machine.status.speedMmS * 0.0036, 1) : "-");
+        parts.write("tool", machine.version === undefined ? "-" : say(machine.toolOut ? "toolOut" : "toolIn"));
         parts.write(
             "place",
-            machine.status ? `${((machine.status.position * machine.tickMm) / 1000).toFixed(2)} m` : "-",
+            machine.status ? quantity((machine.status.position * machine.tickMm) / 1000, "meter", 2) : "-",
         );
         parts.write("windows", machine.status ? String(machine.status.windows) : "-");
         const trouble = machine.alarm ?? machine.warning;
@@ -116,23 +161,24 @@ export class Panel {
         parts.html("alarm").classList.toggle("warning", machine.alarm === undefined);
         parts.html("clear").hidden = machine.alarm === undefined;
         if (trouble !== undefined) {
-            const { code, name, advice } = fault(trouble);
-            parts.write("alarm-name", machine.alarm === undefined ? `Warning ${name}` : `Alarm ${code} ${name}`);
+            const { title, advice } = fault(trouble);
+            parts.write("alarm-name", say(machine.alarm === undefined ? "warning" : "alarm", { title }));
             parts.write("alarm-advice", sentence(advice));
         }
         drawStrip(this.#strip, machine, this.#now);
         this.#examples.show();
         this.#calibration.show();
-        parts.write(
-            "log-length",
-            `${this.#log.length} lines${this.#log.isFull ? ": it is full, save it and begin anew" : ""}`,
-        );
+        const lines = say("logLines", { count: this.#log.length });
+        parts.write("log-length", this.#log.isFull ? say("logFull", { lines }) : lines);
         this.#console.show();
     }
 
     #take(happening: Happening): void {
+        const { alarm } = this.machine;
         this.machine.take(happening, this.#now);
+        this.#signal(happening, this.machine.alarm !== alarm);
         this.#log.add(happening, this.#now);
+        this.#setUp.take(happening);
         switch (happening.is) {
             case "started":
                 this.#console.add(happening.line, "happened");
@@ -171,6 +217,17 @@ export class Panel {
         this.onHappening(happening);
     }
 
+    /** Lets the operator hear what he has to know without looking. */
+    #signal(happening: Happening, isOtherAlarm: boolean): void {
+        if (isOtherAlarm && this.machine.alarm !== undefined) signal("alarm");
+        if (happening.is === "lost" && !happening.isWanted) signal("lost");
+        const said = happening.is === "told" ? happening.said : undefined;
+        if (said?.is !== "state" && said?.is !== "alarm" && happening.is !== "lost") return;
+        // By its switch, or by another page's HOLD. The operator hears this page's own by its answer, which comes before this or after.
+        if (said?.is === "state" && said.mode === "hold" && !this.#isHolding) signal("held");
+        this.#isHolding = false;
+    }
+
     /** Buttons work where a machine is there. */
     #showConnected(): void {
         const isThere = this.machine.version !== undefined;
@@ -178,13 +235,30 @@ export class Panel {
             button.disabled = !isThere;
     }
 
-    /** What was typed could not be sent. */
-    #cannot(error: unknown): void {
-        if (error instanceof NoMachine) this.#console.add(error.message, "error");
+    /** Types a line of the console. A screen reader says its answer, and not all that the machine tells. */
+    async #type(line: string): Promise<void> {
+        this.#parts.write("answered", "");
+        try {
+            const answer = await this.ask(line);
+            this.#parts.write("answered", answer.join("\n") || "ok");
+        } catch (error) {
+            const { message } = error as Error;
+            this.#parts.write("answered", told(message));
+            if (error instanceof NoMachine) this.#console.add(message, "error");
+        }
+    }
+
+    /** Has a screen reader say the state at once, and its reason where that lasts. */
+    #tell(): void {
+        const { heard, state } = this.machine;
+        const nowMs = performance.now();
+        const isOther = state !== this.#heard.state;
+        if (isOther || heard !== this.#heard.text) this.#heard = { text: heard, state, sinceMs: nowMs };
+        if (isOther || nowMs - this.#heard.sinceMs > LASTING_MS) this.#parts.write("heard", this.#row + heard);
     }
 
     #say(error: unknown): void {
-        this.#parts.write("drive-said", sentence(error instanceof Error ? error.message : String(error)));
+        this.#parts.say("drive-said", () => sentence(told(error instanceof Error ? error.message : String(error))));
     }
 
     #wireTabs(name: string, tabs: readonly (typeof TABS)[number][]): void {
@@ -193,7 +267,6 @@ export class Panel {
         const choose = (chosen: string) => {
             for (const which of tabs) {
                 tab(which).ariaSelected = String(which === chosen);
-                tab(which).tabIndex = which === chosen ? 0 : -1;
                 body(which).hidden = which !== chosen;
             }
         };
@@ -218,10 +291,9 @@ export class Panel {
     }
 }
 
-/** What may be done from here, and where the rest may. */
-function limits({ mayStart }: Allowed): string {
-    return mayStart
-        ? "From here the machine is watched, started and held. Settings, calibration and teaching are for the computer that has its port."
-        : "From here the machine is watched and held. It is started, and its alarms are cleared, at the machine itself, or from here " +
-              "where weeder serve was started with --allow-start. Settings, calibration and teaching are for the computer that has its port.";
+/** Leaves room at the page's end for the dock that is on the screen, and has the browser scroll what has the focus to above it. */
+function followDock(dock: HTMLElement): void {
+    new ResizeObserver(() => {
+        if (dock.offsetHeight > 0) document.documentElement.style.setProperty("--dock", `${dock.offsetHeight}px`);
+    }).observe(dock);
 }

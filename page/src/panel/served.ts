@@ -2,7 +2,7 @@
 
 import { make } from "../dom.ts";
 import { Served } from "../link/served.ts";
-import { sentence } from "./machine.ts";
+import { onLanguage, say } from "../words/words.ts";
 import { Overview } from "./overview.ts";
 import { Panel } from "./panel.ts";
 
@@ -13,23 +13,31 @@ const TURN_MS = 20;
 export async function showServed(into: HTMLElement): Promise<Panel[]> {
     const served = await Served.open();
     const all = make("section", "overview");
-    all.ariaLabel = "all rows";
+    const label = () => {
+        all.ariaLabel = say("allRows");
+    };
+    label();
+    onLanguage(label);
     const overview = served.names.length > 1 ? new Overview(all, served.names, () => served.holdAll()) : undefined;
     if (overview) into.append(all);
     const panels = served.names.map((name, machine) => {
-        const element = make("div", "panel");
+        const element = make("div", overview ? "panel" : "panel alone");
         const section = make("section", "served", make("h2", "", name), element);
         section.ariaLabel = name;
         into.append(section);
-        const panel = new Panel(element, `served-${machine}`, served.allowed);
-        // Whoever does not see the page has to know whose part he is in.
-        for (const part of element.querySelectorAll("section")) part.ariaLabel = `${name}: ${part.ariaLabel}`;
+        const panel = new Panel(element, `served-${machine}`, served.allowed, overview ? name : "");
+        // Read out, they say whose parts they are.
+        const label = () => {
+            for (const part of element.querySelectorAll("section")) part.ariaLabel = `${name}: ${part.ariaLabel}`;
+        };
+        label();
+        onLanguage(label);
         return panel;
     });
     served.onThere = (machine, wire) => panels[machine]?.connect(wire, performance.now(), false);
     served.onLost = (machine, why) => {
         const panel = panels[machine];
-        if (panel) panel.machine.lost = sentence(why);
+        if (panel) panel.machine.lost = why;
     };
     setInterval(() => {
         served.watch();

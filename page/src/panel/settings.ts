@@ -5,6 +5,7 @@ import { download, make, type Parts } from "../dom.ts";
 import { steps as order, type Setting } from "../link/grammar.ts";
 import type { Ask } from "../link/session.ts";
 import { parse, range, SettingsFileError, write } from "../link/settings_file.ts";
+import { type Plain, say, settingHelp, told } from "../words/words.ts";
 import { type Machine, sentence } from "./machine.ts";
 
 export class SettingsForm {
@@ -23,11 +24,8 @@ export class SettingsForm {
         parts.button("settings-send", () => void this.#send());
         parts.button("settings-undo", () => this.#undo());
         parts.button("settings-read", () => void this.#read());
-        parts.button(
-            "settings-defaults",
-            () => void this.#take("defaults", "The defaults are in use. They are not saved yet."),
-        );
-        parts.button("settings-revert", () => void this.#take("revert", "The saved settings are in use."));
+        parts.button("settings-defaults", () => void this.#take("defaults", "defaultsInUse"));
+        parts.button("settings-revert", () => void this.#take("revert", "savedInUse"));
         parts.button("settings-save-file", () =>
             download("machine.toml", write(machine.settings, machine.help), "application/toml"),
         );
@@ -46,6 +44,13 @@ export class SettingsForm {
         this.#list.replaceChildren(...this.#machine.settings.map((setting) => this.#row(setting)));
         if (focused) this.#list.querySelector<HTMLElement>(`[data-setting="${focused}"]`)?.focus();
         this.#count();
+    }
+
+    /** Has the machine save these values; whether it has. */
+    async putBack(values: ReadonlyMap<string, number>): Promise<boolean> {
+        for (const [name, value] of values) this.#wanted.set(name, value);
+        this.show();
+        return await this.#send();
     }
 
     #row(setting: Setting): HTMLElement {
@@ -77,17 +82,23 @@ export class SettingsForm {
             input.addEventListener("input", () => change(input.value === "" ? Number.NaN : input.valueAsNumber));
         }
         const isSaved =
-            saved === value ? "" : saved === undefined ? "; not saved" : `; ${shown(setting, saved)} is saved`;
+            saved === value
+                ? ""
+                : `; ${saved === undefined ? say("notSaved") : say("isSaved", { value: shown(setting, saved) })}`;
+        const inOwnWords = settingHelp(name);
+        const help = make("span", "", inOwnWords ?? this.#machine.help.get(name) ?? "");
+        // The machine speaks English.
+        if (inOwnWords === undefined) help.lang = "en";
         const label = make(
             "label",
             "",
             make("span", "setting-name", name),
             make("span", "setting-field", input, make("span", "unit", unit)),
-            make("span", "setting-help", `${this.#machine.help.get(name) ?? ""} (${range(setting)}${isSaved})`),
+            make("span", "setting-help", help, ` (${told(range(setting))}${isSaved})`),
         );
         const row = make("li", this.#wanted.has(name) ? "changed" : "", label);
         const problem = this.#problems.get(name);
-        if (problem) row.append(make("p", "problem", problem));
+        if (problem) row.append(make("p", "problem", told(problem)));
         return row;
     }
 
@@ -95,52 +106,49 @@ export class SettingsForm {
         const { size } = this.#wanted;
         this.#parts.get("settings-send", HTMLButtonElement).disabled = size === 0 && !this.#isUnsaved;
         this.#parts.get("settings-undo", HTMLButtonElement).disabled = size === 0;
-        this.#parts.write(
-            "settings-send",
-            size === 0 ? "Save" : size === 1 ? "Send 1 change and save" : `Send ${size} changes and save`,
-        );
+        this.#parts.write("settings-send", size === 0 ? say("save") : say("sendAndSave", { count: size }));
     }
 
     get #isUnsaved(): boolean {
         return this.#machine.settings.some(({ value, saved }) => value !== saved);
     }
 
-    #say(text: string): void {
-        this.#parts.write("settings-said", text);
+    #say(text?: () => string): void {
+        this.#parts.say("settings-said", text ?? (() => ""));
     }
 
     #undo(): void {
         this.#wanted.clear();
         this.#problems.clear();
-        this.#say("");
+        this.#say();
         this.show();
     }
 
     async #read(): Promise<void> {
-        await this.#take("get", "These are the machine's.");
+        await this.#take("get", "areMachines");
     }
 
-    async #take(command: string, said: string): Promise<void> {
+    async #take(command: string, done: Plain): Promise<void> {
         try {
             await this.#ask(command);
             this.#undo();
-            this.#say(said);
+            this.#say(() => say(done));
         } catch (error) {
-            this.#say(String(error instanceof Error ? error.message : error));
+            this.#say(() => told(String(error instanceof Error ? error.message : error)));
         }
     }
 
     /**
      * Sends what was changed, in an order in which no value contradicts one that is yet to be sent, and saves it. What contradicts
-     * itself in the end is not sent; what the machine refuses is shown with its words.
+     * itself in the end is not sent; what the machine refuses is shown with its words. Whether it is saved.
      */
-    async #send(): Promise<void> {
+    async #send(): Promise<boolean> {
         this.#problems.clear();
         const { settings } = this.#machine;
         const { contradiction, steps } = order(settings, this.#wanted);
         if (contradiction) {
-            this.#say(`${sentence(contradiction)} Nothing was sent.`);
-            return;
+            this.#say(() => say("nothingSent", { why: sentence(told(contradiction)) }));
+            return false;
         }
         for (const [name, value] of steps)
             try {
@@ -149,16 +157,20 @@ export class SettingsForm {
             } catch (error) {
                 this.#problems.set(name, error instanceof Error ? error.message : String(error));
             }
+        let isSaved = false;
         const { size } = this.#problems;
-        if (size > 0) this.#say(`${size} of ${steps.length} were refused, and nothing is saved: see there.`);
+        if (size > 0) this.#say(() => say("refused", { count: size, all: steps.length }));
         else
             try {
                 await this.#ask("save");
-                this.#say("Saved: they are there after a reset, and without power.");
+                isSaved = true;
+                this.#say(() => say("savedForGood"));
             } catch (error) {
-                this.#say(`Not saved: ${error instanceof Error ? error.message : error}`);
+                const why = error instanceof Error ? error.message : String(error);
+                this.#say(() => say("notSavedWhy", { why: told(why) }));
             }
         this.show();
+        return isSaved;
     }
 
     async #open(file: HTMLInputElement): Promise<void> {
@@ -169,15 +181,12 @@ export class SettingsForm {
             const values = parse(await chosen.text(), this.#machine.settings);
             for (const [name, value] of values) this.#wanted.set(name, value);
             this.show();
-            const { size } = this.#wanted;
-            this.#say(
-                size === 0
-                    ? `${chosen.name} says what the machine has already.`
-                    : `${chosen.name}: ${size} differ from the machine's. Look at them, then send them.`,
-            );
+            const { size: count } = this.#wanted;
+            const file = chosen.name;
+            this.#say(() => (count === 0 ? say("fileSame", { file }) : say("fileDiffers", { file, count })));
         } catch (error) {
             if (!(error instanceof SettingsFileError)) throw error;
-            this.#say(`${chosen.name}, ${error.message}`);
+            this.#say(() => `${chosen.name}, ${told(error.message)}`);
         }
     }
 }

@@ -2,6 +2,7 @@
 //
 // One unit is a millimetre along the row. The tool stands at 0, the beam ahead of it on the right.
 
+import { say } from "../words/words.ts";
 import type { Machine } from "./machine.ts";
 
 const SVG = "http://www.w3.org/2000/svg";
@@ -82,7 +83,7 @@ export function drawStrip(svg: SVGSVGElement, machine: Machine, nowMs: number): 
             d: `M${-length * 0.025} ${toolY}h${length * 0.05}l${-length * 0.025} ${height * 0.26}z`,
             "stroke-width": length / 200,
         }),
-        text(machine.toolOut ? "tool, out" : "tool, in", 0, "middle"),
-        text("beam", beamMm, "middle"),
+        text(say(machine.toolOut ? "toolDrawnOut" : "toolDrawnIn"), 0, "middle"),
+        text(say("beam"), beamMm, "middle"),
     );
 }

@@ -1,230 +1,157 @@
-// The machine between row and Uno: wheel, encoder, beam, servo, arm and tool.
+// The machine between row and Uno: the project's own Rust (host/page/src/trial.rs) rolls it, and here it is wired to the Uno.
 //
-// The machine's place is what the beam sees; the tool works the ground beamToToolMm behind it. `runUntil` rolls the
-// machine and lets the Uno's clock run side by side: encoder and beam change their pins at their exact cycles, and the
-// servo hears each pulse. The arm swings sideways about a pivot beside the row: the tool is clear of the row only when it
-// is fully out, and works the row's line while its middle is beside it by less than half its width.
-//
-// Speed, slip and the faults below may change on the way. What became of a plant is not judged here.
+// The machine's place is what the beam sees; the tool works the ground beamToToolMm behind it. `runUntil` lets the Uno's clock run:
+// encoder and beams change their pins at their exact cycles, and the servo hears each pulse. Speed, slip, faults and what is yet to
+// be sown may change between two calls.
 
-import { CYCLES_PER_SECOND, type Uno } from "../uno/uno.ts";
-import type { Motion } from "./motion.ts";
-import type { Row } from "./row.ts";
-import { OUT_DEGREES, SERVO, Servo, type ServoKind } from "./servo.ts";
+import { another } from "../core.ts";
+import type { Uno } from "../uno/uno.ts";
+import type { Thing } from "./row.ts";
 
-/** The Uno's pins that the machine is wired to (README, wiring). */
-export const PIN = { encoderA: 2, encoderB: 3, workSwitch: 4, endSwitch: 5, beam: 8, servo: 9, lamp: 13 } as const;
+/** The Uno's pins that the page itself has to do with (README, wiring). */
+export const PIN = { workSwitch: 4, endSwitch: 5, servo: 9, lamp: 13 } as const;
 
-/** Dimensions of the machine. */
+/** What is not as on the machine straight from the box. */
+export interface MachineKind {
+    readonly toolWidthMm?: number;
+    /** Distance from the beam back to a second one; 0 where there is none. */
+    readonly secondBeamMm?: number;
+    /** Pulse widths for the tool in the row, and out of it. */
+    readonly servoInUs?: number;
+    readonly servoOutUs?: number;
+}
+
+/** What the machine stands in front of. */
+export interface Ground {
+    /** In order of place, and apart. */
+    readonly things?: readonly Thing[];
+    /** How the row goes on behind them, by chance, for as long as the machine rolls. */
+    readonly sowing?: {
+        readonly seed: number;
+        readonly spacingMm: number;
+        /** Share of the gaps between plants in which a tall weed stands. */
+        readonly weedShare: number;
+        /** Where the first plant stands. */
+        readonly firstMm: number;
+    };
+}
+
 export interface Dimensions {
-    /** Diameter of the ground wheel, and encoder counts in a turn of it. */
-    readonly wheelMm: number;
-    readonly ticksPerRev: number;
-    /** Distance from the beam back to the tool: the paper's X. */
     readonly beamToToolMm: number;
-    /** Time after which the beam's sensor reports a change. A change that lasts less is not reported. */
-    readonly beamResponseMs: number;
-    /** Length of the arm from its pivot to the tool, and the tool's width, across the row. */
+    /** From the arm's pivot to the tool. */
     readonly armMm: number;
     readonly toolWidthMm: number;
 }
 
-export const DIMENSIONS: Dimensions = {
-    wheelMm: 400,
-    ticksPerRev: 2400,
-    beamToToolMm: 400,
-    beamResponseMs: 1,
-    armMm: 350,
-    toolWidthMm: 55,
-};
+/** How a plant fared, from good to bad: kept by its margin, or the tool came nearer, or was not out over its canopy. */
+export type Verdict = "kept" | "margin cut" | "damaged";
 
-/**
- * An arm within this angle of fully out is fully out: half a millimetre at the tool's end, and 1 us of a pulse, whose edges
- * avr8js does not place more exactly (docs/simulators.md).
- */
-export const CLEAR_WITHIN_DEGREES = 0.09;
-
-/** Levels of the channels A and B in the four phases of forward motion. */
-const CHANNELS = [
-    [false, false],
-    [true, false],
-    [true, true],
-    [false, true],
-] as const;
-
-/** What is broken on the machine. */
-export interface Faults {
-    /** The beam's wire is torn: its pin stays on the pull-up, as over bare ground. */
-    beamWireTorn: boolean;
+/** What may become different on the way, one at a time. */
+export type Change =
+    /** The speed that the machine comes to; negative backwards. */
+    | { speedKmH: number }
+    /** The share of the wheel's way that is lost, below 1. */
+    | { slip: number }
+    /** The first beam's wire is torn: its pin stays on the pull-up, as over bare ground. */
+    | { beamWireTorn: boolean }
     /** The encoder says nothing more: its pins stay as they are. */
-    encoderDead: boolean;
-}
+    | { encoderDead: boolean }
+    | { spacingMm: number }
+    | { weedShare: number };
+
+type Levels = [pin: number, high: boolean][];
+
+/** The tables of host/page/src/trial.rs. */
+const TABLE = { now: 0, changes: 1, sown: 2 } as const;
 
 export class Machine {
     readonly uno: Uno;
-    readonly row: Row;
-    readonly motion: Motion;
     readonly dimensions: Dimensions;
-    readonly servo: Servo;
-    /** The servo has taken a pulse for a command: the cycles of its edges. */
-    onCommand: (rise: number, fall: number) => void = () => {};
-    readonly faults: Faults = { beamWireTorn: false, encoderDead: false };
-    /** Counts of a perfect encoder, net, since the machine was put in front of the row. */
-    ticks = 0;
+    /** What stands in the row so far. */
+    readonly things: Thing[] = [];
+    /** The ground that the beam sees, and the ground under the tool. */
+    placeMm = 0;
+    toolMm = 0;
+    /** Negative backwards. */
+    speedMmS = 0;
+    /** The tool's angle; 0 is in the row. */
+    degrees = 0;
+    /** How far the tool's middle is beside the row's line. */
+    acrossMm = 0;
+    /** Whether the tool is fully out of the row. */
+    isClear = true;
+    /** Whether the tool works the row's line. */
+    isWeeding = false;
     /** Whether something stands in the beam. */
     isBroken = false;
-    readonly #startCycle: number;
-    readonly #startWheelMm: number;
-    /** Ends of things that the beam has passed. */
-    #endsPassed = 0;
-    /** When the sensor will report a change that it has not yet reported. */
-    #reportS = Number.POSITIVE_INFINITY;
-    #reported = false;
+    /** Counts of a perfect encoder, net, since the machine was put in front of the row, and what it rolls in one. */
+    ticks = 0;
+    groundMmATick = 0;
+    /** Changes of the tool's command so far. The first is not a swing. */
+    commands = 0;
+    readonly #rust = another();
     #pulseRise = 0;
 
-    /** Puts the machine, from the Uno's cycle on, in front of a row, as the motion has it then. */
-    constructor(uno: Uno, row: Row, motion: Motion, dimensions: Dimensions = DIMENSIONS, servo: ServoKind = SERVO) {
+    /** Puts the machine, from the Uno's cycle on, in front of a row, where it stands. */
+    constructor(uno: Uno, { things = [], sowing }: Ground, kind: MachineKind = {}) {
         this.uno = uno;
-        this.row = row;
-        this.motion = motion;
+        const { dimensions, levels } = this.#rust.ask<{ dimensions: Dimensions; levels: Levels }>({
+            begin: { cycle: uno.cycle, things, sowing, ...kind },
+        });
         this.dimensions = dimensions;
-        this.servo = new Servo(servo);
-        this.#startCycle = uno.cycle;
-        this.#startWheelMm = motion.wheelMm(0);
-        const placeMm = motion.placeMm(0);
-        while (placeMm >= (row.endOfThing(this.#endsPassed) ?? Number.POSITIVE_INFINITY)) this.#endsPassed += 1;
-        this.isBroken = this.#endsPassed % 2 === 1;
-        this.#reported = this.isBroken;
-        uno.set(PIN.beam, !this.isBroken);
-        this.#turnTo(0);
+        this.#set(levels);
+        this.#look();
         uno.set(PIN.workSwitch, true);
         uno.set(PIN.endSwitch, true);
         uno.onLevel = (pin, high, cycle) => {
             if (pin !== PIN.servo) return;
             if (high) this.#pulseRise = cycle;
-            else if (this.servo.hear(((cycle - this.#pulseRise) / CYCLES_PER_SECOND) * 1e6, this.timeS(cycle)))
-                this.onCommand(this.#pulseRise, cycle);
+            else this.#rust.hear(this.#pulseRise, cycle);
         };
     }
 
-    /** The motion's time at a cycle of the Uno's clock: now, where none is given. */
-    timeS(cycle: number = this.uno.cycle): number {
-        return (cycle - this.#startCycle) / CYCLES_PER_SECOND;
+    /** From now on something is different. */
+    change(change: Change): void {
+        this.#set(this.#rust.ask<Levels>({ change }));
     }
 
-    /** The Uno's cycle at a time of the motion. */
-    cycleAt(timeS: number): number {
-        return this.#startCycle + Math.round(timeS * CYCLES_PER_SECOND);
-    }
-
-    /** Distance rolled between two encoder counts. */
-    get tickMm(): number {
-        return (Math.PI * this.dimensions.wheelMm) / this.dimensions.ticksPerRev;
-    }
-
-    /** The ground that the beam sees. */
-    get placeMm(): number {
-        return this.motion.placeMm(this.timeS());
-    }
-
-    /** The ground under the tool. */
-    get toolMm(): number {
-        return this.placeMm - this.dimensions.beamToToolMm;
-    }
-
-    /** The tool's angle; 0 is in the row. */
-    get degrees(): number {
-        return this.servo.degrees(this.timeS());
-    }
-
-    /** Whether the tool is fully out of the row. */
-    get isClear(): boolean {
-        return this.degrees >= OUT_DEGREES - CLEAR_WITHIN_DEGREES;
-    }
-
-    /** How far the tool's middle is beside the row's line. */
-    get acrossMm(): number {
-        return this.dimensions.armMm * Math.sin((this.degrees / 180) * Math.PI);
-    }
-
-    /** Whether the tool works the row's line. */
-    get isWeeding(): boolean {
-        return this.acrossMm < this.dimensions.toolWidthMm / 2;
-    }
-
-    /** Tears the beam's wire, or mends it. */
-    tearBeamWire(torn: boolean): void {
-        this.faults.beamWireTorn = torn;
-        this.#showBeam();
-    }
-
-    /** Kills the encoder, or has it live again. */
-    killEncoder(dead: boolean): void {
-        this.faults.encoderDead = dead;
-        this.#showEncoder();
+    /** Rolls on until a cycle that the Uno has not come to, and lets the Uno's clock run there. */
+    runUntil(cycle: number): void {
+        const { uno } = this;
+        this.#rust.roll(cycle);
+        // A copy: the servo's pulses on the way change the memory that it is in.
+        const changes = this.#rust.trialTable(TABLE.changes).slice();
+        for (let at = 0; at < changes.length; at += 3) {
+            uno.runUntil(changes[at] ?? 0);
+            uno.set(changes[at + 1] ?? 0, changes[at + 2] === 1);
+        }
+        uno.runUntil(cycle);
+        this.#look();
     }
 
     /**
-     * Rolls on until a cycle. `onStep` is called at each change of encoder or beam, with the machine and the Uno there.
+     * Judges what lies behind the tool by now, by the margin and the stem zone that the firmware keeps: of each thing, by its number,
+     * how a plant fared, or whether a weed was cut. What is passed again is judged again; of a plant the worse stands.
      */
-    runUntil(cycle: number, onStep: () => void = () => {}): void {
-        for (;;) {
-            const [timeS, change] = this.#next();
-            const due = this.cycleAt(timeS);
-            if (due > cycle) break;
-            this.uno.runUntil(due);
-            change();
-            onStep();
+    judge(marginMm: number, stemZoneMm: number): [number: number, fate: Verdict | boolean][] {
+        return this.#rust.ask({ judge: { marginMm, stemZoneMm } });
+    }
+
+    #set(levels: Levels): void {
+        for (const [pin, high] of levels) this.uno.set(pin, high);
+    }
+
+    /** Takes how the machine is now, and what was sown. */
+    #look(): void {
+        const now = this.#rust.trialTable(TABLE.now);
+        const [placeMm = 0, toolMm = 0, speedMmS = 0, degrees = 0, acrossMm = 0] = now;
+        const [isClear, isWeeding, isBroken, ticks = 0, groundMmATick = 0, commands = 0] = now.subarray(5);
+        const numbers = { placeMm, toolMm, speedMmS, degrees, acrossMm, ticks, groundMmATick, commands };
+        Object.assign(this, numbers, { isClear: isClear === 1, isWeeding: isWeeding === 1, isBroken: isBroken === 1 });
+        const sown = this.#rust.trialTable(TABLE.sown);
+        for (let at = 0; at < sown.length; at += 3) {
+            const [kind, placeMm = 0, widthMm = 0] = sown.subarray(at, at + 3);
+            this.things.push({ kind: kind === 0 ? "plant" : "weed", placeMm, widthMm });
         }
-        this.uno.runUntil(cycle);
-        this.servo.forget(this.timeS());
-    }
-
-    /** The next change of encoder or beam, and when it is due. */
-    #next(): [number, () => void] {
-        const nowS = this.timeS();
-        const { motion, tickMm, row } = this;
-        const rimMm = (count: number) => this.#startWheelMm + count * tickMm;
-        const tick = motion.nextTurning(nowS, rimMm(this.ticks + 0.5), rimMm(this.ticks - 0.5));
-        const end = motion.nextPassing(
-            nowS,
-            row.endOfThing(this.#endsPassed) ?? Number.POSITIVE_INFINITY,
-            row.endOfThing(this.#endsPassed - 1) ?? Number.NEGATIVE_INFINITY,
-        );
-        const tickS = tick?.timeS ?? Number.POSITIVE_INFINITY;
-        const endS = end?.timeS ?? Number.POSITIVE_INFINITY;
-        if (this.#reportS <= Math.min(tickS, endS)) return [this.#reportS, () => this.#report()];
-        if (endS <= tickS) return [endS, () => this.#passEnd(end?.forward ? 1 : -1, endS)];
-        return [tickS, () => this.#turnTo(this.ticks + (tick?.forward ? 1 : -1))];
-    }
-
-    #turnTo(ticks: number): void {
-        this.ticks = ticks;
-        this.#showEncoder();
-    }
-
-    #showEncoder(): void {
-        if (this.faults.encoderDead) return;
-        const [a, b] = CHANNELS[this.ticks & 3] ?? CHANNELS[0];
-        this.uno.set(PIN.encoderA, a);
-        this.uno.set(PIN.encoderB, b);
-    }
-
-    #passEnd(by: number, timeS: number): void {
-        this.#endsPassed += by;
-        this.isBroken = this.#endsPassed % 2 === 1;
-        // A change that was not reported yet is taken back.
-        const isNews = this.isBroken !== this.#reported;
-        this.#reportS = isNews ? timeS + this.dimensions.beamResponseMs / 1000 : Number.POSITIVE_INFINITY;
-    }
-
-    #report(): void {
-        this.#reportS = Number.POSITIVE_INFINITY;
-        this.#reported = this.isBroken;
-        this.#showBeam();
-    }
-
-    #showBeam(): void {
-        this.uno.set(PIN.beam, this.faults.beamWireTorn || !this.#reported);
     }
 }

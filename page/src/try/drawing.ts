@@ -3,8 +3,8 @@
 // One unit is a millimetre on the ground. The machine rolls to the right; up is left of the row. What stands on the ground
 // is put there once and moved with it, and taken away when it has left the picture.
 
+import type { Verdict } from "../row/machine.ts";
 import { span, type Thing } from "../row/row.ts";
-import type { Verdict } from "./outcome.ts";
 import type { Trial } from "./trial.ts";
 
 const SVG = "http://www.w3.org/2000/svg";
@@ -66,7 +66,7 @@ export class Drawing {
     readonly #ground = make("g", {});
     readonly #specks = make("g", { class: "specks" });
     readonly #track = make("path", { class: "worked-ground" });
-    readonly #windows = make("g", { class: "windows" });
+    readonly #zones = make("g", { class: "zones" });
     readonly #things = make("g", { class: "things" });
     readonly #soil = make("rect", { class: "ground" });
     readonly #beam = make("line", { class: "beam-line", y1: -ACROSS_MM.out + 30, y2: ACROSS_MM.other - 10 });
@@ -80,7 +80,7 @@ export class Drawing {
         this.#svg = svg;
         const { beamToToolMm, armMm, toolWidthMm } = machine.dimensions;
         this.#track.setAttribute("stroke-width", String(toolWidthMm));
-        this.#ground.append(this.#specks, this.#track, this.#windows, this.#things);
+        this.#ground.append(this.#specks, this.#track, this.#zones, this.#things);
         for (const end of ["x1", "x2"]) this.#beam.setAttribute(end, String(beamToToolMm));
         const wheel = { class: "wheel", width: 190, height: 34, rx: 10, x: armMm - 150 };
         const frameMm = { left: -ACROSS_MM.out + 30, right: ACROSS_MM.other - 10 };
@@ -99,7 +99,7 @@ export class Drawing {
     }
 
     draw(trial: Trial): void {
-        const { machine, windows } = trial;
+        const { machine, zones } = trial;
         const { toolMm, degrees } = machine;
         const heightMm = ACROSS_MM.out + ACROSS_MM.other;
         const { clientWidth, clientHeight } = this.#svg;
@@ -111,17 +111,17 @@ export class Drawing {
 
         this.#ground.setAttribute("transform", `translate(${-toolMm} 0)`);
         const [fromMm, toMm] = [toolMm - behindMm, toolMm - behindMm + lengthMm];
-        this.#drawThings(machine.row.things, fromMm, toMm);
+        this.#drawThings(machine.things, fromMm, toMm);
         this.#drawVerdicts(trial);
         this.#drawSpecks(fromMm, toMm);
         const way = trial.track.map(({ alongMm, acrossMm }) => `${alongMm.toFixed(1)} ${(-acrossMm).toFixed(1)}`);
         this.#track.setAttribute("d", way.length > 1 ? `M${way.join("L")}` : "");
-        this.#windows.replaceChildren(
-            ...windows
+        this.#zones.replaceChildren(
+            ...zones
                 .filter(({ startMm, endMm }) => endMm > fromMm && startMm < toMm)
                 .map(({ startMm, endMm }) =>
                     make("rect", {
-                        class: "window-ground",
+                        class: "zone-ground",
                         x: startMm,
                         width: endMm - startMm,
                         y: -105,
@@ -164,7 +164,7 @@ export class Drawing {
     /** Puts a sign at each plant that is judged. */
     #drawVerdicts({ machine, outcome }: Trial): void {
         for (const [index, shape] of this.#shapes) {
-            const [thing, verdict] = [machine.row.things[index], outcome.plants.get(index)];
+            const [thing, verdict] = [machine.things[index], outcome.plants.get(index)];
             if (!thing || !verdict || shape.dataset.verdict === verdict) continue;
             shape.dataset.verdict = verdict;
             const way = SIGNS[verdict];

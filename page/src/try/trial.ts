@@ -5,19 +5,15 @@
 
 import type { Seen } from "../link/grammar.ts";
 import type { Happening } from "../link/session.ts";
-import { Machine, PIN } from "../row/machine.ts";
-import { Motion, mmS } from "../row/motion.ts";
-import { chance, PLANTING, type Planting, Row, sow } from "../row/row.ts";
+import { Machine, type MachineKind, PIN } from "../row/machine.ts";
 import { CYCLES_PER_SECOND, Uno } from "../uno/uno.ts";
+import { groundInWords, Losses, whyInWords } from "./losses.ts";
 import { Outcome } from "./outcome.ts";
+import type { Zone } from "./zone.ts";
 
-/** Ground that lies sown ahead of the beam. */
-const SOWN_AHEAD_MM = 2000;
-/** Where the first plant stands, ahead of the beam. */
-const FIRST_MM = 800;
-/** How fast the machine gains and loses speed. */
-const ACCELERATION_MM_S2 = 500;
-/** Ground behind the tool of which tracks and windows are kept. */
+/** How the row is planted until that is changed, and where the first plant stands, ahead of the beam. */
+const SOWING = { spacingMm: 550, weedShare: 0.25, firstMm: 800 };
+/** Tracks and zones are remembered this far behind the tool. */
 const KEPT_MM = 3000;
 /** Cycles between two looks at the host's clock: a millisecond. */
 const SLICE_CYCLES = CYCLES_PER_SECOND / 1000;
@@ -28,64 +24,54 @@ export interface TrackPoint {
     readonly acrossMm: number;
 }
 
-/** Ground along the row that the firmware leaves alone. */
-export interface Window {
-    readonly startMm: number;
-    readonly endMm: number;
-}
-
 export class Trial {
     readonly uno: Uno;
     readonly machine: Machine;
-    readonly planting: Planting = { ...PLANTING };
-    readonly outcome: Outcome;
+    readonly outcome = new Outcome();
+    readonly losses: Losses;
     /** What the firmware sends. */
     onText: (text: string) => void = () => {};
-    windows: Window[] = [];
+    /** Keep-out zones at the tool or ahead of it, as the firmware has told them. */
+    zones: Zone[] = [];
     track: TrackPoint[] = [];
-    readonly #random: () => number;
     /** The machine's count when the firmware began to count. */
     #zero = 0;
 
-    constructor(hex: string, seed: number) {
-        this.#random = chance(seed);
+    /** With a machine straight from the box, but for what is given. */
+    constructor(hex: string, seed: number, kind: MachineKind = {}) {
         this.uno = new Uno(hex);
-        const row = new Row();
-        sow(row, SOWN_AHEAD_MM, this.planting, this.#random, FIRST_MM);
-        this.machine = new Machine(this.uno, row, new Motion(0));
-        this.outcome = new Outcome(this.machine);
+        this.machine = new Machine(this.uno, { sowing: { ...SOWING, seed } }, kind);
+        this.losses = new Losses(this.machine.toolMm);
         this.uno.onByte = (byte) => this.onText(String.fromCharCode(byte));
         this.#mark();
     }
 
     /** Lets time pass on the chip, for no longer than the host has for it, and gives back how much did. */
     advance(seconds: number, budgetMs: number): number {
-        const { uno, machine } = this;
+        const { uno, machine, losses, outcome } = this;
         const begin = uno.cycle;
         const end = begin + seconds * CYCLES_PER_SECOND;
         const until = performance.now() + budgetMs;
         while (uno.cycle < end && performance.now() < until) {
-            sow(machine.row, machine.placeMm + SOWN_AHEAD_MM, this.planting, this.#random, FIRST_MM);
-            machine.runUntil(Math.min(end, uno.cycle + SLICE_CYCLES), () => this.#mark());
+            machine.runUntil(Math.min(end, uno.cycle + SLICE_CYCLES));
+            this.#mark();
+            losses.pass(machine, this.zones, outcome.marginMm);
         }
-        this.outcome.judge();
+        outcome.judge(machine, this.zones);
         this.#forget();
         return (uno.cycle - begin) / CYCLES_PER_SECOND;
-    }
-
-    /** From now on, rolls at a speed, back where it is negative. */
-    rollAt(speedKmH: number): void {
-        this.machine.motion.changeSpeed(this.machine.timeS(), mmS(speedKmH), ACCELERATION_MM_S2);
-    }
-
-    /** From now on, loses a share of the wheel's way. */
-    slipBy(share: number): void {
-        this.machine.motion.slipFrom(this.machine.timeS(), share);
     }
 
     /** Throws the work switch. */
     work(on: boolean): void {
         this.uno.set(PIN.workSwitch, !on);
+    }
+
+    /** Where the ground went, why tall weeds were left and why plants were not kept, in words. */
+    get why(): string {
+        const { losses, outcome } = this;
+        const left = [...outcome.weeds].filter(([, cut]) => !cut).map(([number]) => losses.below.get(number));
+        return `${whyInWords(left, [...outcome.notKept.values()])} ${groundInWords(losses.groundMm)}`.trim();
     }
 
     /** Whether the status lamp is lit. */
@@ -102,30 +88,34 @@ export class Trial {
     take(happening: Happening): void {
         if (happening.is === "started") {
             this.#zero = this.machine.ticks;
-            this.windows = [];
+            this.zones = [];
         }
         if (happening.is === "connected" || happening.is === "settings") {
             const margin = happening.settings.find(({ name }) => name === "margin_mm");
             if (margin) this.outcome.marginMm = margin.value;
+            const zone = happening.settings.find(({ name }) => name === "stem_zone_mm");
+            if (zone) this.outcome.stemZoneMm = zone.value;
+        }
+        if (happening.is === "status") {
+            this.losses.isAtWork = happening.status.mode === "work";
+            this.losses.reason = happening.status.reason;
         }
         if (happening.is !== "told") return;
         const { said } = happening;
-        if (said.is === "alarm") this.windows = [];
-        if (said.is === "object" && said.seen.class !== "weed") this.windows.push(this.#window(said.seen));
+        if (said.is === "state" || said.is === "alarm")
+            this.losses.isAtWork = said.is === "state" && said.mode === "work";
+        if (said.is === "alarm") this.zones = [];
+        if (said.is === "object" && said.seen.class !== "weed") this.zones.push(this.#zone(said.seen));
     }
 
     /**
-     * The ground of a window. The paper's delay and hold are counted from the moment at which the leading edge is in the
+     * The ground of a zone. The paper's delay and hold are counted from the moment at which the leading edge is in the
      * beam, when the tool is beamToToolMm behind it. Counts become ground as the machine rolls now.
      */
-    #window({ position, delay, hold }: Seen): Window {
-        const { machine } = this;
-        const { motion, tickMm, dimensions } = machine;
-        const timeS = machine.timeS();
-        const slipped = motion.groundMmAMm(timeS);
-        const ground = (count: number) => machine.placeMm + (count + this.#zero - machine.ticks) * tickMm * slipped;
-        const startMm = ground(position + delay) - dimensions.beamToToolMm;
-        return { startMm, endMm: startMm + hold * tickMm * slipped };
+    #zone({ position, delay, hold }: Seen): Zone {
+        const { placeMm, ticks, groundMmATick, dimensions } = this.machine;
+        const startMm = placeMm + (position + delay + this.#zero - ticks) * groundMmATick - dimensions.beamToToolMm;
+        return { startMm, endMm: startMm + hold * groundMmATick };
     }
 
     /** Puts the tool's place on its track. On a straight way only its end moves. */
@@ -141,6 +131,6 @@ export class Trial {
         const gone = this.track.findIndex(({ alongMm }) => alongMm > behindMm);
         // The point before is where a straight way comes from.
         if (gone > 100) this.track.splice(0, gone - 1);
-        this.windows = this.windows.filter(({ endMm }) => endMm > behindMm);
+        this.zones = this.zones.filter(({ endMm }) => endMm > behindMm);
     }
 }

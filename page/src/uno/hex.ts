@@ -27,8 +27,9 @@ export function readHex(text: string, size: number): Uint8Array {
         if (digits === undefined) throw refuse("is not a colon with pairs of hexadecimal digits: is it a HEX file?");
         const record = Uint8Array.from(digits.match(/../g) ?? [], (pair) => Number.parseInt(pair, 16));
         const [count = 0, high = 0, low = 0, kind = 0] = record;
-        if (record.length !== count + FRAME_BYTES) throw refuse("is cut off: load the file anew");
-        if (record.reduce((sum, byte) => sum + byte, 0) % 256 !== 0) throw refuse("has a wrong checksum: load it anew");
+        if (record.length !== count + FRAME_BYTES) throw refuse("is cut off: load the file again");
+        if (record.reduce((sum, byte) => sum + byte, 0) % 256 !== 0)
+            throw refuse("has a wrong checksum: load it again");
         const data = record.subarray(4, 4 + count);
         const number = () => data.reduce((sum, byte) => sum * 256 + byte, 0);
         switch (kind) {
@@ -41,7 +42,7 @@ export function readHex(text: string, size: number): Uint8Array {
                 break;
             }
             case END:
-                if (!filled) throw new HexError("the HEX file is empty: build the firmware anew");
+                if (!filled) throw new HexError("the HEX file is empty: build the firmware again");
                 return flash;
             case SEGMENT_BASE:
                 base = number() * 16;
@@ -56,7 +57,7 @@ export function readHex(text: string, size: number): Uint8Array {
                 throw refuse(`has the unknown kind ${kind}`);
         }
     }
-    throw new HexError("the HEX file has no end: load it anew");
+    throw new HexError("the HEX file has no end: load it again");
 }
 
 /** How many bytes of a flash a firmware takes: behind them it is erased. */

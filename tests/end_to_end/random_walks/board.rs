@@ -18,17 +18,17 @@ use control::operate::{state::State, tool::Reason};
 use control::say::command::{Command, parse};
 use control::settings::{Setting, Settings};
 use field::wiring;
-use signal::{CYCLES_PER_SECOND, Pin, PinChange};
+use model_test::Failure;
+use model_test::drive::is_end;
+use model_test::machine::{Attended, Checked, Machine, World};
+use model_test::run::Beginning;
 use std::collections::VecDeque;
 use std::fmt;
 use std::path::PathBuf;
 use std::sync::LazyLock;
 use trial::console::{ConsoleError, ask};
+use uno::{CYCLES_PER_SECOND, Pin, PinChange};
 use uno::{Uno, UnoError};
-use walks::Failure;
-use walks::drive::is_end;
-use walks::machine::{Attended, Checked, Machine, World};
-use walks::walk::Beginning;
 
 static ELF: LazyLock<PathBuf> = LazyLock::new(elf);
 
@@ -118,7 +118,7 @@ fn unanswered(error: ConsoleError) -> Failure {
 const CHANNELS: [(bool, bool); 4] = [(false, false), (true, false), (true, true), (false, true)];
 
 impl Board {
-    fn wake_up(&mut self) -> Result<String, Failure> {
+    fn init(&mut self) -> Result<String, Failure> {
         let greeting = self.uno.run_until_serial("commands\r\n", GREETING_CYCLES).map_err(stopped)?;
         let state = greeting.rsplit_once(", state ").and_then(|(_, rest)| rest.split(',').next());
         self.state = match state.and_then(|state| state.split(' ').next_back()) {
@@ -142,7 +142,7 @@ impl Board {
             self.state = match value(line, "state") {
                 "hold" => State::Hold,
                 "work" => State::Work,
-                _ => self.alarm(value(line, "alarm"))?,
+                _ => self.alarm(value(line, "name"))?,
             };
             self.unseen_mm = number(line, "unseen_mm") as i16;
             let rests = self.state != State::Work;
@@ -259,7 +259,7 @@ impl Machine for Board {
             resets: 0,
             stack_was_low: false,
         };
-        board.wake_up()?;
+        board.init()?;
         Ok(board)
     }
 
@@ -423,7 +423,7 @@ impl Machine for Board {
         }
         self.uno.received();
         self.zero = world.count;
-        let greeting = self.wake_up()?;
+        let greeting = self.init()?;
         let text: String = cause.text().bytes().map(char::from).collect();
         if !greeting.contains(&format!("reset by {text},")) {
             return Err(Failure::fail(format!("reset by {text}, and it says {greeting:?}")));

@@ -15,7 +15,7 @@ pub const RANGES: [Range; FEATURES] = [
     Range { lowest: 340, highest: 716 },
 ];
 
-/// Squared distance beyond which an object is like no example.
+/// Squared distance beyond which a detection is like no example.
 pub const RADIUS: u32 = 172;
 
 /// Examples that vote.

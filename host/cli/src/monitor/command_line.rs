@@ -5,6 +5,7 @@
 
 use link::COMMAND_LENGTH;
 use link::completion::{common, complete};
+use link::row_names::NAME_LENGTH;
 use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyEventKind};
 
 /// Lines remembered.
@@ -37,6 +38,19 @@ impl CommandLine {
         &self.candidates
     }
 
+    /// Drops what is being typed.
+    pub fn clear(&mut self) {
+        self.show(None, String::new());
+        self.candidates.clear();
+    }
+
+    /// Where the command begins: behind a row's name and a colon, where they are typed.
+    fn command_start(&self) -> usize {
+        let Some(colon) = self.text.find(':').filter(|&colon| colon <= NAME_LENGTH) else { return 0 };
+        let behind = &self.text[colon + 1..];
+        colon + 1 + usize::from(behind.starts_with(' '))
+    }
+
     /// Takes a key; returns the line when it is entered.
     pub fn key(&mut self, key: KeyEvent) -> Option<String> {
         if key.kind == KeyEventKind::Release {
@@ -44,7 +58,7 @@ impl CommandLine {
         }
         self.candidates.clear();
         match key.code {
-            KeyCode::Char(character @ ' '..='~') if self.text.len() < COMMAND_LENGTH => {
+            KeyCode::Char(character @ ' '..='~') if self.text.len() < self.most() => {
                 self.text.insert(self.cursor, character);
                 self.cursor += 1;
             }
@@ -81,16 +95,22 @@ impl CommandLine {
         (self.browsed, self.cursor, self.text) = (browsed, text.len(), text);
     }
 
+    /// Characters that the line may have: those of a command, and of the name before it.
+    fn most(&self) -> usize {
+        COMMAND_LENGTH + self.command_start()
+    }
+
     /// Completes what stands before the cursor, as far as there is one way to go on.
     fn complete(&mut self) {
         let (before, behind) = self.text.split_at(self.cursor);
-        let candidates = complete(before);
+        let (address, begun) = before.split_at(self.command_start().min(before.len()));
+        let candidates: Vec<String> = complete(begun).iter().map(|command| format!("{address}{command}")).collect();
         let completed = match candidates.as_slice() {
             [] => return,
             [only] => format!("{only} "),
             several => common(several).to_owned(),
         };
-        if completed.len() + behind.len() <= COMMAND_LENGTH && completed.len() >= before.len() {
+        if completed.len() + behind.len() <= self.most() && completed.len() >= before.len() {
             let text = format!("{completed}{behind}");
             (self.cursor, self.text) = (completed.len(), text);
         }
@@ -166,6 +186,23 @@ mod tests {
         typed(&mut line, "xyz");
         line.key(KeyCode::Tab.into());
         assert_eq!(line.text(), "set lead_out_ms xyz");
+    }
+
+    #[test]
+    fn a_row_s_name_before_a_command_takes_none_of_its_room_and_keeps_nothing_from_being_completed() {
+        let mut line = CommandLine::default();
+        typed(&mut line, "row3: set lead_o");
+        line.key(KeyCode::Tab.into());
+        assert_eq!(line.text(), "row3: set lead_out_ms ");
+        typed(&mut line, &"x".repeat(200));
+        assert_eq!(line.text().len(), "row3: ".len() + COMMAND_LENGTH);
+        line.clear();
+        assert_eq!((line.text(), line.cursor()), ("", 0));
+        typed(&mut line, "set servo");
+        line.key(KeyCode::Tab.into());
+        assert!(!line.candidates().is_empty());
+        line.clear();
+        assert!(line.candidates().is_empty());
     }
 
     #[test]

@@ -1,7 +1,9 @@
 //! What is known of each row, and how that changes with what happens.
 
+use super::To;
 use super::command_line::CommandLine;
 use link::advice;
+use link::examples::Heading;
 use link::rows::{Heard, Hold, What};
 use link::session::Happening;
 use link::set_up::{SetUp, Step};
@@ -73,6 +75,9 @@ pub struct RowModel {
     /// What was measured of it since it has been watched, and what was said to be done next.
     set_up: SetUp,
     step: Option<Step>,
+    heading: Heading,
+    /// What was said of the margin.
+    warning: Option<String>,
 }
 
 /// What is known of the machine.
@@ -88,6 +93,8 @@ pub struct Model {
     pub lines: VecDeque<String>,
     /// What is being typed.
     pub line: CommandLine,
+    /// Whether the bell is to ring.
+    rings: bool,
 }
 
 impl Model {
@@ -99,7 +106,13 @@ impl Model {
             hold: None,
             lines: VecDeque::new(),
             line: CommandLine::default(),
+            rings: false,
         }
+    }
+
+    /// Whether the bell is to ring: since the last call, an alarm was latched or a row was lost.
+    pub fn take_ring(&mut self) -> bool {
+        std::mem::take(&mut self.rings)
     }
 
     /// Whether there are several rows.
@@ -112,9 +125,18 @@ impl Model {
         self.rows.iter().map(|row| row.name.clone()).collect()
     }
 
-    /// The rows to which commands go.
-    pub fn targets(&self) -> Vec<usize> {
-        self.target.map_or_else(|| (0..self.rows.len()).collect(), |row| vec![row])
+    /// The row that is meant; none for all.
+    pub fn meant(&self, to: To) -> Option<usize> {
+        match to {
+            To::Chosen => self.target,
+            To::All => None,
+            To::Row(row) => Some(row),
+        }
+    }
+
+    /// A row, or all of them.
+    pub fn targets(&self, row: Option<usize>) -> Vec<usize> {
+        row.map_or_else(|| (0..self.rows.len()).collect(), |row| vec![row])
     }
 
     /// Has commands go to the next row, or the one before; all of them stand before the first.
@@ -125,14 +147,14 @@ impl Model {
         self.target = place.checked_sub(1).filter(|_| self.are_several());
     }
 
-    /// A command was sent to those to whom commands go.
-    pub fn sent(&mut self, command: &str) {
+    /// A command was sent to a row, or to all.
+    pub fn sent(&mut self, row: Option<usize>, command: &str) {
         self.hold = None;
-        for row in self.targets() {
+        for row in self.targets(row) {
             self.rows[row].answer = Answer::Waiting;
         }
         if self.are_several() {
-            let to = self.target.map_or("all", |row| self.rows[row].name.as_str());
+            let to = row.map_or("all", |row| self.rows[row].name.as_str());
             self.say(format!("> {to}: {command}"));
         }
     }
@@ -185,13 +207,27 @@ impl Model {
             Happening::Answer(line) => Some(line.clone()),
             Happening::Status(..) | Happening::Settings(_) => None,
         };
+        if let Happening::Answer(line) = &happening
+            && let Some(head) = self.rows.get_mut(number).and_then(|row| row.heading.before(line))
+        {
+            self.say_of(number, &format!("-- {head}"));
+        }
         if let Some(said) = said {
             self.say_of(number, &said);
         }
         let Some(row) = self.rows.get_mut(number) else { return };
+        self.rings |= match &happening {
+            Happening::Event(EventLine::Alarm { .. }, _) => true,
+            Happening::Lost(_) => row.is_there(),
+            _ => false,
+        };
         row.update(happening);
         if let Some(step) = row.take_step() {
             self.say_of(number, &format!("-- next, {step}"));
+        }
+        let Some(row) = self.rows.get_mut(number) else { return };
+        if let Some(warning) = row.take_warning() {
+            self.say_of(number, &format!("-- warning: {warning}"));
         }
     }
 
@@ -227,7 +263,16 @@ impl RowModel {
             answer: Answer::None,
             set_up: SetUp::default(),
             step: None,
+            heading: Heading::default(),
+            warning: None,
         }
+    }
+
+    /// What speaks against the margin, if it is something else now.
+    fn take_warning(&mut self) -> Option<String> {
+        let warning = self.set_up.warning(&self.settings);
+        let before = std::mem::replace(&mut self.warning, warning.clone());
+        warning.filter(|_| before != self.warning)
     }
 
     /// The next step of setting it up, if it is another one now.
@@ -254,6 +299,8 @@ impl RowModel {
             }
             Happening::Lost(why) => {
                 self.connection = Connection::Down(why);
+                // It rolls on unseen.
+                self.windows.clear();
                 // What is not answered by now will not be.
                 if self.answer == Answer::Waiting {
                     self.answer = Answer::Refused;
@@ -273,7 +320,7 @@ impl RowModel {
 
     fn take_status(&mut self, status: Status) {
         if let Some(alarm) = status.alarm {
-            self.advice = Some(format!("alarm {}: {}", name_of(alarm.text().bytes()), advice::alarm(alarm)));
+            self.advice = Some(format!("alarm {}: {}", advice::name(alarm), advice::alarm(alarm)));
         } else if self.status.mode == Mode::Alarm {
             self.advice = None;
         }
@@ -285,7 +332,7 @@ impl RowModel {
 
     fn take_event(&mut self, event: EventLine) {
         match event {
-            EventLine::Object { class, position, votes, spacing, hold, .. } => {
+            EventLine::Detection { class, position, votes, spacing, hold, .. } => {
                 // The hold is the canopy and both margins.
                 let margins = self.settings.wheel().ticks(2 * self.settings.get(Setting::MarginMm)).0;
                 let width = hold.wrapping_sub(margins);

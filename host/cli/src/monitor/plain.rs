@@ -3,12 +3,13 @@
 //! With several rows a command goes to one of them behind its name and a colon, or to all; what they say stands behind their names. A
 //! `hold` to all goes to them at the same moment, and how long the last one took is said.
 
+use super::{To, addressed};
 use crate::finding::Finding;
 use crate::output::tell;
 use crate::ports::Chosen;
 use crate::record::Logs;
-use anyhow::{Result, bail, ensure};
-use link::row_names::ALL;
+use anyhow::{Error, Result, ensure};
+use link::examples::Heading;
 use link::rows::{Heard, Hold, Rows, What};
 use link::session::Happening;
 use std::io::{self, BufRead, ErrorKind, Write};
@@ -49,6 +50,7 @@ struct Standing {
     statuses: usize,
     /// Whether it went away with commands unanswered.
     has_failed: bool,
+    heading: Heading,
 }
 
 struct Talk<'a> {
@@ -98,20 +100,15 @@ impl Talk<'_> {
 
     /// Types a line to the rows that it is for.
     fn command(&mut self, line: &str, output: &mut impl Write) -> Result<()> {
-        let (to, command) = match line.split_once(':') {
-            Some((name, command)) if self.chosen.are_several => (self.named(name.trim())?, command.trim()),
-            _ => (None, line),
-        };
-        ensure!(
-            link::is_command(command),
-            "{command:?} is no command: it has to be one line of at most {} printable ASCII characters",
-            link::COMMAND_LENGTH
-        );
+        let (to, command) = addressed(line, &self.chosen.names()).map_err(Error::msg)?;
         // The machine does not answer a line without a word.
         if command.is_empty() {
             return Ok(());
         }
-        let to = to.map_or_else(|| 0..self.rows.count(), |row| row..row + 1);
+        let to = match to {
+            To::Row(row) => row..row + 1,
+            To::Chosen | To::All => 0..self.rows.count(),
+        };
         if self.chosen.are_several && to.len() == self.rows.count() && command == "hold" {
             self.hold = Some(Hold::new(Instant::now(), self.standing.iter().map(|row| row.is_there)));
         }
@@ -134,15 +131,6 @@ impl Talk<'_> {
         self.tell_of_hold(output)
     }
 
-    /// The row of this name; none for all.
-    fn named(&self, name: &str) -> Result<Option<usize>> {
-        let found = self.chosen.rows.iter().position(|row| row.name == name);
-        match found {
-            None if name != ALL => bail!("there is no row {name}: there are {}", self.chosen.names().join(", ")),
-            found => Ok(found),
-        }
-    }
-
     fn take(&mut self, heard: &Heard, ended: bool, output: &mut impl Write) -> Result<()> {
         let row = heard.row;
         let standing = &mut self.standing[row];
@@ -163,6 +151,10 @@ impl Talk<'_> {
             What::Happened(Happening::Event(_, line)) => writeln!(output, "{}", self.chosen.under_name(row, line))?,
             What::Happened(Happening::Answer(line)) => {
                 standing.statuses = 0;
+                // The lines on standard output are the machine's own.
+                if let Some(head) = standing.heading.before(line) {
+                    tell!("{}", self.chosen.under_name(row, head));
+                }
                 writeln!(output, "{}", self.chosen.under_name(row, line))?;
             }
             What::Answered { refusal, .. } => {

@@ -1,12 +1,13 @@
 //! The monitor on a terminal: keys go in, the screen comes out.
 
 use super::model::{Model, RowModel};
-use super::view;
+use super::{addressed, view};
 use crate::record::Logs;
 use anyhow::{Context, Result};
 use link::rows::{Hold, Rows, What};
 use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{self, Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
+use std::io::{self, Write};
 use std::time::{Duration, Instant};
 
 /// Time between two looks at the keyboard, after which the screen is drawn anew.
@@ -36,6 +37,7 @@ fn watch(terminal: &mut DefaultTerminal, rows: &Rows, mut model: Model, logs: &m
             model.take(heard);
         }
         terminal.draw(|frame| view::draw(&model, frame))?;
+        ring(&mut model, terminal.backend_mut())?;
         while event::poll(Duration::ZERO)? {
             let Event::Key(key) = event::read()? else { continue };
             if ends(key) {
@@ -46,24 +48,47 @@ fn watch(terminal: &mut DefaultTerminal, rows: &Rows, mut model: Model, logs: &m
     }
 }
 
-/// Takes a key: Esc before all others, whatever is being typed.
+/// Rings the terminal's bell where the operator has to look: he watches the row, and not the screen.
+fn ring(model: &mut Model, mut terminal: impl Write) -> io::Result<()> {
+    if model.take_ring() {
+        terminal.write_all(b"\x07")?;
+        terminal.flush()?;
+    }
+    Ok(())
+}
+
+/// Takes a key: Esc before all others, whatever is being typed. What was typed by half goes with it, or it would stand before the next
+/// command.
 fn take_key(model: &mut Model, rows: &Rows, key: KeyEvent) {
     match key.code {
         _ if key.kind == KeyEventKind::Release => {}
-        KeyCode::Esc => hold_all(model, rows),
+        KeyCode::Esc => {
+            model.line.clear();
+            hold_all(model, rows);
+        }
         KeyCode::PageUp => model.choose(false),
         KeyCode::PageDown => model.choose(true),
         _ => {
-            let Some(command) = model.line.key(key) else { return };
-            if command == "hold" && model.target.is_none() {
-                hold_all(model, rows);
-                return;
+            let Some(line) = model.line.key(key) else { return };
+            let (to, command) = match addressed(&line, &model.names()) {
+                Ok((to, command)) => (model.meant(to), command),
+                Err(why) => {
+                    model.say(format!("-- {why}; nothing was sent"));
+                    return;
+                }
+            };
+            match command {
+                "" => return,
+                "hold" if to.is_none() => {
+                    hold_all(model, rows);
+                    return;
+                }
+                _ => model.sent(to, command),
             }
-            model.sent(&command);
-            for row in model.targets() {
-                match command.as_str() {
+            for row in model.targets(to) {
+                match command {
                     "hold" => rows.hold(row),
-                    _ => rows.command(row, &command),
+                    _ => rows.command(row, command),
                 }
             }
         }
@@ -86,7 +111,10 @@ fn ends(key: KeyEvent) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use link::LinkError;
+    use crate::monitor::model::Answer;
+    use link::session::Happening;
+    use link::settings::Settings;
+    use link::{EventLine, LinkError};
 
     fn typed(model: &mut Model, rows: &Rows, text: &str) {
         for character in text.chars() {
@@ -107,12 +135,69 @@ mod tests {
             model.hold.as_ref().map(|hold| hold.summary(&model.names())).as_deref(),
             Some("HOLD 0 of 2; NOT THERE: left, right")
         );
-        assert_eq!((model.line.text(), model.target), ("set k", Some(0)));
+        assert_eq!((model.line.text(), model.target), ("", Some(0)), "it does not stand before the next command");
         // As does the word, typed to all.
         (model.hold, model.target) = (None, None);
-        take_key(&mut model, &rows, KeyCode::Enter.into());
         typed(&mut model, &rows, "hold");
         take_key(&mut model, &rows, KeyCode::Enter.into());
         assert!(model.hold.is_some());
+    }
+
+    #[test]
+    fn the_bell_rings_once_for_each_alarm_and_each_row_that_is_lost() {
+        let mut model = Model::new(vec!["row".to_owned()]);
+        let mut rung = |happening: Happening| {
+            model.update(0, happening);
+            let mut written = Vec::new();
+            for _ in 0..2 {
+                ring(&mut model, &mut written).expect("a vector takes all");
+            }
+            String::from_utf8(written).expect("a bell is ASCII")
+        };
+        let event = |line: &str| Happening::Event(EventLine::parse(line).expect("it is one"), line.to_owned());
+        let connected =
+            || Happening::Connected { version: "1".to_owned(), settings: Settings::new(), examples: Vec::new() };
+        assert_eq!(rung(Happening::Lost("it is not there".to_owned())), "", "it never was there");
+        assert_eq!(rung(connected()), "");
+        assert_eq!(rung(event("state is=work")), "");
+        assert_eq!(rung(event("alarm code=2-1 name=encoder_silent pos=1")), "\x07");
+        assert_eq!(rung(event("warning name=no_plants")), "");
+        assert_eq!(rung(Happening::Lost("the port is gone".to_owned())), "\x07");
+    }
+
+    #[test]
+    fn a_row_s_name_before_a_colon_has_the_command_go_to_that_row_alone() {
+        let opener = || -> link::rows::Opener { Box::new(|| Err(LinkError::Absent("it".to_owned()))) };
+        let (rows, _) = Rows::open((0..3).map(|_| opener()).collect());
+        let mut model = Model::new(["row1", "row2", "row3"].map(str::to_owned).to_vec());
+        let mut enter = |text: &str| {
+            typed(&mut model, &rows, text);
+            take_key(&mut model, &rows, KeyCode::Enter.into());
+            let waiting: Vec<&str> =
+                model.rows.iter().filter(|row| row.answer == Answer::Waiting).map(|row| row.name.as_str()).collect();
+            let last = model.lines.back().cloned().unwrap_or_default();
+            let said = (waiting.join(" "), last, model.hold.is_some());
+            model.rows.iter_mut().for_each(|row| row.answer = Answer::None);
+            model.hold = None;
+            said
+        };
+        let said = |waiting: &str, line: &str, holds| (waiting.to_owned(), line.to_owned(), holds);
+        assert_eq!(enter("row3: set k 5"), said("row3", "> row3: set k 5", false));
+        assert_eq!(enter("row2:hold"), said("row2", "> row2: hold", false));
+        assert_eq!(enter("set k 5"), said("row1 row2 row3", "> all: set k 5", false));
+        assert_eq!(enter("all: hold"), said("row1 row2 row3", "> all: hold", true));
+        let unknown = "-- there is no row row4: there are row1, row2, row3; nothing was sent";
+        assert_eq!(enter("row4: start"), said("", unknown, false));
+        // Only what is typed to that row is not typed, as none is there.
+        let mut not_typed = Vec::new();
+        while not_typed.len() < 4 {
+            let heard = rows.next(Duration::from_secs(20)).expect("each is told");
+            if let What::NotTyped { command, .. } = heard.what {
+                not_typed.push((heard.row, command));
+            }
+        }
+        not_typed.sort();
+        let k = || "set k 5".to_owned();
+        assert_eq!(not_typed, [(0, k()), (1, k()), (2, k()), (2, k())]);
     }
 }

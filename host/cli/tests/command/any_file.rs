@@ -1,6 +1,8 @@
 //! Every file that a host tool reads, by chance: real ones that were mutilated, and noise. Each is read or refused, with a message
 //! that names it in a line; nothing panics, and what is read is bounded.
 
+use experiments::evaluation::{self, Analysis};
+use experiments::training::table;
 use field::conditions::Conditions;
 use field::machine::Machine;
 use field::row::Row;
@@ -8,15 +10,13 @@ use field::trial::Trial;
 use field::verdict::Timing;
 use field::wiring;
 use files::csv_table;
+use gps::{Job, Wanted, map, picture};
 use link::row_names::Names;
 use link::{log, replay, settings_file};
-use places::{Job, Wanted, map, picture};
 use proptest::prelude::*;
 use std::error::Error;
 use std::fs;
 use std::path::Path;
-use study::evaluation::{self, Analysis};
-use study::training::table;
 use uno::capture::Capture;
 use uno::elf::Image;
 use uno::hex::{self, Bootloader};
@@ -62,7 +62,7 @@ const READERS: [Reader; 11] = [
                 "time_ms,kind,line",
                 "0,antenna,beam_ahead_mm=500 beam_right_mm=0 delay_ms=0",
                 "0,gps_found,/dev/ttyUSB0",
-                "0,connected,0.1.0",
+                "0,connected,0.2.0",
                 "0,setting,k=3",
                 "0,setting,margin_mm=50",
                 "0,example,built_in 0 plant 1 2 3 4 5",

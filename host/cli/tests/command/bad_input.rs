@@ -112,7 +112,7 @@ fn no_message_in_the_source_repeats_its_cause() {
 fn what_a_file_says_gives_the_terminal_no_orders() {
     let folder = tempfile::tempdir().unwrap();
     let wires = "$timescale 1 us $end\n$var wire 1 ! A\u{1b}[2J $end\n$enddefinitions $end\n#0 0!\n";
-    let log = "time_ms,kind,line\n0,connected,0.1.0\n0,setting,k\u{1b}[2J=3\n";
+    let log = "time_ms,kind,line\n0,connected,0.2.0\n0,setting,k\u{1b}[2J=3\n";
     fs::write(folder.path().join("logic.vcd"), wires).unwrap();
     fs::write(folder.path().join("log.csv"), log).unwrap();
     for (arguments, quoted) in [

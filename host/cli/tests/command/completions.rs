@@ -36,6 +36,17 @@ fn bash_completes_commands_and_their_options() {
 }
 
 #[test]
+fn bash_completes_presets_crops_and_what_an_axis_can_be() {
+    assert_eq!(offered_by_bash(&["weeder", "trial", "--field", "so"]), ["soft-ground"]);
+    assert_eq!(offered_by_bash(&["weeder", "sweep", "--field", "dire"]), ["direct-sown"]);
+    assert_eq!(offered_by_bash(&["weeder", "sweep", "--x", "lead_"]), ["lead_out_ms=", "lead_in_ms="]);
+    assert_eq!(offered_by_bash(&["weeder", "sweep", "--y", "ground.slip_p"]), ["ground.slip_percent="]);
+    assert_eq!(offered_by_bash(&["weeder", "train", "--crop", "m"]), ["maize"]);
+    // Where no name fits, bash offers files.
+    assert_eq!(offered_by_bash(&["weeder", "trial", "--field", "my-f"]), [""]);
+}
+
+#[test]
 fn other_shells_are_told_of_every_command() {
     for shell in ["elvish", "fish", "powershell", "zsh"] {
         let script = completions(shell);

@@ -149,7 +149,7 @@ fn the_swing_comes_as_settings_for_the_firmware() {
     for line in [
         "The tool clears a canopy of 190 mm at 22.5 degrees, 250 us of the pulse away from the row.",
         "That takes 60 ms without load, and 89 ms against the soil, which takes 33 % of the servo's torque.",
-        "Between tool and sweeps 22.5 mm on either side of the row are weeded by nobody: a tool of 100 mm would fill that",
+        "Between tool and sweeps 22.5 mm on either side of the row are not weeded: a tool of 100 mm would fill that",
         "\nset servo_in_us 1500\nset servo_out_us 1750\nset lead_out_ms 176\nset lead_in_ms 50\n",
     ] {
         assert!(words.contains(line), "{line:?} is not in\n{words}");

@@ -11,7 +11,7 @@ fn weeder(folder: &Path, arguments: &[&str]) -> Output {
     common::weeder(folder, arguments)
 }
 
-/// Every argument that names something to write, without it.
+/// Arguments that name something to write, without it; the tests in `main.rs` have all of them.
 const WRITERS: [(&[&str], Kind); 13] = [
     (&["trial", "--field", "small.toml", "--out"], Kind::Folder),
     (&["evaluate", concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/trial-example.csv"), "--out"], Kind::Folder),
@@ -79,6 +79,26 @@ fn a_folder_is_no_file_and_a_file_is_no_folder() {
 }
 
 #[test]
+fn a_folder_called_report_where_the_command_is_typed_keeps_it_from_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::create_dir(folder.path().join("report")).unwrap();
+    for (number, (arguments, kind)) in (0..).zip(&WRITERS[..2]) {
+        assert!(matches!(kind, Kind::Folder));
+        for out in [format!("new{number}"), format!("./deep{number}/er"), "report".to_owned()] {
+            let output = weeder(folder.path(), &[*arguments, &[&out, "--force"]].concat());
+            let message = String::from_utf8_lossy(&output.stderr);
+            assert!(matches!(output.status.code(), Some(0 | 1)), "{arguments:?} {out}: {message}");
+            assert!(folder.path().join(&out).join("report.html").is_file(), "{arguments:?} {out}");
+        }
+    }
+    // What stands in the way of a file is said before the work.
+    fs::create_dir_all(folder.path().join("old/trial.csv")).unwrap();
+    let output = weeder(folder.path(), &[WRITERS[0].0, &["old"]].concat());
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(message.contains("old/trial.csv is a folder, and a file would take its place"), "{message}");
+}
+
+#[test]
 fn the_table_is_printed_whatever_happens_to_the_file() {
     let folder = tempfile::tempdir().unwrap();
     let sweep = ["sweep", "--field", "small.toml", "--x", "k=1..3:2", "--out", "/dev/full"];
@@ -101,9 +121,9 @@ fn what_is_written_to_a_device_goes_there() {
 fn every_out_is_a_folder_or_a_file_by_its_name_in_the_help() {
     for command in ["trial", "evaluate", "plan", "sim", "sweep", "train", "record"] {
         let output = Command::new(env!("CARGO_BIN_EXE_weeder")).args([command, "--help"]).output().unwrap();
-        let help = String::from_utf8_lossy(&output.stdout).into_owned();
-        let is_folder =
-            help.contains("--out <FOLDER>") && help.contains("into this folder, which is made where there is none");
+        // It is wrapped.
+        let help = String::from_utf8_lossy(&output.stdout).split_whitespace().collect::<Vec<_>>().join(" ");
+        let is_folder = help.contains("--out <FOLDER>") && help.contains("into this folder, and create it if needed");
         assert!(is_folder || help.contains("--out <FILE."), "{command}: {help}");
     }
 }

@@ -174,23 +174,94 @@ fn an_uno_with_the_old_bootloader_is_flashed_at_its_own_baud_rate_up_to_the_last
     let _uno = VirtualUno::start(&arguments);
     let elf = elf_of(folder.path(), 30_720);
     // avrdude reads back what it has written.
-    flash(&link, &["--old-bootloader", "--elf", elf.to_str().expect("it is text")]);
+    flash(&link, &["--old-bootloader", "--unproved", "--elf", elf.to_str().expect("it is text")]);
 }
 
 #[test]
-fn a_firmware_that_reaches_into_the_old_bootloader_is_refused_and_one_that_does_not_is_written_for_avrdude() {
+fn a_firmware_that_reaches_into_the_old_bootloader_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let pty = Pty::open().unwrap();
     let elf = elf_of(folder.path(), 30_722);
     let flash = |arguments: &[&str]| {
         let mut command = weeder();
-        command.arg("flash").args(arguments).arg("--port").arg(pty.path()).arg("--elf").arg(&elf);
+        command.args(["flash", "--unproved"]).args(arguments).arg("--port").arg(pty.path()).arg("--elf").arg(&elf);
         // Without a PATH there is no avrdude.
         command.env("PATH", folder.path()).output().unwrap()
     };
     assert_refused(&flash(&["--old-bootloader"]), "takes 30722 bytes of flash: the bootloader leaves 30720");
     assert_refused(&flash(&[]), "avrdude cannot be started: ./setup.sh installs it");
-    assert!(elf.with_extension("hex").exists());
+}
+
+/// A program in a folder that does this in the place of avrdude.
+fn avrdude(folder: &Path, script: &str) {
+    let avrdude = folder.join("avrdude");
+    fs::write(&avrdude, format!("#!/bin/sh\n{script}")).unwrap();
+    fs::set_permissions(&avrdude, fs::Permissions::from_mode(0o755)).unwrap();
+}
+
+#[test]
+fn an_elf_whose_bounds_are_not_proved_goes_nowhere_unless_somebody_insists() {
+    let folder = tempfile::tempdir().unwrap();
+    let pty = Pty::open().unwrap();
+    let elf = elf_of(folder.path(), 100);
+    // What stands beside the ELF is the user's.
+    fs::write(elf.with_extension("hex"), "mine").unwrap();
+    avrdude(folder.path(), "echo \"$@\" >\"${0%/*}/called\"");
+    let called = folder.path().join("called");
+    let run = |words: &[&str]| {
+        let mut command = weeder();
+        command.args(words).arg("--elf").arg(&elf).env("PATH", folder.path()).output().unwrap()
+    };
+    let port = pty.path().to_str().expect("it is text");
+    let out = folder.path().join("out.hex");
+    let out_name = out.to_str().expect("it is text");
+    for words in [&["flash", "--port", port][..], &["flash", "--ravedude", "--port", port], &["hex", out_name]] {
+        let output = run(words);
+        assert_refused(&output, "the bounds of ");
+        assert_refused(&output, "--unproved writes it all the same");
+        assert!(!called.exists() && !out.exists(), "{words:?}");
+        assert!(output.stdout.is_empty());
+    }
+    for (words, written) in
+        [(&["flash", "--unproved", "--port", port][..], &called), (&["hex", "--unproved", out_name], &out)]
+    {
+        let output = run(words);
+        let told = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success() && written.exists(), "{words:?}: {told}");
+        assert!(
+            told.contains("Warning: the bounds of ") && told.contains("its stack may overwrite its data"),
+            "{told}"
+        );
+    }
+    assert_eq!(fs::read_to_string(elf.with_extension("hex")).unwrap(), "mine");
+}
+
+#[test]
+fn what_is_given_to_others_has_the_firmware_from_a_command_that_proves_it() {
+    for (file, command) in [("release.sh", "weeder\" hex "), ("page/build.mjs", "\"hex\"")] {
+        let text = fs::read_to_string(firmware::workspace_root().join(file)).unwrap();
+        assert!(text.contains(command) && !text.contains("objcopy"), "{file}");
+    }
+}
+
+#[test]
+fn a_row_is_flashed_by_its_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let pty = Pty::open().unwrap();
+    let names = folder.path().join("rows.toml");
+    fs::write(&names, format!("left = {{ port = \"{}\" }}\n", pty.path().display())).unwrap();
+    avrdude(folder.path(), "echo \"$@\" >\"${0%/*}/called\"");
+    let elf = elf_of(folder.path(), 100);
+    let flash = |port: &str| {
+        let mut command = weeder();
+        command.args(["flash", "--unproved", "--port", port, "--rows-file"]).arg(&names).arg("--elf").arg(&elf);
+        command.env("PATH", folder.path()).output().unwrap()
+    };
+    let output = flash("left");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let called = fs::read_to_string(folder.path().join("called")).unwrap();
+    assert!(called.contains(&format!("-P {}", pty.path().display())), "{called}");
+    assert_refused(&flash("right"), "there is no port right");
 }
 
 #[test]
@@ -228,7 +299,7 @@ fn ravedude_is_given_the_firmware_and_the_port_where_it_is_installed() {
     let pty = Pty::open().unwrap();
     let elf = elf_of(folder.path(), 100);
     let mut command = weeder();
-    command.args(["flash", "--ravedude", "--elf"]).arg(&elf).arg("--port").arg(pty.path());
+    command.args(["flash", "--unproved", "--ravedude", "--elf"]).arg(&elf).arg("--port").arg(pty.path());
     let output = command.env("PATH", folder.path()).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let called = fs::read_to_string(folder.path().join("called")).unwrap();
@@ -241,22 +312,27 @@ fn without_ravedude_avrdude_does_it() {
     let pty = Pty::open().unwrap();
     let elf = elf_of(folder.path(), 100);
     let mut command = weeder();
-    command.args(["flash", "--ravedude", "--elf"]).arg(&elf).arg("--port").arg(pty.path());
+    command.args(["flash", "--unproved", "--ravedude", "--elf"]).arg(&elf).arg("--port").arg(pty.path());
     assert_refused(&command.env("PATH", folder.path()).output().unwrap(), "avrdude cannot be started");
 }
 
 #[test]
 fn the_advice_comes_after_each_of_avrdude_s_words_once() {
     let folder = tempfile::tempdir().unwrap();
-    let avrdude = folder.path().join("avrdude");
-    let script = "#!/bin/sh\nfor n in 1 2 3 4 5 6 7 8 9 10; do\n\
-                  echo \"avrdude: stk500_getsync() attempt $n of 10: not in sync: resp=0x0$n\" >&2\ndone\nexit 1\n";
-    fs::write(&avrdude, script).unwrap();
-    fs::set_permissions(&avrdude, fs::Permissions::from_mode(0o755)).unwrap();
+    avrdude(
+        folder.path(),
+        "for n in 1 2 3 4 5 6 7 8 9 10; do\n\
+         echo \"avrdude: stk500_getsync() attempt $n of 10: not in sync: resp=0x0$n\" >&2\ndone\nexit 1\n",
+    );
     let pty = Pty::open().unwrap();
     let elf = elf_of(folder.path(), 100);
-    let output =
-        weeder().args(["flash", "--elf"]).arg(&elf).arg("--port").arg(pty.path()).env("PATH", folder.path()).output();
+    let output = weeder()
+        .args(["flash", "--unproved", "--elf"])
+        .arg(&elf)
+        .arg("--port")
+        .arg(pty.path())
+        .env("PATH", folder.path())
+        .output();
     let output = output.unwrap();
     assert_refused(&output, "or try with --old-bootloader");
     assert_eq!(String::from_utf8_lossy(&output.stderr).matches("not in sync").count(), 1);

@@ -1,6 +1,7 @@
 //! The host's tools over a pseudo terminal, as a user runs them, with the virtual Uno at its other end.
 
 use crate::typed::{printed, typed};
+use field::conditions::Conditions;
 use std::fs;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
@@ -122,6 +123,11 @@ fn settings_are_pulled_changed_compared_and_pushed() {
     printed(&weeder(&["settings", "diff", name], uno.path(), ""), 0);
     let json = printed(&weeder(&["settings", "pull", "--json"], uno.path(), ""), 0);
     assert!(json.contains("\"wheel_mm\": 405") && json.contains("\"end_switch\": false"), "{json}");
+    // Replaced when it is told to, with its comments.
+    fs::write(&file, "wheel_mm = 390 # measured\n").expect("it can be written");
+    printed(&weeder(&["settings", "pull", name, "--force"], uno.path(), ""), 0);
+    let text = fs::read_to_string(&file).expect("it is there");
+    assert!(text.contains("wheel_mm = 405 # measured\n"), "{text}");
 }
 
 #[test]
@@ -147,7 +153,7 @@ fn examples_are_pulled_taught_to_another_machine_and_compared() {
 
     // Each of these opened the port anew, which is a reset.
     printed(&weeder(&["examples", "diff", taught], uno.path(), ""), 0);
-    printed(&weeder(&["examples", "pull", again], uno.path(), ""), 0);
+    printed(&weeder(&["examples", "pull", again, "--force"], uno.path(), ""), 0);
     printed(&weeder(&["examples", "push", again, "--force"], other.path(), ""), 0);
     printed(&weeder(&["examples", "diff", taught], other.path(), ""), 0);
 
@@ -189,6 +195,24 @@ fn what_is_pushed_is_kept_over_a_reset_unless_it_is_not_to_be() {
 }
 
 #[test]
+fn a_preset_is_pushed_by_its_name_and_the_margin_stays() {
+    let uno = uno();
+    printed(&weeder(&["monitor", "--plain"], uno.path(), "clear\n"), 0);
+    let pushed = printed(&weeder(&["settings", "push", "set-up"], uno.path(), ""), 0);
+    assert!(pushed.starts_with("Set: ") && pushed.contains("servo_out_us"), "{pushed}");
+    assert!(!pushed.contains("margin_mm"), "{pushed}");
+    let json = printed(&weeder(&["settings", "pull", "--json"], uno.path(), ""), 0);
+    let json: serde_json::Value = serde_json::from_str(&json).expect("it is JSON");
+    let set_up = Conditions::preset("set-up").expect("there is one").expect("it is right");
+    assert_eq!((json["margin_mm"].as_u64(), set_up.settings.contains_key("margin_mm")), (Some(50), true));
+    for (name, value) in set_up.settings.iter().filter(|(name, _)| *name != "margin_mm") {
+        assert_eq!(json[name].as_u64(), Some((*value).into()), "{name}");
+    }
+    let nothing = printed(&weeder(&["settings", "push", "from-the-box"], uno.path(), ""), 2);
+    assert!(nothing.contains("the preset from-the-box sets nothing"), "{nothing}");
+}
+
+#[test]
 fn an_empty_file_has_no_settings_to_compare_or_to_push() {
     let file = tempfile::NamedTempFile::new().expect("there is room for a file");
     for action in ["diff", "push"] {
@@ -217,6 +241,26 @@ fn a_second_virtual_uno_leaves_the_link_of_a_living_one_alone() {
 }
 
 #[test]
+fn a_virtual_uno_says_what_to_type_next() {
+    let folder = tempfile::tempdir().expect("there is room for a link");
+    let elf = firmware::build().expect("the firmware builds");
+    let elf = elf.to_str().expect("it is text");
+    let old = "/usr/share/arduino/hardware/arduino/avr/bootloaders/atmega/ATmegaBOOT_168_atmega328.hex";
+    for (words, next) in [
+        (&["--link", "my uno", "--elf", elf][..], "weeder monitor --port 'my uno'\n"),
+        (&["--link", "row", "--rows", "2", "--elf", elf], "weeder monitor --port row1 --port row2\n"),
+        (&["--link", "uno", "--bootloader", "optiboot"], "weeder flash --port uno\n"),
+        (&["--link", "uno", "--bootloader", old], "weeder flash --old-bootloader --port uno\n"),
+    ] {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
+        let command = command.current_dir(&folder).args(["virtual-uno", "--stand", "--for", "1"]).args(words);
+        let output = command.output().expect("cargo has built the command");
+        let told = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.success() && told.contains(&format!("in another terminal: {next}")), "{words:?}: {told}");
+    }
+}
+
+#[test]
 fn a_file_with_a_mistake_is_refused_before_the_port_is_opened() {
     let folder = tempfile::tempdir().expect("there is room for a file");
     let file = folder.path().join("machine.toml");
@@ -230,9 +274,13 @@ fn a_file_with_a_mistake_is_refused_before_the_port_is_opened() {
 fn the_plain_monitor_answers_line_by_line_and_tells_of_refusals_by_its_status() {
     let uno = uno();
     let answers = printed(&weeder(&["monitor", "--plain"], uno.path(), "version\nget k\n"), 0);
-    assert!(answers.starts_with("weeder 0.1.0\nok\nk=3 "), "{answers}");
+    assert!(answers.starts_with("weeder 0.2.0\nok\nk=3 "), "{answers}");
     let refused = printed(&weeder(&["monitor", "--plain"], uno.path(), "hepl\n"), 1);
     assert_eq!(refused, "error: no such command, help lists them all\n");
+    let examples = weeder(&["monitor", "--plain"], uno.path(), "examples\nstatus\n");
+    assert!(String::from_utf8_lossy(&examples.stdout).starts_with("built_in 0 "), "{examples:?}");
+    let beside = String::from_utf8_lossy(&examples.stderr);
+    assert_eq!(beside.matches("source number class, and five features").count(), 1, "{beside}");
     let wrong = printed(&weeder(&["monitor", "--plain"], uno.path(), "h\u{e4}lt\n"), 2);
     assert!(wrong.contains("is no command: it has to be one line of at most 80 printable ASCII characters"), "{wrong}");
 }

@@ -36,7 +36,7 @@ speed_mm_s,spacing_mm,delay_mm,hold_mm,actuation_mm,answer,votes,label
 ";
 
 /// Programs that are not of this repository; what they do with their options is their business.
-const FOREIGN: [&str; 6] = ["avrdude", "echo", "npm", "scontrol", "squeue", "sudo"];
+const FOREIGN: [&str; 7] = ["avrdude", "cp", "echo", "npm", "scontrol", "squeue", "sudo"];
 
 /// Subcommands that need neither an Uno nor much time.
 const CHEAP: [&str; 9] = ["classify", "design", "evaluate", "hex", "merge", "plan", "sweep", "train", "trial"];
@@ -164,6 +164,24 @@ fn every_command_in_the_manual_exists_with_its_options() {
     assert!(seen > 20, "only {seen} commands were found");
 }
 
+/// Lines of the README that a newcomer sees first.
+const FIRST_SCREEN: usize = 32;
+
+#[test]
+fn the_readme_s_first_screen_has_both_ways_in_to_be_copied_as_a_whole_and_the_gate_follows_them() {
+    let readme = fs::read_to_string(Path::new(ROOT).join("README.md")).expect("there is a README");
+    let screen: Vec<&str> = readme.lines().take(FIRST_SCREEN).collect();
+    for command in ["./setup.sh && cargo sim", "./setup.sh && cargo test"] {
+        let block = ["<!-- from nothing -->", "```sh", command, "```"];
+        assert!(screen.windows(block.len()).any(|lines| lines == block), "{command} is not a block of its own");
+    }
+    // All tests are run there, and nowhere else.
+    let gate = fs::read_to_string(Path::new(ROOT).join(".ci/run")).expect("there is a gate");
+    let steps: Vec<&str> = gate.lines().filter(|line| line.starts_with("step ")).collect();
+    assert!(steps.iter().any(|step| step.ends_with("env WEEDER_THOROUGH=1 .ci/from-nothing")), "{steps:?}");
+    assert!(!steps.iter().any(|step| step.contains("cargo test")), "{steps:?}");
+}
+
 #[test]
 fn commands_in_the_manual_that_need_no_uno_do_what_they_say() {
     let folder = TempDir::new().expect("a folder");
@@ -201,9 +219,11 @@ fn files_below(folder: &Path, files: &mut Vec<PathBuf>) {
 }
 
 #[test]
-fn every_file_that_contributing_names_is_there() {
+fn every_file_that_contributing_and_the_page_of_the_sources_name_is_there() {
     let root = Path::new(ROOT);
-    let text = fs::read_to_string(root.join("CONTRIBUTING.md")).expect("it is there");
+    let text =
+        ["CONTRIBUTING.md", "docs/sources.md"].map(|page| fs::read_to_string(root.join(page)).expect("it is there"));
+    let text = text.join("\n");
     let mut files = Vec::new();
     for folder in ["control", "docs", "host", "knn", "page/src", "src", "tests"] {
         files_below(&root.join(folder), &mut files);
@@ -220,14 +240,14 @@ fn every_file_that_contributing_names_is_there() {
 }
 
 #[test]
-fn the_readme_names_every_console_command() {
-    let readme = fs::read_to_string(Path::new(ROOT).join("README.md")).expect("there is a README");
+fn the_manual_s_page_of_the_console_names_every_command() {
+    let page = fs::read_to_string(Path::new(ROOT).join("docs/console.md")).expect("there is such a page");
     let mut uno = trial::boot(&firmware::build().expect("the firmware builds"), &[]).expect("the firmware wakes up");
     let help = ask(&mut uno, "help").expect("it has help");
     assert!(help.len() > 10, "{help:?}");
     for usage in help.iter().filter_map(|line| line.split_once(" - ")).map(|(usage, _)| usage) {
         let word = usage.split(' ').next().unwrap_or(usage);
-        assert!(readme.contains(&format!("`{word}")), "{usage}");
+        assert!(page.contains(&format!("`{word}")), "{usage}");
     }
 }
 
@@ -356,4 +376,20 @@ fn every_link_in_the_manual_leads_somewhere() {
             }
         }
     }
+}
+
+#[test]
+fn one_version_stands_in_every_file_that_names_it() {
+    let version = env!("CARGO_PKG_VERSION");
+    let line = |file: &str, line: &str| {
+        let text = fs::read_to_string(Path::new(ROOT).join(file)).unwrap();
+        assert!(text.lines().any(|found| found == line), "{file} has no line `{line}`");
+    };
+    line("Cargo.toml", &format!("version = \"{version}\""));
+    line("CITATION.cff", &format!("version: {version}"));
+    line("CHANGELOG.md", &format!("## {version}"));
+    for file in ["page/package.json", "page/package-lock.json"] {
+        line(file, &format!("    \"version\": \"{version}\","));
+    }
+    line("page/package-lock.json", &format!("            \"version\": \"{version}\","));
 }

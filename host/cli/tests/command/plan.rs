@@ -40,11 +40,18 @@ fn a_plan_that_is_filled_in_by_hand_is_judged() {
 }
 
 #[test]
-fn a_plan_that_is_not_filled_in_yet_is_refused_with_the_cell_that_is_empty() {
+fn a_plan_that_is_not_filled_in_yet_is_refused_with_how_many_plots_are_not() {
     let folder = TempDir::new().unwrap();
-    said(folder.path(), &["plan", "--out", "trial.csv"]);
-    let empty = "trial.csv, line 6: weeds_before is ``: it has to be a whole number";
-    assert_refused(folder.path(), &["evaluate", "trial.csv"], empty);
+    said(folder.path(), &["plan", "--width", "0.4", "--power", "2.5", "--out", "trial.csv"]);
+    let none = "trial.csv, line 6: 24 of 24 plots are not filled in: here weeds_before is empty";
+    assert_refused(folder.path(), &["evaluate", "trial.csv"], none);
+    let path = folder.path().join("trial.csv");
+    let filled = filled_in(&fs::read_to_string(&path).unwrap());
+    // A cell that was forgotten in the evening.
+    let (last, _) = filled.rsplit_once(',').unwrap();
+    fs::write(&path, format!("{last},\n")).unwrap();
+    let one = "trial.csv, line 29: 1 of 24 plots is not filled in: here power_hp is empty";
+    assert_refused(folder.path(), &["evaluate", "trial.csv"], one);
 }
 
 #[test]

@@ -17,6 +17,8 @@ use tempfile::TempDir;
 use trial::firmware;
 use ureq::Agent;
 
+mod attacks;
+
 /// No answer after so long is none: a hundred times what a busy host takes.
 const PATIENCE: Duration = Duration::from_secs(120);
 
@@ -518,7 +520,8 @@ fn a_port_that_is_pulled_is_told_and_opened_again_and_the_machine_beside_it_work
 
     let (_left, _) = uno(&folder, "left", &["--stand"]);
     events.wait_for(|message| message["machine"] == 0 && message["is"] == "there");
-    events.wait_for(|message| message["machine"] == 0 && has(message, "line", "state=alarm alarm=settings_lost"));
+    events
+        .wait_for(|message| message["machine"] == 0 && has(message, "line", "state=alarm code=5-1 name=settings_lost"));
     assert_eq!(served.command(&served.lan, &phone, "hold"), (200, "ok\n".to_owned()));
     events.wait_for(|message| message["machine"] == 1 && has(message, "line", "state=work"));
     assert_eq!(served.post(&served.lan, "/machines/2/command", &phone, "hold").0, 404);
@@ -532,6 +535,33 @@ fn a_machine_that_is_not_there_is_waited_for() {
     served.wait_until_told("uno: there is no port ");
     let (_uno, _) = uno(&folder, "uno", &["--stand"]);
     served.wait_until_told("uno: weeder ");
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn it_opens_its_page_in_the_browser_where_that_is_asked_for() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = folder();
+    let (browser, opened) = (folder.path().join("xdg-open"), folder.path().join("opened"));
+    fs::write(&browser, format!("#!/bin/sh\necho $1 >{}\n", opened.display())).expect("it can be written to");
+    fs::set_permissions(&browser, fs::Permissions::from_mode(0o755)).expect("it is ours");
+    let mut serve = weeder();
+    serve.arg("serve").args(["--http-port", "0", "--open", "--page"]).arg(folder.path().join("page"));
+    serve
+        .env("PATH", format!("{}:/usr/bin:/bin", folder.path().display()))
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null());
+    let mut process = serve.spawn().expect("cargo has built it");
+    let mut line = String::new();
+    BufReader::new(process.stdout.take().expect("it is piped")).read_line(&mut line).expect("it says where it is");
+    let _running = Running(process);
+    let address = line.split(' ').next().expect("it begins with it");
+    let is_opened = || fs::read_to_string(&opened).is_ok_and(|said| said.trim_end() == address);
+    let since = Instant::now();
+    while !is_opened() {
+        assert!(since.elapsed() < PATIENCE, "{address} is not opened");
+        thread::sleep(LOOK);
+    }
 }
 
 #[test]

@@ -129,6 +129,51 @@ fn settings_of_several_rows_are_pulled_pushed_and_compared_and_the_row_that_fail
 }
 
 #[test]
+fn examples_take_a_row_s_name() {
+    let folder = TempDir::new().expect("there is room for a folder");
+    let _rows = rows(&folder, 1);
+    let file = named(&folder, 1);
+    let with = |words: &[&str], port: &str| weeder(&[words, &["--port", port, "--rows-file", &file]].concat(), "");
+    assert_eq!(printed(&with(&["examples", "pull", "--json"], "left"), 0), "[]\n");
+    let error = printed(&with(&["examples", "pull", "--json"], "right"), 2);
+    assert!(error.contains("there is no port right"), "{error}");
+}
+
+#[test]
+fn of_several_rows_the_one_that_is_named_has_the_receiver_in_its_record() {
+    let folder = TempDir::new().expect("there is room for a folder");
+    let _rows = rows(&folder, 2);
+    let file = named(&folder, 2);
+    let sentences = folder.path().join("gps.nmea");
+    fs::write(&sentences, "$GPGGA,092750.000,5321.6802,N,00630.3372,W,1,8,1.03,61.7,M,55.2,M,,*76\n").unwrap();
+    let (logs, sentences) = (folder.path().join("field"), sentences.display().to_string());
+    let record = |gps: &str| {
+        let mut record = command(&["record", "--all", "--rows-file", &file, "--gps", gps, "--out"]);
+        record.arg(&logs).spawn().expect("it is built")
+    };
+    for (gps, right) in [
+        (
+            sentences.clone(),
+            "of several rows, one has the receiver in its record: say which, as in `--gps left|middle=",
+        ),
+        (format!("right={sentences}"), "there is no row right: there are left, middle"),
+    ] {
+        let error = printed(&record(&gps).wait_with_output().expect("it ends"), 2);
+        assert!(error.contains(right) && !logs.exists(), "{error}");
+    }
+    let mut recording = Running(record(&format!("middle={sentences}")));
+    let text = |name: &str| fs::read_to_string(logs.join(format!("{name}.csv"))).unwrap_or_default();
+    let is_written = || text("middle").contains(",gps,") && text("left").contains(",status,");
+    while !is_written() {
+        assert_eq!(recording.0.try_wait().expect("it is a child"), None, "it goes on");
+        sleep(Duration::from_millis(50));
+    }
+    Command::new("kill").args(["-INT", &recording.0.id().to_string()]).status().expect("there is a kill");
+    assert!(recording.0.wait().expect("it ends").success());
+    assert!(text("middle").contains(",antenna,") && !text("left").contains("gps"), "{}", text("left"));
+}
+
+#[test]
 fn the_plain_monitor_types_to_one_row_or_to_all_and_tells_of_each_answer() {
     let folder = TempDir::new().expect("there is room for a folder");
     let _rows = rows(&folder, 2);

@@ -1,13 +1,13 @@
 //! `--shard` and `weeder merge`: the parts of a study give the bytes of an undivided one, and what is no whole study is refused.
 
 use crate::common::{SMALL, assert_refused, said, weeder};
+use model_test::is_thorough;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
 use std::thread;
 use std::time::Duration;
 use tempfile::TempDir;
-use walks::is_thorough;
 
 /// A trial in it.
 const TRIAL: [&str; 5] = ["trial", "--field", "small.toml", "--seed", "7"];
@@ -53,7 +53,7 @@ fn assert_same(study: &[&str], shown: &[&str], files: &[&str]) {
 fn a_trial_in_four_shards_is_the_undivided_trial_to_the_byte() {
     assert_same(&TRIAL, &["--out", "report"], &["report/report.html", "report/trial.csv", "report/controllers.csv"]);
     assert_same(&TRIAL, &["--json"], &[]);
-    assert_same(&[&TRIAL[..], &["--rivals", "paper", "--speeds", "7"]].concat(), &["--brief"], &[]);
+    assert_same(&[&TRIAL[..], &["--baselines", "paper", "--speeds", "7"]].concat(), &["--brief"], &[]);
 }
 
 #[test]
@@ -115,14 +115,18 @@ fn parts_that_are_no_whole_study_are_refused_by_name() {
         assert!(text.contains(from));
         fs::write(path.join(name), text.replacen(from, to, 1)).unwrap();
     };
-    let version = concat!("\"version\":\"", env!("CARGO_PKG_VERSION"), "\"");
-    change("older.part", version, "\"version\":\"0.0.9\"");
-    assert_reports_nothing(path, &merge(&["1.part", "older.part", "3.part"]), "older.part is of weeder 0.0.9 (build ");
+    let version = concat!("\"version\":\"", env!("CARGO_PKG_VERSION"));
+    change("older.part", version, "\"version\":\"0.0.9");
+    assert_reports_nothing(path, &merge(&["1.part", "older.part", "3.part"]), "older.part is of weeder 0.0.9");
     change("built.part", "\"build\":\"", "\"build\":\"0");
     assert_reports_nothing(path, &merge(&["1.part", "built.part", "3.part"]), "built.part is of weeder ");
     fs::write(path.join("cut.part"), &text[..text.len() / 2]).unwrap();
     assert_reports_nothing(path, &merge(&["1.part", "cut.part", "3.part"]), "cut.part, line ");
     assert_reports_nothing(path, &merge(&["1.part", "small.toml", "3.part"]), "small.toml is no part of a study");
+    fs::write(path.join("empty.csv"), "").unwrap();
+    let empty =
+        "empty.csv is no part of a study, as `weeder trial --shard 1/4 --out empty.csv` would write it: it is empty";
+    assert_reports_nothing(path, &merge(&["1.part", "empty.csv", "3.part"]), empty);
     assert_reports_nothing(path, &merge(&["1.part", "no.part", "3.part"]), "no.part cannot be read: No such file");
 }
 
@@ -165,7 +169,9 @@ fn a_shard_that_is_killed_leaves_no_file_and_computes_the_same_when_it_starts_an
 
     compute_parts(path, &TRIAL, 1);
     let first = fs::read(path.join("1.part")).unwrap();
-    compute_parts(path, &TRIAL, 1);
+    let again = [&TRIAL[..], &["--shard", "1/1", "--out", "1.part"]].concat();
+    assert_refused(path, &again, "1.part is there already");
+    said(path, &[&again[..], &["--force"]].concat());
     assert!(first == fs::read(path.join("1.part")).unwrap(), "the same part, in the place of the first");
 }
 

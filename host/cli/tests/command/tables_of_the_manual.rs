@@ -1,7 +1,7 @@
 //! What stands in the manual and follows from the code: the wiring, every setting, what to do about every alarm, and the
 //! simulated field; and what the classifier's page has of the figures that `weeder figures` writes.
 //!
-//! `UPDATE_EXPECT=1 cargo test -p weeder-cli --test command tables` writes it anew.
+//! `UPDATE_EXPECT=1 cargo test -p weeder-cli --test command tables` updates it.
 
 use control::alarm::{Alarm, Warning};
 use control::settings::{Description, Setting};
@@ -60,10 +60,9 @@ fn the_wiring_diagram_shows_the_pins_and_pull_ups_of_the_pin_table() {
 }
 
 #[test]
-fn the_wiring_tables_are_the_pin_table() {
-    for page in [expect_file!["../../../../README.md"], expect_file!["../../../../docs/build.md"]] {
-        page.assert_eq(&with_part(&page, "wiring", &wiring::table()));
-    }
+fn the_wiring_table_is_the_pin_table() {
+    let page = expect_file!["../../../../docs/build.md"];
+    page.assert_eq(&with_part(&page, "wiring", &wiring::table()));
 }
 
 #[test]
@@ -79,10 +78,12 @@ fn the_simulated_field_s_page_is_the_table_of_its_parameters() {
 }
 
 #[test]
-fn the_settings_that_the_readme_names_have_the_defaults_that_it_gives() {
-    let readme = expect_file!["../../../../README.md"].data();
+fn the_settings_to_set_first_have_the_defaults_that_the_manual_gives() {
+    let page = expect_file!["../../../../docs/settings.md"].data();
+    let (_, rest) = page.split_once("## Set these first\n").expect("there is such a part");
+    let (first, _) = rest.split_once("\n## ").expect("another follows");
     let mut found = 0;
-    for line in readme.lines() {
+    for line in first.lines() {
         let mut cells = line.trim_matches('|').split('|').map(str::trim);
         let (Some(names), Some(defaults)) = (cells.next(), cells.next()) else { continue };
         for (cell, default) in names.split(", ").zip(defaults.split(", ")) {
@@ -92,19 +93,18 @@ fn the_settings_that_the_readme_names_have_the_defaults_that_it_gives() {
             found += 1;
         }
     }
-    assert_eq!(found, 5, "the five that one sets first");
+    assert_eq!(found, 5, "the five to set first");
 }
 
 #[test]
 fn the_faults_page_says_what_the_monitor_says_to_do() {
     let page = expect_file!["../../../../docs/faults.md"].data();
-    let alarms = (0..).map_while(Alarm::from_index).map(|alarm| {
-        let (code, name) = (alarm.code(), alarm.text().bytes().map(char::from).collect::<String>());
-        (format!("| {}-{} | `{name}` |", code / 10, code % 10), advice::alarm(alarm))
-    });
+    let alarms = (0..)
+        .map_while(Alarm::from_index)
+        .map(|alarm| (format!("| `{}` |", advice::name(alarm)), advice::alarm(alarm)));
     let warnings = (0..).map_while(Warning::from_index).map(|warning| {
         let name = warning.text().bytes().map(char::from).collect::<String>();
-        (format!("| | `{name}` (warning) |"), advice::warning(warning))
+        (format!("| `{name}` (warning) |"), advice::warning(warning))
     });
     for (begin, advice) in alarms.chain(warnings) {
         let row = page.lines().find(|line| line.starts_with(&begin)).unwrap_or_else(|| panic!("no row {begin}"));
@@ -132,21 +132,65 @@ fn cycles(figures: &str) -> String {
     table
 }
 
-/// Every parameter of the simulated field as a table in Markdown.
-fn parameters() -> String {
-    let mut table = "| name | default | from | to | what it is | where the number is from |\n".to_owned();
-    table += "| --- | --- | --- | --- | --- | --- |\n";
-    for (Parameter { name, meaning, source, least, greatest }, default) in Conditions::default().values() {
-        writeln!(table, "| `{name}` | {default} | {least} | {greatest} | {meaning} | {source} |")
-            .expect("a string takes everything");
+#[test]
+fn the_page_of_the_blinking_led_has_every_code_with_what_to_do() {
+    let page = expect_file!["../../../../docs/blinking-led.md"].data();
+    let rows: Vec<&str> =
+        page.lines().filter(|line| line.starts_with("| ") && line[2..].starts_with(char::is_numeric)).collect();
+    let alarms: Vec<Alarm> = (0..).map_while(Alarm::from_index).collect();
+    assert_eq!(rows.len(), alarms.len());
+    for alarm in alarms {
+        let ((first, second), advice) = (alarm.code(), advice::alarm(alarm));
+        let row = rows.iter().find(|row| row.starts_with(&format!("| {first}-{second} |")));
+        assert!(row.is_some_and(|row| row.ends_with(&format!(" | {advice} |"))), "{first}-{second}: {row:?}, {advice}");
     }
-    table
 }
 
-/// Every setting as a table in Markdown.
+#[test]
+fn the_result_in_the_readme_is_that_of_the_figures() {
+    let figures = expect_file!["../../../../docs/figures.md"].data();
+    let (_, trial) = figures
+        .split_once("<!-- figures: weeder trial --speeds 1,1.5,2,2.5,3,4 --replications 60 -->")
+        .expect("a trial of the set-up machine");
+    // The first line of this speed and controller is of plants, the second of ground.
+    let cells = |controller: &str, table: usize| -> Vec<&str> {
+        let lines = trial.lines().map(|line| line.trim_matches(['│', ' ']));
+        let line = lines.filter(|line| line.starts_with("2.5 ") && line.contains(controller)).nth(table);
+        let line = line.unwrap_or_else(|| panic!("no line of {controller}"));
+        line.split("  ").map(str::trim).filter(|cell| !cell.is_empty()).skip(2).collect()
+    };
+    let of = |controller: &str| {
+        (cells(controller, 0)[0], cells(controller, 1)[0].split_whitespace().next().unwrap_or_default())
+    };
+    let ((damaged, weeded), (damaged_there, weeded_there)) = (of("this firmware"), of("paper's controller"));
+    let split = |damaged: &str| -> (String, String) {
+        let (share, interval) = damaged.trim_end_matches(')').split_once(" (").expect("an interval");
+        (share.to_owned(), interval.to_owned())
+    };
+    let ((damaged, interval), (damaged_there, _)) = (split(damaged), split(damaged_there));
+    let sentence = format!(
+        "In simulated rows at 2.5 km/h, this firmware weeded {weeded} % of the row's ground and damaged {damaged} % of the plants \
+         ({interval} %).\nThe paper's controller weeded {weeded_there} % and damaged {damaged_there} %.\n"
+    );
+    let page = expect_file!["../../../../README.md"];
+    page.assert_eq(&with_part(&page, "result", &sentence));
+}
+
+/// Every parameter of the simulated field as a list in Markdown.
+fn parameters() -> String {
+    let mut list = String::new();
+    for (Parameter { name, meaning, source, least, greatest }, default) in Conditions::default().values() {
+        writeln!(list, "- `{name}` = {default} ({least} to {greatest}): {meaning}. Source: {source}.")
+            .expect("a string takes everything");
+    }
+    list
+}
+
+/// Every setting in two tables in Markdown: what it is, and its values.
 fn settings() -> String {
-    let mut table = "| name | unit | from | to | default | set in | what it is |\n".to_owned();
-    table += "| --- | --- | --- | --- | --- | --- | --- |\n";
+    let mut meanings = "| name | what it is |\n| --- | --- |\n".to_owned();
+    let mut values =
+        "| name | unit | from | to | default | set in |\n| --- | --- | --- | --- | --- | --- |\n".to_owned();
     for setting in Setting::all() {
         let Description { least, greatest, default, hold_only } = setting.description();
         let shown = |value: u16| match (setting.is_switched(), value) {
@@ -154,18 +198,12 @@ fn settings() -> String {
             (true, _) => "on".to_owned(),
             (false, _) => value.to_string(),
         };
-        writeln!(
-            table,
-            "| `{}` | {} | {} | {} | {} | {} | {} |",
-            name(setting),
-            unit(setting),
-            shown(least),
-            shown(greatest),
-            shown(default),
-            if hold_only { "hold" } else { "any state" },
-            help(setting)
-        )
-        .expect("a string takes everything");
+        let (name, unit, help) = (name(setting), unit(setting), help(setting));
+        let (least, greatest, default) = (shown(least), shown(greatest), shown(default));
+        let set_in = if hold_only { "hold" } else { "any state" };
+        writeln!(meanings, "| `{name}` | {help} |").expect("a string takes everything");
+        writeln!(values, "| `{name}` | {unit} | {least} | {greatest} | {default} | {set_in} |")
+            .expect("a string takes everything");
     }
-    table
+    format!("{meanings}\n{values}")
 }

@@ -1,8 +1,8 @@
 //! `weeder train` and `weeder classify`, as they are called.
 
 use crate::common::{assert_refused, said, weeder};
+use experiments::training::MOST_EXAMPLES;
 use std::fs;
-use study::training::MOST_EXAMPLES;
 use tempfile::TempDir;
 
 /// The table that the firmware is built from.
@@ -31,7 +31,7 @@ fn the_built_in_table_is_what_the_command_writes() {
     let built_in = fs::read_to_string(BUILT_IN).unwrap();
     assert!(
         written == built_in,
-        "the table is out of date: run `cargo run --release -p weeder-cli -- train --synthetic --out {BUILT_IN}`"
+        "the table is out of date: run `cargo run --release -p weeder-cli -- train --synthetic --force --out {BUILT_IN}`"
     );
     assert_eq!(said.matches("Plants taken for weeds   0 of ").count(), 3, "{said}");
     assert!(fs::read_to_string(folder.path().join("regions.svg")).unwrap().starts_with("<svg"));
@@ -129,6 +129,6 @@ fn a_table_is_written_as_rust_or_csv_only() {
 
 #[test]
 fn objects_come_from_files_or_from_the_simulated_field() {
-    assert_not_taken("", &["train"], "FILE.csv");
+    assert_not_taken("", &["train"], "<FILE.csv|--synthetic>");
     assert_not_taken("", &["train", "objects.csv", "--synthetic"], "cannot be used with");
 }

@@ -77,6 +77,7 @@ parameters! {
     /// The crop.
     crop: Crop {
         spacing_scatter_mm: f64 = 30.0, 0 to 200, "a plant stands within this of its place along the row, evenly spread", "assumed";
+        spacing_sd_mm: f64 = 0.0, 0 to 300, "standard deviation of the distance from a plant's place to the next, normally spread, beside that scatter", "none: transplanted by hand or machine";
         across_scatter_mm: f64 = 5.0, 0 to 50, "a plant stands within this of the row's line, evenly spread", "assumed";
         canopy_mm: f64 = 150.0, 20 to 350, "mean width of a canopy where it is widest, half way up", "assumed, for chilli some weeks after transplanting";
         canopy_scatter_mm: f64 = 40.0, 0 to 150, "a canopy's width is within this of its mean, evenly spread", "assumed";
@@ -99,7 +100,7 @@ parameters! {
     }
     /// The ground.
     ground: Ground {
-        slip_percent: f64 = 5.0, -30 to 30, "mean slip of the wheel that the encoder counts: above 0 where it drives, below where it is dragged", "assumed, for a driving wheel on tilled soil that nobody calibrated";
+        slip_percent: f64 = 5.0, -30 to 30, "mean slip of the wheel that the encoder counts: above 0 where it drives, below where it is dragged", "assumed, for a driving wheel on tilled soil, not calibrated";
         slip_scatter_percent: f64 = 3.0, 0 to 10, "slip is within this of its mean, evenly spread, and changes every metre or two", "assumed";
     }
     /// The driving.

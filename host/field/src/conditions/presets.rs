@@ -10,10 +10,16 @@ pub(super) const PRESETS: &[(&str, &str)] = &[
     ("heavy-soil", include_str!("../../presets/heavy-soil.toml")),
     ("dusty", include_str!("../../presets/dusty.toml")),
     ("hand-steered", include_str!("../../presets/hand-steered.toml")),
+    ("hand-steered-set-up", include_str!("../../presets/hand-steered-set-up.toml")),
     ("set-up", include_str!("../../presets/set-up.toml")),
+    ("quick-tool", include_str!("../../presets/quick-tool.toml")),
     ("chilli", include_str!("../../presets/chilli.toml")),
     ("broccoli", include_str!("../../presets/broccoli.toml")),
     ("maize", include_str!("../../presets/maize.toml")),
+    ("maize-uneven", include_str!("../../presets/maize-uneven.toml")),
+    // The same field as the first, by what the machine in it is.
+    ("from-the-box", ""),
+    ("paper", include_str!("../../presets/paper.toml")),
 ];
 
 /// The presets' names.

@@ -1,9 +1,9 @@
 //! What a log tells beside what its replay tells.
 
-use super::replayed::{Difference, OBJECT_TICKS, Replayed, SWING_MS, SWING_TICKS};
-use crate::{Class, EventLine};
+use super::replayed::{DETECTION_TICKS, Difference, Replayed, SWING_MS, SWING_TICKS};
+use crate::{Class, EventLine, advice};
 
-/// Farther than any object's hold goes, 5 m at the default wheel.
+/// Farther than any detection's hold goes, 5 m at the default wheel.
 const FAR_TICKS: i32 = 10_000;
 
 /// Something that was told.
@@ -35,23 +35,23 @@ pub(super) struct Bounds {
 /// which none of the replays agrees with the log. Each is at another pace, the likeliest first.
 pub(super) fn compare(logged: &[Heard], replays: &[&[Heard]], bounds: &Bounds, result: &mut Replayed) {
     let kinds: [fn(&EventLine) -> bool; 3] = [
-        |event| matches!(event, EventLine::Object { .. }),
+        |event| matches!(event, EventLine::Detection { .. }),
         |event| matches!(event, EventLine::Swing { .. }),
         |event| matches!(event, EventLine::Alarm { .. }),
     ];
     let is_judged = |heard: &&Heard| match heard.event {
         // What was in the beam when the log began is cut for the replay.
-        EventLine::Object { position, .. } => position.wrapping_sub(bounds.first) >= 0,
+        EventLine::Detection { position, .. } => position.wrapping_sub(bounds.first) >= 0,
         EventLine::Swing { position, .. } => position >= bounds.judged_from,
         _ => !heard.is_given,
     };
-    // What is at the very end may come in the one and not yet in the other; an object is told some way behind it.
+    // What is at the very end may come in the one and not yet in the other; a detection is told some way behind it.
     let is_at_end = |heard: &Heard| match heard.event {
         EventLine::Swing { position, .. } => {
             bounds.end.wrapping_sub(position).saturating_abs() <= swing_ticks(heard, heard)
         }
-        EventLine::Object { position, hold, .. } => {
-            (-FAR_TICKS..=OBJECT_TICKS).contains(&bounds.end.wrapping_sub(position.wrapping_add(hold)))
+        EventLine::Detection { position, hold, .. } => {
+            (-FAR_TICKS..=DETECTION_TICKS).contains(&bounds.end.wrapping_sub(position.wrapping_add(hold)))
         }
         _ => false,
     };
@@ -62,9 +62,9 @@ pub(super) fn compare(logged: &[Heard], replays: &[&[Heard]], bounds: &Bounds, r
                 && position.wrapping_sub(bounds.judged_from).saturating_abs() <= swing_ticks(heard, heard)
         }
         // Both have it, and only one of them where it is judged.
-        EventLine::Object { position, .. } => {
+        EventLine::Detection { position, .. } => {
             let is_heard = |heard_there: &[Heard]| heard_there.iter().any(|other| agree(heard, other));
-            position.wrapping_sub(bounds.first).saturating_abs() <= OBJECT_TICKS
+            position.wrapping_sub(bounds.first).saturating_abs() <= DETECTION_TICKS
                 && is_heard(logged)
                 && replays.iter().any(|replayed| is_heard(replayed))
         }
@@ -134,7 +134,7 @@ impl Replayed {
     /// Counts what both agree on.
     fn count(&mut self, logged: &Heard, replayed: &Heard) {
         match (logged.event, replayed.event) {
-            (EventLine::Object { .. }, _) => self.objects += 1,
+            (EventLine::Detection { .. }, _) => self.objects += 1,
             (EventLine::Alarm { .. }, _) => self.alarms += 1,
             (EventLine::Swing { position, .. }, EventLine::Swing { position: ours, .. }) => {
                 self.swings += 1;
@@ -157,12 +157,12 @@ fn agree(logged: &Heard, replayed: &Heard) -> bool {
     let near = |one: i32, other: i32, ticks: i32| one.wrapping_sub(other).saturating_abs() <= ticks;
     match (logged.event, replayed.event) {
         (
-            EventLine::Object { class, position, votes, hold, .. },
-            EventLine::Object { class: our_class, position: our_position, votes: our_votes, hold: our_hold, .. },
+            EventLine::Detection { class, position, votes, hold, .. },
+            EventLine::Detection { class: our_class, position: our_position, votes: our_votes, hold: our_hold, .. },
         ) => {
             (class, votes) == (our_class, our_votes)
-                && near(position, our_position, OBJECT_TICKS)
-                && near(hold, our_hold, OBJECT_TICKS)
+                && near(position, our_position, DETECTION_TICKS)
+                && near(hold, our_hold, DETECTION_TICKS)
         }
         (EventLine::Swing { out, position }, EventLine::Swing { out: ours, position: our_position }) => {
             out == ours && (logged.is_given || near(position, our_position, swing_ticks(logged, replayed)))
@@ -175,7 +175,7 @@ fn agree(logged: &Heard, replayed: &Heard) -> bool {
 fn describe(heard: Option<&Heard>) -> String {
     let Some(heard) = heard else { return "none".to_owned() };
     match heard.event {
-        EventLine::Object { class, position, votes, hold, .. } => {
+        EventLine::Detection { class, position, votes, hold, .. } => {
             let class = match class {
                 Class::Plant => "plant",
                 Class::Weed => "weed",
@@ -185,8 +185,7 @@ fn describe(heard: Option<&Heard>) -> String {
         }
         EventLine::Swing { out, position } => format!("`swing tool={} pos={position}`", if out { "out" } else { "in" }),
         EventLine::Alarm { alarm, position } => {
-            let name: String = alarm.text().bytes().map(char::from).collect();
-            format!("`alarm name={name} pos={position}`")
+            format!("`alarm {} pos={position}`", advice::name(alarm))
         }
         EventLine::Guarded { .. }
         | EventLine::Slip { .. }

@@ -1,8 +1,8 @@
 //! The decisions, driven along a log: the machine's way, the beam's edges, and what was typed.
 
+use super::classifier::{ReplayClassifier, Seen, Witness};
 use super::compare::Heard;
-use super::judge::{Judge, Seen, Witness};
-use super::replayed::OBJECT_TICKS;
+use super::replayed::DETECTION_TICKS;
 use super::stretch::{Happened, Stretch};
 use crate::settings::{Setting, steps};
 use crate::{EventLine, Mode, Status};
@@ -14,7 +14,7 @@ use control::operate::event::Event;
 use control::say::command::{self, Command};
 use control::units::{Instant, Interval, Position, Ticks, TicksPerSecond};
 use control::{
-    measure::readings::{Edge, Readings, WakeUp},
+    measure::readings::{Edge, Readings, Startup},
     operate::state::State,
     weeder::Controller,
 };
@@ -79,10 +79,10 @@ impl Pace {
 /// The decisions, driven along the log.
 pub(super) struct Player<'a> {
     pace: Pace,
-    controller: Controller<Judge<'a>, Volatile>,
+    controller: Controller<ReplayClassifier<'a>, Volatile>,
     witness: Rc<Witness>,
     /// The ground over which the beam was broken.
-    canopies: Vec<Canopy>,
+    canopies: Canopies,
     broken: bool,
     now: Instant,
     /// Steps until here, which are the same at every pace.
@@ -100,17 +100,17 @@ impl<'a> Player<'a> {
     /// A machine as it was when the stretch began. It has rolled there from where watching began, as far as the log tells where
     /// that was.
     pub(super) fn new(stretch: &'a Stretch<'a>, pace: Pace) -> Self {
-        let canopies = canopies(stretch);
+        let canopies = Canopies::of(stretch);
         // A little before, so that what stands at that place is seen in full and the log says what it was taken for.
         let began = stretch.began();
         let has_rolled = began != stretch.first.position;
-        let position = if has_rolled { began.wrapping_sub(OBJECT_TICKS + 1) } else { began };
-        let broken = is_in(&canopies, position);
+        let position = if has_rolled { began.wrapping_sub(DETECTION_TICKS + 1) } else { began };
+        let broken = canopies.over(position).is_some();
         let readings = Readings::new(Instant::new(0), Position::new(position));
-        let wake_up = WakeUp { readings, beam_broken: broken, cause: Cause::Unknown };
+        let startup = Startup { readings, beam_broken: broken, cause: Cause::Unknown };
         let witness = Rc::new(Witness::default());
-        let classifier = Judge::new(&stretch.examples, stretch.built_in, Rc::clone(&witness));
-        let mut controller = Controller::new(classifier, Volatile::new(), wake_up);
+        let classifier = ReplayClassifier::new(&stretch.examples, stretch.built_in, Rc::clone(&witness));
+        let mut controller = Controller::new(classifier, Volatile::new(), startup);
         controller.clear();
         for (setting, value) in steps(controller.settings(), &stretch.settings) {
             // In an order that the firmware takes, and every value is in its range.
@@ -237,15 +237,16 @@ impl<'a> Player<'a> {
         self.steps += 1;
         let response = self.speed().distance_in_ms(self.controller.settings().get(Setting::BeamResponseMs));
         let ground = (Position::new(self.position) - response).count();
-        let broken = is_in(&self.canopies, ground);
+        let canopy = self.canopies.over(ground);
+        let broken = canopy.is_some();
         let edge = (broken != self.broken).then_some(Edge::Seen {
             position: Position::new(self.position),
             broken,
             second_broken: false,
         });
         self.broken = broken;
-        // The edge may end the object before, which is judged by the time that another edge is asked for.
-        let canopy = edge.and_then(|_| self.canopies.iter().find(|canopy| canopy.is_over(ground)));
+        // The edge may end the detection before, which is classified by the time that another edge is asked for.
+        let canopy = edge.and(canopy);
         let behind_it = std::iter::from_fn(|| {
             if let Some(canopy) = canopy {
                 self.witness.seen.set(canopy.seen);
@@ -263,7 +264,7 @@ impl<'a> Player<'a> {
         let speed = self.speed().0;
         while let Some(event) = self.controller.next_event() {
             let event = match event {
-                Event::Object { vote, leading, spacing, plan } => EventLine::Object {
+                Event::Detection { vote, leading, spacing, plan } => EventLine::Detection {
                     class: vote.class,
                     position: leading.count(),
                     votes: vote.votes,
@@ -307,8 +308,9 @@ impl<'a> Player<'a> {
         if is_given {
             // All alarms do the same; this one can be given from outside.
             self.swallows_alarm = true;
-            // What was in the beam begins anew here, give or take what an object's place may differ by.
-            self.broken = (0..=OBJECT_TICKS).any(|ahead| is_in(&self.canopies, self.position.wrapping_add(ahead)));
+            // What was in the beam begins anew here, give or take what a detection's place may differ by.
+            self.broken =
+                (0..=DETECTION_TICKS).any(|ahead| self.canopies.over(self.position.wrapping_add(ahead)).is_some());
             self.step_behind(Some(Edge::Lost { broken: self.broken }));
         }
         is_given
@@ -350,7 +352,7 @@ impl<'a> Player<'a> {
 struct Canopy {
     from: i32,
     to: i32,
-    /// What the log tells of it, where it was judged.
+    /// What the log tells of it, where it was classified.
     seen: Option<Seen>,
 }
 
@@ -367,7 +369,7 @@ fn canopies(stretch: &Stretch) -> Vec<Canopy> {
     for (_, happened) in &stretch.happened {
         let wheel = settings.wheel();
         match happened {
-            Happened::Event(EventLine::Object { class, position, votes, spacing, hold, .. }) => {
+            Happened::Event(EventLine::Detection { class, position, votes, spacing, hold, .. }) => {
                 let width = hold.wrapping_sub(2 * wheel.ticks(settings.get(Setting::MarginMm)).0);
                 let seen = Seen {
                     vote: Vote { class: *class, votes: *votes },
@@ -377,7 +379,7 @@ fn canopies(stretch: &Stretch) -> Vec<Canopy> {
                 };
                 canopies.push(Canopy { from: *position, to: position.wrapping_add(width), seen: Some(seen) });
             }
-            // It is latched as soon as the object is wider than it may be.
+            // It is latched as soon as the detection is wider than it may be.
             Happened::Event(EventLine::Alarm { alarm: Alarm::BeamBlocked, position }) => {
                 let from = position.wrapping_sub(settings.ticks(Setting::MaxWidthMm).0 + 1);
                 canopies.push(Canopy { from, to: position.wrapping_add(1), seen: None });
@@ -394,7 +396,37 @@ fn canopies(stretch: &Stretch) -> Vec<Canopy> {
     canopies
 }
 
-/// Whether the beam is broken over this ground.
-fn is_in(canopies: &[Canopy], ground: i32) -> bool {
-    canopies.iter().any(|canopy| canopy.is_over(ground))
+/// The ground over which the beam was broken, in the log's order, and how to find it: a day has 200 000 plants.
+struct Canopies {
+    canopies: Vec<Canopy>,
+    /// Where a stretch began: ground is compared as ticks from here, as a position wraps.
+    first: i32,
+    /// Their numbers, by where they begin.
+    by_from: Vec<usize>,
+    /// The farthest end of each of these and all that begin before it, in ticks from `first`.
+    farthest: Vec<i32>,
+}
+
+impl Canopies {
+    fn of(stretch: &Stretch) -> Self {
+        let (canopies, first) = (canopies(stretch), stretch.first.position);
+        let mut by_from: Vec<usize> = (0..canopies.len()).collect();
+        by_from.sort_by_key(|&number| canopies[number].from.wrapping_sub(first));
+        let mut farthest = Vec::with_capacity(by_from.len());
+        for &number in &by_from {
+            let end = canopies[number].to.wrapping_sub(first);
+            farthest.push(farthest.last().map_or(end, |&before: &i32| before.max(end)));
+        }
+        Self { canopies, first, by_from, farthest }
+    }
+
+    /// The first of them in the log over this ground.
+    fn over(&self, ground: i32) -> Option<&Canopy> {
+        let ticks = ground.wrapping_sub(self.first);
+        let begun =
+            self.by_from.partition_point(|&number| self.canopies[number].from.wrapping_sub(self.first) <= ticks);
+        let near = (0..begun).rev().take_while(|&place| self.farthest[place] > ticks);
+        let over = near.map(|place| self.by_from[place]).filter(|&number| self.canopies[number].is_over(ground));
+        over.min().map(|number| &self.canopies[number])
+    }
 }

@@ -3,8 +3,8 @@
 use std::fmt;
 use thiserror::Error;
 
-/// By how many ticks an object's place and width may differ.
-pub const OBJECT_TICKS: i32 = 3;
+/// By how many ticks a detection's place and width may differ.
+pub const DETECTION_TICKS: i32 = 3;
 
 /// By how many ticks a swing's place may differ, 6 mm at the default wheel, besides [`SWING_MS`].
 pub const SWING_TICKS: i32 = 12;

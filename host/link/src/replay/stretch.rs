@@ -4,7 +4,7 @@
 use super::replayed::ReplayError;
 use crate::log::{Entry, Kind};
 use crate::settings::{Setting, Settings, shown};
-use crate::{EventLine, Mode, Said, Status};
+use crate::{ConsoleLine, EventLine, Mode, Status};
 use control::ground::class::label;
 use control::ground::features;
 use control::say::command::{self, Command};
@@ -98,11 +98,11 @@ impl<'a> Stretch<'a> {
         self.in_the_beam_at_first().map_or(first, |(from, _)| from)
     }
 
-    /// The ground of the object that was in the beam when the log began.
+    /// The ground of the detection that was in the beam when the log began.
     fn in_the_beam_at_first(&self) -> Option<(i32, i32)> {
         let widest = self.settings.ticks(Setting::MaxWidthMm).0;
         self.happened.iter().find_map(|(_, happened)| match happened {
-            Happened::Event(EventLine::Object { position, hold, .. }) => {
+            Happened::Event(EventLine::Detection { position, hold, .. }) => {
                 let before = self.first.position.wrapping_sub(*position);
                 (0..=widest).contains(&before).then_some((*position, position.wrapping_add(*hold)))
             }
@@ -207,9 +207,9 @@ fn swing_or_status((_, happened): &(&Entry, Happened<'_>)) -> Option<(i32, bool)
 
 /// Whether a line that ends an answer is an error; none where it ends none.
 fn end_of_answer(line: &str) -> Option<bool> {
-    match Said::parse(line) {
-        Said::Done => Some(false),
-        Said::Refused(_) => Some(true),
+    match ConsoleLine::parse(line) {
+        ConsoleLine::Done => Some(false),
+        ConsoleLine::Refused(_) => Some(true),
         _ => None,
     }
 }

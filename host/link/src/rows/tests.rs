@@ -66,7 +66,7 @@ impl Write for Firmware {
             let setting = |setting: Setting| format!("{}={}\n", name(setting), setting.description().default);
             let answer = match line.as_str() {
                 "" => continue,
-                "version" => "weeder 0.1.0\nok\n".to_owned(),
+                "version" => "weeder 0.2.0\nok\n".to_owned(),
                 "get" => Setting::all().map(setting).collect::<String>() + "ok\n",
                 "status" => "state=hold tool=out pos=7 speed_mm_s=0 windows=0 unseen_mm=400\nok\n".to_owned(),
                 "examples" | "events on" => "ok\n".to_owned(),

@@ -39,7 +39,7 @@ impl Write for Firmware {
             let line = std::mem::take(&mut self.typed);
             let answer = match line.as_slice() {
                 b"" => String::new(),
-                b"version" => "weeder 0.1.0\r\nok\r\n".to_owned(),
+                b"version" => "weeder 0.2.0\r\nok\r\n".to_owned(),
                 b"get" => {
                     let defaults = settings::Setting::all();
                     let line = |setting: settings::Setting| {
@@ -183,7 +183,7 @@ fn an_uno_that_is_reset_is_asked_for_everything_again() {
     let (mut session, _, says) = session();
     let now = Instant::now();
     second(&mut session, now);
-    says.borrow_mut().extend(b"weeder 0.1.0, reset by brown_out, state hold, tool out; help lists the commands\r\n");
+    says.borrow_mut().extend(b"weeder 0.2.0, reset by brown_out, state hold, tool out; help lists the commands\r\n");
     let happened = second(&mut session, now + Duration::from_secs(1));
     assert!(matches!(happened.as_slice(), [Happening::Lost(_), Happening::Connected { .. }]), "{happened:?}");
 }
@@ -234,7 +234,7 @@ fn what_was_typed_before_a_reset_is_not_carried_out_after_it() {
     assert!(session.command("start"));
     session.hold();
     assert!(session.command("start"));
-    says.borrow_mut().extend(b"weeder 0.1.0, reset by brown_out, state hold, tool out; help lists the commands\r\n");
+    says.borrow_mut().extend(b"weeder 0.2.0, reset by brown_out, state hold, tool out; help lists the commands\r\n");
     let happened = second(&mut session, now + Duration::from_secs(1));
     assert!(matches!(happened.as_slice(), [Happening::Lost(_), Happening::Connected { .. }]), "{happened:?}");
     assert!(session.is_idle());

@@ -1,14 +1,14 @@
 //! The classifier alone: cycles of a classification, from the bench's ELF.
 //!
-//! The bench (`knn/bench/` in the workspace) raises D13 around each call that it measures: the cycles between the edges are
+//! The bench (`bench/` in the workspace) raises D13 around each call that it measures: the cycles between the edges are
 //! exact. It also compares every answer of the search in flash with a plain search's, and no figure is given where
 //! they differ.
 
 use super::error::BenchError;
 use field::wiring;
 use knn_bench::{QUERIES, Task};
-use signal::CYCLES_PER_SECOND;
 use std::path::Path;
+use uno::CYCLES_PER_SECOND;
 use uno::Uno;
 
 /// Cycles that D13 is high for longer than the call: those of the instruction that raises it (`sbi`, 2).

@@ -24,8 +24,8 @@ use crate::run;
 use field::wiring;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use signal::{CYCLES_PER_SECOND, PinChange};
 use std::path::Path;
+use uno::{CYCLES_PER_SECOND, PinChange};
 use uno::{Place, SENT_BYTE_CYCLES, Uno};
 
 /// Fewest counts of a trial: the count's second byte changes more than a hundred times.

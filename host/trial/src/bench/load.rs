@@ -3,7 +3,7 @@
 use field::wiring;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use signal::{CYCLES_PER_SECOND, PinChange};
+use uno::{CYCLES_PER_SECOND, PinChange};
 use uno::{ReceivedByte, Uno, UnoError};
 
 /// Bits of a byte on the line: its data, a start bit and a stop bit.

@@ -4,8 +4,8 @@ use super::error::BenchError;
 use super::load::{Telemetry, flicker};
 use crate::run;
 use field::wiring;
-use signal::{CYCLES_PER_SECOND, PinChange};
 use std::path::Path;
+use uno::{CYCLES_PER_SECOND, PinChange};
 
 /// Pulses of the measurement.
 pub const PULSES: usize = 500;

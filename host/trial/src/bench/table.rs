@@ -11,7 +11,7 @@ use super::swings::Lateness;
 use super::weeding::FirmwareCosts;
 use comfy_table::{CellAlignment, Table, presets};
 use knn_bench::Task;
-use signal::CYCLES_PER_SECOND;
+use uno::CYCLES_PER_SECOND;
 
 /// Everything that the bench measures.
 #[derive(Clone, Debug, PartialEq)]
@@ -57,7 +57,7 @@ impl Figures {
         let idle = self.lowest_rate(Load::Idle);
         let busy = self.lowest_rate(Load::Telemetry);
         for (name, ours, others) in [
-            ("counts/s without loss, nothing else", idle, [67_770.0, 108_061.0, 744_111.0]),
+            ("counts/s without loss, alone", idle, [67_770.0, 108_061.0, 744_111.0]),
             ("  beside serial at 115200", busy, [49_429.0, 82_195.0, 206_225.0]),
             ("  and a servo", busy, [36_906.0, 55_090.0, 128_543.0]),
         ] {
@@ -83,7 +83,7 @@ impl Figures {
             fewer_is_better("cycles to classify, 32 examples", cycles.mean, 0, others);
         }
         let jitter_us = self.jitter.width_cycles as f64 * 1e6 / CYCLES_PER_SECOND as f64;
-        fewer_is_better("servo jitter at 20,000 counts/s, us", jitter_us, 1, [Some(23.6), Some(16.9), Some(0.0)]);
+        fewer_is_better("servo jitter, 20,000 counts/s, us", jitter_us, 1, [Some(23.6), Some(16.9), Some(0.0)]);
         let lateness = self.lateness.worst_ticks();
         fewer_is_better("worst swing at 2.5 km/h, ticks", lateness, 1, [Some(31.6), None, None]);
         // A classifier and a serial line, without a schedule of several plants, settings, alarms, or field examples.
@@ -109,7 +109,7 @@ impl Figures {
     /// A line per load, with the highest rate each way.
     fn rates(&self) -> Table {
         let mut table = number_table(&[
-            "highest counts/s without a lost count,\nwhatever the moments of the edges",
+            "highest counts/s without a lost count,\nfor any phase of the edges",
             "forward",
             "backward",
             "30 % jitter,\nforward",

@@ -9,8 +9,8 @@ use field::motion::mm_s;
 use field::planting::Planting;
 use field::trial::Trial;
 use field::verdict::Timing;
-use signal::CYCLES_PER_SECOND;
 use std::path::Path;
+use uno::CYCLES_PER_SECOND;
 use uno::elf::Size;
 use uno::{InterruptStatistics, Turns};
 

@@ -1,12 +1,15 @@
 //! Hours of the decision core on the host: a turn of the loop is a millisecond, and an edge of the beam comes at its tick.
 //!
+//! Each row has a machine of its own, with a second beam or without, and a wheel whose slip changes. Where there are two beams, now and
+//! then one of them misses a plant. The tool must be out of the row at a plant that at least one beam has seen.
+//!
 //! Clock and count go on over resets, unlike on the chip, and begin shortly before their ends, so that in each hour both run over them.
 
 use super::tally::{Plan, SoakError, Tally, chance, count, total};
 use control::{
     ground::{class::Class, examples::EXAMPLES, nearest::Nearest},
     measure::{
-        readings::{Edge, Readings, WakeUp},
+        readings::{Edge, Readings, Startup},
         reset::Cause,
     },
     memory::{Memory, Volatile},
@@ -24,6 +27,7 @@ use field::machine::Machine;
 use field::motion::mm_s;
 use field::planting::Planting;
 use field::row::{Kind, Row};
+use field::wheel::{Wheel, most_slip};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use std::{cell::RefCell, ops::Range, rc::Rc};
@@ -49,6 +53,22 @@ const PLANTING: Planting = Planting {
     ragged: false,
 };
 
+/// A stand in which plants are too near for two beams.
+const DENSE: Planting = Planting {
+    spacing_mm: 260.0,
+    spacing_scatter_mm: 20.0,
+    canopy_mm: 120.0,
+    canopy_scatter_mm: 15.0,
+    weeds: 0,
+    ..PLANTING
+};
+
+/// Ground between the second beam and the tool: the tool swings out over it, at 3 km/h and with the margin.
+const SECOND_BEAM_TO_TOOL_MM: u16 = 300;
+
+/// Either of two beams misses a thing as rarely as this.
+pub(super) const MISSED_ONCE_IN: usize = 16;
+
 /// Ground before and behind each row.
 const HEADLAND_MM: f64 = 1000.0;
 
@@ -56,8 +76,8 @@ const HEADLAND_MM: f64 = 1000.0;
 const SPEED_SETTLES_TURNS: u64 = 100;
 
 /// An offset between the ground and the count from which on the firmware cannot know: a quarter of the margin. The rest is
-/// what a push or a jerk may use up.
-const BLIND_TICKS: i64 = 24;
+/// what a push, a jerk or slip may use up.
+const BLIND_TICKS: f64 = 24.0;
 
 /// What the ends of an object may be off by.
 const EDGE_TICKS: i64 = 4;
@@ -90,30 +110,46 @@ impl Shared {
     }
 }
 
-/// A row in ticks of the wheel.
+/// A row in ticks of a wheel that does not slip.
 struct Ground {
-    /// Whether the beam is broken over each tick.
-    broken: Vec<bool>,
+    /// Whether each beam is broken over each tick.
+    broken: [Vec<bool>; 2],
     plants: Vec<Range<i64>>,
+    /// What the tool must not reach of each plant.
+    kept: Vec<Range<i64>>,
 }
 
 impl Ground {
-    fn of(row: &Row, machine: &Machine) -> Self {
+    /// A row as the beams of a machine see it: of two, now and then one misses a thing. Of a plant the stem's zone is kept, where there
+    /// is one.
+    fn of(row: &Row, machine: &Machine, stem_zone_mm: u16, rng: &mut ChaCha8Rng) -> Self {
         let start_mm = row.span_mm().start - HEADLAND_MM;
         let tick = |mm: f64| ((mm - start_mm) / machine.tick_mm()).round() as i64;
         let length = tick(row.span_mm().end + HEADLAND_MM + machine.beam_to_tool_mm);
-        let mut broken = vec![false; length as usize];
+        let mut broken = [vec![false; length as usize], vec![false; length as usize]];
         for thing in row.things() {
             let span = thing.span_mm();
-            broken[tick(span.start) as usize..tick(span.end) as usize].fill(true);
+            let missed = if machine.has_second_beam() { rng.random_range(0..MISSED_ONCE_IN) } else { MISSED_ONCE_IN };
+            for (beam, broken) in broken.iter_mut().enumerate().filter(|&(beam, _)| beam != missed) {
+                // The second beam has nothing to see where there is none.
+                let is_there = beam == 0 || machine.has_second_beam();
+                broken[tick(span.start) as usize..tick(span.end) as usize].fill(is_there);
+            }
         }
-        let plants = row.things().iter().filter(|thing| thing.kind == Kind::Plant);
-        let plants = plants.map(|plant| tick(plant.span_mm().start)..tick(plant.span_mm().end)).collect();
-        Self { broken, plants }
+        let spans = |most_mm: f64| {
+            let plants = row.things().iter().filter(|thing| thing.kind == Kind::Plant).map(|plant| plant.span_mm());
+            let plants = plants.map(|Range { start, end }| {
+                let cut_mm = ((end - start - most_mm) / 2.0).max(0.0);
+                tick(start + cut_mm)..tick(end - cut_mm)
+            });
+            plants.collect::<Vec<_>>()
+        };
+        let zone_mm = if stem_zone_mm > 0 { stem_zone_mm.into() } else { f64::INFINITY };
+        Self { broken, plants: spans(f64::INFINITY), kept: spans(zone_mm) }
     }
 
-    fn is_broken(&self, place: i64) -> bool {
-        usize::try_from(place).is_ok_and(|place| self.broken.get(place).copied().unwrap_or(false))
+    fn is_broken(&self, beam: usize, place: i64) -> bool {
+        usize::try_from(place).is_ok_and(|place| self.broken[beam].get(place).copied().unwrap_or(false))
     }
 }
 
@@ -127,9 +163,13 @@ struct Field {
     turns: u64,
     /// Where the machine is in its row, in ticks, and the encoder's count.
     place: f64,
+    wheel: Wheel,
     count: i64,
     speed: f64,
     broken: bool,
+    second_broken: bool,
+    /// What the firmware is told of the machine.
+    told: [(Setting, u16); 3],
     /// What came from the beam since the last turn.
     edges: Vec<Edge>,
     /// Turns for which the encoder is yet to be dead, and whether one of its channels is alive then.
@@ -187,7 +227,7 @@ impl Field {
     fn new(rng: ChaCha8Rng, machine: Machine) -> Self {
         let memories = [Shared::default(), Shared::default()];
         let readings = Readings::new(Instant::new(FIRST_STEPS), Position::new(FIRST_COUNT));
-        let weeder = wake_up(&memories, readings, false, Cause::PowerOn);
+        let weeder = init(&memories, readings, false, Cause::PowerOn);
         Self {
             rng,
             machine,
@@ -196,9 +236,12 @@ impl Field {
             line: LineBuffer::new(),
             turns: 0,
             place: 0.0,
+            wheel: Wheel::default(),
             count: FIRST_COUNT.into(),
             speed: 0.0,
             broken: false,
+            second_broken: false,
+            told: told(&machine, 0),
             edges: Vec::new(),
             silent_turns: 0,
             one_channel_lives: false,
@@ -232,11 +275,45 @@ impl Field {
     ) -> Result<Tally, SoakError> {
         let chance = faults_an_hour * TURN_S / 3600.0;
         while self.turns < last_turn && self.tally.violations.is_empty() {
-            let row = PLANTING.grow(self.rng.random())?;
-            self.work(&Ground::of(&row, &self.machine), chance, last_turn, progress);
+            let stem_zone_mm = self.take_a_machine();
+            let is_dense = self.machine.has_second_beam() && self.rng.random_bool(0.25);
+            let row = if is_dense { DENSE } else { PLANTING }.grow(self.rng.random())?;
+            let ground = Ground::of(&row, &self.machine, stem_zone_mm, &mut self.rng);
+            self.work(&ground, chance, last_turn, progress);
         }
         self.tally.seconds = self.time_s();
         Ok(self.tally)
+    }
+
+    /// Takes the machine for a row, and tells its firmware of it; the zone of a stem.
+    fn take_a_machine(&mut self) -> u16 {
+        (self.machine.beam_to_tool_mm, self.machine.second_beam_mm) = if self.rng.random() {
+            let to_tool_mm = self.rng.random_range(470..=1000_u16);
+            let apart_mm = self.rng.random_range(to_tool_mm * 7 / 20..=to_tool_mm - SECOND_BEAM_TO_TOOL_MM);
+            (to_tool_mm.into(), apart_mm.into())
+        } else {
+            (Machine::default().beam_to_tool_mm, 0.0)
+        };
+        let stem_zone_mm = if self.rng.random_bool(0.25) { 90 } else { 0 };
+        self.told = told(&self.machine, stem_zone_mm);
+        self.weeder.hold();
+        self.tell();
+        if self.weeder.save().is_err() {
+            self.tally.violated(self.time_s(), "a machine in HOLD does not save");
+        }
+        while !self.weeder.carry_on() {}
+        stem_zone_mm
+    }
+
+    /// Tells the firmware what the machine is like.
+    fn tell(&mut self) {
+        self.weeder.clear();
+        let none = (Setting::SecondBeamMm, 0);
+        for (setting, value) in [none].into_iter().chain(self.told) {
+            if self.weeder.set(setting, value).is_err() {
+                self.tally.violated(self.time_s(), format_args!("{value} is refused for {}", setting as u8));
+            }
+        }
     }
 
     /// Works a row from its headland to its end, or to the soak's end.
@@ -245,13 +322,19 @@ impl Field {
         self.excused = vec![Excuse::default(); ground.plants.len()];
         // The machine was turned round and stands in the headland: the operator knows, and tells it.
         self.weeder.hold();
-        (self.place, self.speed) = (0.0, 0.0);
+        (self.place, self.speed, self.wheel) = (0.0, 0.0, Wheel::default());
+        (self.broken, self.second_broken) = (false, false);
         self.reset(Cause::ResetPin);
         let (mut target, mut leg_turns) = (0.0_f64, 0_u32);
-        while (self.place as usize) < ground.broken.len() && self.turns < last_turn && self.tally.violations.is_empty()
+        while (self.place as usize) < ground.broken[0].len()
+            && self.turns < last_turn
+            && self.tally.violations.is_empty()
         {
             if leg_turns == 0 {
                 target = self.next_speed();
+                let most =
+                    most_slip(f64::from(self.weeder.settings().get(Setting::MarginMm)), self.machine.beam_to_tool_mm);
+                self.wheel.turns_a_tick = 1.0 + self.rng.random_range(-most..=most);
                 leg_turns =
                     if target < 0.0 { self.rng.random_range(300..1500) } else { self.rng.random_range(500..6000) };
                 self.start_again();
@@ -318,18 +401,20 @@ impl Field {
         let to = self.place.floor() as i64;
         self.tally.metres += (to - from).abs() as f64 * self.machine.tick_mm() / 1000.0;
         let direction = (to - from).signum();
+        let apart = (self.machine.second_beam_mm / self.machine.tick_mm()).round() as i64;
         for step in 1..=(to - from).abs() {
             let place = from + step * direction;
+            let turned = self.wheel.roll(place - direction, direction > 0);
             let counted = match (self.silent_turns, self.one_channel_lives) {
-                (0, _) => direction,
-                (_, true) => 1 - 2 * (place & 1),
+                (0, _) => turned,
+                (_, true) => turned.abs() * (1 - 2 * (self.wheel.ticks() & 1)),
                 (_, false) => 0,
             };
             self.count += counted;
-            self.lost_ticks += direction - counted;
-            let broken = ground.is_broken(place);
-            if broken != self.broken {
-                self.edge(broken);
+            self.lost_ticks += turned - counted;
+            let levels = (ground.is_broken(0, place), ground.is_broken(1, place - apart));
+            if levels != (self.broken, self.second_broken) {
+                self.edge(levels);
             }
         }
         if self.silent_turns > 0 {
@@ -346,9 +431,10 @@ impl Field {
         self.judge(ground, to - self.distance());
     }
 
-    fn edge(&mut self, broken: bool) {
-        self.broken = broken;
-        self.edges.push(Edge::Seen { position: Position::new(self.count as i32), broken, second_broken: false });
+    /// What the beams see is this from here on.
+    fn edge(&mut self, (broken, second_broken): (bool, bool)) {
+        (self.broken, self.second_broken) = (broken, second_broken);
+        self.edges.push(Edge::Seen { position: Position::new(self.count as i32), broken, second_broken });
     }
 
     /// Takes what the machine tells.
@@ -356,15 +442,17 @@ impl Field {
         while let Some(event) = self.weeder.next_event() {
             match event {
                 Event::Alarm { alarm, .. } => {
-                    count(&mut self.tally.alarms, &name(alarm.text().bytes()));
+                    count(&mut self.tally.alarms, &link::advice::name(alarm));
                     self.see_anew();
                 }
                 Event::Warning(warning) => count(&mut self.tally.warnings, &name(warning.text().bytes())),
-                Event::Object { vote, leading, plan, .. } if vote.class == Class::Weed => {
+                Event::Detection { vote, leading, plan, .. } if vote.class == Class::Weed => {
                     let behind = i64::from((leading - Position::new(self.count as i32)).0);
                     let place = self.place as i64 + behind;
                     let margin = self.weeder.settings().ticks(Setting::MarginMm);
-                    let object = place - EDGE_TICKS..place + i64::from(plan.hold.0 - 2 * margin.0) + EDGE_TICKS;
+                    // Over ground the wheel has slipped since.
+                    let edge_ticks = EDGE_TICKS + behind.abs() / 16;
+                    let object = place - edge_ticks..place + i64::from(plan.hold.0 - 2 * margin.0) + edge_ticks;
                     for (plant, excuse) in ground.plants.iter().zip(&mut self.excused) {
                         excuse.mistaken |= plant.start < object.end && object.start < plant.end;
                     }
@@ -377,10 +465,21 @@ impl Field {
     /// From here on only ground counts that the beam sees anew. If the count was wrong until now, the tool is on its way out
     /// from where it should not have been.
     fn see_anew(&mut self) {
-        if self.lost_ticks.abs() >= BLIND_TICKS {
+        if self.is_blind() {
             self.blind_until_turn = self.blind_until_turn.max(self.turns + self.swing_ms() as u64);
         }
         self.lost_ticks = 0;
+    }
+
+    /// Whether the count is off the ground by more than the firmware can know. What it is off by between two beams is measured as slip,
+    /// and taken for the whole distance to the tool.
+    fn is_blind(&self) -> bool {
+        let share = if self.machine.has_second_beam() {
+            self.machine.second_beam_mm / self.machine.beam_to_tool_mm
+        } else {
+            1.0
+        };
+        self.lost_ticks.abs() as f64 >= BLIND_TICKS * share
     }
 
     fn swing_ms(&self) -> f64 {
@@ -406,8 +505,9 @@ impl Field {
         } else {
             self.order_turns += 1;
         }
-        let first = ground.plants.partition_point(|plant| plant.end <= tool);
-        let Some((plant, excuse)) = ground.plants.get(first).zip(self.excused.get_mut(first)) else { return };
+        let is_blind = self.is_blind();
+        let first = ground.kept.partition_point(|plant| plant.end <= tool);
+        let Some((plant, excuse)) = ground.kept.get(first).zip(self.excused.get_mut(first)) else { return };
         if !plant.contains(&tool) {
             return;
         }
@@ -416,7 +516,7 @@ impl Field {
             return;
         }
         excuse.harmed = true;
-        excuse.blind |= self.lost_ticks.abs() >= BLIND_TICKS || self.turns <= self.blind_until_turn;
+        excuse.blind |= is_blind || self.turns <= self.blind_until_turn;
         // Rolled back onto ground that it has not seen since it woke up: there is no margin before what it does not know.
         excuse.blind |= out && self.weeder.unseen_mm() > 0;
         if !excuse.mistaken && !excuse.blind {
@@ -438,9 +538,15 @@ impl Field {
     fn fail(&mut self, ground: &Ground) {
         let fault = match self.rng.random_range(0..9) {
             0 => {
+                let (first, second) = (self.broken, self.second_broken);
+                let dusty = if self.machine.has_second_beam() && self.rng.random() {
+                    (first, !second)
+                } else {
+                    (!first, second)
+                };
                 for _ in 0..self.rng.random_range(1..40) {
-                    self.edge(!self.broken);
-                    self.edge(!self.broken);
+                    self.edge(dusty);
+                    self.edge((first, second));
                 }
                 "dust"
             }
@@ -454,7 +560,9 @@ impl Field {
                 "encoder_jumps"
             }
             3 => {
-                self.broken = ground.is_broken(self.place as i64);
+                let apart = self.machine.second_beam_mm / self.machine.tick_mm();
+                self.broken = ground.is_broken(0, self.place as i64);
+                self.second_broken = ground.is_broken(1, self.place as i64 - apart.round() as i64);
                 self.edges.push(Edge::Lost { broken: self.broken });
                 "lost_edges"
             }
@@ -491,15 +599,19 @@ impl Field {
     /// The chip starts anew.
     fn reset(&mut self, cause: Cause) {
         self.memories.iter().for_each(Shared::recover);
-        self.weeder = wake_up(&self.memories, self.readings(), self.broken, cause);
+        self.weeder = init(&self.memories, self.readings(), self.broken, cause);
         self.see_anew();
         if let State::Alarm(alarm) = self.weeder.state() {
-            count(&mut self.tally.alarms, &name(alarm.text().bytes()));
+            count(&mut self.tally.alarms, &link::advice::name(alarm));
         }
         self.line = LineBuffer::new();
         count(&mut self.tally.resets, &name(cause.text().bytes()));
         if !self.weeder.tool_out() || self.weeder.state() == State::Work {
             self.tally.violated(self.time_s(), "the machine woke up with the tool in the row");
+        }
+        // Settings that came back old or not at all are put right before it rolls on: the firmware knows the ground by its settings of that time.
+        if self.told.iter().any(|&(setting, value)| self.weeder.settings().get(setting) != value) {
+            self.tell();
         }
     }
 
@@ -553,9 +665,18 @@ impl Field {
     }
 }
 
-fn wake_up(memories: &[Shared; 2], readings: Readings, beam_broken: bool, cause: Cause) -> Weeder {
+/// What the firmware is told of a machine, in this order.
+fn told(machine: &Machine, stem_zone_mm: u16) -> [(Setting, u16); 3] {
+    [
+        (Setting::BeamToToolMm, machine.beam_to_tool_mm as u16),
+        (Setting::SecondBeamMm, machine.second_beam_mm as u16),
+        (Setting::StemZoneMm, stem_zone_mm),
+    ]
+}
+
+fn init(memories: &[Shared; 2], readings: Readings, beam_broken: bool, cause: Cause) -> Weeder {
     let nearest = Nearest::new(&EXAMPLES[..], memories[1].clone());
-    let mut weeder = Controller::new(nearest, memories[0].clone(), WakeUp { readings, beam_broken, cause });
+    let mut weeder = Controller::new(nearest, memories[0].clone(), Startup { readings, beam_broken, cause });
     weeder.tell_events(true);
     weeder
 }
@@ -584,6 +705,23 @@ mod tests {
     fn a_tool_that_is_told_too_late_is_seen_to_harm_a_plant() {
         let tally = with_leads(0, 0);
         assert!(tally.harmed > 0 && tally.violations[0].contains("a plant was harmed"), "{tally}");
+    }
+
+    #[test]
+    fn a_plant_that_the_first_beam_misses_is_seen_to_be_harmed_where_the_firmware_ignores_the_second() {
+        let mut field = Field::new(ChaCha8Rng::seed_from_u64(1), Machine::default());
+        while field.tally.violations.is_empty() && field.tally.rows < 20 {
+            let stem_zone_mm = field.take_a_machine();
+            // The beam is there, and its wire is not.
+            field.told[1].1 = 0;
+            field.tell();
+            field.weeder.save().expect("in HOLD");
+            while !field.weeder.carry_on() {}
+            let row = PLANTING.grow(field.rng.random()).expect("rows grow");
+            let ground = Ground::of(&row, &field.machine, stem_zone_mm, &mut field.rng);
+            field.work(&ground, 0.0, u64::MAX, &mut |_| {});
+        }
+        assert!(field.tally.violations.iter().any(|what| what.contains("a plant was harmed")), "{}", field.tally);
     }
 
     #[test]

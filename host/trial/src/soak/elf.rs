@@ -1,21 +1,26 @@
 //! Minutes of the real ELF on the virtual Uno: short rows, with a fault somewhere in each.
 //!
+//! Half of the machines have a second beam, of which either misses a plant now and then, and each wheel slips.
+//!
 //! After a reset the firmware is in HOLD, and the operator lets it roll to the end of the row: from there on nothing may be
 //! harmed. Rows whose encoder was made to lie are held only against their alarms.
 
+use super::core::MISSED_ONCE_IN;
 use super::tally::{Plan, SoakError, Tally, chance, count, total};
 use crate::console::ask;
 use crate::run::{TrialError, boot, set_up};
 use field::machine::{Machine, cycle_at, time_at_s};
 use field::motion::mm_s;
 use field::planting::Planting;
+use field::row::Row;
 use field::trial::Trial;
 use field::verdict::{Timing, Verdict, judge};
+use field::wheel::most_slip;
 use field::wiring;
 use rand::{Rng, RngExt};
 use rand_chacha::ChaCha8Rng;
-use signal::{CYCLES_PER_SECOND, PinChange, Pulse};
 use std::path::Path;
+use uno::{CYCLES_PER_SECOND, Pin, PinChange, Pulse};
 use uno::{Uno, UnoError};
 
 /// The rows.
@@ -28,6 +33,9 @@ const PLANTING: Planting = Planting {
     weeds: 2,
     ragged: false,
 };
+
+/// A machine with a second beam, before which the tool swings out at 3 km/h.
+const TWO_BEAMS_MM: (f64, f64) = (500.0, 200.0);
 
 /// The longest time from a reset until the tool is out: the firmware starts, and the servo swings.
 const RESTART_S: f64 = 0.7;
@@ -115,7 +123,26 @@ pub fn row(plan: Plan, number: u64, elf: &Path) -> Result<Tally, SoakError> {
 /// Draws a row and the speed in it.
 fn draw(rng: &mut ChaCha8Rng) -> Result<Trial, SoakError> {
     let row = PLANTING.grow(rng.random())?;
-    Ok(Trial::at_speed(row, Machine::default(), Timing::default(), mm_s(rng.random_range(1.0..3.0))))
+    let mut machine = Machine::default();
+    if rng.random() {
+        (machine.beam_to_tool_mm, machine.second_beam_mm) = TWO_BEAMS_MM;
+    }
+    let timing = Timing::default();
+    let mut trial = Trial::at_speed(row, machine, timing, mm_s(rng.random_range(1.0..3.0)));
+    let most = most_slip(timing.margin_mm.into(), machine.beam_to_tool_mm);
+    trial.motion = trial.motion.with_slip(|| rng.random_range(-most..=most));
+    Ok(trial)
+}
+
+/// The row as each beam sees it: of two, now and then one misses a thing.
+fn seen(rng: &mut ChaCha8Rng, trial: &Trial) -> [Row; 2] {
+    let things = trial.row.things();
+    let beams = if trial.machine.has_second_beam() { 2 } else { 0 };
+    let missed: Vec<usize> = things.iter().map(|_| rng.random_range(0..MISSED_ONCE_IN)).collect();
+    [0, 1].map(|beam| {
+        let seen = things.iter().zip(&missed).filter(|&(_, &missed)| missed != beam || missed >= beams);
+        Row::new(seen.map(|(thing, _)| thing.clone()).collect()).expect("a row without some of its things is one")
+    })
 }
 
 fn work(rng: &mut ChaCha8Rng, plan: Plan, elf: &Path, tally: &mut Tally) -> Result<(), SoakError> {
@@ -128,8 +155,10 @@ fn work(rng: &mut ChaCha8Rng, plan: Plan, elf: &Path, tally: &mut Tally) -> Resu
         count(&mut tally.faults, fault.name());
     }
 
-    let beam = machine.beam_before(&trial.row, motion);
-    let mut uno = boot(elf, &[beam]).map_err(TrialError::from)?;
+    let [first, second] = seen(rng, &trial);
+    let mut beams = vec![machine.beam_before(&first, motion)];
+    beams.extend(machine.second_beam_before(&second, motion));
+    let mut uno = boot(elf, &beams).map_err(TrialError::from)?;
     set_up(&trial, &mut uno).map_err(TrialError::from)?;
     if fault == Some(Fault::SpoiledEeprom) {
         uno = restart_with_spoiled_eeprom(rng, uno, elf, tally)?;
@@ -143,9 +172,14 @@ fn work(rng: &mut ChaCha8Rng, plan: Plan, elf: &Path, tally: &mut Tally) -> Resu
     let start_cycle = uno.cycle();
     let fails_at_s = rng.random_range(0.2..0.9) * motion.duration_s();
     let fails_at = cycle_at(start_cycle, fails_at_s);
-    let mut changes = machine.pin_changes(&trial.row, motion, start_cycle);
+    let mut changes = Machine { second_beam_mm: 0.0, ..machine }.pin_changes(&first, motion, start_cycle);
+    changes.extend(machine.second_beam_changes(&second, motion, start_cycle));
+    changes.sort_by_key(|change| change.cycle);
     match fault {
-        Some(Fault::Dust) => add_dust(rng, &mut changes, fails_at),
+        Some(Fault::Dust) => {
+            let on_second = machine.has_second_beam() && rng.random();
+            add_dust(rng, &mut changes, if on_second { wiring::SECOND_BEAM } else { wiring::BEAM }, fails_at);
+        }
         Some(Fault::EncoderJumps) => jump(rng, &mut changes, fails_at),
         Some(Fault::DeadEncoder) => changes.retain(|change| change.cycle < fails_at || !is_encoder(change)),
         _ => {}
@@ -175,8 +209,9 @@ fn work(rng: &mut ChaCha8Rng, plan: Plan, elf: &Path, tally: &mut Tally) -> Resu
     tally.rows += 1;
     for line in heard.lines() {
         let named = |event: &str| line.strip_prefix(event)?.split_whitespace().next();
-        if let Some(alarm) = named("alarm name=") {
-            count(&mut tally.alarms, alarm);
+        if let Some((code, rest)) = line.strip_prefix("alarm code=").and_then(|rest| rest.split_once(" name=")) {
+            let name = rest.split_whitespace().next().unwrap_or_default();
+            count(&mut tally.alarms, &format!("{code} {name}"));
         }
         if let Some(warning) = named("warning name=") {
             count(&mut tally.warnings, warning);
@@ -229,11 +264,12 @@ fn work(rng: &mut ChaCha8Rng, plan: Plan, elf: &Path, tally: &mut Tally) -> Resu
     Ok(())
 }
 
-/// Whether an event's position lies in a plant: the firmware counts from where the motion began.
+/// Whether an event's position lies in a plant: the firmware counts from where the motion began, which is all forward.
 fn is_of(line: &str, span_mm: &std::ops::Range<f64>, trial: &Trial) -> bool {
     let ticks = line.split_whitespace().find_map(|word| word.strip_prefix("pos=")?.parse::<f64>().ok());
-    ticks.is_some_and(|ticks| {
-        let place_mm = trial.motion.start_mm() + ticks * trial.machine.tick_mm();
+    let passings = trial.motion.mark_passings(trial.machine.tick_mm());
+    ticks.and_then(|ticks| passings.get(ticks.max(0.0) as usize)).is_some_and(|passing| {
+        let place_mm = trial.motion.position_mm(passing.time_s);
         (span_mm.start - 10.0..span_mm.end + 10.0).contains(&place_mm)
     })
 }
@@ -274,25 +310,21 @@ fn restart_with_spoiled_eeprom(
     Ok(uno)
 }
 
-/// The beam flickers for a while: each flicker begins and ends with the level that was there.
-fn add_dust(rng: &mut ChaCha8Rng, changes: &mut Vec<PinChange>, from: u64) {
+/// A beam flickers for a while: each flicker begins and ends with the level that was there.
+fn add_dust(rng: &mut ChaCha8Rng, changes: &mut Vec<PinChange>, pin: Pin, from: u64) {
     let until = from + rng.random_range(CYCLES_PER_SECOND / 50..CYCLES_PER_SECOND / 4);
     let level_at = |changes: &[PinChange], cycle: u64| {
-        changes
-            .iter()
-            .rev()
-            .find(|change| change.pin == wiring::BEAM && change.cycle <= cycle)
-            .is_none_or(|change| change.high)
+        changes.iter().rev().find(|change| change.pin == pin && change.cycle <= cycle).is_none_or(|change| change.high)
     };
     let mut dust = Vec::new();
     let mut cycle = from;
     while cycle < until {
         let length = CYCLES_PER_SECOND / 500;
-        let is_steady = !changes.iter().any(|c| c.pin == wiring::BEAM && (cycle..=cycle + length).contains(&c.cycle));
+        let is_steady = !changes.iter().any(|c| c.pin == pin && (cycle..=cycle + length).contains(&c.cycle));
         if is_steady {
             let high = level_at(changes, cycle);
-            dust.push(PinChange { cycle, pin: wiring::BEAM, high: !high });
-            dust.push(PinChange { cycle: cycle + length, pin: wiring::BEAM, high });
+            dust.push(PinChange { cycle, pin, high: !high });
+            dust.push(PinChange { cycle: cycle + length, pin, high });
         }
         cycle += rng.random_range(2..6) * length;
     }

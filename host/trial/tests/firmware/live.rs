@@ -38,7 +38,7 @@ fn open(uno: &Background<LiveUno>) -> Link {
 fn opening_the_port_resets_the_chip_and_the_firmware_says_that_it_is_there() {
     let uno = start(product());
     for _ in 0..2 {
-        assert_eq!(open(&uno).version(), env!("CARGO_PKG_VERSION"));
+        assert!(open(&uno).version().starts_with(env!("CARGO_PKG_VERSION")));
     }
     assert_eq!(uno.stop().expect("it ran to the end").uno().resets().len(), 2);
 }
@@ -47,7 +47,7 @@ fn opening_the_port_resets_the_chip_and_the_firmware_says_that_it_is_there() {
 fn an_uno_whose_reset_is_cut_runs_on_when_the_port_is_opened() {
     let uno = start(Setup { keeps_running_when_opened: true, ..product() });
     for _ in 0..2 {
-        assert_eq!(open(&uno).version(), env!("CARGO_PKG_VERSION"));
+        assert!(open(&uno).version().starts_with(env!("CARGO_PKG_VERSION")));
     }
     assert_eq!(uno.stop().expect("it ran to the end").uno().resets(), []);
 }
@@ -79,7 +79,7 @@ fn avrdude_writes_the_flash_through_the_old_bootloader_and_leaves_that_alone() {
     ChaCha8Rng::seed_from_u64(1).fill_bytes(&mut flash);
     let folder = tempfile::tempdir().unwrap();
     let hex = folder.path().join("noise.hex");
-    uno::hex::write(&hex, &flash).unwrap();
+    std::fs::write(&hex, uno::hex::text(&flash)).unwrap();
     // It reads back what it wrote, and compares.
     avrdude(uno.path(), "57600", &format!("flash:w:{}:i", hex.display()));
     let uno = uno.stop().expect("it ran to the end");
@@ -145,7 +145,7 @@ fn a_port_that_another_program_has_claimed_is_busy_until_it_is_done() {
     let port = pty.path().to_string_lossy().into_owned();
     let claim = serialport::new(&port, 115_200).open().unwrap();
     let error = try_port(&port).unwrap_err().to_string();
-    assert!(error.ends_with("close the serial monitor or whatever else has it open"), "{error}");
+    assert!(error.ends_with("close the serial monitor, or the other program that has it open"), "{error}");
     drop(claim);
     assert!(pty.was_opened().unwrap());
     // A program that another test starts has a copy of the claim from its fork to its exec.

@@ -148,7 +148,7 @@ fn of_six_rows_in_real_time_one_that_is_lost_reset_or_in_alarm_disturbs_no_other
     // The others have not noticed, and still do not: each tells of its plants.
     let mut seen = [0; 6];
     laptop.until("plants of the others", |laptop, heard| {
-        if let What::Happened(Happening::Event(EventLine::Object { .. }, _)) = heard.what {
+        if let What::Happened(Happening::Event(EventLine::Detection { .. }, _)) = heard.what {
             seen[heard.row] += 1;
         }
         assert_eq!([0, 3, 5].map(|row| laptop.modes[row]), [Some(Mode::Work); 3]);

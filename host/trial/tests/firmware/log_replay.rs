@@ -8,17 +8,17 @@ use link::log::{self, Entry, Kind, LogWriter};
 use link::replay::{Replayed, replay};
 use link::session::{Happening, Session};
 use link::{Link, LinkError, Status};
+use model_test::cases;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use signal::CYCLES_PER_SECOND;
 use std::io::{self, Read, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 use trial::{UnoPort, firmware};
+use uno::CYCLES_PER_SECOND;
 use uno::Uno;
-use walks::cases;
 
 /// Plants and a tall weed.
 fn row() -> Row {
@@ -257,7 +257,7 @@ fn an_alarm_of_the_beam_is_raised_again_and_what_is_left_of_the_object_is_cut() 
     let row = Row::new(things).expect("plants are a row");
     let motion = Motion::steady(0.0, 500.0, 500.0, 3200.0).change_speed(0.0, 500.0);
     let log = logged(&row, &motion, &["start"]);
-    assert!(log.iter().any(|entry| entry.text.starts_with("alarm name=beam_blocked")), "{log:#?}");
+    assert!(log.iter().any(|entry| entry.text.starts_with("alarm code=1-1 name=beam_blocked")), "{log:#?}");
     let replayed = replay(&log).expect("the log can be replayed");
     assert_eq!(replayed.difference, None, "{replayed:#?}");
     assert_eq!((replayed.objects, replayed.alarms), (3, 1), "{replayed:#?}");
@@ -292,12 +292,12 @@ fn a_log_without_a_machine_or_with_a_line_that_cannot_be_is_refused() {
         (Kind::Status, "state=asleep", "is no status"),
         (Kind::Event, "swing tool=up", "is no event"),
     ] {
-        let error = replay(&[entry(Kind::Connected, "0.1.0"), entry(kind, text)]).unwrap_err().to_string();
+        let error = replay(&[entry(Kind::Connected, "0.2.0"), entry(kind, text)]).unwrap_err().to_string();
         assert!(error.contains(wrong), "{error}");
     }
     let far = "state=work tool=in pos=2000000000 speed_mm_s=1 windows=0 unseen_mm=0";
     let near = "state=work tool=in pos=0 speed_mm_s=1 windows=0 unseen_mm=0";
-    let log = [entry(Kind::Connected, "0.1.0"), entry(Kind::Status, near), entry(Kind::Status, far)];
+    let log = [entry(Kind::Connected, "0.2.0"), entry(Kind::Status, near), entry(Kind::Status, far)];
     assert!(replay(&log).unwrap_err().to_string().contains("the machine cannot have come so far"));
 }
 
@@ -311,7 +311,7 @@ fn numbers_that_no_machine_gives_are_replayed_or_refused() {
         let (swing, alarm) =
             (format!("swing tool=out pos={other}"), format!("alarm name=beam_blocked code=11 pos={one}"));
         let log = [
-            entry(Kind::Connected, "0.1.0"),
+            entry(Kind::Connected, "0.2.0"),
             entry(Kind::Status, &status(one)),
             entry(Kind::Event, &plant),
             entry(Kind::Event, &swing),

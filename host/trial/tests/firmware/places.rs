@@ -4,21 +4,21 @@
 use field::machine::Machine;
 use field::motion::Motion;
 use field::row::{Kind as Grown, Row, Thing};
+use gps::job::{self, Did, Job, What};
+use gps::summary::{Stand, Summary};
+use gps::track::{Basis, Missing, Offset};
+use gps::{Antenna, Recorder, Wanted};
 use link::log::{self, Entry, Kind, LogWriter};
 use link::replay::replay;
 use link::session::{Happening, Session};
 use link::{Class, Link, LinkError};
-use places::job::{self, Did, Job, What};
-use places::summary::{Stand, Summary};
-use places::track::{Basis, Missing, Offset};
-use places::{Antenna, Recorder, Wanted};
-use signal::CYCLES_PER_SECOND;
 use std::cell::Cell;
 use std::io::{self, Read, Write};
 use std::rc::Rc;
 use std::time::{Duration, Instant};
 use trial::receiver::{ReceiverSetup, SimulatedReceiver, Trouble};
 use trial::{UnoPort, firmware};
+use uno::CYCLES_PER_SECOND;
 
 /// From plant to plant, and how many there are.
 const SPACING_MM: f64 = 500.0;
@@ -89,7 +89,8 @@ fn recorded(
         None => Err(LinkError::Absent("it is gone".to_owned())),
     };
     let mut session = Session::open(open).expect("the firmware answers");
-    assert!(session.command("start"));
+    // The simulated servo has no load on it, and the tool comes in between any two plants.
+    assert!(session.command("set lead_out_ms 180") && session.command("start"));
     let folder = tempfile::tempdir().expect("there is room for a log");
     let path = folder.path().join("log.csv");
     let mut log = LogWriter::open(&path).expect("the log can be written");

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use signal::{Pin, Wire};
-use uno::Uno;
+use virtual_uno::Uno;
+use virtual_uno::{Pin, Wire};
 
 /// Compiles a fixture and returns its ELF.
 pub fn compile(name: &str) -> PathBuf {

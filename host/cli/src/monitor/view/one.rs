@@ -24,9 +24,13 @@ pub fn draw(model: &Model, row: &RowModel, frame: &mut Frame) {
     }
 }
 
-/// The state, with the tool and why it is out.
+/// The state, with the tool and why it is out; of a machine that is gone, the last that was heard.
 fn state(row: &RowModel) -> Line<'static> {
     let status = &row.status;
+    if !row.is_there() {
+        let tool = if status.tool_out { "out" } else { "in" };
+        return Line::raw(format!("state unknown, last heard: {}, tool {tool}", status.mode.name())).dim();
+    }
     let reason = status.reason.as_deref().map_or_else(String::new, |reason| format!(" for {reason}"));
     Line::from(vec![
         Span::raw("state "),
@@ -36,8 +40,12 @@ fn state(row: &RowModel) -> Line<'static> {
 }
 
 fn speed_and_place(row: &RowModel) -> String {
+    let place_m = row.millimetres(row.status.position) / 1000.0;
+    if !row.is_there() {
+        return format!("speed unknown      last place {place_m:8.2} m");
+    }
     let km_h = f64::from(row.status.speed_mm_s) * 0.0036;
-    format!("speed {km_h:5.2} km/h   place {:8.2} m", row.millimetres(row.status.position) / 1000.0)
+    format!("speed {km_h:5.2} km/h   place {place_m:8.2} m")
 }
 
 fn draw_small(model: &Model, row: &RowModel, frame: &mut Frame) {
@@ -104,8 +112,10 @@ fn draw_machine(row: &RowModel, frame: &mut Frame, area: Rect) {
     };
     let status = &row.status;
     let slip = status.slip_permille.map_or_else(String::new, |slip| format!("   slip {:.1} %", f64::from(slip) / 10.0));
-    let second =
-        format!("{}   windows {}   unseen {} mm{slip}", speed_and_place(row), status.windows, status.unseen_mm);
+    let second = match row.is_there() {
+        true => format!("{}   windows {}   unseen {} mm{slip}", speed_and_place(row), status.windows, status.unseen_mm),
+        false => speed_and_place(row),
+    };
     let key = Line::styled(format!(" {HOLD_KEY} "), hold_style()).right_aligned();
     let block = Block::bordered().title(title).title(key);
     frame.render_widget(Paragraph::new(vec![state(row), second.into()]).block(block), area);
@@ -114,7 +124,12 @@ fn draw_machine(row: &RowModel, frame: &mut Frame, area: Rect) {
 /// Where the tool and the beam are.
 fn marks(row: &RowModel, columns: usize) -> String {
     let tool_at = tool_column(row, columns);
-    let tool = format!("{:tool_at$}{}", "", if row.status.tool_out { "△ tool out" } else { "▲ tool in" });
+    let tool = match (row.is_there(), row.status.tool_out) {
+        (false, _) => "? tool",
+        (true, true) => "△ tool out",
+        (true, false) => "▲ tool in",
+    };
+    let tool = format!("{:tool_at$}{tool}", "");
     let mut marks: Vec<char> = tool.chars().take(columns).collect();
     marks.resize(columns, ' ');
     let beam = "beam |";

@@ -3,7 +3,7 @@
 
 use super::parts::{colour, draw_line, draw_said, draw_top, ground};
 use crate::monitor::model::{Answer, Connection, Model, RowModel};
-use link::Mode;
+use link::{Mode, advice};
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::{Color, Style, Stylize};
@@ -138,10 +138,7 @@ fn line(row: &RowModel, name: usize, columns: u16, is_target: bool) -> Line<'sta
     let room = usize::from(columns).saturating_sub(name + 13);
     let (tool, rest) = match (&row.connection, row.status.alarm) {
         (Connection::Down(why), _) => ("   ", Span::styled(why.clone(), Is::Lost.style())),
-        (Connection::Up(_), Some(alarm)) => {
-            let name: String = alarm.text().bytes().map(char::from).collect();
-            ("out", Span::styled(name, Is::Alarm.style()))
-        }
+        (Connection::Up(_), Some(alarm)) => ("out", Span::styled(advice::name(alarm), Is::Alarm.style())),
         (Connection::Up(_), None) => {
             (if row.status.tool_out { "out" } else { "in " }, Span::raw(ground(row, room)).green())
         }

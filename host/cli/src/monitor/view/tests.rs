@@ -32,7 +32,7 @@ fn machine(lines: &[&str]) -> Model {
 
 /// A row connects, and tells these lines.
 fn tell(model: &mut Model, row: usize, lines: &[&str]) {
-    let version = "0.1.0".to_owned();
+    let version = "0.2.0".to_owned();
     model.update(row, Happening::Connected { version, settings: Settings::new(), examples: Vec::new() });
     for line in lines {
         let line = (*line).to_owned();
@@ -84,11 +84,26 @@ fn what_is_to_be_measured_next_is_said_once_calibrating_has_begun() {
 }
 
 #[test]
+fn a_margin_that_nothing_was_measured_for_is_warned_of_once() {
+    let mut model = machine(&["state is=hold"]);
+    model.update(0, Happening::Command("set margin_mm 13".to_owned()));
+    let mut settings = Settings::new();
+    settings.set(Setting::MarginMm, 13).expect("it is in its range");
+    model.update(0, Happening::Settings(settings.clone()));
+    model.update(0, Happening::Settings(settings));
+    let warnings: Vec<&String> = model.lines.iter().filter(|line| line.starts_with("-- warning: ")).collect();
+    assert_eq!(
+        warnings,
+        ["-- warning: margin_mm 13 is not measured: time the servo and measure the wheel first; 50 is safe"]
+    );
+}
+
+#[test]
 fn an_alarm_is_shown_with_what_to_do_until_it_is_cleared() {
     let mut lines = ROW.to_vec();
-    lines.push("alarm name=beam_blocked code=11 pos=2700");
+    lines.push("alarm code=1-1 name=beam_blocked pos=2700");
     lines.push("state is=alarm");
-    lines.push("state=alarm alarm=beam_blocked tool=out pos=2700 speed_mm_s=0 windows=0 unseen_mm=400");
+    lines.push("state=alarm code=1-1 name=beam_blocked tool=out pos=2700 speed_mm_s=0 windows=0 unseen_mm=400");
     insta::assert_snapshot!(screen(&machine(&lines)));
     lines.push("state=hold tool=out pos=2700 speed_mm_s=0 windows=0 unseen_mm=400");
     assert_eq!(machine(&lines).rows[0].advice, None);
@@ -109,6 +124,35 @@ fn a_machine_that_is_gone_is_said_to_be() {
     let mut model = machine(&ROW);
     model.update(0, Happening::Lost("the port is gone: plug the Uno in again".to_owned()));
     insta::assert_snapshot!(screen(&model));
+}
+
+#[test]
+fn of_a_machine_that_is_gone_nothing_stands_as_if_it_were_now() {
+    let at_work = "state=work tool=in pos=2196 speed_mm_s=694 windows=1 unseen_mm=0";
+    let mut model = machine(&[&ROW[..], &[at_work]].concat());
+    assert!(screen(&model).contains("██"));
+    for (columns, lines) in [(90, 22), (40, 10)] {
+        let drawn = screen_of(&model, columns, lines);
+        assert!(drawn.contains("2.50 km/h") && drawn.contains("tool in"), "{drawn}");
+    }
+    model.update(0, Happening::Lost("the port is gone".to_owned()));
+    for (columns, lines) in [(90, 22), (40, 10)] {
+        let drawn = screen_of(&model, columns, lines);
+        assert!(drawn.contains("speed unknown") && !drawn.contains("km/h") && !drawn.contains('▲'), "{drawn}");
+        assert!(!drawn.contains("██"), "{drawn}");
+    }
+    tell(&mut model, 0, &[at_work]);
+    assert!(screen(&model).contains("2.50 km/h"));
+}
+
+#[test]
+fn a_list_of_examples_has_a_head() {
+    let list = ["built_in 1 plant 12 200 8 90 255", "built_in 2 weed 12 20 8 9 25", "field 1 weed 3 4 5 6 7", "ok"];
+    let model = machine(&[&list[..], &list[..]].concat());
+    let lines: Vec<&String> = model.lines.iter().skip_while(|line| !line.starts_with("-- source")).collect();
+    let heads = lines.iter().filter(|line| line.starts_with("-- source number class")).count();
+    assert_eq!((heads, lines.len()), (2, 10), "{lines:?}");
+    assert_eq!(lines[1], list[0]);
 }
 
 #[test]
@@ -149,7 +193,8 @@ fn what_is_drawn_follows_the_machine_s_settings() {
 
 /// A status of a row at work with these windows, and one of a row in alarm.
 const AT_WORK: &str = "state=work tool=in pos=2196 speed_mm_s=556 windows=1 unseen_mm=0";
-const IN_ALARM: &str = "state=alarm alarm=encoder_channel_dead tool=out pos=2700 speed_mm_s=0 windows=0 unseen_mm=400";
+const IN_ALARM: &str =
+    "state=alarm code=2-2 name=encoder_channel_dead tool=out pos=2700 speed_mm_s=0 windows=0 unseen_mm=400";
 
 /// A machine of so many rows, the third of which is in alarm and the last of which is lost.
 fn rows(count: usize) -> Model {
@@ -211,7 +256,7 @@ fn on_no_screen_of_40_columns_and_10_lines_or_more_the_key_or_an_alarmed_or_lost
                 assert!(drawn.contains("Esc HOLD"), "{count}: {drawn}");
                 if count > 3 {
                     assert!(
-                        drawn.contains("row 3") && drawn.contains("ALARM") && drawn.contains("encoder_chan"),
+                        drawn.contains("row 3") && drawn.contains("ALARM") && drawn.contains("2-2 encoder_chan"),
                         "{drawn}"
                     );
                     assert!(drawn.contains(&format!("row {count}")) && drawn.contains("LOST"), "{drawn}");
@@ -225,11 +270,11 @@ fn on_no_screen_of_40_columns_and_10_lines_or_more_the_key_or_an_alarmed_or_lost
 #[test]
 fn the_row_that_commands_go_to_is_chosen_and_its_answer_is_marked() {
     let mut model = rows(3);
-    assert_eq!(model.targets(), [0, 1, 2]);
+    assert_eq!(model.target, None);
     model.choose(true);
     model.choose(true);
-    assert_eq!(model.targets(), [1]);
-    model.sent("start");
+    assert_eq!(model.target, Some(1));
+    model.sent(model.target, "start");
     assert!(screen_of(&model, 80, 24).contains("row 2 work  ? in"), "{}", screen_of(&model, 80, 24));
     let refusal = Some("error: alarm latched".to_owned());
     model.take(Heard { row: 1, at: Instant::now(), what: What::Answered { command: "start".to_owned(), refusal } });
@@ -240,7 +285,7 @@ fn the_row_that_commands_go_to_is_chosen_and_its_answer_is_marked() {
     );
     model.choose(false);
     model.choose(false);
-    assert_eq!(model.targets(), [0, 1, 2]);
+    assert_eq!(model.target, None);
     model.choose(false);
-    assert_eq!(model.targets(), [2]);
+    assert_eq!(model.target, Some(2));
 }

@@ -1,0 +1,19 @@
+// Makes an SBOM the same in each run and each folder: `node sbom.mjs FROM TO [PACKAGE...]`. Number and time go, and the folder's name.
+//
+// Each PACKAGE, as `NAME|VERSION|LICENCE`, is C code that is linked in. No package manager of Rust or Node.js knows it, so it is added here.
+
+import { readFileSync, writeFileSync } from "node:fs";
+
+const [from, to, ...packages] = process.argv.slice(2);
+const sbom = JSON.parse(readFileSync(from, "utf8").replaceAll(process.cwd(), "/weeder"));
+delete sbom.serialNumber;
+delete sbom.metadata.timestamp;
+if (sbom.bomFormat !== "CycloneDX" || !sbom.components?.length) {
+    throw new Error(`${from} is no SBOM with components`);
+}
+for (const text of packages) {
+    const [name, version, expression] = text.split("|");
+    if (!name || !version || !expression) throw new Error(`\`${text}\` is not NAME|VERSION|LICENCE`);
+    sbom.components.push({ type: "library", name, version, licenses: [{ expression }] });
+}
+writeFileSync(to, `${JSON.stringify(sbom, null, 2)}\n`);

@@ -1,0 +1,154 @@
+//! What a program may need at most, as a file says it, and whether it keeps to that. The file tells what the ELF does not say as well:
+//! how often loops turn, where calls lead, how deep recursion goes.
+
+use crate::error::BoundsError;
+use crate::loops::LoopBounds;
+use crate::proved::{Bounds, Input, Longest};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// What a program may need at most, and facts about it. Every key is optional.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Budgets {
+    /// The chip, where the ELF does not name it.
+    pub chip: Option<String>,
+    /// The deepest stack, in bytes.
+    pub stack_bytes: Option<u64>,
+    /// The longest handler.
+    pub handler_cycles: Option<u64>,
+    /// The longest critical section of the main program.
+    pub critical_section_cycles: Option<u64>,
+    /// Loops without a bound in a turn of the main program's loop.
+    pub loops_without_bound: Option<u64>,
+    /// The longest turn of that loop, without the handlers that come in.
+    pub turn_cycles: Option<u64>,
+    /// Edges of the input in a second of which none is lost: at least so many.
+    pub never_lost_per_s: Option<u64>,
+    /// What is to be proved of values in registers.
+    pub registers: RegisterRule,
+    /// The input whose edges are watched.
+    pub input: Option<Input>,
+    /// How often the loops of some functions turn.
+    pub loops: LoopBounds,
+    /// Where functions that call by an address can lead: by the caller's name, the functions called.
+    pub calls: BTreeMap<String, Vec<String>>,
+    /// How often functions may be active at once.
+    pub recursion: BTreeMap<String, Depth>,
+}
+
+/// How deep a recursion goes.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Depth {
+    /// How many calls of the function are active at once, at most.
+    pub depth: usize,
+    /// Why there are no more.
+    pub because: String,
+}
+
+/// What is to be proved of values in registers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RegisterRule {
+    /// Functions preserve r2 to r17, r28 and r29 and leave zero in r1, as the calling convention has it, and handlers all registers and flags.
+    #[default]
+    Convention,
+    /// Whatever a caller needs behind a call is preserved, and handlers preserve all: for compilers that drop the convention.
+    Followed,
+    /// Nothing.
+    Unchecked,
+}
+
+/// Why a file of budgets could not be read.
+#[derive(Debug, thiserror::Error)]
+#[error("{}: {problem}", path.display())]
+pub struct BudgetsError {
+    /// The file.
+    pub path: PathBuf,
+    /// What is wrong with it.
+    pub problem: BudgetsProblem,
+}
+
+/// What is wrong with a file of budgets.
+#[derive(Debug, thiserror::Error)]
+pub enum BudgetsProblem {
+    /// The system does not give it.
+    #[error(transparent)]
+    File(#[from] io::Error),
+    /// It is no TOML, or has a key that is not known; with line and column.
+    #[error(transparent)]
+    Content(#[from] toml::de::Error),
+}
+
+/// A bound beside its budget.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Held {
+    /// The budget's name.
+    pub name: &'static str,
+    /// What was proved.
+    pub proved: u64,
+    /// What is allowed.
+    pub budget: u64,
+    /// Whether the one keeps to the other.
+    pub keeps: bool,
+}
+
+impl Budgets {
+    /// Reads them from a TOML file.
+    ///
+    /// # Errors
+    /// Where it cannot be read, or says what is not known.
+    pub fn read(path: &Path) -> Result<Budgets, BudgetsError> {
+        let read = || Ok(toml::from_str(&std::fs::read_to_string(path)?)?);
+        read().map_err(|problem| BudgetsError { path: path.into(), problem })
+    }
+
+    /// Holds bounds against the budgets that there are.
+    ///
+    /// # Errors
+    /// Where there is a budget for a time that has no bound.
+    pub fn hold(&self, bounds: &Bounds) -> Result<Vec<Held>, BoundsError> {
+        let mut held = Vec::new();
+        let mut at_most = |name, proved, budget: Option<u64>| {
+            held.extend(budget.map(|budget| Held { name, proved, budget, keeps: proved <= budget }));
+        };
+        at_most("stack_bytes", bounds.stack_bytes as u64, self.stack_bytes);
+        if self.handler_cycles.is_some() {
+            for handler in &bounds.handlers {
+                let what = format!("the handler of vector {}", handler.vector);
+                Longest { cycles: handler.cycles, without_bound: handler.without_bound.clone() }.or_refuse(&what)?;
+            }
+        }
+        at_most("handler_cycles", bounds.longest_handler_cycles(), self.handler_cycles);
+        if self.critical_section_cycles.is_some() {
+            let longest = bounds.critical_section.or_refuse("a stretch without interrupts")?;
+            at_most("critical_section_cycles", longest.unwrap_or_default(), self.critical_section_cycles);
+        }
+        // A main program whose turn is not found has bounded nothing.
+        let loops = bounds.turn.as_ref().map_or(u64::MAX, |turn| turn.without_bound.len() as u64);
+        at_most("loops_without_bound", loops, self.loops_without_bound);
+        let turn = bounds.turn.as_ref().and_then(|turn| turn.cycles).unwrap_or(u64::MAX);
+        at_most("turn_cycles", turn, self.turn_cycles);
+        let rate = bounds.edges.as_ref().map_or(0, |edges| edges.never_lost_per_s);
+        held.extend(self.never_lost_per_s.map(|budget| Held {
+            name: "never_lost_per_s",
+            proved: rate,
+            budget,
+            keeps: rate >= budget,
+        }));
+        Ok(held)
+    }
+}
+
+impl Longest {
+    /// The cycles of a time that has to have a bound; `what` it is the time of. `None` where it never ends.
+    pub(crate) fn or_refuse(&self, what: &str) -> Result<Option<u64>, BoundsError> {
+        match self.without_bound.first() {
+            None => Ok(self.cycles),
+            Some(place) => Err(BoundsError::Unbounded { what: what.into(), place: place.clone() }),
+        }
+    }
+}

@@ -1,0 +1,209 @@
+//! How often a loop turns that counts by itself.
+//!
+//! A loop is counted where a branch that leaves it goes by registers which only arithmetic in the loop changes, each of these instructions runs
+//! exactly once a turn, and the registers hold constants wherever the loop is entered. Then those instructions are carried out,
+//! turn after turn, until the branch leaves. Another way out makes the loop shorter, never longer. Everything else is not counted.
+
+use crate::concrete::Concrete;
+use crate::decode::Operation::*;
+use crate::decode::{Instruction, Operation};
+use crate::effects::Registers;
+use crate::flow::{Code, Node};
+use crate::paths::{circles, is_circle};
+use crate::values::Constants;
+use std::collections::BTreeSet;
+
+/// Turns that are tried before a loop counts as endless.
+const MOST_TURNS: u64 = 1 << 22;
+
+/// How often `head` is come to again at most, each time that its loop is entered. `circle` is a strongly connected part of a routine.
+pub(crate) fn turns(code: &Code, nodes: &[Node], circle: &BTreeSet<usize>, head: usize) -> Option<u64> {
+    let within = |set: &BTreeSet<usize>, node: usize| -> Vec<usize> {
+        nodes[node].ways.iter().map(|way| way.to).filter(|to| set.contains(to)).collect()
+    };
+    // Where it is entered.
+    let mut entries: Vec<(usize, Constants)> = Vec::new();
+    for (_, node) in nodes.iter().enumerate().filter(|(number, _)| !circle.contains(number)) {
+        entries.extend(node.ways.iter().filter(|way| circle.contains(&way.to)).map(|way| (way.to, way.constants)));
+    }
+    let first = entries.first()?.0;
+    if circle.contains(&0) || entries.iter().any(|(to, _)| *to != first) {
+        return None;
+    }
+    // What runs exactly once a turn: it is in no loop within, and no turn goes round it.
+    let without_first: BTreeSet<usize> = circle.iter().copied().filter(|&node| node != first).collect();
+    let inner: BTreeSet<usize> = circles(&without_first, &|node| within(&without_first, node))
+        .into_iter()
+        .filter(|inner| is_circle(inner, &|node| within(inner, node)))
+        .flatten()
+        .collect();
+    let runs_once = |once: usize| {
+        let others: BTreeSet<usize> = circle.iter().copied().filter(|&node| node != once).collect();
+        let goes_round = || {
+            let rest = circles(&others, &|node| within(&others, node));
+            rest.iter().any(|rest| rest.contains(&first) && is_circle(rest, &|node| within(rest, node)))
+        };
+        !inner.contains(&once) && (once == first || !goes_round())
+    };
+    if head != first && inner.contains(&head) {
+        return None;
+    }
+    let ordered: Vec<usize> = {
+        let mut order = vec![first];
+        let rest = circles(&without_first, &|node| within(&without_first, node));
+        order.extend(rest.iter().flat_map(|part| part.iter().copied()));
+        order
+    };
+    let only_before = |node: usize| {
+        let mut before = circle.iter().copied().filter(|&other| nodes[other].ways.iter().any(|way| way.to == node));
+        let only = before.next()?;
+        (node != first && before.next().is_none()).then_some(only)
+    };
+    let leaving = ordered.iter().copied().filter(|&node| {
+        let is_out = |to: usize| !circle.contains(&to);
+        let ways = &nodes[node].ways;
+        ways.len() == 2 && ways.iter().filter(|way| is_out(way.to)).count() == 1
+    });
+    let loops = Loop { code, nodes, circle, ordered: &ordered };
+    leaving
+        .filter(|&exit| runs_once(exit))
+        .filter_map(|exit| loops.counted_by(exit, &entries, &runs_once, &only_before))
+        .min()
+}
+
+struct Loop<'a> {
+    code: &'a Code<'a>,
+    nodes: &'a [Node],
+    circle: &'a BTreeSet<usize>,
+    /// Its places, each behind those that lead to it from the entry.
+    ordered: &'a [usize],
+}
+
+impl Loop<'_> {
+    fn instruction(&self, node: usize) -> Option<Instruction> {
+        self.code.instruction(self.nodes[node].place.address).ok()
+    }
+
+    /// How often the loop's beginning is come to again, as the branch at `exit` has it.
+    fn counted_by(
+        &self,
+        exit: usize,
+        entries: &[(usize, Constants)],
+        runs_once: &dyn Fn(usize) -> bool,
+        only_before: &dyn Fn(usize) -> Option<usize>,
+    ) -> Option<u64> {
+        let branch = self.instruction(exit)?;
+        if !matches!(branch.operation, Brbs | Brbc | Cpse | Sbrc | Sbrs) {
+            return None;
+        }
+        let mut needed = Registers::NONE;
+        let mut slice = BTreeSet::new();
+        // Flags are made right in front of what reads them.
+        let mut flags_of = vec![(exit, branch.effects().reads & Registers::FLAGS)];
+        needed |= branch.effects().reads - Registers::FLAGS;
+        loop {
+            while let Some((mut node, mut flags)) = flags_of.pop() {
+                while !flags.is_empty() {
+                    node = only_before(node)?;
+                    if self.nodes[node].ways.iter().any(|way| way.through.is_some()) {
+                        return None;
+                    }
+                    let effects = self.instruction(node)?.effects();
+                    if !(effects.changes & flags).is_empty() {
+                        flags = flags - effects.changes;
+                        slice.insert(node);
+                        needed |= effects.reads - Registers::FLAGS;
+                        flags_of.push((node, effects.reads & Registers::FLAGS));
+                    }
+                }
+            }
+            // Everything in the loop that changes what is needed.
+            let before = (needed, slice.len());
+            for &node in self.circle {
+                let instruction = self.instruction(node)?;
+                let effects = instruction.effects();
+                if self.nodes[node].ways.iter().any(|way| clobbers(way.through.as_deref(), needed)) {
+                    return None;
+                }
+                if !(effects.changes & needed).is_empty() && slice.insert(node) {
+                    needed |= effects.reads - Registers::FLAGS;
+                    flags_of.push((node, effects.reads & Registers::FLAGS));
+                }
+            }
+            if flags_of.is_empty() && before == (needed, slice.len()) {
+                break;
+            }
+        }
+        if !slice.iter().all(|&node| runs_once(node)) {
+            return None;
+        }
+        let steps: Vec<Instruction> = (self.ordered.iter())
+            .filter(|node| slice.contains(node) || **node == exit)
+            .map(|&node| self.instruction(node))
+            .collect::<Option<_>>()?;
+        let stays = self.nodes[exit].ways.iter().find(|way| self.circle.contains(&way.to))?;
+        let stays_when_next = self.nodes[stays.to].place.address == branch.next();
+        let mut most = 0;
+        for (_, constants) in entries {
+            if !needed.iter().all(|register| constants[register].is_some()) {
+                return None;
+            }
+            let registers = std::array::from_fn(|register| constants[register].unwrap_or_default());
+            most = most.max(run(&steps, branch.address, stays_when_next, Concrete { registers, status: 0 }, needed)?);
+        }
+        Some(most)
+    }
+}
+
+/// Whether a call changes what is needed.
+fn clobbers(called: Option<&crate::flow::Routine>, needed: Registers) -> bool {
+    called.is_some_and(|called| needed.iter().any(|register| !called.keeps[register]))
+}
+
+/// Carries the steps of a turn out until the branch leaves; how many turns went on.
+fn run(steps: &[Instruction], exit: u32, stays_when_next: bool, mut held: Concrete, needed: Registers) -> Option<u64> {
+    let mut before = held.clone();
+    for turn in 0..MOST_TURNS {
+        // What holds the same once more never ends.
+        if turn > 0 && needed.iter().all(|register| held.registers[register] == before.registers[register]) {
+            return None;
+        }
+        if turn.is_power_of_two() {
+            before = held.clone();
+        }
+        for step in steps {
+            if step.address == exit {
+                let goes_next = match step.operation {
+                    Brbs | Brbc => {
+                        let is_set = held.status >> step.operand('s') & 1 == 1;
+                        is_set != (step.operation == Brbs)
+                    }
+                    Cpse => held.registers[step.destination()] != held.registers[step.source()],
+                    _ => {
+                        let is_set = held.registers[step.source()] >> step.operand('b') & 1 == 1;
+                        is_set != (step.operation == Operation::Sbrs)
+                    }
+                };
+                if goes_next != stays_when_next {
+                    return Some(turn);
+                }
+            } else if !held.carry_out(step) && !moves_pointer(step, &mut held, needed) {
+                return None;
+            }
+        }
+    }
+    None
+}
+
+/// Moves the pointer of a load or store, which does nothing else to what is needed.
+fn moves_pointer(step: &Instruction, held: &mut Concrete, needed: Registers) -> bool {
+    let Some(pointer) = step.moved_pointer() else { return false };
+    let is_load = matches!(step.operation, Ld | Lpm | Elpm);
+    if is_load && needed.contains(step.destination()) {
+        return false;
+    }
+    let address = u16::from_le_bytes([held.registers[pointer], held.registers[pointer + 1]]);
+    let moved = address.wrapping_add_signed(step.moves_by().into()).to_le_bytes();
+    held.registers[pointer..pointer + 2].copy_from_slice(&moved);
+    true
+}

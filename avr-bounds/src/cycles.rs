@@ -1,0 +1,473 @@
+//! How long a program may take: the longest path through a routine, and the longest stretch in which no interrupt comes in.
+//!
+//! A path's length is the sum of its instructions' cycles, with what is called on it. Where paths form a loop, the longest is
+//! found for one turn first, from the loop's head back to it, and taken as often as the loop may turn. Loops within loops are
+//! taken from the inside out. How often a loop turns is said by its source or by a table ([`crate::loops`]), or counted
+//! (`counted`). Else the loop is taken once and its head is kept in the result, which then is no bound ([`Time::is_bound`]).
+//!
+//! Paths that never come to an end are left out: a loop that waits for the watchdog's reset is not the longest time of anything.
+
+use crate::counted;
+use crate::flow::{Code, Node, Routine, Way};
+use crate::paths::{circles, is_circle, reaching};
+use crate::values::Interrupts;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// The longest time of something.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Time {
+    /// Cycles, where every loop without a bound turns once.
+    pub(crate) cycles: u64,
+    /// Addresses of the heads of the loops on the way that have no bound.
+    pub(crate) unbounded: BTreeSet<u32>,
+}
+
+impl Time {
+    fn of(cycles: u64) -> Time {
+        Time { cycles, unbounded: BTreeSet::new() }
+    }
+
+    /// Whether it is a bound.
+    pub(crate) fn is_bound(&self) -> bool {
+        self.unbounded.is_empty()
+    }
+
+    fn and(&self, other: &Time) -> Time {
+        Time { cycles: self.cycles.saturating_add(other.cycles), unbounded: &self.unbounded | &other.unbounded }
+    }
+
+    fn and_cycles(&self, cycles: u32) -> Time {
+        self.and(&Time::of(cycles.into()))
+    }
+
+    /// The longer of both; loops without a bound on either make the longer one unknown.
+    pub(crate) fn or(&self, other: &Time) -> Time {
+        Time { cycles: self.cycles.max(other.cycles), unbounded: &self.unbounded | &other.unbounded }
+    }
+}
+
+/// The longer of what there is.
+fn longer(one: Option<Time>, other: Option<Time>) -> Option<Time> {
+    match (one, other) {
+        (Some(one), Some(other)) => Some(one.or(&other)),
+        (one, None) => one,
+        (None, other) => other,
+    }
+}
+
+/// What has been said of how often loops are passed through.
+#[derive(Clone, Default)]
+pub(crate) struct Passes {
+    /// By addresses in loops: how often the program comes by them at most, each time that the loop is come to.
+    pub(crate) stated: BTreeMap<u32, u64>,
+    /// By addresses at which loops may begin, for the outermost of a function and for each depth within it.
+    pub(crate) of_heads: BTreeMap<u32, Vec<u64>>,
+    /// Entries of functions whose only loop is passed once for each byte of a length, and once more.
+    pub(crate) by_length: BTreeSet<u32>,
+}
+
+/// What is meant by a stretch without interrupts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Stretch {
+    /// From behind the instruction that clears the interrupt flag to behind the one that sets it.
+    FlagClear,
+    /// From one moment at which an interrupt can come in to the next: an instruction in front of it and one behind it join in.
+    Closed,
+}
+
+/// The stretches of a routine.
+#[derive(Clone, Debug, Default)]
+struct Stretches {
+    /// From the entry to a return, all of it without interrupts.
+    through: Option<Time>,
+    /// From the entry to where interrupts come in.
+    first: Option<Time>,
+    /// From where none comes in any more to a return.
+    last: Option<Time>,
+    /// From where none comes in any more to where one does again.
+    inner: Option<Time>,
+}
+
+/// Times routines, each once.
+pub(crate) struct Timer<'a> {
+    code: &'a Code<'a>,
+    passes: Passes,
+    longest: BTreeMap<*const Routine, Option<Time>>,
+    stretches: BTreeMap<(*const Routine, Stretch), Stretches>,
+}
+
+impl<'a> Timer<'a> {
+    pub(crate) fn new(code: &'a Code<'a>, passes: Passes) -> Timer<'a> {
+        Timer { code, passes, longest: BTreeMap::new(), stretches: BTreeMap::new() }
+    }
+
+    /// The longest path from a routine's entry to the end of a return; `None` where it never returns.
+    pub(crate) fn longest(&mut self, routine: &Routine) -> Option<Time> {
+        if let Some(known) = self.longest.get(&std::ptr::from_ref(routine)) {
+            return known.clone();
+        }
+        let returning = reaching(&routine.nodes, |node| routine.nodes[node].returns.is_some());
+        let times = self.times(&routine.nodes, &|node| returning[node], vec![(0, Time::default())], None);
+        let time = ends(&routine.nodes, &times);
+        self.longest.insert(routine, time.clone());
+        time
+    }
+
+    /// The longest paths from a routine's entry to the end of each of some places, and from there to the end of a return.
+    pub(crate) fn around(&mut self, routine: &Routine, is_place: impl Fn(&Node) -> bool) -> Option<(Time, Time)> {
+        let returning = reaching(&routine.nodes, |node| routine.nodes[node].returns.is_some());
+        let before = self.times(&routine.nodes, &|node| returning[node], vec![(0, Time::default())], None);
+        let places: Vec<usize> = (0..routine.nodes.len()).filter(|&node| is_place(&routine.nodes[node])).collect();
+        let (mut to, mut behind) = (None, Vec::new());
+        for &place in &places {
+            for way in &routine.nodes[place].ways {
+                to = longer(to, before[place].as_ref().map(|time| time.and_cycles(way.cycles)));
+                behind.push((way.to, Time::default()));
+            }
+        }
+        let after = self.times(&routine.nodes, &|node| returning[node], behind, None);
+        let is_passed_again = places.iter().any(|&place| after[place].is_some());
+        // Every path has to come by one of the places.
+        let others = self.times(
+            &routine.nodes,
+            &|node| returning[node] && !places.contains(&node),
+            vec![(0, Time::default())],
+            None,
+        );
+        let is_passed_by = ends(&routine.nodes, &others).is_some() && !places.contains(&0);
+        if is_passed_again || is_passed_by {
+            return None;
+        }
+        Some((to?, ends(&routine.nodes, &after)?))
+    }
+
+    /// The longest stretch in a routine and in what it calls; `None` where there is none.
+    pub(crate) fn longest_stretch(&mut self, routine: &Routine, kind: Stretch) -> Option<Time> {
+        self.stretches(routine, kind).inner
+    }
+
+    fn stretches(&mut self, routine: &Routine, kind: Stretch) -> Stretches {
+        let key = (std::ptr::from_ref(routine), kind);
+        if let Some(known) = self.stretches.get(&key) {
+            return known.clone();
+        }
+        let nodes = &routine.nodes;
+        let is_inside = |node: &Node| match kind {
+            Stretch::FlagClear => node.place.interrupts == Interrupts::Off,
+            Stretch::Closed => node.place.interrupts != Interrupts::On,
+        };
+        let mut found = Stretches::default();
+        // Where stretches begin: behind an instruction that is not in one, or in what was called.
+        let mut begins = Vec::new();
+        for node in nodes {
+            for (_, called) in &node.ends_in {
+                found.inner = longer(found.inner, self.stretches(called, kind).inner);
+            }
+            for way in &node.ways {
+                let called = way.through.as_ref().map(|called| self.stretches(called, kind));
+                if let Some(called) = called {
+                    found.inner = longer(found.inner, called.inner);
+                    if is_inside(&nodes[way.to])
+                        && let Some(last) = called.last
+                    {
+                        begins.push((way.to, last));
+                    }
+                }
+                if !is_inside(node) {
+                    let own = if kind == Stretch::Closed { way.cycles } else { 0 };
+                    let alone = (kind == Stretch::Closed).then(|| Time::of(own.into()));
+                    if way.through.is_none() && is_inside(&nodes[way.to]) {
+                        begins.push((way.to, Time::of(own.into())));
+                    } else {
+                        found.inner = longer(found.inner, alone);
+                    }
+                }
+            }
+            if let (Stretch::Closed, false, Some(cycles)) = (kind, is_inside(node), node.returns) {
+                found.inner = longer(found.inner, Some(Time::of(cycles.into())));
+            }
+        }
+        // Those that begin in here, and the one that the routine is entered in.
+        (found.last, found.inner) = self.run(routine, kind, &is_inside, begins, found.inner);
+        if is_inside(&nodes[0]) {
+            (found.through, found.first) = self.run(routine, kind, &is_inside, vec![(0, Time::default())], None);
+        }
+        self.stretches.insert(key, found.clone());
+        found
+    }
+
+    /// The longest of the stretches that begin so: to a return, and to where interrupts come in.
+    fn run(
+        &mut self,
+        routine: &Routine,
+        kind: Stretch,
+        is_inside: &dyn Fn(&Node) -> bool,
+        begins: Vec<(usize, Time)>,
+        longest: Option<Time>,
+    ) -> (Option<Time>, Option<Time>) {
+        let nodes = &routine.nodes;
+        // Where a call's stretch goes on to in what is called: at once, where interrupts are on there.
+        let opens = |timer: &mut Timer<'a>, called: &Routine| {
+            if is_inside(&called.nodes[0]) { timer.stretches(called, kind).first } else { Some(Time::default()) }
+        };
+        let mut ending = Vec::new();
+        for node in nodes {
+            let mut ends = Vec::new();
+            for way in &node.ways {
+                match &way.through {
+                    Some(called) => ends.extend(opens(self, called).map(|first| first.and_cycles(way.cycles))),
+                    None if !is_inside(&nodes[way.to]) => ends.push(Time::of(way.cycles.into())),
+                    None => {}
+                }
+            }
+            for (cycles, called) in &node.ends_in {
+                ends.extend(opens(self, called).map(|first| first.and_cycles(*cycles)));
+            }
+            ending.push(ends.into_iter().reduce(|longest, end| longest.or(&end)));
+        }
+        let leading = reaching(nodes, |node| {
+            is_inside(&nodes[node]) && (nodes[node].returns.is_some() || ending[node].is_some())
+        });
+        let times = self.times(nodes, &|node| is_inside(&nodes[node]) && leading[node], begins, Some(kind));
+        let (mut to_return, mut to_open) = (None, longest);
+        for ((node, time), end) in nodes.iter().zip(&times).zip(&ending) {
+            let Some(time) = time else { continue };
+            if let Some(cycles) = node.returns {
+                // A return that the flag has been set in front of is the last instruction of its stretch.
+                let found = if node.place.interrupts == Interrupts::Off { &mut to_return } else { &mut to_open };
+                *found = longer(found.take(), Some(time.and_cycles(cycles)));
+            }
+            if let Some(end) = end {
+                to_open = longer(to_open, Some(time.and(end)));
+            }
+        }
+        (to_return, to_open)
+    }
+
+    /// The longest turn of the loop that never ends and in which the watchdog is fed: from one `is_fed` to the next. `None` where
+    /// the routine has none.
+    pub(crate) fn turn(&mut self, routine: &Routine, is_fed: impl Fn(&Node) -> bool) -> Option<Time> {
+        let nodes = &routine.nodes;
+        let mut turn = None;
+        for fed in (0..nodes.len()).filter(|&node| is_fed(&nodes[node])) {
+            let circle = reaching(nodes, |node| node == fed);
+            let begins = nodes[fed].ways.iter().map(|way| (way.to, Time::of(way.cycles.into()))).collect();
+            let times = self.times(nodes, &|node| node != fed && circle[node], begins, None);
+            for (node, time) in nodes.iter().zip(&times) {
+                let Some(time) = time else { continue };
+                for way in node.ways.iter().filter(|way| way.to == fed) {
+                    turn = longer(turn, self.time_of(node, way, None).map(|own| time.and(&own)));
+                }
+            }
+        }
+        turn
+    }
+
+    /// The time of a way, with what is called on it: all of it, or the part that is in one stretch.
+    fn time_of(&mut self, node: &Node, way: &Way, stretch: Option<Stretch>) -> Option<Time> {
+        let called = match (&way.through, stretch) {
+            (None, _) => Time::default(),
+            (Some(called), None) => match way.length {
+                Some(length) if self.passes.by_length.contains(&called.entry.address) => {
+                    self.of_length(called, length)?
+                }
+                _ => self.longest(called)?,
+            },
+            (Some(called), Some(kind)) => self.stretches(called, kind).through?,
+        };
+        let mut time = called.and_cycles(way.cycles);
+        if node.waits {
+            time.unbounded.insert(node.place.address);
+        }
+        Some(time)
+    }
+
+    /// The longest path through a function that goes over so many bytes.
+    fn of_length(&self, routine: &Routine, length: u16) -> Option<Time> {
+        let passes = vec![u64::from(length) + 1];
+        let of_heads = routine.nodes.iter().map(|node| (node.place.address, passes.clone())).collect();
+        Timer::new(self.code, Passes { of_heads, ..Passes::default() }).longest(routine)
+    }
+
+    /// The beginnings of a routine's own loops that have no bound, but for loops that it never leaves.
+    pub(crate) fn loops_without_bound(&mut self, routine: &Routine) -> BTreeSet<u32> {
+        let nodes = &routine.nodes;
+        let mut found = BTreeSet::new();
+        // Of a loop that is never left, the loops within.
+        let mut sets = vec![(0..nodes.len()).collect::<BTreeSet<usize>>()];
+        while let Some(set) = sets.pop() {
+            let ways = |node: usize| nodes[node].ways.iter().map(|way| way.to).filter(|to| set.contains(to)).collect();
+            for circle in circles(&set, &ways).into_iter().filter(|circle| is_circle(circle, &ways)) {
+                let is_left = circle.iter().any(|&node| {
+                    nodes[node].returns.is_some() || nodes[node].ways.iter().any(|way| !circle.contains(&way.to))
+                });
+                let heads: BTreeSet<usize> = (nodes.iter().enumerate())
+                    .filter(|(number, _)| !circle.contains(number))
+                    .flat_map(|(_, node)| node.ways.iter().map(|way| way.to))
+                    .chain([0])
+                    .filter(|to| circle.contains(to))
+                    .collect();
+                let heads = if heads.is_empty() { circle.iter().copied().take(1).collect() } else { heads };
+                if is_left {
+                    let begins = heads.iter().map(|&head| (head, Time::default())).collect();
+                    for time in self.times_of_own(nodes, &|node| circle.contains(&node), begins).iter().flatten() {
+                        found.extend(&time.unbounded);
+                    }
+                } else {
+                    sets.push(circle.difference(&heads).copied().collect());
+                }
+            }
+        }
+        found
+    }
+
+    /// The same as `times`, where what is called takes no time.
+    fn times_of_own(
+        &self,
+        nodes: &[Node],
+        within: &dyn Fn(usize) -> bool,
+        begins: Vec<(usize, Time)>,
+    ) -> Vec<Option<Time>> {
+        let own = |node: &Node| -> Vec<(usize, Time)> {
+            node.ways.iter().filter(|way| within(way.to)).map(|way| (way.to, Time::of(way.cycles.into()))).collect()
+        };
+        let ways = nodes.iter().enumerate().map(|(number, node)| if within(number) { own(node) } else { Vec::new() });
+        self.fill(nodes, &ways.collect::<Vec<_>>(), within, begins)
+    }
+
+    /// The longest time to the beginning of each place that can be come to from those where paths begin, over places that are
+    /// within.
+    fn times(
+        &mut self,
+        nodes: &[Node],
+        within: &dyn Fn(usize) -> bool,
+        begins: Vec<(usize, Time)>,
+        stretch: Option<Stretch>,
+    ) -> Vec<Option<Time>> {
+        let mut ways: Vec<Vec<(usize, Time)>> = Vec::with_capacity(nodes.len());
+        for (number, node) in nodes.iter().enumerate() {
+            let mut leading = Vec::new();
+            for way in node.ways.iter().filter(|way| within(number) && within(way.to)) {
+                leading.extend(self.time_of(node, way, stretch).map(|time| (way.to, time)));
+            }
+            ways.push(leading);
+        }
+        self.fill(nodes, &ways, within, begins)
+    }
+
+    fn fill(
+        &self,
+        nodes: &[Node],
+        ways: &[Vec<(usize, Time)>],
+        within: &dyn Fn(usize) -> bool,
+        begins: Vec<(usize, Time)>,
+    ) -> Vec<Option<Time>> {
+        let mut times = vec![None; nodes.len()];
+        for (node, time) in begins.into_iter().filter(|(node, _)| within(*node)) {
+            times[node] = longer(times[node].take(), Some(time));
+        }
+        let all = (0..nodes.len()).filter(|&node| within(node)).collect();
+        Paths { code: self.code, nodes, ways, passes: &self.passes }.fill(all, &BTreeSet::new(), 0, &mut times);
+        times
+    }
+}
+
+/// The longest time to the end of a return.
+fn ends(nodes: &[Node], times: &[Option<Time>]) -> Option<Time> {
+    let ends = nodes.iter().zip(times).filter_map(|(node, time)| Some(time.as_ref()?.and_cycles(node.returns?)));
+    ends.fold(None, |longest, end| longer(longest, Some(end)))
+}
+
+/// Longest paths over places and ways.
+struct Paths<'a> {
+    code: &'a Code<'a>,
+    nodes: &'a [Node],
+    ways: &'a [Vec<(usize, Time)>],
+    passes: &'a Passes,
+}
+
+impl Paths<'_> {
+    fn address(&self, node: usize) -> u32 {
+        self.nodes[node].place.address
+    }
+
+    /// Carries the times of the places where paths begin on to all others of a set, which lies in so many loops; ways back to `heads` are
+    /// left out.
+    fn fill(&self, set: BTreeSet<usize>, heads: &BTreeSet<usize>, depth: usize, times: &mut [Option<Time>]) {
+        let ways = |node: usize| self.ways[node].iter().filter(|(to, _)| set.contains(to) && !heads.contains(to));
+        for circle in circles(&set, &|node| ways(node).map(|(to, _)| *to).collect()) {
+            let is_loop = circle.len() > 1 || circle.iter().any(|&node| ways(node).any(|(to, _)| *to == node));
+            if is_loop {
+                self.turn(&circle, depth, times);
+            }
+            for &node in &circle {
+                let Some(time) = times[node].clone() else { continue };
+                for (to, own) in ways(node).filter(|(to, _)| !circle.contains(to)) {
+                    times[*to] = longer(times[*to].take(), Some(time.and(own)));
+                }
+            }
+        }
+    }
+
+    /// Carries the times at which a loop is entered on to all of its places.
+    fn turn(&self, circle: &BTreeSet<usize>, depth: usize, times: &mut [Option<Time>]) {
+        // Of a loop that can be entered at several places, a turn is the way from one of them to the next, and it turns as often as the
+        // program comes by any of them; what one place in it says is no word for all of them.
+        let heads: BTreeSet<usize> = circle.iter().copied().filter(|&node| times[node].is_some()).collect();
+        let mut passes = Some(0);
+        let mut entered: Option<Time> = None;
+        let mut inside = vec![None; times.len()];
+        for &head in &heads {
+            let stated = if heads.len() == 1 { self.stated(circle, head) } else { None };
+            let stated = stated.or_else(|| {
+                let by_depth = self.passes.of_heads.get(&self.address(head))?;
+                by_depth.get(depth).or(by_depth.last()).copied()
+            });
+            let counted = || if heads.len() == 1 { counted::turns(self.code, self.nodes, circle, head) } else { None };
+            let stated = stated.or_else(counted);
+            passes = passes.zip(stated).map(|(passes, stated)| passes + stated);
+            entered = longer(entered, times[head].clone());
+            inside[head] = Some(Time::default());
+        }
+        let (Some(entered), Some(&first)) = (entered, heads.first()) else { return };
+        self.fill(circle.clone(), &heads, depth + 1, &mut inside);
+        let mut turn = Time::default();
+        for &node in circle {
+            for (_, own) in self.ways[node].iter().filter(|(to, _)| heads.contains(to)) {
+                turn = inside[node].as_ref().map_or(turn.clone(), |time| turn.or(&time.and(own)));
+            }
+        }
+        let cycles = turn.cycles.saturating_mul(passes.unwrap_or(1));
+        let mut before_last = Time { cycles, unbounded: turn.unbounded };
+        if passes.is_none() {
+            before_last.unbounded.insert(self.address(first));
+        }
+        let entered = entered.and(&before_last);
+        for &node in circle {
+            times[node] = inside[node].as_ref().map(|time| entered.and(time));
+        }
+    }
+
+    /// How often a loop turns at most, where a place that is in no loop within it says so, and no turn goes round that place.
+    fn stated(&self, circle: &BTreeSet<usize>, head: usize) -> Option<u64> {
+        let saying = |node: usize| self.passes.stated.get(&self.address(node)).map(|passes| (node, *passes));
+        let within = |node: usize, set: &BTreeSet<usize>| -> Vec<usize> {
+            self.ways[node].iter().map(|(to, _)| *to).filter(|to| set.contains(to)).collect()
+        };
+        let without_head: BTreeSet<usize> = circle.iter().copied().filter(|&node| node != head).collect();
+        let inner = circles(&without_head, &|node| within(node, &without_head));
+        let is_inner = |node: usize| {
+            inner.iter().any(|inner| inner.contains(&node) && (inner.len() > 1 || within(node, inner).contains(&node)))
+        };
+        let goes_round = |saying: usize| {
+            let others: BTreeSet<usize> = circle.iter().copied().filter(|&node| node != saying).collect();
+            let rest = circles(&others, &|node| within(node, &others));
+            saying != head
+                && rest
+                    .iter()
+                    .any(|rest| rest.contains(&head) && (rest.len() > 1 || within(head, rest).contains(&head)))
+        };
+        let stated = circle.iter().filter_map(|&node| saying(node));
+        stated.filter(|&(node, _)| !is_inner(node) && !goes_round(node)).map(|(_, passes)| passes).min()
+    }
+}

@@ -1,0 +1,390 @@
+//! The instructions of the family: what a word of flash means, and how many cycles it takes.
+//!
+//! The table has a row for every form of every instruction, its bits written as the AVR instruction set manual writes them, and
+//! its cycles as the data sheet's instruction set summary gives them.
+//! It is the project's own because what would have been there is not dependable enough for a proof: the one crate that decodes AVR
+//! gives `jmp` and `call`, the two that this is about, a wrong length, and the text of avr-objdump is made for readers. A
+//! test holds the table against avr-objdump, over all 65,536 words.
+
+use std::sync::LazyLock;
+
+/// What an instruction does. Forms that differ only in how they address memory have the same name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[rustfmt::skip]
+pub(crate) enum Operation {
+    Adc, Add, Adiw, And, Andi, Asr, Bclr, Bld, Brbc, Brbs, Break, Bset, Bst, Call, Cbi, Com, Cp, Cpc, Cpi, Cpse, Dec, Eicall, Eijmp, Elpm, Eor, Fmul,
+    Fmuls, Fmulsu, Icall, Ijmp, In, Inc, Jmp, Ld, Ldd, Ldi, Lds, Lpm, Lsr, Mov, Movw, Mul, Muls, Mulsu, Neg, Nop, Or, Ori, Out,
+    Pop, Push, Rcall, Ret, Reti, Rjmp, Ror, Sbc, Sbci, Sbi, Sbic, Sbis, Sbiw, Sbrc, Sbrs, Sleep, Spm, St, Std, Sts, Sub, Subi,
+    Swap, Wdr,
+}
+
+use Operation::*;
+
+/// A form of an instruction: its bits, from the highest on, where a letter is a bit of the operand of that name; what it does;
+/// its cycles, without the one of a branch that is taken and those of what is skipped.
+type Form = (&'static str, Operation, u32);
+
+/// Every form.
+const FORMS: [Form; 91] = [
+    ("000111rdddddrrrr", Adc, 1),
+    ("000011rdddddrrrr", Add, 1),
+    ("10010110KKddKKKK", Adiw, 2),
+    ("001000rdddddrrrr", And, 1),
+    ("0111KKKKddddKKKK", Andi, 1),
+    ("1001010ddddd0101", Asr, 1),
+    ("100101001sss1000", Bclr, 1),
+    ("1111100ddddd0bbb", Bld, 1),
+    ("111101kkkkkkksss", Brbc, 1),
+    ("111100kkkkkkksss", Brbs, 1),
+    ("1001010110011000", Break, 1),
+    ("100101000sss1000", Bset, 1),
+    ("1111101ddddd0bbb", Bst, 1),
+    ("1001010kkkkk111k", Call, 4),
+    ("10011000AAAAAbbb", Cbi, 2),
+    ("1001010ddddd0000", Com, 1),
+    ("000101rdddddrrrr", Cp, 1),
+    ("000001rdddddrrrr", Cpc, 1),
+    ("0011KKKKddddKKKK", Cpi, 1),
+    ("000100rdddddrrrr", Cpse, 1),
+    ("1001010ddddd1010", Dec, 1),
+    ("1001010100011001", Eicall, 4),
+    ("1001010000011001", Eijmp, 2),
+    ("1001010111011000", Elpm, 3),
+    ("1001000ddddd0110", Elpm, 3),
+    ("1001000ddddd0111", Elpm, 3),
+    ("001001rdddddrrrr", Eor, 1),
+    ("000000110ddd1rrr", Fmul, 2),
+    ("000000111ddd0rrr", Fmuls, 2),
+    ("000000111ddd1rrr", Fmulsu, 2),
+    ("1001010100001001", Icall, 3),
+    ("1001010000001001", Ijmp, 2),
+    ("10110AAdddddAAAA", In, 1),
+    ("1001010ddddd0011", Inc, 1),
+    ("1001010kkkkk110k", Jmp, 3),
+    ("1001000ddddd1100", Ld, 2),
+    ("1001000ddddd1101", Ld, 2),
+    ("1001000ddddd1110", Ld, 2),
+    ("1001000ddddd1001", Ld, 2),
+    ("1001000ddddd1010", Ld, 2),
+    ("1001000ddddd0001", Ld, 2),
+    ("1001000ddddd0010", Ld, 2),
+    ("10q0qq0ddddd1qqq", Ldd, 2),
+    ("10q0qq0ddddd0qqq", Ldd, 2),
+    ("1110KKKKddddKKKK", Ldi, 1),
+    ("1001000ddddd0000", Lds, 2),
+    ("1001010111001000", Lpm, 3),
+    ("1001000ddddd0100", Lpm, 3),
+    ("1001000ddddd0101", Lpm, 3),
+    ("1001010ddddd0110", Lsr, 1),
+    ("001011rdddddrrrr", Mov, 1),
+    ("00000001ddddrrrr", Movw, 1),
+    ("100111rdddddrrrr", Mul, 2),
+    ("00000010ddddrrrr", Muls, 2),
+    ("000000110ddd0rrr", Mulsu, 2),
+    ("1001010ddddd0001", Neg, 1),
+    ("0000000000000000", Nop, 1),
+    ("001010rdddddrrrr", Or, 1),
+    ("0110KKKKddddKKKK", Ori, 1),
+    ("10111AArrrrrAAAA", Out, 1),
+    ("1001000ddddd1111", Pop, 2),
+    ("1001001rrrrr1111", Push, 2),
+    ("1101kkkkkkkkkkkk", Rcall, 3),
+    ("1001010100001000", Ret, 4),
+    ("1001010100011000", Reti, 4),
+    ("1100kkkkkkkkkkkk", Rjmp, 2),
+    ("1001010ddddd0111", Ror, 1),
+    ("000010rdddddrrrr", Sbc, 1),
+    ("0100KKKKddddKKKK", Sbci, 1),
+    ("10011010AAAAAbbb", Sbi, 2),
+    ("10011001AAAAAbbb", Sbic, 1),
+    ("10011011AAAAAbbb", Sbis, 1),
+    ("10010111KKddKKKK", Sbiw, 2),
+    ("1111110rrrrr0bbb", Sbrc, 1),
+    ("1111111rrrrr0bbb", Sbrs, 1),
+    ("1001010110001000", Sleep, 1),
+    ("1001010111101000", Spm, 1),
+    ("1001001rrrrr1100", St, 2),
+    ("1001001rrrrr1101", St, 2),
+    ("1001001rrrrr1110", St, 2),
+    ("1001001rrrrr1001", St, 2),
+    ("1001001rrrrr1010", St, 2),
+    ("1001001rrrrr0001", St, 2),
+    ("1001001rrrrr0010", St, 2),
+    ("10q0qq1rrrrr1qqq", Std, 2),
+    ("10q0qq1rrrrr0qqq", Std, 2),
+    ("1001001rrrrr0000", Sts, 2),
+    ("000110rdddddrrrr", Sub, 1),
+    ("0101KKKKddddKKKK", Subi, 1),
+    ("1001010ddddd0010", Swap, 1),
+    ("1001010110101000", Wdr, 1),
+];
+
+/// The lower registers of the pointers.
+const X: usize = 26;
+const Y: usize = 28;
+const Z: usize = 30;
+
+/// Which form each word is of.
+static FORM_OF_WORD: LazyLock<Vec<Option<&Form>>> = LazyLock::new(|| {
+    let mut forms = vec![None; 1 << 16];
+    for form in &FORMS {
+        let bits = form.0.bytes().rev().enumerate();
+        let (mut fixed, mut value) = (0_usize, 0_usize);
+        for (bit, letter) in bits.filter(|(_, letter)| matches!(letter, b'0' | b'1')) {
+            fixed |= 1 << bit;
+            value |= usize::from(letter == b'1') << bit;
+        }
+        // Every way to fill the bits that are free, counted through them.
+        let free = !fixed & 0xFFFF;
+        let mut operand = 0_usize;
+        loop {
+            forms[value | operand] = Some(form);
+            operand = operand.wrapping_sub(free) & free;
+            if operand == 0 {
+                break;
+            }
+        }
+    }
+    forms
+});
+
+/// An instruction at its place in flash.
+#[derive(Clone, Copy)]
+pub(crate) struct Instruction {
+    /// Its address, in bytes.
+    pub(crate) address: u32,
+    /// What it does.
+    pub(crate) operation: Operation,
+    /// Its cycles, without those of a branch that is taken, of what is skipped, and of the EEPROM.
+    pub(crate) cycles: u32,
+    bits: &'static str,
+    destination: u8,
+    source: u8,
+    constant: u8,
+    word: u16,
+    /// The second word, of those that have one.
+    second: u16,
+}
+
+impl Instruction {
+    /// The instruction at an address, in bytes; `None` where there is no flash or no instruction.
+    pub(crate) fn at(flash: &[u8], address: u32) -> Option<Instruction> {
+        let word = |address: u32| {
+            let bytes = flash.get(address as usize..)?.first_chunk()?;
+            Some(u16::from_le_bytes(*bytes))
+        };
+        let first = word(address)?;
+        let &(bits, operation, cycles) = FORM_OF_WORD[usize::from(first)]?;
+        let second = if matches!(operation, Call | Jmp | Lds | Sts) { word(address + 2)? } else { 0 };
+        let (destination, source, constant) = (0, 0, 0);
+        let found =
+            Instruction { address, operation, cycles, bits, destination, source, constant, word: first, second };
+        let (destination, source) = (found.destination_in_bits() as u8, found.source_in_bits() as u8);
+        Some(Instruction { destination, source, constant: found.operand('K') as u8, ..found })
+    }
+
+    /// The operand of this letter, as a number: its bits, put together; 0 where the form has none.
+    pub(crate) fn operand(&self, letter: char) -> u16 {
+        let bits = self.bits.chars().zip((0..16).rev()).filter(|(bit, _)| *bit == letter);
+        bits.fold(0, |operand, (_, bit)| operand << 1 | self.word >> bit & 1)
+    }
+
+    /// The register that is read and written, or written: R0 to R31, of a pair the lower one.
+    pub(crate) fn destination(&self) -> usize {
+        self.destination.into()
+    }
+
+    fn destination_in_bits(&self) -> usize {
+        let d = usize::from(self.operand('d'));
+        match (self.operation, self.bits.matches('d').count()) {
+            (Movw, _) => d * 2,
+            (_, 2) => 24 + d * 2,
+            (_, 3 | 4) => 16 + d,
+            _ => d,
+        }
+    }
+
+    /// The register that is only read.
+    pub(crate) fn source(&self) -> usize {
+        self.source.into()
+    }
+
+    fn source_in_bits(&self) -> usize {
+        let r = usize::from(self.operand('r'));
+        match (self.operation, self.bits.matches('r').count()) {
+            (Movw, _) => r * 2,
+            (Muls | Mulsu | Fmul | Fmuls | Fmulsu, _) => 16 + r,
+            _ => r,
+        }
+    }
+
+    /// The constant of an arithmetic instruction, or of `ldi`.
+    pub(crate) fn constant(&self) -> u8 {
+        self.constant
+    }
+
+    /// The data address that is in the instruction itself: of `in`, `out` and those for a bit of a register as of `lds` and `sts`.
+    pub(crate) fn data_address(&self) -> Option<u16> {
+        /// Where the registers for `in` and `out` begin in the data space (data sheet, register summary).
+        const IO_START: u16 = 0x20;
+
+        match self.operation {
+            Lds | Sts => Some(self.second),
+            In | Out | Sbi | Cbi | Sbic | Sbis => Some(IO_START + self.operand('A')),
+            _ => None,
+        }
+    }
+
+    /// Whether it reads the register at an address in the data space that is in the instruction itself.
+    pub(crate) fn reads(&self, address: u16) -> bool {
+        matches!(self.operation, In | Lds | Sbic | Sbis) && self.data_address() == Some(address)
+    }
+
+    /// The lower register of the pointer that a load or a store goes by.
+    pub(crate) fn pointer(&self) -> Option<usize> {
+        match (self.operation, self.word & 0xF) {
+            (Ld | St, 0xC..=0xE) => Some(X),
+            (Ld | St, 0x9 | 0xA) => Some(Y),
+            (Ldd | Std, 0x8..) => Some(Y),
+            (Ld | St, 0x1 | 0x2) | (Ldd | Std | Lpm | Elpm, _) => Some(Z),
+            _ => None,
+        }
+    }
+
+    /// The lower register of the pointer that a load or a store moves on or back.
+    pub(crate) fn moved_pointer(&self) -> Option<usize> {
+        match (self.operation, self.word & 0xF) {
+            (Ld | St, 0xD | 0xE) => Some(X),
+            (Ld | St, 0x9 | 0xA) => Some(Y),
+            (Ld | St, 0x1 | 0x2) | (Lpm, 0x5) | (Elpm, 0x7) => Some(Z),
+            _ => None,
+        }
+    }
+
+    /// By how much a load or a store moves its pointer: on behind it, or back in front of it.
+    pub(crate) fn moves_by(&self) -> i8 {
+        match (self.moved_pointer(), self.operation, self.word & 0xF) {
+            (None, ..) => 0,
+            (_, Ld | St, 0xE | 0xA | 0x2) => -1,
+            _ => 1,
+        }
+    }
+
+    /// How far behind its pointer a load or a store goes.
+    pub(crate) fn displacement(&self) -> u8 {
+        if matches!(self.operation, Ldd | Std) { self.operand('q') as u8 } else { 0 }
+    }
+
+    /// Its length in bytes.
+    pub(crate) fn bytes(&self) -> u32 {
+        if matches!(self.operation, Call | Jmp | Lds | Sts) { 4 } else { 2 }
+    }
+
+    /// The address behind it.
+    pub(crate) fn next(&self) -> u32 {
+        self.address + self.bytes()
+    }
+
+    /// The address that a jump, a call or a branch leads to. Those relative to the program counter wrap at the flash's end.
+    pub(crate) fn target(&self, flash_bytes: u32) -> Option<u32> {
+        // The distance is in words, with its sign in the highest bit.
+        let relative = |width: u32| {
+            let distance = i32::from((self.operand('k') << (16 - width)) as i16) >> (16 - width);
+            (self.next() as i32 + 2 * distance).rem_euclid(flash_bytes as i32) as u32
+        };
+        match self.operation {
+            Jmp | Call => Some((u32::from(self.operand('k')) << 16 | u32::from(self.second)) * 2),
+            Rjmp | Rcall => Some(relative(12)),
+            Brbs | Brbc => Some(relative(7)),
+            _ => None,
+        }
+    }
+
+    /// Its name, as avr-objdump writes it.
+    pub(crate) fn mnemonic(&self) -> String {
+        let bit = usize::from(self.operand('s'));
+        match self.operation {
+            Brbs => ["brcs", "breq", "brmi", "brvs", "brlt", "brhs", "brts", "brie"][bit].into(),
+            Brbc => ["brcc", "brne", "brpl", "brvc", "brge", "brhc", "brtc", "brid"][bit].into(),
+            Bset => ["sec", "sez", "sen", "sev", "ses", "seh", "set", "sei"][bit].into(),
+            Bclr => ["clc", "clz", "cln", "clv", "cls", "clh", "clt", "cli"][bit].into(),
+            // Without a displacement it has the shorter name.
+            Ldd if self.operand('q') == 0 => "ld".into(),
+            Std if self.operand('q') == 0 => "st".into(),
+            other => format!("{other:?}").to_lowercase(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::process::Command;
+
+    /// The instructions that avr-objdump finds in so many bytes of flash: address, length and name. What it takes for data
+    /// is called `.word`.
+    fn by_objdump(arguments: &[&str], file: &std::path::Path) -> Vec<(u32, u32, String)> {
+        let output =
+            Command::new("avr-objdump").args(arguments).arg(file).output().expect("./setup.sh brings avr-objdump");
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let text = String::from_utf8(output.stdout).expect("it is text");
+        let line = |line: &str| {
+            let mut columns = line.split('\t');
+            let address = u32::from_str_radix(columns.next()?.trim().strip_suffix(':')?, 16).ok()?;
+            let length = columns.next()?.split_whitespace().count() as u32;
+            Some((address, length, columns.next()?.trim().to_owned()))
+        };
+        text.lines().filter_map(line).collect()
+    }
+
+    /// What only the XMEGA have, and what is no instruction.
+    const LACKING: [&str; 6] = [".word", "des", "xch", "las", "lac", "lat"];
+    const SPM_WITH_INCREMENT: u32 = 0x95F8;
+
+    #[test]
+    fn every_word_is_what_avr_objdump_takes_it_for() {
+        let file = tempfile::NamedTempFile::new().expect("there is room for a file");
+        // A second word behind each, for those that have one; 0 is `nop`.
+        let words: Vec<u8> = (0..=u16::MAX).flat_map(|word| [word.to_le_bytes(), [0, 0]].concat()).collect();
+        std::fs::write(file.path(), &words).expect("it can be written");
+        let listed = by_objdump(&["-D", "-z", "-b", "binary", "-m", "avr:6"], file.path());
+        let mut seen = 0;
+        for (address, length, name) in listed.into_iter().filter(|(address, ..)| address % 4 == 0) {
+            let found = Instruction::at(&words, address).map(|found| (found.bytes(), found.mnemonic()));
+            let word = address / 4;
+            let expected = Some((length, name))
+                .filter(|(_, name)| !LACKING.contains(&name.as_str()) && word != SPM_WITH_INCREMENT);
+            assert_eq!(found, expected, "{word:#06x}");
+            seen += 1;
+        }
+        assert_eq!(seen, 1 << 16);
+    }
+
+    #[test]
+    fn no_word_is_of_two_forms() {
+        let sizes = FORMS.iter().map(|(bits, ..)| 1 << bits.chars().filter(|bit| bit.is_alphabetic()).count());
+        let all: usize = sizes.sum();
+        // `ld` and `st` without a displacement are in the table once.
+        assert_eq!(all, FORM_OF_WORD.iter().flatten().count());
+    }
+
+    #[test]
+    fn operands_and_targets_are_put_together() {
+        let at_0x100 = |word: u16, second: u16| {
+            let mut flash = vec![0; 0x100];
+            flash.extend([word.to_le_bytes(), second.to_le_bytes()].concat());
+            Instruction::at(&flash, 0x100).expect("an instruction")
+        };
+        // sbiw r28, 0x28; movw r30, r18; in r25, 0x3f; lds r24, 0x01FC; call 0x2e28; rjmp .-504; brne .+4
+        let sbiw = at_0x100(0x97A8, 0);
+        assert_eq!((sbiw.destination(), sbiw.constant()), (28, 0x28));
+        let movw = at_0x100(0x01F9, 0);
+        assert_eq!((movw.destination(), movw.source()), (30, 18));
+        let input = at_0x100(0xB79F, 0);
+        assert_eq!((input.destination(), input.data_address()), (25, Some(0x5F)));
+        assert_eq!(at_0x100(0x9180, 0x01FC).data_address(), Some(0x01FC));
+        assert_eq!(at_0x100(0x940E, 0x1714).target(0x8000), Some(0x2E28));
+        assert_eq!(at_0x100(0xCF04, 0).target(0x8000), Some(0x7F0A));
+        assert_eq!(at_0x100(0xF411, 0).target(0x8000), Some(0x106));
+    }
+}

@@ -1,0 +1,313 @@
+//! What an instruction reads and what it changes, of registers and of the flags in SREG.
+//!
+//! As the AVR instruction set manual gives it. The interrupt flag is not among the flags here ([`crate::flow`] follows it). A
+//! call, a jump and a return have no effects of their own; what a call does to registers is what the called function does.
+
+use crate::decode::Instruction;
+use crate::decode::Operation::*;
+use std::fmt;
+use std::ops::{self, RangeInclusive};
+
+const SREG: u16 = 0x5F;
+
+/// A set of registers and flags: registers by their number, flags behind them by their bit in SREG.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Registers(u64);
+
+/// How many registers there are; the flags come behind them.
+const REGISTERS: usize = 32;
+
+impl Registers {
+    pub(crate) const NONE: Registers = Registers(0);
+    /// The pair that a multiplication's product is in.
+    const PRODUCT: Registers = Registers(0b11);
+    /// All flags but the interrupts'.
+    pub(crate) const FLAGS: Registers = flags(0b0111_1111);
+    pub(crate) const ZERO_FLAG: Registers = Z;
+    pub(crate) const CARRY_FLAG: Registers = C;
+    /// All registers and flags.
+    pub(crate) const ALL: Registers = Registers(Registers::FLAGS.0 | ((1 << REGISTERS) - 1));
+
+    pub(crate) fn one(register: usize) -> Registers {
+        Registers(1 << register)
+    }
+
+    fn pair(lower: usize) -> Registers {
+        Registers(0b11 << lower)
+    }
+
+    pub(crate) fn contains(self, register: usize) -> bool {
+        self.0 >> register & 1 == 1
+    }
+
+    pub(crate) fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
+    /// Those of it that are registers or flags, one after the other.
+    pub(crate) fn iter(self) -> impl Iterator<Item = usize> {
+        (0..REGISTERS + 7).filter(move |&register| self.contains(register))
+    }
+
+    /// Registers that are neighbours.
+    pub(crate) const fn range(registers: RangeInclusive<usize>) -> Registers {
+        Registers((2 << *registers.end()) - (1 << *registers.start()))
+    }
+
+    /// Every register for which that holds.
+    pub(crate) fn which(holds: impl Fn(usize) -> bool) -> Registers {
+        let registers = (0..REGISTERS).filter(|&register| holds(register));
+        registers.fold(Registers::NONE, |all, register| all | Registers::one(register))
+    }
+}
+
+impl ops::BitOr for Registers {
+    type Output = Registers;
+
+    fn bitor(self, other: Registers) -> Registers {
+        Registers(self.0 | other.0)
+    }
+}
+
+impl ops::BitOrAssign for Registers {
+    fn bitor_assign(&mut self, other: Registers) {
+        self.0 |= other.0;
+    }
+}
+
+impl ops::BitAnd for Registers {
+    type Output = Registers;
+
+    fn bitand(self, other: Registers) -> Registers {
+        Registers(self.0 & other.0)
+    }
+}
+
+impl ops::Sub for Registers {
+    type Output = Registers;
+
+    fn sub(self, other: Registers) -> Registers {
+        Registers(self.0 & !other.0)
+    }
+}
+
+/// Names: `r5, r6`, and a flag by its letter.
+impl fmt::Display for Registers {
+    fn fmt(&self, to: &mut fmt::Formatter) -> fmt::Result {
+        let names = self.iter().map(|register| match register.checked_sub(REGISTERS) {
+            None => format!("r{register}"),
+            Some(flag) => format!("flag {}", char::from(b"CZNVSHT"[flag])),
+        });
+        to.write_str(&names.collect::<Vec<_>>().join(", "))
+    }
+}
+
+/// The flags with these bits in SREG.
+const fn flags(bits: u64) -> Registers {
+    Registers(bits << REGISTERS)
+}
+
+// Flags by their bit in SREG, and those that instructions of a kind change.
+const C: Registers = flags(1);
+const Z: Registers = flags(1 << 1);
+const T: Registers = flags(1 << 6);
+const SVNZ: Registers = flags(0b01_1110);
+const SVNZC: Registers = flags(0b01_1111);
+const HSVNZC: Registers = flags(0b11_1111);
+
+/// What an instruction does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Effects {
+    pub(crate) reads: Registers,
+    pub(crate) changes: Registers,
+    /// It does something else as well: to memory, to a peripheral, to the stack, or to where the program goes.
+    pub(crate) acts: bool,
+}
+
+impl Instruction {
+    /// What it reads and changes.
+    pub(crate) fn effects(&self) -> Effects {
+        use Registers as R;
+
+        let (d, r) = (self.destination(), self.source());
+        let (to, from) = (R::one(d), R::one(r));
+        let flag = flags(1 << self.operand('s')) & R::FLAGS;
+        let pointer = self.pointer().map_or(R::NONE, R::pair);
+        let moved = self.moved_pointer().map_or(R::NONE, R::pair);
+        // A register less itself, or with itself by exclusive or, is 0 or made of the carry, whatever it held.
+        let is_same = d == r;
+        let (reads, changes, acts) = match self.operation {
+            Sub | Eor if is_same => (R::NONE, to | if self.operation == Sub { HSVNZC } else { SVNZ }, false),
+            Sbc if is_same => (C | Z, to | HSVNZC, false),
+            Add | Sub => (to | from, to | HSVNZC, false),
+            Adc => (to | from | C, to | HSVNZC, false),
+            Sbc => (to | from | C | Z, to | HSVNZC, false),
+            Subi | Neg => (to, to | HSVNZC, false),
+            Sbci => (to | C | Z, to | HSVNZC, false),
+            And | Or | Eor => (to | from, to | SVNZ, false),
+            Andi | Ori | Inc | Dec => (to, to | SVNZ, false),
+            Com | Asr | Lsr => (to, to | SVNZC, false),
+            Ror => (to | C, to | SVNZC, false),
+            Adiw | Sbiw => (R::pair(d), R::pair(d) | SVNZC, false),
+            Mul | Muls | Mulsu | Fmul | Fmuls | Fmulsu => (to | from, R::PRODUCT | Z | C, false),
+            Cp => (to | from, HSVNZC, false),
+            Cpc => (to | from | C | Z, HSVNZC, false),
+            Cpi => (to, HSVNZC, false),
+            Swap => (to, to, false),
+            Mov => (from, to, false),
+            Movw => (R::pair(r), R::pair(d), false),
+            Ldi => (R::NONE, to, false),
+            Bst => (to, T, false),
+            Bld => (to | T, to, false),
+            Bset | Bclr => (R::NONE, flag, flag.is_empty()),
+            Brbs | Brbc => (flag, R::NONE, true),
+            Cpse => (to | from, R::NONE, true),
+            Sbrc | Sbrs => (from, R::NONE, true),
+            // Functions read the status register for its interrupt flag, handlers to put it back, which is followed by itself.
+            In | Lds => (R::NONE, to, false),
+            Out | Sts => (from, R::NONE, true),
+            Ld | Ldd => (pointer, to | moved, false),
+            Lpm | Elpm => (pointer, to | moved, false),
+            St | Std => (pointer | from, moved, true),
+            // What is on the stack is followed by itself.
+            Push => (R::NONE, R::NONE, true),
+            Pop => (R::NONE, to, true),
+            Break | Call | Cbi | Eicall | Eijmp | Icall | Ijmp | Jmp | Nop | Rcall | Ret | Reti | Rjmp | Sbi | Sbic
+            | Sbis | Sleep | Spm | Wdr => (R::NONE, R::NONE, true),
+        };
+        Effects { reads, changes, acts }
+    }
+
+    /// Whether it puts a whole byte into the status register, or takes it from there.
+    pub(crate) fn is_of_status(&self) -> bool {
+        matches!(self.operation, In | Out | Lds | Sts) && self.data_address() == Some(SREG)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::concrete::Concrete;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    unsafe extern "C" {
+        /// Runs the next instruction. It stands in sim_core.h, which simavr-ffi leaves out of its bindings.
+        fn avr_run_one(avr: *mut simavr_ffi::avr_t) -> simavr_ffi::avr_flashaddr_t;
+    }
+
+    /// Registers and flags, each with what it holds: a byte, or 0 or 1.
+    type Contents = [u8; REGISTERS + 7];
+
+    /// A chip that carries single instructions out.
+    struct Chip(*mut simavr_ffi::avr_t);
+
+    impl Chip {
+        fn new() -> Chip {
+            // SAFETY: the name is a string of C; the chip is initialised once, and belongs to this value alone.
+            unsafe {
+                let avr = simavr_ffi::avr_make_mcu_by_name(c"atmega328p".as_ptr());
+                simavr_ffi::avr_init(avr);
+                Chip(avr)
+            }
+        }
+
+        /// Carries an instruction of these two words out and returns what registers and flags hold then.
+        fn run(&mut self, words: [u16; 2], before: &Contents) -> Contents {
+            /// Where it stands: no vector lies there.
+            const PLACE: usize = 0x100;
+
+            let mut behind = *before;
+            // SAFETY: the chip lives as long as this value; its flash has 32 KB, its data space begins with the registers, and
+            // SREG has 8 flags of a byte each.
+            unsafe {
+                let avr = &mut *self.0;
+                for (place, byte) in words.iter().flat_map(|word| word.to_le_bytes()).enumerate() {
+                    *avr.flash.add(PLACE + place) = byte;
+                }
+                avr.pc = PLACE as u32;
+                avr.state = simavr_ffi::cpu_Running as _;
+                std::ptr::copy_nonoverlapping(before.as_ptr(), avr.data, REGISTERS);
+                avr.sreg[..7].copy_from_slice(&before[REGISTERS..]);
+                avr_run_one(avr);
+                std::ptr::copy_nonoverlapping(avr.data, behind.as_mut_ptr(), REGISTERS);
+                behind[REGISTERS..].copy_from_slice(&avr.sreg[..7]);
+            }
+            behind
+        }
+    }
+
+    /// Whatever registers and flags can hold, with pointers into SRAM, and away from its ends by more than a displacement.
+    fn any_contents(random: &mut ChaCha8Rng) -> Contents {
+        std::array::from_fn(|register| match register {
+            27 | 29 | 31 => random.random_range(2..6),
+            REGISTERS.. => random.random_range(0..2),
+            // Ends of the range are where flags change.
+            _ if random.random_bool(0.3) => [0, 1, 0x7F, 0x80, 0xFF][random.random_range(0..5)],
+            _ => random.random(),
+        })
+    }
+
+    #[test]
+    fn an_instruction_changes_and_reads_in_the_simulator_what_it_is_said_to() {
+        /// An address in SRAM for those that have it in their second word, and GPIOR0, which does nothing, for `in`.
+        const ADDRESS: u16 = 0x0300;
+        const GPIOR0: u16 = 0x3E;
+
+        let chip_of_table = crate::chip::Chip::named("atmega328p").expect("it is in the table");
+        let mut chip = Chip::new();
+        let mut random = ChaCha8Rng::seed_from_u64(1);
+        let (mut seen, mut computed) = (0, 0);
+        for word in 0..=u16::MAX {
+            let bytes = [word.to_le_bytes(), ADDRESS.to_le_bytes()].concat();
+            let Some(instruction) = Instruction::at(&bytes, 0).filter(|found| chip_of_table.has(found.operation))
+            else {
+                continue;
+            };
+            let Effects { reads, changes, acts } = instruction.effects();
+            let is_store = matches!(instruction.operation, St | Std | Sts);
+            let is_harmless_input = instruction.operation != In || instruction.data_address() == Some(GPIOR0);
+            if acts && !is_store || !is_harmless_input {
+                continue;
+            }
+            seen += 1;
+            for _ in 0..4 {
+                let before = any_contents(&mut random);
+                let behind = chip.run([word, ADDRESS], &before);
+                for place in (Registers::ALL - changes).iter() {
+                    assert_eq!(
+                        behind[place],
+                        before[place],
+                        "{} changes {}",
+                        instruction.mnemonic(),
+                        Registers::one(place)
+                    );
+                }
+                let mut concrete = Concrete { registers: [0; 32], status: 0 };
+                concrete.registers.copy_from_slice(&before[..REGISTERS]);
+                concrete.status = (0..7).fold(0, |status, flag| status | before[REGISTERS + flag] << flag);
+                if concrete.carry_out(&instruction) {
+                    computed += 1;
+                    let flags = (0..7).map(|flag| concrete.status >> flag & 1);
+                    let all: Vec<u8> = concrete.registers.into_iter().chain(flags).collect();
+                    assert_eq!(all, behind, "{} from {before:?}", instruction.mnemonic());
+                }
+                // What is not read may hold anything else.
+                let other = any_contents(&mut random);
+                let other =
+                    std::array::from_fn(|place| if reads.contains(place) { before[place] } else { other[place] });
+                let behind_other = chip.run([word, ADDRESS], &other);
+                for place in changes.iter() {
+                    assert_eq!(
+                        behind_other[place],
+                        behind[place],
+                        "{} reads more for {}",
+                        instruction.mnemonic(),
+                        Registers::one(place)
+                    );
+                }
+            }
+        }
+        assert!(seen > 40_000 && computed > 100_000, "{seen} instructions, {computed} computed");
+    }
+}

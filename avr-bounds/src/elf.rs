@@ -1,0 +1,367 @@
+//! What the analysis takes from an ELF: the bytes in flash and of initialised variables, the functions, the chip, and what the program says
+//! of its loops.
+
+use crate::chip::Chip;
+use crate::lines::Lines;
+use crate::loops;
+use object::read::elf::{ElfFile32, ElfSymbol32, ProgramHeader};
+use object::{
+    Architecture, LittleEndian, Object, ObjectSection, ObjectSymbol, RelocationFlags, RelocationTarget, SectionKind,
+    SymbolKind, elf,
+};
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+/// Where AVR ELF files place SRAM and EEPROM in their single address space.
+const SRAM_ORIGIN: u32 = 0x80_0000;
+const EEPROM_ORIGIN: u32 = 0x81_0000;
+
+/// The section in which avr-gcc names the chip.
+const DEVICE_INFO: &str = ".note.gnu.avr.deviceinfo";
+
+/// Why an ELF could not be read.
+#[derive(Debug, thiserror::Error)]
+pub enum ElfError {
+    /// The file could not be read.
+    #[error("{path} could not be read")]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// The operating system's answer.
+        source: std::io::Error,
+    },
+    /// The file is no ELF, or a broken one.
+    #[error("{path} is not a readable ELF file ({reason})")]
+    NotElf {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: object::Error,
+    },
+    /// The file was made for another processor.
+    #[error("{path} was made for {architecture:?}: an ELF for AVR is needed")]
+    NotAvr {
+        /// The file.
+        path: PathBuf,
+        /// What it was made for.
+        architecture: Architecture,
+    },
+    /// The file does not name its chip, and neither did the caller.
+    #[error(
+        "{path} does not say what chip it is for: name it with --chip or `chip = ..` in the budgets, as one of {}",
+        names()
+    )]
+    NoChip {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The chip is not in the table.
+    #[error("the chip {name} is not known: the known ones are {}", names())]
+    UnknownChip {
+        /// Its name.
+        name: String,
+    },
+    /// The file holds more than the chip does.
+    #[error("{path} has {end} bytes for the flash: the {chip} holds {limit}; --chip names another chip")]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// Address behind the last byte.
+        end: u32,
+        /// The chip.
+        chip: &'static str,
+        /// Its flash.
+        limit: u32,
+    },
+}
+
+/// The chips' names.
+fn names() -> String {
+    crate::chip::CHIPS.map(|chip| chip.name).join(", ")
+}
+
+/// A function's symbol.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Symbol {
+    /// Its name as its source has it: a Rust or C++ path, without the compiler's numbers.
+    pub name: String,
+    /// Its size in bytes; 0 where the file does not say it.
+    pub bytes: u32,
+}
+
+/// An ELF, taken apart.
+#[derive(Debug)]
+pub struct Program {
+    /// The chip it is for.
+    pub chip: Chip,
+    /// Flash from address 0 to the last byte used.
+    pub flash: Vec<u8>,
+    /// Where a reset starts it, in bytes of flash.
+    pub start: u32,
+    /// Whether interrupt vectors stand at its start.
+    pub has_vectors: bool,
+    /// Its functions by their addresses. Of two names for one address the first in the alphabet is kept.
+    pub functions: BTreeMap<u32, Symbol>,
+    /// Every symbol in flash by its raw name.
+    pub(crate) labels: BTreeMap<String, u32>,
+    /// Where code can begin, behind the vectors, and where flash ends but for the initial values of variables.
+    pub(crate) code_start: u32,
+    code_end: u32,
+    /// Initial values of variables.
+    pub(crate) data: Vec<u8>,
+    /// Which of these bytes are virtual tables.
+    pub(crate) virtual_tables: Vec<Range<usize>>,
+    /// Functions whose address is taken outside virtual tables and the tables of constructors, where the relocations are kept.
+    pub(crate) taken: Option<BTreeSet<u32>>,
+    /// What loops say of themselves.
+    pub(crate) records: BTreeMap<u32, u64>,
+    lines: Lines,
+}
+
+impl Program {
+    /// Reads the ELF at `path`, for the chip named, or the one that the file names.
+    ///
+    /// # Errors
+    /// Where the file cannot be read, is no ELF for AVR, is for no known chip, or holds more than it.
+    pub fn read(path: &Path, chip: Option<&str>) -> Result<Program, ElfError> {
+        let bytes = std::fs::read(path).map_err(|source| ElfError::Read { path: path.into(), source })?;
+        let not_elf = |reason| ElfError::NotElf { path: path.into(), reason };
+        let architecture = object::File::parse(&*bytes).map_err(not_elf)?.architecture();
+        if architecture != Architecture::Avr {
+            return Err(ElfError::NotAvr { path: path.into(), architecture });
+        }
+        let file: ElfFile32<LittleEndian> = ElfFile32::parse(&*bytes).map_err(not_elf)?;
+        let name = chip.map(str::to_owned).or_else(|| device(&file)).ok_or(ElfError::NoChip { path: path.into() })?;
+        let chip = Chip::named(&name).ok_or(ElfError::UnknownChip { name })?;
+
+        let (mut flash, mut data, mut data_start) = (Vec::new(), Vec::new(), 0);
+        let (mut start, mut code_end) = (u32::MAX, 0);
+        for header in file.elf_program_headers() {
+            let content = header.data(LittleEndian, &*bytes).unwrap_or_default();
+            let address = header.p_paddr(LittleEndian);
+            if header.p_type(LittleEndian) != elf::PT_LOAD || content.is_empty() || address >= SRAM_ORIGIN {
+                continue;
+            }
+            let end = address + content.len() as u32;
+            if end > chip.flash_bytes {
+                return Err(ElfError::TooLarge { path: path.into(), end, chip: chip.name, limit: chip.flash_bytes });
+            }
+            start = start.min(address);
+            if flash.len() < end as usize {
+                // Erased flash reads as 0xFF.
+                flash.resize(end as usize, 0xFF);
+            }
+            flash[address as usize..end as usize].copy_from_slice(content);
+            if (SRAM_ORIGIN..EEPROM_ORIGIN).contains(&header.p_vaddr(LittleEndian)) {
+                data_start = header.p_vaddr(LittleEndian);
+                data = content.to_vec();
+            } else {
+                code_end = code_end.max(end);
+            }
+        }
+        let labels: BTreeMap<String, u32> = (file.symbols())
+            .filter(|symbol| symbol.address() < u64::from(SRAM_ORIGIN))
+            .filter_map(|symbol| Some((symbol.name().ok()?.to_owned(), symbol.address() as u32)))
+            .collect();
+        let virtual_tables = (file.symbols())
+            .filter(|symbol| symbol.name().is_ok_and(|name| name.starts_with("_ZTV")))
+            .filter_map(|symbol| {
+                let first = (symbol.address() as u32).checked_sub(data_start)? as usize;
+                let table = first..first + symbol.size() as usize;
+                data.get(table.clone()).map(|_| table)
+            })
+            .collect();
+        // A program that lies behind address 0 is a bootloader; some have no vectors.
+        let start = if start == u32::MAX { 0 } else { start };
+        let has_vectors = start == 0 || labels.get("__vectors") == Some(&start);
+        let records = loops::records_of(&file).map_err(not_elf)?;
+        let functions = functions(&file);
+        let taken = taken(&file, &functions, &labels);
+        let vectors = if has_vectors { u32::from(chip.vectors) * chip.vector_bytes } else { 0 };
+        Ok(Program {
+            chip,
+            flash,
+            start,
+            has_vectors,
+            functions,
+            taken,
+            labels,
+            code_start: start + vectors,
+            code_end,
+            data,
+            virtual_tables,
+            records,
+            lines: Lines::of(path),
+        })
+    }
+
+    /// What loops say of themselves: by an address in the loop, how often the program comes by it.
+    pub fn records(&self) -> &BTreeMap<u32, u64> {
+        &self.records
+    }
+
+    /// File and line of an address, if the ELF has debug information.
+    pub fn line(&self, address: u32) -> Option<String> {
+        self.lines.at(address)
+    }
+
+    /// The functions of a name.
+    pub(crate) fn functions_called(&self, name: &str) -> Vec<u32> {
+        let all = self.functions.iter().filter(|(_, symbol)| symbol.name == name);
+        all.map(|(address, _)| *address).collect()
+    }
+
+    /// Flash in front of the first function, and between functions, in which constants can lie.
+    pub(crate) fn gaps(&self) -> impl Iterator<Item = Range<u32>> {
+        let ends = self.functions.keys().filter_map(|&function| Some(self.extent(function)?.1));
+        let begins = self.functions.keys().copied().chain([self.code_end]);
+        [self.code_start].into_iter().chain(ends).zip(begins).map(|(end, begin)| end..begin)
+    }
+
+    /// Where the function ends that an address lies in, and where it begins.
+    pub(crate) fn extent(&self, address: u32) -> Option<(u32, u32)> {
+        let (&first, symbol) = self.functions.range(..=address).next_back()?;
+        let next = self.functions.range(address + 1..).next().map_or(self.flash.len() as u32, |(&next, _)| next);
+        Some((first, if symbol.bytes > 0 { (first + symbol.bytes).max(address + 2) } else { next }))
+    }
+}
+
+/// The chip that an ELF was made for, if it says so.
+fn device(file: &ElfFile32<LittleEndian>) -> Option<String> {
+    /// Where the names begin: behind the note's head, six sizes, and the table of one name.
+    const NAMES: usize = 0x31;
+
+    let note = file.section_by_name(DEVICE_INFO)?.data().ok()?;
+    let name = note.get(NAMES..)?.split(|byte| *byte == 0).next()?;
+    Some(String::from_utf8_lossy(name).into_owned()).filter(|name| !name.is_empty())
+}
+
+fn functions(file: &ElfFile32<LittleEndian>) -> BTreeMap<u32, Symbol> {
+    // Those of libgcc have a size and no type.
+    let is_code = |symbol: &ElfSymbol32<LittleEndian>| {
+        let section = symbol.section_index().and_then(|index| file.section_by_index(index).ok());
+        section.is_some_and(|section| section.kind() == SectionKind::Text)
+    };
+    let is_function = |symbol: &ElfSymbol32<LittleEndian>| match symbol.kind() {
+        SymbolKind::Text => true,
+        SymbolKind::Unknown => is_code(symbol) && symbol.size() > 0,
+        _ => false,
+    };
+    let mut functions: BTreeMap<u32, Symbol> = BTreeMap::new();
+    for symbol in file.symbols().filter(|symbol| is_function(symbol) && symbol.address() < u64::from(SRAM_ORIGIN)) {
+        let Ok(name) = symbol.name() else { continue };
+        let (name, bytes) = (demangled(name), symbol.size() as u32);
+        if name.is_empty() {
+            continue;
+        }
+        let new = Symbol { name, bytes };
+        let rank = |symbol: &Symbol| (symbol.bytes == 0, symbol.name.clone());
+        functions
+            .entry(symbol.address() as u32)
+            .and_modify(|known| {
+                if rank(&new) < rank(known) {
+                    *known = new.clone();
+                }
+            })
+            .or_insert(new);
+    }
+    functions
+}
+
+/// The functions whose address is taken, by the relocations that `--emit-relocs` keeps; `None` where there are none. Left out are virtual
+/// tables and the tables of constructors.
+fn taken(
+    file: &ElfFile32<LittleEndian>,
+    functions: &BTreeMap<u32, Symbol>,
+    labels: &BTreeMap<String, u32>,
+) -> Option<BTreeSet<u32>> {
+    /// Word addresses: in memory, and in `ldi`, directly and by a trampoline (binutils, elf/avr.h).
+    const OF_WORDS: [u32; 6] = [5, 12, 13, 14, 24, 25];
+
+    let label = |name: &str| labels.get(name).copied().unwrap_or_default();
+    let constructors =
+        label("__ctors_start").min(label("__dtors_start"))..label("__ctors_end").max(label("__dtors_end"));
+    let tables: Vec<Range<u64>> = (file.symbols())
+        .filter(|symbol| symbol.name().is_ok_and(|name| name.starts_with("_ZTV")))
+        .map(|symbol| symbol.address()..symbol.address() + symbol.size())
+        .collect();
+    let mut taken = BTreeSet::new();
+    let mut is_kept = false;
+    for section in file.sections().filter(|section| section.kind() != SectionKind::Other && section.size() > 0) {
+        for (place, relocation) in section.relocations() {
+            is_kept |= section.kind() == SectionKind::Text;
+            let RelocationFlags::Elf { r_type } = relocation.flags() else { continue };
+            let RelocationTarget::Symbol(symbol) = relocation.target() else { continue };
+            let Ok(symbol) = file.symbol_by_index(symbol) else { continue };
+            // In a linked file a relocation's place is an address.
+            let is_elsewhere = tables.iter().any(|table| table.contains(&place))
+                || u32::try_from(place).is_ok_and(|place| constructors.contains(&place));
+            let address = symbol.address().wrapping_add_signed(relocation.addend()) as u32;
+            if OF_WORDS.contains(&r_type.0) && !is_elsewhere && functions.contains_key(&address) {
+                taken.insert(address);
+            }
+        }
+    }
+    is_kept.then_some(taken)
+}
+
+/// A symbol's name as its source has it: a Rust path without the types that it is made for, or a C++ name without its parameters.
+fn demangled(name: &str) -> String {
+    // A local symbol may carry a number behind its mangled name.
+    let (mangled, suffix) = name.split_once('.').unwrap_or((name, ""));
+    if let Ok(rust) = rustc_demangle::try_demangle(mangled) {
+        return without_types(&format!("{rust:#}"));
+    }
+    let cpp = cpp_demangle::Symbol::new(mangled).ok().filter(|_| mangled.starts_with("_Z"));
+    let options = cpp_demangle::DemangleOptions::new().no_return_type().hide_expression_literal_types();
+    let cpp = cpp.and_then(|symbol| symbol.demangle_with_options(&options).ok());
+    cpp.unwrap_or_else(|| if suffix.is_empty() { mangled.to_owned() } else { name.to_owned() })
+}
+
+/// A function's path without the types that it is made for: of `<a::B<c::D> as e::F>::g::<h>` remains `a::B::g`.
+fn without_types(name: &str) -> String {
+    let Some(inner) = name.strip_prefix('<') else {
+        let mut depth = 0;
+        let kept = name.replace("::<", "<").replace("->", "");
+        return kept
+            .chars()
+            .filter(|&letter| {
+                depth += i32::from(letter == '<');
+                let is_kept = depth == 0;
+                depth -= i32::from(letter == '>');
+                is_kept
+            })
+            .collect();
+    };
+    let mut depth = 1;
+    let end = inner.char_indices().find(|(_, letter)| {
+        depth += i32::from(*letter == '<') - i32::from(*letter == '>');
+        depth == 0
+    });
+    let Some((end, _)) = end else { return name.to_owned() };
+    let (of, method) = (without_types(&inner[..end]), without_types(&inner[end + 1..]));
+    let of = of.split(" as ").next().unwrap_or_default();
+    format!("{of}{method}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_paths_without_types() {
+        for (name, short) in [
+            ("weeder_firmware::run", "weeder_firmware::run"),
+            ("control::say::say_numbers::<weeder_firmware::serial::Serial>", "control::say::say_numbers"),
+            (
+                "<control::taught::FieldExamples<weeder_firmware::eeprom::Half>>::slot",
+                "control::taught::FieldExamples::slot",
+            ),
+            ("<a::Half as control::memory::Memory>::read", "a::Half::read"),
+            ("knn::search::<5, 2, (&a::B, &c::D<e::F>)>::{closure#0}", "knn::search::{closure#0}"),
+        ] {
+            assert_eq!(without_types(name), short);
+        }
+    }
+}

@@ -1,0 +1,201 @@
+//! Why nothing could be proved of a program, where, and what to write.
+
+use crate::elf::ElfError;
+use crate::proved::Place;
+use std::fmt;
+
+/// Why nothing could be proved.
+#[derive(Debug, thiserror::Error)]
+pub enum BoundsError {
+    /// The ELF cannot be read.
+    #[error(transparent)]
+    Elf(#[from] ElfError),
+    /// The budgets tell of functions that the program does not have.
+    #[error(
+        "no function of the program is called {}, which the budgets name in [{table}]: take the names that `avr-objdump -dC` shows",
+        names.join(" or ")
+    )]
+    NoSuchFunction {
+        /// The table in the budgets.
+        table: &'static str,
+        /// What they are said to be called.
+        names: Vec<String>,
+    },
+    /// The program does something at a place that cannot be followed.
+    #[error("{} {problem}, at {:#06x}{}{}", place.function, place.address, Line(place), problem.advice(place))]
+    At {
+        /// Where.
+        place: Place,
+        /// What it does.
+        problem: Problem,
+    },
+    /// Functions that call each other in a circle.
+    #[error(
+        "there is recursion, which has no deepest stack: {} calls itself: say in the budgets how many calls are active at once, \
+         as in [recursion] {:?} = {{ depth = 3, because = \"..\" }}; if a call by a pointer is taken for one of these, link with \
+         -Wl,--emit-relocs, which tells the functions whose address is taken",
+        circle.join(", which calls "),
+        circle.first().map_or("", String::as_str)
+    )]
+    Recursion {
+        /// The functions, the first once more at the end.
+        circle: Vec<String>,
+    },
+    /// A handler that lets others come in.
+    #[error(
+        "the handler of vector {vector} turns interrupts on at {:#06x}{}, in {}: handlers could nest without an end",
+        place.address, Line(place), place.function
+    )]
+    HandlerEnables {
+        /// The vector.
+        vector: u8,
+        /// Where.
+        place: Place,
+    },
+    /// A loop where time has to have a bound.
+    #[error(
+        "{what} has a loop without a bound, at {:#06x}{} in {}: say how often it turns, by a record in .loop_bounds or for the function, \
+         as in [loops] {:?} = {{ passes = 9, because = \"..\" }}",
+        place.address, Line(place), place.function, place.function
+    )]
+    Unbounded {
+        /// What has no bound.
+        what: String,
+        /// Where the loop begins.
+        place: Place,
+    },
+    /// Functions change registers that are needed behind their calls.
+    #[error("a value is needed behind a call that clobbers it:{}", all.iter().map(Clobbered::to_string).collect::<String>())]
+    Clobbered {
+        /// Every call that does.
+        all: Vec<Clobbered>,
+    },
+    /// A function breaks the calling convention.
+    #[error(
+        "{function} does not preserve {registers}, which the calling convention asks of every function: mend it, or write \
+         `registers = \"followed\"` into the budgets if a compiler chose so, or `registers = \"unchecked\"`"
+    )]
+    NotPreserved {
+        /// The function.
+        function: String,
+        /// The registers.
+        registers: String,
+    },
+    /// A handler leaves something else in registers or flags than it found there.
+    #[error("the handler of vector {vector}, {function}, does not put back what it found in {registers}")]
+    HandlerSpoils {
+        /// The vector.
+        vector: u8,
+        /// The handler.
+        function: String,
+        /// The registers and flags.
+        registers: String,
+    },
+    /// The watched vectors do not come before all others.
+    #[error(
+        "vector {other} goes before vector {vector} and is not among those whose edges are watched, so their longest wait is not bounded"
+    )]
+    NotFirst {
+        /// One that is watched.
+        vector: u8,
+        /// The one before it.
+        other: u8,
+    },
+    /// A watched vector has no handler, or one that does not look once.
+    #[error(
+        "the handler of vector {vector} does not read the port at {port:#04x} exactly once on every path, or there is none"
+    )]
+    DoesNotLook {
+        /// The vector.
+        vector: u8,
+        /// The port's address in the data space.
+        port: u16,
+    },
+}
+
+/// A place's line, in brackets.
+struct Line<'a>(&'a Place);
+
+impl fmt::Display for Line<'_> {
+    fn fmt(&self, to: &mut fmt::Formatter) -> fmt::Result {
+        self.0.source.iter().try_for_each(|source| write!(to, " ({source})"))
+    }
+}
+
+/// What cannot be followed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Problem {
+    /// A word that is no instruction, or none of this chip.
+    NoInstruction,
+    /// A call or a jump to an address that is worked out.
+    Indirect,
+    /// The status register gets a value that is not known.
+    UnknownStatus,
+    /// The stack pointer gets a value that is not known.
+    UnknownStack,
+    /// An interrupt could come between the two halves of the stack pointer.
+    HalfAStackPointer,
+    /// A stack that grows without an end.
+    GrowsForEver,
+    /// A function that takes what is not its own from the stack.
+    TakesTooMuch,
+    /// A return to an address that the function has put onto the stack.
+    ReturnsElsewhere,
+    /// `ret` in a handler, or `reti` elsewhere.
+    WrongReturn,
+    /// The register for long indirect jumps gets a value other than 0.
+    LongIndirect,
+}
+
+impl fmt::Display for Problem {
+    fn fmt(&self, to: &mut fmt::Formatter) -> fmt::Result {
+        to.write_str(match self {
+            Problem::NoInstruction => "comes to a place where there is no instruction of the chip",
+            Problem::Indirect => "calls or jumps to an address that it works out",
+            Problem::UnknownStatus => "sets the interrupt flag by a value that is not a saved SREG",
+            Problem::UnknownStack => "sets the stack pointer to what cannot be followed",
+            Problem::HalfAStackPointer => "lets an interrupt come in between the two halves of the stack pointer",
+            Problem::GrowsForEver => "puts more onto the stack in every turn of a loop",
+            Problem::TakesTooMuch => "takes more from the stack than it has put there",
+            Problem::ReturnsElsewhere => "returns with a stack that is not as it found it",
+            Problem::WrongReturn => "ends a handler by `ret`, or a function by `reti`, or the program",
+            Problem::LongIndirect => "sets EIND to something else than 0",
+        })
+    }
+}
+
+impl Problem {
+    /// What to write, behind a colon.
+    fn advice(self, place: &Place) -> String {
+        match self {
+            Problem::Indirect => {
+                format!(": list the functions in the budgets, as in [calls] {:?} = [\"..\"]", place.function)
+            }
+            Problem::UnknownStack => {
+                ": alloca and arrays of unknown length have no bound, take an array of fixed length".into()
+            }
+            Problem::NoInstruction => ": check that --chip is the one that the program was built for".into(),
+            _ => String::new(),
+        }
+    }
+}
+
+/// A call behind which registers are needed that the function changes.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Clobbered {
+    /// The call's address.
+    pub address: u32,
+    /// The function that calls.
+    pub function: String,
+    /// The function that is called.
+    pub called: String,
+    /// The registers.
+    pub registers: String,
+}
+
+impl fmt::Display for Clobbered {
+    fn fmt(&self, to: &mut fmt::Formatter) -> fmt::Result {
+        let Clobbered { address, function, called, registers } = self;
+        write!(to, "\n  {address:#06x} {function} calls {called}, which clobbers {registers}")
+    }
+}

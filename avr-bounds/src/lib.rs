@@ -1,0 +1,328 @@
+//! What an AVR program can need at most, proved from its ELF: stack, handlers, stretches without interrupts, and how fast the edges of
+//! an input may follow each other.
+//!
+//! [`prove`] follows every path of the program in flash, from the reset vector and from every interrupt's, and takes the deepest and the
+//! longest. The program is not run, and nothing is sampled. So the bounds hold for every input and every phase.
+//!
+//! ```no_run
+//! use avr_bounds::{Budgets, Program, prove};
+//!
+//! let program = Program::read("blink.elf".as_ref(), None)?;
+//! let bounds = prove(&program, &Budgets::default())?;
+//! println!("{} bytes of stack", bounds.stack_bytes);
+//! # Ok::<(), avr_bounds::BoundsError>(())
+//! ```
+//!
+//! What it takes for granted: handlers do not turn interrupts on (this is checked, and refused), stores through pointers keep off return
+//! addresses and saved registers, and the program gets the address of a function from one of the places where the README says that
+//! such addresses are found. A path that the program never takes is followed like any other. So a bound can be larger than what ever
+//! happens, never smaller.
+//!
+//! # The response of a handler
+//!
+//! A request waits for the longest other handler of lower rank, or for its own; for each handler of higher rank once; and in front of each of
+//! them for the longest stretch of the main program in which no interrupt comes in. After each handler the program is given one
+//! instruction, and that one may turn interrupts off. Handlers that ask more often than once in this time make the wait longer.
+//!
+//! # The rate that is never lost
+//!
+//! An edge asks for a handler, and the handler looks at the pins. From an edge that comes right behind one look to the next look
+//! pass, at most: the chip's synchroniser; the longest other handler, or what is left of this one behind its look; the longest
+//! stretch of the main program in which no interrupt comes in; the interrupt's response; the handler up to its look. While no more
+//! edges come in that time than the decoder can tell apart, none is ever lost, however long it goes on. It holds for the
+//! vectors that go before all others that the program uses, which is checked.
+
+mod budget;
+mod chip;
+#[cfg(feature = "cli")]
+pub mod command;
+mod concrete;
+mod counted;
+mod cycles;
+mod decode;
+mod effects;
+mod elf;
+mod error;
+mod flow;
+mod lines;
+mod loops;
+mod order;
+mod paths;
+mod proved;
+mod registers;
+mod targets;
+mod values;
+
+pub use self::budget::{Budgets, BudgetsError, BudgetsProblem, Depth, Held, RegisterRule};
+pub use self::chip::{CHIPS, Chip};
+use self::cycles::{Passes, Stretch, Time, Timer};
+use self::decode::{Instruction, Operation};
+pub use self::elf::{ElfError, Program, Symbol};
+pub use self::error::{BoundsError, Clobbered, Problem};
+use self::flow::{Code, Entry, Kind, Node, Routine, bytes};
+pub use self::loops::{LoopBound, LoopBounds};
+pub use self::order::order;
+pub use self::proved::{
+    Bounds, EdgeBounds, Found, Frame, FunctionBounds, Handler, Indirect, Input, Lasting, Longest, Place,
+};
+use self::values::Interrupts;
+use std::collections::{BTreeMap, BTreeSet};
+use std::rc::Rc;
+
+/// Cycles more that a response takes out of sleep (data sheets, interrupt response time), without the time that the oscillator needs.
+const WAKE_UP_CYCLES: u64 = 4;
+
+/// Cycles from an edge at a pin until it asks for its interrupt, at most, and by which it may come before a look and not be seen
+/// (data sheet, pin change interrupt timing, and reading the pin value).
+const SYNCHRONISER_CYCLES: u64 = 3;
+
+/// The instruction at an address of flash, as the proof takes it: its length in bytes and what a disassembler calls it. None where
+/// no instruction stands.
+pub fn instruction_at(flash: &[u8], address: u32) -> Option<(u32, String)> {
+    Instruction::at(flash, address).map(|found| (found.bytes(), found.mnemonic()))
+}
+
+/// Proves what a program needs at most, and how fast the edges of an input may come, if the budgets name one. The facts of the budgets are
+/// used: how often loops turn, where calls lead, how deep recursion goes. Their limits are not ([`Budgets::hold`]).
+///
+/// # Errors
+/// Where the program cannot be followed.
+pub fn prove(elf: &Program, budgets: &Budgets) -> Result<Bounds, BoundsError> {
+    let known: BTreeSet<&str> = elf.functions.values().map(|symbol| symbol.name.as_str()).collect();
+    let tables: [(_, Vec<&String>); 2] =
+        [("loops", budgets.loops.keys().collect()), ("recursion", budgets.recursion.keys().collect())];
+    for (table, names) in tables {
+        let names: Vec<String> = names.into_iter().filter(|name| !known.contains(name.as_str())).cloned().collect();
+        if !names.is_empty() {
+            return Err(BoundsError::NoSuchFunction { table, names });
+        }
+    }
+    let mut code = Code::new(elf, budgets)?;
+    let entry = |address, kind| Entry { address, interrupts: Interrupts::Off, kind, active: 0 };
+    let main = code.follow(entry(elf.start, Kind::Reset))?;
+    let mut handlers = BTreeMap::new();
+    for vector in (1..elf.chip.vectors).filter(|_| elf.has_vectors) {
+        if let Some(address) = handler_of(&code, vector)? {
+            let handler = code.follow(entry(address, Kind::Handler))?;
+            if let Some(address) = handler.enables {
+                return Err(BoundsError::HandlerEnables { vector, place: code.place(address) });
+            }
+            handlers.insert(vector, handler);
+        }
+    }
+    let code = code;
+    let all = || handlers.iter().map(|(&vector, handler)| (vector, handler));
+    let mut timer = Timer::new(&code, passes(&code, budgets));
+    let (critical_section, closed) = [Stretch::FlagClear, Stretch::Closed]
+        .map(|kind| timer.longest_stretch(&main, kind).map(|time| time.longest(&code)))
+        .map(|longest| longest.unwrap_or(Longest { cycles: Some(0), without_bound: Vec::new() }))
+        .into();
+    let of_handlers = time_handlers(&code, &handlers, &mut timer, &closed);
+    let edges = (budgets.input.as_ref())
+        .map(|input| watch(input, &code, &handlers, &of_handlers, &mut timer, &closed))
+        .transpose()?;
+
+    let feeds = |node: &Node| {
+        code.instruction(node.place.address).is_ok_and(|instruction| instruction.operation == Operation::Wdr)
+    };
+    let turns = code.routines().filter(|routine| routine.entry.kind != Kind::Handler);
+    let turns: Vec<Time> = turns.filter_map(|routine| timer.turn(routine, feeds)).collect();
+    let turn = turns.into_iter().reduce(|longest, turn| longest.or(&turn)).map(|turn| turn.longest(&code));
+    let loops: BTreeSet<u32> = code.routines().flat_map(|routine| timer.loops_without_bound(routine)).collect();
+
+    let lasting = match budgets.registers {
+        RegisterRule::Convention => registers::prove_convention(&code, all()).map(|()| None)?,
+        RegisterRule::Followed => Some(registers::prove(&code, &main, all())?),
+        RegisterRule::Unchecked => None,
+    };
+
+    let stack = deepest(&main, handlers.values(), elf.chip.return_address_bytes());
+    Ok(Bounds {
+        chip: elf.chip.name,
+        stack_bytes: bytes(&stack),
+        stack,
+        handlers: of_handlers,
+        critical_section,
+        closed,
+        edges,
+        turn,
+        lasting,
+        loops_without_bound: loops.into_iter().map(|address| code.place(address)).collect(),
+        indirect: indirect(&code),
+        functions: functions(&code, &mut timer),
+    })
+}
+
+/// What is said of loops.
+fn passes(code: &Code, budgets: &Budgets) -> Passes {
+    let loops = &budgets.loops;
+    let functions = code.elf.functions.iter();
+    let by_length = functions.filter(|(_, symbol)| loops.get(&symbol.name).is_some_and(|bound| bound.by_length));
+    let by_length = by_length.map(|(address, _)| *address).collect();
+    let places = code.routines().flat_map(|routine| &routine.nodes).map(|node| node.place.address);
+    let of_heads = places.filter_map(|place| Some((place, loops.get(&code.name(place))?.passes.clone()))).collect();
+    Passes { stated: code.elf.records.clone(), of_heads, by_length }
+}
+
+/// Every handler with its times.
+fn time_handlers(
+    code: &Code,
+    handlers: &BTreeMap<u8, Rc<Routine>>,
+    timer: &mut Timer,
+    closed: &Longest,
+) -> Vec<Handler> {
+    let sleeps = code.routines().flat_map(|routine| &routine.nodes).any(|node| {
+        code.instruction(node.place.address).is_ok_and(|instruction| instruction.operation == Operation::Sleep)
+    });
+    let response = code.elf.chip.response_cycles() + if sleeps { WAKE_UP_CYCLES } else { 0 };
+    let mut timed: Vec<Handler> = (handlers.iter())
+        .map(|(&vector, handler)| {
+            let longest = timer.longest(handler).map(|time| time.longest(code)).unwrap_or_default();
+            Handler {
+                vector,
+                function: code.name_of(handler.entry),
+                cycles: longest.cycles.map(|cycles| response + cycles),
+                without_bound: longest.without_bound,
+                response_cycles: None,
+                stack_bytes: code.elf.chip.return_address_bytes() + bytes(&handler.deepest),
+            }
+        })
+        .collect();
+    // One that never returns lets no other wait: the program ends in it.
+    let time = |handler: &Handler| {
+        if handler.without_bound.is_empty() { Some(handler.cycles.unwrap_or_default()) } else { None }
+    };
+    let responses: Vec<Option<u64>> = (timed.iter())
+        .map(|own| {
+            let (before, behind): (Vec<&Handler>, Vec<&Handler>) =
+                timed.iter().partition(|other| other.vector < own.vector);
+            let closed = closed.cycles?;
+            let running = behind.into_iter().map(time).try_fold(0, |longest, time| Some(time?.max(longest)))?;
+            let before = before.into_iter().map(time).try_fold(0, |sum, time| Some(sum + time? + closed))?;
+            Some(running + before + closed + response)
+        })
+        .collect();
+    for (handler, cycles) in timed.iter_mut().zip(responses) {
+        handler.response_cycles = cycles;
+    }
+    timed
+}
+
+/// How long an edge of an input waits for a look, and how fast its edges may come. `of_handlers` are all handlers with their times.
+fn watch(
+    input: &Input,
+    code: &Code,
+    handlers: &BTreeMap<u8, Rc<Routine>>,
+    of_handlers: &[Handler],
+    timer: &mut Timer,
+    closed: &Longest,
+) -> Result<EdgeBounds, BoundsError> {
+    let is_before_last = |other: u8| input.vectors.last().filter(|last| other < **last).copied();
+    for &other in handlers.keys().filter(|other| !input.vectors.contains(other)) {
+        if let Some(vector) = is_before_last(other) {
+            return Err(BoundsError::NotFirst { vector, other });
+        }
+    }
+    let looks = |node: &Node| code.instruction(node.place.address).is_ok_and(|found| found.reads(input.port));
+    let (mut to_look, mut busy) = (0, 0);
+    for &vector in &input.vectors {
+        let look = handlers.get(&vector).and_then(|handler| timer.around(handler, looks));
+        let (to, behind) = look.ok_or(BoundsError::DoesNotLook { vector, port: input.port })?;
+        let to = to.longest(code).or_refuse("the way to a look")?.unwrap_or_default();
+        to_look = to_look.max(code.elf.chip.response_cycles() + to);
+        busy = busy.max(behind.longest(code).or_refuse("the way from a look")?.unwrap_or_default());
+    }
+    for other in of_handlers.iter().filter(|handler| !input.vectors.contains(&handler.vector)) {
+        let longest = Longest { cycles: other.cycles, without_bound: other.without_bound.clone() };
+        let cycles = longest.or_refuse(&format!("the handler of vector {}", other.vector))?;
+        busy = busy.max(cycles.unwrap_or_default());
+    }
+    let closed = closed.or_refuse("a stretch without interrupts")?.unwrap_or_default();
+    let wait_cycles = SYNCHRONISER_CYCLES + busy + closed + to_look;
+    Ok(EdgeBounds { wait_cycles, never_lost_per_s: input.edges_between_looks * input.clock_hz / wait_cycles })
+}
+
+/// The deepest stack: the main program where a handler comes in, and that handler, or with interrupts off the main program alone.
+fn deepest<'a>(
+    main: &Routine,
+    handlers: impl Iterator<Item = &'a Rc<Routine>>,
+    return_address_bytes: usize,
+) -> Vec<Frame> {
+    let handler = handlers.map(|handler| &handler.deepest).max_by_key(|frames| bytes(frames));
+    let interrupted = main.deepest_interrupted.clone().zip(handler).map(|(mut frames, handler)| {
+        frames.extend_from_slice(handler);
+        let handler = frames.len() - handler.len();
+        if let Some(first) = frames.get_mut(handler) {
+            first.bytes += return_address_bytes;
+        }
+        frames
+    });
+    interrupted.into_iter().chain([main.deepest.clone()]).max_by_key(|frames| bytes(frames)).unwrap_or_default()
+}
+
+/// Every function that is come to, in whatever state of the interrupts.
+fn functions(code: &Code, timer: &mut Timer) -> Vec<FunctionBounds> {
+    let mut found: BTreeMap<u32, (FunctionBounds, Option<Time>)> = BTreeMap::new();
+    for routine in code.routines() {
+        let called = |node: &Node| {
+            let through = node.ways.iter().filter_map(|way| way.through.clone());
+            through.chain(node.ends_in.iter().map(|(_, called)| Rc::clone(called))).collect::<Vec<_>>()
+        };
+        let calls = routine.nodes.iter().flat_map(called).map(|called| code.name_of(called.entry));
+        let time = timer.longest(routine);
+        let (bounds, longest) = found.entry(routine.entry.address).or_insert_with(|| {
+            let bounds = FunctionBounds {
+                function: code.name_of(routine.entry),
+                address: routine.entry.address,
+                stack_bytes: 0,
+                longest: None,
+                calls: BTreeSet::new(),
+            };
+            (bounds, None)
+        });
+        bounds.stack_bytes = bounds.stack_bytes.max(bytes(&routine.deepest));
+        bounds.calls.extend(calls);
+        *longest = match (longest.take(), time) {
+            (Some(one), Some(other)) => Some(one.or(&other)),
+            (one, other) => one.or(other),
+        };
+    }
+    let functions = found.into_values();
+    functions.map(|(bounds, time)| FunctionBounds { longest: time.map(|time| time.longest(code)), ..bounds }).collect()
+}
+
+/// Every indirect call and jump.
+fn indirect(code: &Code) -> Vec<Indirect> {
+    let all = code.indirect.iter();
+    all.map(|(&address, leads)| Indirect {
+        place: code.place(address),
+        found: leads.found,
+        targets: leads.addresses.iter().map(|&target| code.place(target).to_string()).collect(),
+    })
+    .collect()
+}
+
+impl Time {
+    /// The time with the places that have no bound.
+    fn longest(&self, code: &Code) -> Longest {
+        let without_bound = self.unbounded.iter().map(|&address| code.place(address)).collect();
+        Longest { cycles: self.is_bound().then_some(self.cycles), without_bound }
+    }
+}
+
+/// Where the handler of a vector is entered: at the vector itself. `None` where the vector's jumps lead to the reset, as
+/// they do for a vector that is not used.
+fn handler_of(code: &Code, vector: u8) -> Result<Option<u32>, BoundsError> {
+    let start = code.elf.start + u32::from(vector) * code.elf.chip.vector_bytes;
+    let mut address = start;
+    // Two jumps, and the one in the vector.
+    for _ in 0..3 {
+        let instruction = code.instruction(address)?;
+        match instruction.target(code.elf.chip.flash_bytes) {
+            Some(target) if target == code.elf.start || target == 0 => return Ok(None),
+            Some(target) if matches!(instruction.operation, Operation::Jmp | Operation::Rjmp) => address = target,
+            _ => break,
+        }
+    }
+    Ok(Some(start))
+}

@@ -1,0 +1,665 @@
+//! Whether every value in a register lasts as long as it is needed: over calls, and over interrupts.
+//!
+//! By default every function is held to the calling convention: it preserves R2 to R17, R28 and R29, and leaves zero in R1. That finds a
+//! push or a pop that is missing, in assembly as well. The rest of this page is about the rule `followed`, for programs whose compiler drops the
+//! convention or goes beyond it. With GCC's `-fipa-ra`, which `-Os` turns on, a caller keeps values in registers that the function which it
+//! calls leaves alone. With LLVM's `--enable-ipra` a function need not save what none of its callers needs. Which registers those are
+//! stands nowhere in the ELF. It can be worked out there, though:
+//!
+//! - **what a function keeps**: the registers that hold at each of its returns what they held at its entry, because nothing has
+//!   changed them or because they were saved and put back ([`Preserved`]);
+//! - **what is needed** behind a call: the registers that are read later on before anything changes them, in the caller, in what it
+//!   calls, or behind its own return in one of its callers ([`LiveIn`]). To save a register and to put it back is no use of it;
+//! - **what a function gives back**: see below.
+//!
+//! A register that is needed behind a call has to be one that the function keeps, or one in which it gives something back. All else
+//! has been clobbered: whoever called the function reads what happened to be left in the register.
+//!
+//! # What a function gives back
+//!
+//! Results are in R18 to R25 and nowhere else, and end in R25 or R24 (AVR calling conventions of GCC and LLVM, libgcc's division
+//! included). Of those a register counts as a result where an instruction puts something there that the function itself does not
+//! need, and that reaches a return. What is read only to work out what nobody needs is not needed, so a result that is worked
+//! out in a loop counts. A counter, a pointer or a temporary value is needed until the function has done with it, so it does not.
+//! The division routines go by what they have worked out so far; for them it is written down ([`LIBRARY`]). All between a result
+//! and R25 goes with it, and R25 with R24, since a value of several bytes lies in neighbours.
+//!
+//! # What is found, and what is not
+//!
+//! Found is an instruction that reads what a call has clobbered, whichever way the program came to it; and a call that clobbers a register
+//! other than a result's, which was set before it, has not been read since, and is needed behind it.
+//!
+//! A read that clobbered and proper values can both reach, of a register that was read before the call too, is let pass. Compilers make such
+//! reads of the payload of an empty `Option`, which nobody has set and which they copy with the rest: an analysis of registers
+//! cannot tell the two apart. A test takes from functions of the firmware the saving of a register, and counts how often it is found.
+//!
+//! # What else is held
+//!
+//! R1 is zero at every call of a function that reads it or lets its caller read it, and at every return. A handler leaves every register
+//! and every flag as it found them. That handlers and main program share no memory by accident is Rust's to say, not this
+//! proof's.
+
+use crate::decode::Instruction;
+use crate::decode::Operation::*;
+use crate::effects::Registers;
+use crate::error::{BoundsError, Clobbered};
+use crate::flow::{Code, Kind, Node, Place, Routine};
+use crate::proved::Lasting;
+use crate::values::Interrupts;
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::RangeInclusive;
+use std::rc::Rc;
+
+/// The register that is zero between instructions that change it (AVR calling convention).
+const ZERO: usize = 1;
+
+/// Registers that results are in: R18 to R25 (AVR calling conventions).
+const RESULTS: Registers = Registers::range(18..=25);
+
+/// Division, which uses what it gives back, and in which registers it gives it: quotient and remainder (GCC's AVR calling convention,
+/// exceptions).
+const LIBRARY: [(&str, RangeInclusive<usize>); 3] =
+    [("__udivmodqi4", 24..=25), ("__udivmodhi4", 22..=25), ("__udivmodsi4", 18..=25)];
+
+/// The general purpose I/O registers and the stack pointer's lower byte, by their addresses in the data space.
+const GPIOR: [u16; 3] = [0x3E, 0x4A, 0x4B];
+const SPL: u16 = 0x5D;
+
+/// What a register holds, as far as it matters here.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Content {
+    Unknown,
+    Zero,
+    /// What this register held at the entry.
+    Register(usize),
+    /// The flags as they were at the entry.
+    Flags,
+}
+
+/// What is held where at a place.
+#[derive(Clone, Debug, PartialEq)]
+struct Preserved {
+    registers: [Content; 32],
+    /// The flags, of which these are as they were at the entry.
+    flags: Registers,
+    /// The register that has just been counted down, while the flag says whether it has come to zero.
+    counted: Option<usize>,
+    /// The general purpose I/O registers, in which some handlers keep the flags.
+    gpior: [Content; 3],
+    stack: Vec<Content>,
+}
+
+impl Preserved {
+    fn at_entry(kind: Kind) -> Preserved {
+        let mut registers = std::array::from_fn(Content::Register);
+        if kind == Kind::Function {
+            registers[ZERO] = Content::Zero;
+        }
+        Preserved { registers, flags: Registers::FLAGS, counted: None, gpior: [Content::Unknown; 3], stack: Vec::new() }
+    }
+
+    /// Leaves what both know; whether that is less than before.
+    fn meet(&mut self, other: &Preserved) -> bool {
+        let mut is_less =
+            self.flags & other.flags != self.flags || self.counted.is_some() && self.counted != other.counted;
+        self.flags = self.flags & other.flags;
+        self.counted = self.counted.filter(|counted| Some(*counted) == other.counted);
+        let pairs = (self.registers.iter_mut().zip(&other.registers))
+            .chain(self.gpior.iter_mut().zip(&other.gpior))
+            .chain(self.stack.iter_mut().zip(&other.stack));
+        for (mine, theirs) in pairs {
+            if mine != theirs && *mine != Content::Unknown {
+                *mine = Content::Unknown;
+                is_less = true;
+            }
+        }
+        is_less
+    }
+
+    /// Carries an instruction out that calls nothing.
+    fn carry_out(&mut self, instruction: &Instruction) {
+        let (d, r) = (instruction.destination(), instruction.source());
+        let gpior = instruction.data_address().and_then(|address| GPIOR.iter().position(|gpior| *gpior == address));
+        let value = match instruction.operation {
+            Push => {
+                self.stack.push(self.registers[r]);
+                return;
+            }
+            Pop => self.stack.pop().unwrap_or(Content::Unknown),
+            Mov => self.registers[r],
+            Movw => {
+                self.registers[d + 1] = self.registers[r + 1];
+                self.registers[d] = self.registers[r];
+                return;
+            }
+            Ldi if instruction.constant() == 0 => Content::Zero,
+            Eor | Sub if d == r => Content::Zero,
+            In | Lds if instruction.is_of_status() => {
+                if self.flags == Registers::FLAGS {
+                    Content::Flags
+                } else {
+                    Content::Unknown
+                }
+            }
+            In | Lds => gpior.map_or(Content::Unknown, |gpior| self.gpior[gpior]),
+            Out | Sts if instruction.is_of_status() => {
+                self.flags = if self.registers[r] == Content::Flags { Registers::FLAGS } else { Registers::NONE };
+                self.counted = None;
+                return;
+            }
+            Out | Sts | Sbi | Cbi => {
+                if let Some(gpior) = gpior {
+                    let is_whole = matches!(instruction.operation, Out | Sts);
+                    self.gpior[gpior] = if is_whole { self.registers[r] } else { Content::Unknown };
+                }
+                return;
+            }
+            _ => Content::Unknown,
+        };
+        let changes = instruction.effects().changes;
+        self.clobber(changes);
+        if changes.contains(d) {
+            self.registers[d] = value;
+        }
+        if instruction.operation == Dec {
+            self.counted = Some(d);
+        }
+    }
+
+    /// Something else is in these now.
+    fn clobber(&mut self, changed: Registers) {
+        for (register, held) in self.registers.iter_mut().enumerate() {
+            if changed.contains(register) {
+                *held = Content::Unknown;
+            }
+        }
+        self.flags = self.flags - changed;
+        self.counted =
+            self.counted.filter(|counted| !changed.contains(*counted) && (changed & Registers::ZERO_FLAG).is_empty());
+    }
+}
+
+/// What is needed at a place.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+struct LiveIn {
+    registers: Registers,
+    /// Bytes of the stack, by how many lie below, that are put back into a register which is needed.
+    stack: BTreeSet<usize>,
+}
+
+impl LiveIn {
+    /// Takes what else is needed; whether it is more than before.
+    fn join(&mut self, other: &LiveIn) -> bool {
+        let before = (self.registers, self.stack.len());
+        self.registers |= other.registers;
+        self.stack.extend(&other.stack);
+        before != (self.registers, self.stack.len())
+    }
+}
+
+/// What is known of a routine whichever way it is called.
+struct Summary {
+    /// Registers, and flags, that hold at every return what they held at the entry.
+    keeps: Registers,
+    /// Registers in which something is given back.
+    gives: Registers,
+    /// Those whose value at the entry is read.
+    reads: Registers,
+    /// Those whose value at the entry is read on every path.
+    surely_reads: Registers,
+    /// Whether R1 is zero at each place.
+    zero: Vec<bool>,
+}
+
+/// Which needs are meant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum What {
+    /// What is needed behind the return, and lasts until there. Nothing that is read on the way.
+    Lasting,
+    /// What is read before it changes.
+    Needed,
+}
+
+/// Proves that in this program every value lasts. `main` and the handlers are where it is entered.
+pub(crate) fn prove<'a>(
+    program: &Code,
+    main: &Rc<Routine>,
+    handlers: impl Iterator<Item = (u8, &'a Rc<Routine>)>,
+) -> Result<Lasting, BoundsError> {
+    let handlers: Vec<_> = handlers.collect();
+    let mut survey = Survey { program, summaries: BTreeMap::new(), order: Vec::new() };
+    for routine in handlers.iter().map(|(_, handler)| *handler).chain([main]) {
+        survey.summarise(routine)?;
+    }
+    for (vector, handler) in handlers {
+        survey.put_back(vector, handler)?;
+    }
+    survey.hold()
+}
+
+/// The registers that functions preserve (AVR calling convention).
+fn is_preserved(register: usize) -> bool {
+    matches!(register, 2..=17 | 28 | 29)
+}
+
+/// Proves that every function of this program keeps to the calling convention, and that handlers put back all registers and flags.
+pub(crate) fn prove_convention<'a>(
+    program: &Code,
+    handlers: impl Iterator<Item = (u8, &'a Rc<Routine>)>,
+) -> Result<(), BoundsError> {
+    let functions = program.routines().filter(|routine| routine.entry.kind == Kind::Function);
+    for routine in functions.filter(|routine| !routine.returns.is_empty()) {
+        let broken = |routine: &Routine| {
+            Registers::which(|register| {
+                is_preserved(register) && !routine.keeps[register] || register == ZERO && !routine.leaves_zero
+            })
+        };
+        // What it calls is named for itself.
+        let called = routine.nodes.iter().flat_map(called).filter(|called| !called.returns.is_empty());
+        let broken = broken(routine) - called.fold(Registers::NONE, |all, called| all | broken(called));
+        if !broken.is_empty() {
+            let function = program.name_of(routine.entry);
+            return Err(BoundsError::NotPreserved { function, registers: broken.to_string() });
+        }
+    }
+    let mut survey = Survey { program, summaries: BTreeMap::new(), order: Vec::new() };
+    for (vector, handler) in handlers {
+        survey.look_at(handler)?;
+        survey.put_back(vector, handler)?;
+    }
+    Ok(())
+}
+
+/// What is known of the routines of a program.
+struct Survey<'a> {
+    program: &'a Code<'a>,
+    summaries: BTreeMap<*const Routine, Summary>,
+    /// Each routine behind those that it calls.
+    order: Vec<Rc<Routine>>,
+}
+
+impl Survey<'_> {
+    fn of(&self, routine: &Rc<Routine>) -> &Summary {
+        &self.summaries[&Rc::as_ptr(routine)]
+    }
+
+    /// Works out what a routine keeps, and nothing else of it.
+    fn look_at(&mut self, routine: &Rc<Routine>) -> Result<(), BoundsError> {
+        if self.summaries.contains_key(&Rc::as_ptr(routine)) {
+            return Ok(());
+        }
+        for called in routine.nodes.iter().flat_map(called) {
+            self.look_at(called)?;
+        }
+        let (keeps, zero) = self.keeps(routine)?;
+        // Registers that are saved in a frame are known to the paths.
+        let keeps = keeps | Registers::which(|register| routine.keeps[register]);
+        let (none, all) = (Registers::NONE, Registers::ALL);
+        let summary = Summary { keeps, gives: none, reads: all, surely_reads: none, zero };
+        self.summaries.insert(Rc::as_ptr(routine), summary);
+        Ok(())
+    }
+
+    /// Holds that a handler leaves everything as it found it.
+    fn put_back(&self, vector: u8, handler: &Rc<Routine>) -> Result<(), BoundsError> {
+        let clobbered = Registers::ALL - self.of(handler).keeps;
+        // What one leaves that never returns is read by none.
+        if !clobbered.is_empty() && handler.nodes.iter().any(|node| node.returns.is_some()) {
+            let function = self.program.name_of(handler.entry);
+            return Err(BoundsError::HandlerSpoils { vector, function, registers: clobbered.to_string() });
+        }
+        Ok(())
+    }
+
+    fn summarise(&mut self, routine: &Rc<Routine>) -> Result<(), BoundsError> {
+        if self.summaries.contains_key(&Rc::as_ptr(routine)) {
+            return Ok(());
+        }
+        for called in routine.nodes.iter().flat_map(called) {
+            self.summarise(called)?;
+        }
+        let (keeps, zero) = self.keeps(routine)?;
+        let gives = self.gives(routine, keeps)?;
+        let needs = self.needs(routine, gives, What::Needed)?;
+        let reads = needs[0].registers;
+        // On a path that never ends, nothing is left that would not be read on it.
+        let surely_reads = self.sure_needs(routine, &needs)?[0] & reads;
+        let summary = Summary { keeps, gives, reads, surely_reads, zero };
+        self.summaries.insert(Rc::as_ptr(routine), summary);
+        self.order.push(Rc::clone(routine));
+        Ok(())
+    }
+
+    /// What holds at every return what it held at the entry, and where R1 is zero.
+    fn keeps(&self, routine: &Routine) -> Result<(Registers, Vec<bool>), BoundsError> {
+        let nodes = &routine.nodes;
+        let mut known: Vec<Option<Preserved>> = vec![None; nodes.len()];
+        known[0] = Some(Preserved::at_entry(routine.entry.kind));
+        let mut keeps = Registers::ALL;
+        let mut to_do = vec![0];
+        while let Some(number) = to_do.pop() {
+            let node = &nodes[number];
+            let Some(mut keeping) = known[number].clone() else { continue };
+            if node.place.interrupts == Interrupts::On {
+                // Any handler that comes in can change these.
+                keeping.gpior = [Content::Unknown; 3];
+            }
+            if node.returns.is_some() {
+                let holds = |register: usize| match keeping.registers[register] {
+                    Content::Register(held) => held == register,
+                    Content::Zero => register == ZERO && routine.entry.kind == Kind::Function,
+                    _ => false,
+                };
+                keeps = keeps & (Registers::which(holds) | keeping.flags);
+            }
+            let instruction = self.program.instruction(node.place.address)?;
+            keeping.carry_out(&instruction);
+            for way in &node.ways {
+                let mut behind = keeping.clone();
+                if let Some(called) = &way.through {
+                    behind.clobber(Registers::ALL - self.of(called).keeps);
+                    behind.gpior = [Content::Unknown; 3];
+                }
+                if let Some(counted) =
+                    keeping.counted.filter(|_| is_way_of_zero(&instruction, nodes[way.to].place.address))
+                {
+                    behind.registers[counted] = Content::Zero;
+                }
+                behind.stack.resize(nodes[way.to].place.depth, Content::Unknown);
+                let is_less = match &mut known[way.to] {
+                    Some(before) => before.meet(&behind),
+                    new @ None => {
+                        *new = Some(behind);
+                        true
+                    }
+                };
+                if is_less {
+                    to_do.push(way.to);
+                }
+            }
+        }
+        let is_zero =
+            |known: &Option<Preserved>| known.as_ref().is_some_and(|known| known.registers[ZERO] == Content::Zero);
+        Ok((keeps, known.iter().map(is_zero).collect()))
+    }
+
+    /// What is needed at each place, where so much is needed behind the return.
+    fn needs(&self, routine: &Routine, behind: Registers, what: What) -> Result<Vec<LiveIn>, BoundsError> {
+        let nodes = &routine.nodes;
+        let from = leading_to(nodes);
+        let mut needs = vec![LiveIn::default(); nodes.len()];
+        let mut to_do: Vec<usize> = (0..nodes.len()).collect();
+        while let Some(number) = to_do.pop() {
+            let node = &nodes[number];
+            let mut before = self.in_front(node, &needs, what);
+            let instruction = self.program.instruction(node.place.address)?;
+            let depth = node.place.depth;
+            match instruction.operation {
+                Push if before.stack.remove(&depth) => before.registers |= Registers::one(instruction.source()),
+                Pop if before.registers.contains(instruction.destination()) => {
+                    before.registers = before.registers - Registers::one(instruction.destination());
+                    before.stack.extend(depth.checked_sub(1));
+                }
+                // What the stack pointer passes over has been put there to be read through a pointer.
+                Out if what != What::Lasting && instruction.data_address() == Some(SPL) => {
+                    let least = node.ways.iter().map(|way| nodes[way.to].place.depth).min();
+                    before.stack.extend(least.unwrap_or(depth)..depth);
+                }
+                _ => {
+                    let reads = reads(&instruction, before.registers);
+                    before.registers = before.registers - instruction.effects().changes;
+                    if what != What::Lasting {
+                        before.registers |= reads;
+                    }
+                }
+            }
+            if node.returns.is_some() {
+                before.registers |= behind;
+            }
+            if needs[number].join(&before) {
+                to_do.extend(&from[number]);
+            }
+        }
+        Ok(needs)
+    }
+
+    /// What is needed in front of what is called at a place, behind the instruction itself.
+    fn in_front(&self, node: &Node, needs: &[LiveIn], what: What) -> LiveIn {
+        let mut all = LiveIn::default();
+        for way in &node.ways {
+            let mut behind = needs[way.to].clone();
+            if let Some(called) = &way.through {
+                behind.registers = behind.registers & self.of(called).keeps;
+            }
+            all.join(&behind);
+        }
+        for called in called(node).filter(|_| what == What::Needed) {
+            all.registers |= self.of(called).reads;
+        }
+        all
+    }
+
+    /// In which registers a routine that keeps so many gives something back.
+    fn gives(&self, routine: &Routine, keeps: Registers) -> Result<Registers, BoundsError> {
+        let name = self.program.name_of(routine.entry);
+        if let Some((_, gives)) = LIBRARY.iter().find(|(library, _)| *library == name) {
+            return Ok(Registers::range(gives.clone()));
+        }
+        let needs = self.needs(routine, Registers::NONE, What::Needed)?;
+        let reaching = self.needs(routine, RESULTS - keeps, What::Lasting)?;
+        let mut gives = Registers::NONE;
+        for node in &routine.nodes {
+            let (needed, reaching) = (behind(node, &needs), behind(node, &reaching));
+            for way in &node.ways {
+                if let Some(called) = &way.through {
+                    gives |= (self.of(called).gives & reaching) - needed;
+                }
+            }
+            let effects = self.program.instruction(node.place.address)?.effects();
+            if !effects.acts {
+                gives |= (effects.changes & reaching) - needed;
+            }
+        }
+        // A result ends in R25, and begins in R24, R22 or R18.
+        for first in [18..=21, 22..=23, 24..=25] {
+            if !(gives & Registers::range(first.clone())).is_empty() {
+                gives |= Registers::range(*first.start()..=25);
+            }
+        }
+        Ok(gives - keeps)
+    }
+
+    /// What is read on every path from a place on, before it changes and in this routine.
+    fn sure_needs(&self, routine: &Routine, needs: &[LiveIn]) -> Result<Vec<Registers>, BoundsError> {
+        let nodes = &routine.nodes;
+        let from = leading_to(nodes);
+        let mut sure = vec![Registers::ALL; nodes.len()];
+        let mut to_do: Vec<usize> = (0..nodes.len()).collect();
+        while let Some(number) = to_do.pop() {
+            let node = &nodes[number];
+            let instruction = self.program.instruction(node.place.address)?;
+            let ways = node.ways.iter().map(|way| match &way.through {
+                Some(called) => (sure[way.to] & self.of(called).keeps) | self.of(called).surely_reads,
+                None => sure[way.to],
+            });
+            let ends = node.ends_in.iter().map(|(_, called)| self.of(called).surely_reads);
+            let returns = node.returns.map(|_| Registers::NONE);
+            let all = ways.chain(ends).chain(returns).fold(Registers::ALL, |all, way| all & way);
+            let before = (all - instruction.effects().changes) | reads(&instruction, behind(node, needs));
+            if before != sure[number] {
+                sure[number] = before;
+                to_do.extend(&from[number]);
+            }
+        }
+        Ok(sure)
+    }
+
+    /// In which registers something has been put on every path to a place, and has not been read yet.
+    fn unread(&self, routine: &Routine) -> Result<Vec<Registers>, BoundsError> {
+        let nodes = &routine.nodes;
+        let mut unread = vec![Registers::ALL; nodes.len()];
+        unread[0] = Registers::NONE;
+        let mut to_do = vec![0];
+        let mut is_seen = vec![false; nodes.len()];
+        while let Some(number) = to_do.pop() {
+            let node = &nodes[number];
+            let effects = self.program.instruction(node.place.address)?.effects();
+            let new = if effects.acts { Registers::NONE } else { effects.changes };
+            let behind = (unread[number] - effects.reads - effects.changes) | new;
+            for way in &node.ways {
+                let behind = way.through.as_ref().map_or(behind, |called| {
+                    let Summary { keeps, reads, .. } = *self.of(called);
+                    behind & (keeps - reads)
+                });
+                let both = unread[way.to] & behind;
+                if both != unread[way.to] || !is_seen[way.to] {
+                    (unread[way.to], is_seen[way.to]) = (both, true);
+                    to_do.push(way.to);
+                }
+            }
+        }
+        Ok(unread)
+    }
+
+    /// What has been clobbered by a call on every path to a place, and not been set since.
+    fn clobbered(&self, routine: &Routine) -> Result<Vec<Registers>, BoundsError> {
+        let nodes = &routine.nodes;
+        let mut clobbered = vec![Registers::ALL; nodes.len()];
+        clobbered[0] = Registers::NONE;
+        let mut to_do = vec![0];
+        let mut is_seen = vec![false; nodes.len()];
+        while let Some(number) = to_do.pop() {
+            let node = &nodes[number];
+            let behind = clobbered[number] - self.program.instruction(node.place.address)?.effects().changes;
+            for way in &node.ways {
+                let behind = way
+                    .through
+                    .as_ref()
+                    .map_or(behind, |called| (behind - self.of(called).gives) | self.clobbers(called));
+                let both = clobbered[way.to] & behind;
+                if both != clobbered[way.to] || !is_seen[way.to] {
+                    (clobbered[way.to], is_seen[way.to]) = (both, true);
+                    to_do.push(way.to);
+                }
+            }
+        }
+        Ok(clobbered)
+    }
+
+    /// Registers in which a routine gives nothing back and leaves something else than it found. R1 is looked at by itself.
+    fn clobbers(&self, routine: &Rc<Routine>) -> Registers {
+        let Summary { keeps, gives, .. } = *self.of(routine);
+        Registers::ALL - keeps - gives - Registers::one(ZERO)
+    }
+
+    /// Holds every call against what is needed behind it.
+    fn hold(&self) -> Result<Lasting, BoundsError> {
+        let mut needed_behind: BTreeMap<*const Routine, Registers> = BTreeMap::new();
+        let mut found: BTreeMap<(u32, u32), Registers> = BTreeMap::new();
+        let mut lasting: BTreeMap<u32, Registers> = BTreeMap::new();
+        // Callers first.
+        for routine in self.order.iter().rev() {
+            let needed_behind_it = needed_behind.get(&Rc::as_ptr(routine)).copied().unwrap_or_default();
+            let needs = self.needs(routine, needed_behind_it | self.of(routine).gives, What::Needed)?;
+            let clobbered = self.clobbered(routine)?;
+            let unread = self.unread(routine)?;
+            for (number, node) in routine.nodes.iter().enumerate() {
+                let Place { address, .. } = node.place;
+                let needed = behind(node, &needs);
+                let instruction = self.program.instruction(address)?;
+                let mut read = reads(&instruction, self.in_front(node, &needs, What::Needed).registers);
+                for called in called(node) {
+                    let Summary { keeps, reads, surely_reads, .. } = *self.of(called);
+                    read |= surely_reads;
+                    let mut clobbers = (needed & unread[number]) - keeps - RESULTS - reads;
+                    let zero = if self.of(routine).zero[number] { needed - keeps } else { needed | reads };
+                    clobbers |= zero & Registers::one(ZERO);
+                    if !clobbers.is_empty() {
+                        *found.entry((address, called.entry.address)).or_default() |= clobbers;
+                    }
+                    *needed_behind.entry(Rc::as_ptr(called)).or_default() |= needed;
+                    *lasting.entry(address).or_default() |= needed & (keeps - Registers::one(ZERO));
+                }
+                for register in (read & clobbered[number]).iter() {
+                    for (place, called) in self.clobberers(routine, number, register)? {
+                        *found.entry((place, called)).or_default() |= Registers::one(register);
+                    }
+                }
+            }
+        }
+        if found.is_empty() {
+            let bytes = lasting.values().map(|registers| registers.iter().count()).sum();
+            return Ok(Lasting { calls: lasting.len(), bytes });
+        }
+        let clobbered = |((address, called), registers): ((u32, u32), Registers)| Clobbered {
+            address,
+            function: self.program.name(address),
+            called: self.program.name(called),
+            registers: registers.to_string(),
+        };
+        Err(BoundsError::Clobbered { all: found.into_iter().map(clobbered).collect() })
+    }
+
+    /// The calls that have left in a register what is found there at a place: where they are, and what they call.
+    fn clobberers(
+        &self,
+        routine: &Routine,
+        place: usize,
+        register: usize,
+    ) -> Result<BTreeSet<(u32, u32)>, BoundsError> {
+        let from = leading_to(&routine.nodes);
+        let (mut found, mut seen) = (BTreeSet::new(), BTreeSet::new());
+        let mut to_do = vec![place];
+        while let Some(to) = to_do.pop() {
+            for &number in &from[to] {
+                let node = &routine.nodes[number];
+                let through = node.ways.iter().filter(|way| way.to == to).filter_map(|way| way.through.as_ref());
+                let clobbering: Vec<_> = through.filter(|called| self.clobbers(called).contains(register)).collect();
+                found.extend(clobbering.iter().map(|called| (node.place.address, called.entry.address)));
+                let changes = self.program.instruction(node.place.address)?.effects().changes;
+                if clobbering.is_empty() && !changes.contains(register) && seen.insert(number) {
+                    to_do.push(number);
+                }
+            }
+        }
+        Ok(found)
+    }
+}
+
+/// What an instruction reads, where so much is needed behind it. What does nothing that is needed reads for nothing.
+fn reads(instruction: &Instruction, needed: Registers) -> Registers {
+    let effects = instruction.effects();
+    let has_purpose = effects.acts || !(effects.changes & needed).is_empty();
+    if has_purpose { effects.reads } else { Registers::NONE }
+}
+
+/// The registers that are needed behind an instruction, and behind what it calls.
+fn behind(node: &Node, needs: &[LiveIn]) -> Registers {
+    node.ways.iter().fold(Registers::NONE, |all, way| all | needs[way.to].registers)
+}
+
+/// The places in front of each place.
+fn leading_to(nodes: &[Node]) -> Vec<Vec<usize>> {
+    let mut from: Vec<Vec<usize>> = vec![Vec::new(); nodes.len()];
+    for (number, node) in nodes.iter().enumerate() {
+        for way in &node.ways {
+            from[way.to].push(number);
+        }
+    }
+    from
+}
+
+/// Whether a branch leads there where the last result was zero.
+fn is_way_of_zero(branch: &Instruction, to: u32) -> bool {
+    let is_of_zero = Registers::ZERO_FLAG == branch.effects().reads;
+    match branch.operation {
+        Brbs if is_of_zero => to != branch.next(),
+        Brbc if is_of_zero => to == branch.next(),
+        _ => false,
+    }
+}
+
+/// The routines that are called from a place.
+fn called(node: &Node) -> impl Iterator<Item = &Rc<Routine>> {
+    node.ways.iter().filter_map(|way| way.through.as_ref()).chain(node.ends_in.iter().map(|(_, called)| called))
+}

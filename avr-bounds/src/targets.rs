@@ -1,0 +1,231 @@
+//! Where calls and jumps lead whose address is worked out.
+//!
+//! - **A constant** in the pointer: there (`-mcall-prologues`, pointers that the compiler knows).
+//! - **A compiler's jump table** (libgcc's `__tablejump2__`): to every entry of the table that lies in the same function. The table's length
+//!   is not needed: what stands behind it belongs to another function, or is another place of this one.
+//! - **Constructors and destructors** of global objects: to every entry of their tables.
+//! - **Listed** in the budgets' `[calls]`: there, and nowhere else.
+//! - **Any other call**: to every function whose address the program takes. The relocations tell these, if the program was linked with
+//!   `-Wl,--emit-relocs`. Else they are the functions whose word address stands somewhere in the initial values of variables, in
+//!   flash where no function is, or in a pair of registers that a function loads with constants; that can be too many. A virtual call, which loads its pointer from a slot behind a pointer that it loaded as well, leads to this slot of every virtual
+//!   table and to functions whose address is taken elsewhere.
+//!
+//! A jump through a pointer that is none of a virtual table's and no variable at a fixed address could be a computed `goto`, and is
+//! refused. So is a call for which no function is found.
+//!
+//! What this takes for granted: that a program has a function's address from one of these places. One that works it out by arithmetic has to list
+//! its calls.
+
+use crate::budget::Budgets;
+use crate::decode::Instruction;
+use crate::decode::Operation::*;
+use crate::elf::Program;
+use crate::error::BoundsError;
+use crate::proved::Found;
+use crate::values::{Deep, Known, Value};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Where an indirect call or jump leads.
+#[derive(Clone, Debug)]
+pub(crate) struct Where {
+    pub(crate) found: Found,
+    pub(crate) addresses: BTreeSet<u32>,
+}
+
+/// What of a program tells where indirect calls lead.
+pub(crate) struct Targets {
+    /// Entries of libgcc's routines that jump through a table.
+    table_jumps: BTreeSet<u32>,
+    /// Functions whose address is taken outside virtual tables, and whether these are all for sure.
+    taken: BTreeSet<u32>,
+    is_exact: bool,
+    /// Virtual tables: in each, the words as functions, as far as they are some.
+    virtual_tables: Vec<Vec<Option<u32>>>,
+    /// By the caller's name.
+    listed: BTreeMap<String, BTreeSet<u32>>,
+}
+
+/// The lower register of the pointer.
+const Z: usize = 30;
+
+impl Targets {
+    pub(crate) fn new(elf: &Program, budgets: &Budgets) -> Result<Targets, BoundsError> {
+        let table_jumps = elf.labels.iter().filter(|(name, _)| name.starts_with("__tablejump"));
+        let table_jumps = table_jumps.map(|(_, address)| *address).collect();
+        let virtual_tables = elf.virtual_tables.iter().map(|table| {
+            let words = elf.data[table.clone()].chunks_exact(2);
+            words.map(|word| function_at(elf, u16::from_le_bytes([word[0], word[1]]))).collect()
+        });
+        let gone: Vec<String> = (budgets.calls.iter())
+            .flat_map(|(caller, called)| called.iter().chain([caller]))
+            .filter(|name| elf.functions_called(name).is_empty())
+            .cloned()
+            .collect();
+        if !gone.is_empty() {
+            return Err(BoundsError::NoSuchFunction { table: "calls", names: gone });
+        }
+        let listed = budgets.calls.iter().map(|(caller, called)| {
+            (caller.clone(), called.iter().flat_map(|name| elf.functions_called(name)).collect())
+        });
+        let taken = elf.taken.clone();
+        Ok(Targets {
+            table_jumps,
+            is_exact: taken.is_some(),
+            taken: taken.unwrap_or_else(|| found_taken(elf)),
+            virtual_tables: virtual_tables.collect(),
+            listed: listed.collect(),
+        })
+    }
+
+    /// Whether a routine stands there that jumps through a table.
+    pub(crate) fn is_table_jump(&self, address: u32) -> bool {
+        self.table_jumps.contains(&address)
+    }
+
+    /// Where a call or jump at `at` of such a routine leads, and the cycles of the routine itself.
+    pub(crate) fn of_table(&self, elf: &Program, at: u32, known: &Known) -> Option<(Where, u32)> {
+        let label = |name: &str| elf.labels.get(name).copied();
+        let call = Instruction::at(&elf.flash, at)?;
+        let entry = call.target(elf.chip.flash_bytes)?;
+        let mut cycles = 0;
+        let mut instruction = Instruction::at(&elf.flash, entry)?;
+        while !matches!(instruction.operation, Ijmp | Eijmp) {
+            cycles += instruction.cycles;
+            instruction = Instruction::at(&elf.flash, instruction.next())?;
+            if instruction.address > entry + 64 {
+                return None;
+            }
+        }
+        cycles += instruction.cycles;
+        let word = |address: u32| {
+            let bytes = elf.flash.get(address as usize..address as usize + 2)?;
+            Some(u32::from(u16::from_le_bytes([bytes[0], bytes[1]])) * 2)
+        };
+        for of in ["ctors", "dtors"] {
+            // It is called in a loop from the start-up code, right in front of which its label stands.
+            let caller = label(&format!("__do_global_{of}"));
+            let in_loop = caller.is_some_and(|caller| (caller..caller + 32).contains(&at));
+            if in_loop && matches!(call.operation, Call | Rcall) {
+                let table = label(&format!("__{of}_start"))?..label(&format!("__{of}_end"))?;
+                let addresses = table.step_by(2).map(word).collect::<Option<_>>()?;
+                return Some((Where { found: Found::Table, addresses }, cycles));
+            }
+        }
+        let base = match (known.pair(Z), known.registers[Z], known.registers[Z + 1]) {
+            (Some(base), ..) => base,
+            (_, Value::Less(low), Value::Less(high)) => u16::from_le_bytes([low, high]).wrapping_neg(),
+            _ => return None,
+        };
+        let (first, end) = elf.extent(at)?;
+        let entries = (u32::from(base) * 2..).step_by(2).map(word);
+        let addresses: BTreeSet<u32> =
+            entries.map_while(|entry| entry.filter(|entry| (first..end).contains(entry))).collect();
+        (!addresses.is_empty()).then_some((Where { found: Found::Table, addresses }, cycles))
+    }
+
+    /// Where a call or jump by the pointer leads.
+    pub(crate) fn of_pointer(
+        &self,
+        elf: &Program,
+        caller: &str,
+        instruction: &Instruction,
+        known: &Known,
+    ) -> Option<Where> {
+        if let Some(word) = known.pair(Z) {
+            let address = u32::from(word) * 2 % elf.chip.flash_bytes;
+            return Some(Where { found: Found::Followed, addresses: [beyond_trampoline(elf, address)].into() });
+        }
+        if let Some(listed) = self.listed.get(caller) {
+            return Some(Where { found: Found::Listed, addresses: listed.clone() });
+        }
+        let (low, high) = (known.registers[Z], known.registers[Z + 1]);
+        let slot = match (low, high) {
+            (Value::Loaded(Some(low), Deep::Yes), Value::Loaded(Some(high), Deep::Yes)) => {
+                (high == low + 1 || (low, high) == (0, 0)).then_some(usize::from(low))
+            }
+            _ => None,
+        };
+        let is_variable = matches!((low, high), (Value::Loaded(None, _), Value::Loaded(None, _)));
+        let is_jump = matches!(instruction.operation, Ijmp | Eijmp);
+        if is_jump && slot.is_none() && !is_variable {
+            return None;
+        }
+        let mut addresses = self.taken.clone();
+        for table in self.virtual_tables.iter().filter(|_| !is_variable) {
+            match slot {
+                // A pointer to a table points behind two words that are no functions.
+                Some(slot) => {
+                    let is_start = |&start: &usize| table[start - 1].is_none() && table[start].is_some();
+                    let starts = (1..table.len()).filter(is_start);
+                    addresses.extend(starts.filter_map(|start| *table.get(start + slot / 2)?));
+                }
+                None => addresses.extend(table.iter().flatten()),
+            }
+        }
+        let found = if slot.is_some() { Found::Slot } else { Found::Taken };
+        // A pointer that no function can be in is never called by.
+        (self.is_exact || !addresses.is_empty()).then_some(Where { found, addresses })
+    }
+}
+
+/// The function that begins at a word address, if one does.
+fn function_at(elf: &Program, word: u16) -> Option<u32> {
+    let address = beyond_trampoline(elf, u32::from(word) * 2);
+    let is_function = elf.functions.contains_key(&address) && address >= elf.code_start;
+    (is_function && word != 0).then_some(address)
+}
+
+/// Where a jump among the trampolines leads, which stand in for functions that a word cannot reach.
+fn beyond_trampoline(elf: &Program, address: u32) -> u32 {
+    let label = |name: &str| elf.labels.get(name).copied();
+    let is_trampoline = label("__trampolines_start")
+        .zip(label("__trampolines_end"))
+        .is_some_and(|(start, end)| (start..end).contains(&address));
+    let target = || Instruction::at(&elf.flash, address)?.target(elf.chip.flash_bytes);
+    if is_trampoline { target().unwrap_or(address) } else { address }
+}
+
+/// The functions whose address the program seems to take outside virtual tables: all that it does, and others whose address is by chance a
+/// number that it uses.
+fn found_taken(elf: &Program) -> BTreeSet<u32> {
+    let mut taken = BTreeSet::new();
+    let word = |bytes: &[u8]| function_at(elf, u16::from_le_bytes([bytes[0], bytes[1]]));
+    // Variables lie at any address.
+    for (place, bytes) in elf.data.windows(2).enumerate() {
+        if !elf.virtual_tables.iter().any(|table| table.contains(&place)) {
+            taken.extend(word(bytes));
+        }
+    }
+    // Constants in flash, in front of the code and between functions; the tables of constructors are called from start-up code alone.
+    let label = |name: &str| elf.labels.get(name).copied().unwrap_or_default();
+    let constructors = label("__ctors_start")..label("__dtors_end").max(label("__ctors_end"));
+    for address in elf.gaps().flatten() {
+        if let Some(bytes) = elf.flash.get(address as usize..address as usize + 2)
+            && !constructors.contains(&address)
+        {
+            taken.extend(word(bytes));
+        }
+    }
+    // Pairs of registers that a function loads with constants, in whatever order.
+    for &first in elf.functions.keys() {
+        let Some((_, end)) = elf.extent(first) else { continue };
+        let mut loaded: BTreeMap<usize, BTreeSet<u8>> = BTreeMap::new();
+        let mut address = first;
+        while address < end {
+            let Some(instruction) = Instruction::at(&elf.flash, address) else {
+                address += 2;
+                continue;
+            };
+            if instruction.operation == Ldi {
+                loaded.entry(instruction.destination()).or_default().insert(instruction.constant());
+            }
+            address = instruction.next();
+        }
+        for lower in (16..31).step_by(2) {
+            let (Some(low), Some(high)) = (loaded.get(&lower), loaded.get(&(lower + 1))) else { continue };
+            let words = low.iter().flat_map(|low| high.iter().map(|high| u16::from_le_bytes([*low, *high])));
+            taken.extend(words.filter_map(|word| function_at(elf, word)));
+        }
+    }
+    taken
+}

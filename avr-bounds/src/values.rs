@@ -1,0 +1,437 @@
+//! What is known of the registers and the stack at a place of the program, and what an instruction makes of it.
+//!
+//! Only what decides where a program goes is followed: bytes of a stack pointer, a saved status register, constants, what the caller
+//! left, and from where a pointer to a function was loaded. All else is unknown, and so is what two paths that meet disagree on. Where
+//! it goes from there is worked out in `flow`.
+
+use crate::chip::Chip;
+use crate::concrete::Concrete;
+use crate::decode::Instruction;
+use crate::decode::Operation::*;
+use crate::effects::Registers;
+
+/// More than there is SRAM for: a stack so deep grows without an end.
+pub(crate) const DEEPEST: usize = 0x4000;
+
+// Registers by their address in the data space (data sheets, register summary).
+const EIND: u16 = 0x5C;
+const SPL: u16 = 0x5D;
+const SPH: u16 = 0x5E;
+const SREG: u16 = 0x5F;
+
+/// SREG's bit of the interrupts.
+pub(crate) const INTERRUPT_FLAG: u16 = 7;
+
+/// Where the flags stand in a set of registers and flags.
+const FLAGS: usize = 32;
+
+/// Whether an interrupt can come in before an instruction.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(crate) enum Interrupts {
+    /// The flag is clear.
+    Off,
+    /// The flag has just been set: the instruction that follows is still carried out (data sheet, section 7.7).
+    Soon,
+    /// The flag is set.
+    On,
+}
+
+/// What a register holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Value {
+    Unknown,
+    Constant(u8),
+    /// What this register held at the routine's entry.
+    AtEntry(usize),
+    /// The lower byte of the stack pointer at the entry less so many, modulo 256.
+    StackLow(u8),
+    /// The upper byte of the stack pointer at the entry less so many.
+    StackHigh(i32),
+    /// The status register, with interrupts on or off.
+    Status(bool),
+    /// From memory: so far behind a pointer, which came from memory itself where it is deep; `None` from a fixed address.
+    Loaded(Option<u8>, Deep),
+    /// Something unknown, less a constant.
+    Less(u8),
+}
+
+/// Whether a pointer was loaded by a pointer that was loaded too.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Deep {
+    No,
+    Yes,
+}
+
+/// What is known at a place.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Known {
+    pub(crate) registers: [Value; 32],
+    /// Flags that are known, and what they are.
+    flags: (u8, u8),
+    /// R1 is zero at the entry, as the calling convention has it of functions.
+    is_zero_at_entry: bool,
+    /// The general purpose I/O registers, which some handlers keep the status register in.
+    pub(crate) kept: [Value; 3],
+    /// What lies on the stack, from the entry on.
+    pub(crate) stack: Vec<Value>,
+    /// A constant has just been taken from the lower byte of a stack pointer, or added: what that was, and the constant. The carry is
+    /// still that operation's.
+    borrow: Option<(u8, u8, bool)>,
+    /// The stack pointer's upper byte has been written, and the lower one not yet.
+    pub(crate) upper_half: Option<Value>,
+    /// The register that has just been counted down, while the zero flag tells of it.
+    counted: Option<usize>,
+}
+
+/// The registers whose content is a known constant.
+pub(crate) type Constants = [Option<u8>; 32];
+
+impl Known {
+    /// What is known at a routine's entry.
+    pub(crate) fn at_entry(is_function: bool) -> Known {
+        Known {
+            registers: std::array::from_fn(Value::AtEntry),
+            flags: (0, 0),
+            is_zero_at_entry: is_function,
+            kept: [Value::Unknown; 3],
+            stack: Vec::new(),
+            borrow: None,
+            upper_half: None,
+            counted: None,
+        }
+    }
+
+    /// Takes the way of a branch on which the last result was zero.
+    pub(crate) fn is_zero(&mut self) {
+        if let Some(register) = self.counted {
+            self.registers[register] = Value::Constant(0);
+        }
+    }
+
+    /// The content of a register, if it is a known constant.
+    pub(crate) fn constant(&self, register: usize) -> Option<u8> {
+        match self.registers[register] {
+            Value::Constant(constant) => Some(constant),
+            Value::AtEntry(1) if self.is_zero_at_entry => Some(0),
+            _ => None,
+        }
+    }
+
+    /// All registers that hold known constants.
+    pub(crate) fn constants(&self) -> Constants {
+        std::array::from_fn(|register| self.constant(register))
+    }
+
+    /// The number in a pair of registers, by the lower one.
+    pub(crate) fn pair(&self, lower: usize) -> Option<u16> {
+        Some(u16::from_le_bytes([self.constant(lower)?, self.constant(lower + 1)?]))
+    }
+
+    /// The number in R21 and R20, a function's third argument where each has 16 bits.
+    pub(crate) fn length(&self) -> Option<u16> {
+        self.pair(20)
+    }
+
+    /// Leaves what both know; whether that is less than before.
+    pub(crate) fn meet(&mut self, other: &Known) -> bool {
+        let before = self.clone();
+        // What the caller left in R1 is zero.
+        if self.registers[1] != other.registers[1]
+            && self.constant(1).is_some()
+            && self.constant(1) == other.constant(1)
+        {
+            self.registers[1] = Value::Constant(0);
+        }
+        let zero = self.registers[1];
+        let pairs = (self.registers.iter_mut().zip(&other.registers))
+            .chain(self.kept.iter_mut().zip(&other.kept))
+            .chain(self.stack.iter_mut().zip(&other.stack));
+        for (mine, _) in pairs.filter(|(mine, theirs)| mine != theirs) {
+            *mine = Value::Unknown;
+        }
+        if zero == Value::Constant(0) && other.constant(1) == Some(0) {
+            self.registers[1] = zero;
+        }
+        let (mask, bits) = self.flags;
+        let mask = mask & other.flags.0 & !(bits ^ other.flags.1);
+        self.flags = (mask, bits & mask);
+        if self.borrow != other.borrow {
+            self.borrow = None;
+        }
+        if self.counted != other.counted {
+            self.counted = None;
+        }
+        if self.upper_half != other.upper_half {
+            self.upper_half = Some(Value::Unknown);
+        }
+        *self != before
+    }
+
+    /// What a call leaves: registers that it does not keep are unknown, and flags.
+    pub(crate) fn after_call(&mut self, keeps: &[bool; 32]) {
+        for (register, _) in keeps.iter().enumerate().filter(|(_, keeps)| !**keeps) {
+            self.registers[register] = Value::Unknown;
+        }
+        self.flags = (0, 0);
+        self.borrow = None;
+        self.counted = None;
+        self.kept = [Value::Unknown; 3];
+    }
+
+    /// How far below the stack pointer at the entry a pair points, if it does.
+    fn below(&self, lower: usize) -> Option<i32> {
+        match (self.registers[lower], self.registers[lower + 1]) {
+            (Value::StackLow(low), Value::StackHigh(high)) if low == high as u8 => Some(high),
+            _ => None,
+        }
+    }
+
+    fn point_below(&mut self, lower: usize, below: i32) {
+        self.registers[lower] = Value::StackLow(below as u8);
+        self.registers[lower + 1] = Value::StackHigh(below);
+    }
+
+    /// The place on the stack that a load or a store goes to, by a pointer whose way is known.
+    fn on_stack(&self, instruction: &Instruction, pointer: usize) -> Option<usize> {
+        let below = self.below(pointer)?;
+        let place = match instruction.moves_by() {
+            -1 => below + 1,
+            _ => below - i32::from(instruction.displacement()),
+        };
+        usize::try_from(place).ok().filter(|place| *place < self.stack.len())
+    }
+
+    /// Arithmetic on the bytes of a stack pointer; whether it was that.
+    fn moves_stack_pointer(&mut self, instruction: &Instruction) -> bool {
+        use Value::{StackHigh, StackLow, Unknown};
+
+        let (d, r) = (instruction.destination(), instruction.source());
+        let constant = match instruction.operation {
+            Adiw | Sbiw | Subi | Sbci => Some(instruction.constant()),
+            Add | Adc | Sub | Sbc => self.constant(r),
+            _ => return false,
+        };
+        let is_sum = matches!(instruction.operation, Adiw | Add | Adc);
+        let by = |constant: i32| if is_sum { -constant } else { constant };
+        match (instruction.operation, self.registers[d], constant) {
+            (Adiw | Sbiw, _, Some(constant)) => {
+                let Some(below) = self.below(d) else { return false };
+                self.point_below(d, below + by(constant.into()));
+                self.borrow = None;
+                true
+            }
+            (Subi | Add | Sub, StackLow(low), Some(constant)) => {
+                self.registers[d] = StackLow((i32::from(low) + by(constant.into())) as u8);
+                self.borrow = Some((low, constant, is_sum));
+                true
+            }
+            (Sbci | Adc | Sbc, StackHigh(high), Some(constant)) => {
+                self.registers[d] = match self.borrow.take() {
+                    Some((low, lower, was_sum)) if low == high as u8 && was_sum == is_sum => {
+                        StackHigh(high + by(u16::from_be_bytes([constant, lower]).cast_signed().into()))
+                    }
+                    _ => Unknown,
+                };
+                true
+            }
+            _ => false,
+        }
+    }
+
+    /// Arithmetic on constants; whether it was that.
+    fn computes(&mut self, instruction: &Instruction) -> bool {
+        let effects = instruction.effects();
+        let known = |place: usize| match place.checked_sub(FLAGS) {
+            Some(flag) => self.flags.0 >> flag & 1 == 1,
+            None => self.constant(place).is_some(),
+        };
+        if !effects.reads.iter().all(known) {
+            return false;
+        }
+        let registers = std::array::from_fn(|register| self.constant(register).unwrap_or_default());
+        let mut concrete = Concrete { registers, status: self.flags.1 };
+        if !concrete.carry_out(instruction) {
+            return false;
+        }
+        for place in effects.changes.iter() {
+            match place.checked_sub(FLAGS) {
+                None => self.registers[place] = Value::Constant(concrete.registers[place]),
+                Some(flag) => {
+                    let bit = 1 << flag;
+                    self.flags = (self.flags.0 | bit, self.flags.1 & !bit | concrete.status & bit);
+                }
+            }
+        }
+        true
+    }
+
+    /// Carries an instruction out that leads to the one behind it. Only start-up code may set the stack pointer to a constant.
+    pub(crate) fn carry_out(
+        &mut self,
+        instruction: &Instruction,
+        chip: &Chip,
+        interrupts_before: Interrupts,
+        interrupts: &mut Interrupts,
+        is_start_up: bool,
+    ) -> Result<(), Doubt> {
+        use Value::{Constant, Less, Loaded, StackHigh, StackLow, Status, Unknown};
+
+        let (d, r) = (instruction.destination(), instruction.source());
+        let gpior =
+            instruction.data_address().and_then(|address| chip.gpior.iter().position(|gpior| *gpior == address));
+        let changes = instruction.effects().changes;
+        let tells = |counted: &usize| (changes & (Registers::ZERO_FLAG | Registers::one(*counted))).is_empty();
+        self.counted = if instruction.operation == Dec { Some(d) } else { self.counted.filter(tells) };
+        let moves = self.moves_stack_pointer(instruction);
+        if !moves && !(changes & Registers::CARRY_FLAG).is_empty() {
+            self.borrow = None;
+        }
+        if !moves && self.computes(instruction) {
+            // Registers that only move may hold more than constants.
+            return Ok(());
+        }
+        let changed_flags = (0..8).filter(|&flag| changes.contains(FLAGS + flag)).fold(0, |all, flag| all | 1 << flag);
+        self.flags = (self.flags.0 & !changed_flags, self.flags.1 & !changed_flags);
+        if moves {
+            return Ok(());
+        }
+        match instruction.operation {
+            Bset if instruction.operand('s') == INTERRUPT_FLAG => turn(interrupts, true),
+            Bclr if instruction.operand('s') == INTERRUPT_FLAG => turn(interrupts, false),
+            Push => self.stack.push(self.registers[r]),
+            Pop => {
+                self.registers[d] = self.stack.pop().ok_or(Doubt::TakesTooMuch)?;
+            }
+            Mov => self.registers[d] = self.registers[r],
+            Movw => {
+                self.registers[d + 1] = self.registers[r + 1];
+                self.registers[d] = self.registers[r];
+            }
+            Subi | Sbci => self.registers[d] = Less(instruction.constant()),
+            In | Lds => {
+                let depth = self.stack.len() as i32;
+                self.registers[d] = match instruction.data_address() {
+                    Some(SPL) => StackLow(depth as u8),
+                    Some(SPH) => StackHigh(depth),
+                    Some(SREG) => Status(interrupts_before != Interrupts::Off),
+                    _ if instruction.operation == Lds && gpior.is_none() => Loaded(None, Deep::No),
+                    _ => gpior.map_or(Unknown, |gpior| self.kept[gpior]),
+                };
+            }
+            Out | Sts => {
+                let value = self.registers[r];
+                match instruction.data_address() {
+                    Some(SREG) => {
+                        self.flags = (0, 0);
+                        self.counted = None;
+                        match value {
+                            Status(on) => turn(interrupts, on),
+                            Constant(status) => turn(interrupts, status >> INTERRUPT_FLAG & 1 == 1),
+                            _ => return Err(Doubt::Status),
+                        }
+                    }
+                    Some(EIND) if chip.return_address_bytes() > 2 => {
+                        if matches!(value, Constant(1..)) {
+                            return Err(Doubt::LongIndirect);
+                        }
+                    }
+                    Some(SPH) => self.upper_half = Some(value),
+                    Some(SPL) => {
+                        let upper = self.upper_half.take();
+                        let depth = match (upper, value) {
+                            (Some(StackHigh(high)), StackLow(low)) if low == high as u8 => usize::try_from(high).ok(),
+                            // The start-up code says what the reset has done already.
+                            (Some(Constant(high)), Constant(low)) if is_start_up => {
+                                chip.ram_last.checked_sub(u16::from_be_bytes([high, low])).map(usize::from)
+                            }
+                            _ => None,
+                        };
+                        let depth = depth.ok_or(Doubt::Stack)?;
+                        self.stack.resize(depth.min(DEEPEST + 1), Unknown);
+                    }
+                    _ => {
+                        if let Some(gpior) = gpior {
+                            self.kept[gpior] = value;
+                        }
+                    }
+                }
+            }
+            Sbi | Cbi => {
+                if let Some(gpior) = gpior {
+                    self.kept[gpior] = Unknown;
+                }
+            }
+            Mul | Muls | Mulsu | Fmul | Fmuls | Fmulsu => self.registers[..2].fill(Unknown),
+            Ld | Ldd | Lpm | Elpm | St | Std => {
+                let pointer = instruction.pointer().unwrap_or_default();
+                let place = self.on_stack(instruction, pointer);
+                match instruction.operation {
+                    Lpm | Elpm => self.registers[d] = Unknown,
+                    St | Std => {
+                        if let Some(place) = place {
+                            self.stack[place] = lasting(self.registers[r]);
+                        }
+                    }
+                    _ => {
+                        let deep = match (self.registers[pointer], self.registers[pointer + 1]) {
+                            (Loaded(..), Loaded(..)) => Deep::Yes,
+                            _ => Deep::No,
+                        };
+                        let loaded = Loaded(Some(instruction.displacement()), deep);
+                        let value = place.map_or(loaded, |place| lasting(self.stack[place]));
+                        // Of a pointer that loads over itself the second byte goes by what was there before.
+                        self.registers[d] = value;
+                    }
+                }
+                // The pointer goes on, or back, with what it was loaded from.
+                if instruction.moves_by() != 0 && !(pointer..pointer + 2).contains(&d) {
+                    match (self.below(pointer), self.pair(pointer)) {
+                        (Some(below), _) => self.point_below(pointer, below - i32::from(instruction.moves_by())),
+                        (_, Some(address)) => {
+                            let [low, high] = address.wrapping_add_signed(instruction.moves_by().into()).to_le_bytes();
+                            (self.registers[pointer], self.registers[pointer + 1]) = (Constant(low), Constant(high));
+                        }
+                        _ if matches!(self.registers[pointer], Loaded(..)) => {}
+                        _ => self.registers[pointer..pointer + 2].fill(Unknown),
+                    }
+                }
+            }
+            Cp | Cpc | Cpi | Bst | Nop | Wdr | Bset | Bclr | Sleep | Spm | Break => {}
+            // Compilers ask so whether a pair is zero.
+            Adiw | Sbiw if instruction.constant() == 0 => {}
+            Adiw | Sbiw => self.registers[d..d + 2].fill(Unknown),
+            _ => self.registers[d] = Unknown,
+        }
+        Ok(())
+    }
+}
+
+/// What a byte of a frame is taken to hold for good. Variables can be changed through pointers, so only what compilers save there is.
+fn lasting(value: Value) -> Value {
+    match value {
+        Value::AtEntry(2..=17 | 28 | 29) | Value::Status(_) | Value::StackLow(_) | Value::StackHigh(_) => value,
+        _ => Value::Unknown,
+    }
+}
+
+/// What was to be known of an instruction's operands, and is not.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Doubt {
+    /// It takes more from the stack than the routine has put there.
+    TakesTooMuch,
+    /// It sets the stack pointer to what is not known.
+    Stack,
+    /// It sets the status register to what is not known.
+    Status,
+    /// It sets EIND to something else than 0.
+    LongIndirect,
+}
+
+/// Sets the interrupt flag, or clears it.
+pub(crate) fn turn(interrupts: &mut Interrupts, on: bool) {
+    *interrupts = match (on, *interrupts) {
+        (false, _) => Interrupts::Off,
+        (true, Interrupts::Off) => Interrupts::Soon,
+        (true, already) => already,
+    };
+}

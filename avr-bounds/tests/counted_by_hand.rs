@@ -1,0 +1,737 @@
+//! What is proved of small programs in assembly, whose stack and cycles can be counted by hand.
+
+use avr_bounds::{Bounds, BoundsError, Budgets, Input, LoopBound, LoopBounds, Program, RegisterRule, prove};
+use std::io::Write;
+use std::process::{Command, Stdio};
+
+/// Assembles a program for the ATmega328P and proves its bounds. It begins at `start`; `handler` is INT0's, where there is one,
+/// and `other` Timer0's. A vector that is not used leads to the reset, as avr-libc has it.
+fn try_to_prove(program: &str, input: Option<&Input>) -> Result<Bounds, BoundsError> {
+    try_to_prove_with(program, input, &LoopBounds::new())
+}
+
+/// The same with what is said of the loops of its functions.
+fn try_to_prove_with(program: &str, input: Option<&Input>, loops: &LoopBounds) -> Result<Bounds, BoundsError> {
+    let (input, loops, registers) = (input.cloned(), loops.clone(), RegisterRule::Followed);
+    try_to_prove_by(program, &Budgets { input, loops, registers, ..Budgets::default() })
+}
+
+/// The same by facts of any kind; every time that a budget could be for has to have a bound.
+fn try_to_prove_by(program: &str, facts: &Budgets) -> Result<Bounds, BoundsError> {
+    let elf = assembled(program);
+    let bounds = prove(&Program::read(elf.path(), Some("atmega328p"))?, facts)?;
+    let any = Some(u64::MAX);
+    Budgets { handler_cycles: any, critical_section_cycles: any, ..Budgets::default() }.hold(&bounds)?;
+    Ok(bounds)
+}
+
+/// The ELF of a program that begins at `start`.
+fn assembled(program: &str) -> tempfile::NamedTempFile {
+    assembled_for(program, false)
+}
+
+/// The same, with the vectors of an ATmega2560 where it is large.
+fn assembled_for(program: &str, is_large: bool) -> tempfile::NamedTempFile {
+    let used = |label: &str| if program.contains(&format!("{label}:")) { label.to_owned() } else { "0".to_owned() };
+    let vectors: String = (0..57)
+        .map(|vector| match vector {
+            0 => "jmp start\n".to_owned(),
+            1 => format!("jmp {}\n", used("handler")),
+            16 => format!("jmp {}\n", used("other")),
+            26.. if !is_large => String::new(),
+            _ => "jmp 0\n".to_owned(),
+        })
+        .collect();
+    let functions: String = (program.lines())
+        .filter_map(|line| line.trim().strip_suffix(':'))
+        .filter(|label| label.parse::<u8>().is_err())
+        .map(|label| format!(".type {label}, @function\n"))
+        .collect();
+    let elf = tempfile::NamedTempFile::new().expect("there is room for a file");
+    let mut gcc = Command::new("avr-gcc")
+        .args(["-mmcu=atmega328p", "-nostdlib", "-x", "assembler", "-", "-o"])
+        .arg(elf.path())
+        .stdin(Stdio::piped())
+        .spawn()
+        .unwrap_or_else(|error| panic!("avr-gcc could not be started ({error}): run ./setup.sh"));
+    let mut source = gcc.stdin.take().expect("it was asked for");
+    writeln!(source, "{functions}{vectors}{program}").expect("avr-gcc reads");
+    drop(source);
+    assert!(gcc.wait().expect("avr-gcc ends").success(), "{program}");
+    elf
+}
+
+#[track_caller]
+fn proved(program: &str) -> Bounds {
+    try_to_prove(program, None).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// The refusal of a program, which has to say this.
+#[track_caller]
+fn assert_refused(program: &str, words: &str) {
+    let error = try_to_prove(program, None).expect_err("it has no bounds").to_string();
+    assert!(error.contains(words), "{error}");
+}
+
+#[test]
+fn a_stack_is_what_is_pushed_and_called_on_the_deepest_path() {
+    let bounds = proved(
+        "start:
+            rcall flat
+            rcall one
+            rjmp start
+        one:
+            push r2
+            rcall two
+            pop r2
+            ret
+        two:
+            push r3
+            push r4
+            pop r4
+            pop r3
+            ret
+        flat:
+            ret",
+    );
+    // Two calls, and three bytes pushed.
+    assert_eq!(bounds.stack_bytes, 7);
+    let frames: Vec<_> = bounds.stack.iter().map(|frame| (frame.function.as_str(), frame.bytes)).collect();
+    assert_eq!(frames, [("reset", 2), ("one", 3), ("two", 2)]);
+}
+
+#[test]
+fn a_jump_into_another_function_is_its_call_at_the_end() {
+    let bounds = proved(
+        "start:\n rcall one\n rjmp start\none:\n push r2\n pop r2\n rjmp two\ntwo:\n push r2\n push r3\n pop r3\n pop r2\n ret",
+    );
+    assert_eq!(bounds.stack_bytes, 4);
+}
+
+#[test]
+fn of_two_paths_that_push_the_deeper_counts() {
+    let bounds = proved(
+        "start:
+            sbrc r24, 0
+            rjmp 1f
+            push r2
+            pop r2
+            rjmp start
+        1:
+            push r2
+            push r3
+            push r4
+            pop r4
+            pop r3
+            pop r2
+            rjmp start",
+    );
+    assert_eq!(bounds.stack_bytes, 3);
+}
+
+#[test]
+fn a_frame_is_made_by_arithmetic_on_the_stack_pointer() {
+    // 300 bytes by two subtractions, as compilers make large frames.
+    let frame = |size: u16, inner: &str| {
+        format!(
+            "in r28, 0x3d\n in r29, 0x3e\n subi r28, lo8({size})\n sbci r29, hi8({size})\n in r0, 0x3f\n cli\n out 0x3e, r29\n \
+             out 0x3f, r0\n out 0x3d, r28\n {inner}\n subi r28, lo8(-{size})\n sbci r29, hi8(-{size})\n in r0, 0x3f\n cli\n \
+             out 0x3e, r29\n out 0x3f, r0\n out 0x3d, r28\n"
+        )
+    };
+    let large = frame(300, "rcall leaf");
+    let bounds = proved(&format!(
+        "start:\n sei\n1: rcall one\n rjmp 1b\none:\n push r28\n push r29\n {large} pop r29\n pop r28\n ret\nleaf:\n ret"
+    ));
+    assert_eq!(bounds.stack_bytes, 2 + 2 + 300 + 2);
+    // `out SPH` and `out SREG` behind `cli`; the instruction in front of them and the one behind join in.
+    assert_eq!((bounds.critical_section.cycles, bounds.closed.cycles), (Some(2), Some(4)));
+}
+
+#[test]
+fn a_function_that_clobbers_the_frame_s_pointer_leaves_the_stack_unknown() {
+    assert_refused(
+        "start:\n in r28, 0x3d\n in r29, 0x3e\n rcall clobbers\n out 0x3e, r29\n out 0x3d, r28\n rjmp start\nclobbers:\n ldi r28, 1\n ret",
+        "start sets the stack pointer to what cannot be followed",
+    );
+}
+
+#[test]
+fn a_handler_comes_in_where_the_stack_is_deepest_with_interrupts_on() {
+    let handler = "handler:\n push r2\n pop r2\n reti";
+    let on = proved(&format!("start:\n sei\n1: push r2\n push r3\n pop r3\n pop r2\n rjmp 1b\n{handler}"));
+    assert_eq!(on.stack_bytes, 2 + 2 + 1);
+    // The deepest place has them off: none comes in there, but one does right before.
+    let off =
+        proved(&format!("start:\n sei\n1: push r2\n cli\n push r3\n pop r3\n sei\n nop\n pop r2\n rjmp 1b\n{handler}"));
+    assert_eq!(off.stack_bytes, 1 + 2 + 1);
+}
+
+#[test]
+fn a_handler_s_time_is_its_longest_path_with_response_and_return() {
+    let bounds = proved(
+        "start:
+            sei
+        1:  rjmp 1b
+        handler:
+            push r24
+            in r24, 0x3f
+            out 0x1e, r24
+            sbic 0x09, 2
+            rjmp 2f
+            lds r24, 0x0100
+            inc r24
+            sts 0x0100, r24
+        2:
+            in r24, 0x1e
+            out 0x3f, r24
+            pop r24
+            reti",
+    );
+    // Response 4, jmp 3; push 2, in, out; sbic skips the jump 2; lds 2, inc 1, sts 2; in, out, pop 2, reti 4.
+    assert_eq!(bounds.handlers.len(), 1, "the vectors that lead to the reset are not used");
+    assert_eq!(bounds.handlers[0].cycles, Some(4 + 3 + 4 + 2 + 5 + 8));
+    assert_eq!(bounds.handlers[0].function, "handler");
+    assert_eq!(bounds.handlers[0].stack_bytes, 3);
+}
+
+#[test]
+fn a_handler_that_jumps_away_for_ever_counts_for_the_stack_and_not_for_the_time() {
+    let bounds = proved(
+        "start:\n sei\n1: rjmp 1b\nhandler:\n sbrc r2, 0\n jmp stalled\n reti\nstalled:\n push r2\n push r3\n rcall waits\nwaits:\n rjmp waits",
+    );
+    // Response 4, jmp 3, sbrc over two words 3, reti 4.
+    assert_eq!(bounds.handlers[0].cycles, Some(14));
+    assert_eq!(bounds.handlers[0].stack_bytes, 2 + 2 + 2);
+}
+
+#[test]
+fn a_nested_critical_section_ends_with_the_outer_one() {
+    let bounds = proved(
+        "start:
+            sei
+        1:  in r18, 0x3f
+            cli
+            rcall inner
+            out 0x3f, r18
+            nop
+            rcall inner
+            rjmp 1b
+        inner:
+            in r19, 0x3f
+            cli
+            nop
+            out 0x3f, r19
+            ret",
+    );
+    // rcall 3, in, cli, nop, out, ret 4, out.
+    assert_eq!(bounds.critical_section.cycles, Some(3 + 4 + 4 + 1));
+    // `cli` in front of it, `nop` behind it.
+    assert_eq!(bounds.closed.cycles, Some(1 + 12 + 1));
+}
+
+#[test]
+fn an_instruction_between_two_critical_sections_lets_nothing_in() {
+    let apart = proved("start:\n sei\n1: cli\n nop\n sei\n nop\n cli\n nop\n sei\n rjmp 1b");
+    assert_eq!((apart.critical_section.cycles, apart.closed.cycles), (Some(2), Some(1 + 2 + 2)));
+    // The instruction behind the first `sei` is the second `cli`: both sections are one to whoever waits.
+    let joined = proved("start:\n sei\n1: nop\n cli\n nop\n sei\n cli\n nop\n sei\n rjmp 1b");
+    assert_eq!((joined.critical_section.cycles, joined.closed.cycles), (Some(2), Some(1 + 2 + 1 + 2 + 2)));
+}
+
+#[test]
+fn a_path_that_waits_for_the_reset_is_no_critical_section() {
+    let bounds =
+        proved("start:\n sei\n1: sbrc r2, 0\n rcall gives_up\n cli\n sei\n rjmp 1b\ngives_up:\n cli\n2: wdr\n rjmp 2b");
+    assert_eq!(bounds.critical_section.cycles, Some(1));
+}
+
+/// INT0's input: one handler reads PIND, and two edges between its looks are told apart.
+const INPUT: fn() -> Input = || Input { vectors: [1].into(), port: 0x29, edges_between_looks: 2, clock_hz: 16_000_000 };
+
+#[test]
+fn an_edge_waits_for_the_other_handler_for_a_critical_section_and_for_the_way_to_the_look() {
+    let program = "start:
+            sei
+        1:  nop
+            cli
+            nop
+            nop
+            sei
+            rjmp 1b
+        handler:
+            push r2
+            in r2, 0x09
+            pop r2
+            reti
+        other:
+            push r3
+            pop r3
+            reti";
+    let edges = try_to_prove(program, Some(&INPUT())).expect("it has bounds").edges.expect("they were asked for");
+    // Synchroniser 3; the other handler 4 + 3 + 4 + 4; cli, nop, nop, sei, rjmp 2; response 4, jmp 3, push 2, in 1.
+    assert_eq!(edges.wait_cycles, 3 + 15 + 6 + 10);
+    assert_eq!(edges.never_lost_per_s, 2 * 16_000_000 / 34);
+}
+
+#[test]
+fn an_edge_that_a_handler_does_not_look_at_once_has_no_bound() {
+    let main = "start:\n sei\n1: rjmp 1b\n";
+    let refused = |handler: &str| {
+        try_to_prove(&format!("{main}{handler}"), Some(&INPUT())).expect_err("it has no bound").to_string()
+    };
+    for handler in
+        ["handler:\n reti", "handler:\n in r2, 9\n in r3, 9\n reti", "handler:\n sbrc r2, 0\n in r3, 9\n reti", ""]
+    {
+        assert!(refused(handler).contains("does not read the port at 0x29 exactly once"), "{handler}");
+    }
+    let second = Input { vectors: [16].into(), ..INPUT() };
+    let program = format!("{main}handler:\n reti\nother:\n in r2, 9\n reti");
+    let error = try_to_prove(&program, Some(&second)).expect_err("INT0 goes before it").to_string();
+    assert!(error.contains("vector 1 goes before vector 16"), "{error}");
+}
+
+#[test]
+fn recursion_is_refused_with_its_circle() {
+    assert_refused(
+        "start:\n rcall one\n rjmp start\none:\n rcall two\n ret\ntwo:\n rcall one\n ret",
+        "one, which calls two, which calls one calls itself",
+    );
+}
+
+#[test]
+fn what_is_called_by_an_address_is_refused() {
+    assert_refused("start:\n icall\n rjmp start", "start calls or jumps to an address that it works out");
+    assert_refused("start:\n ijmp", "start calls or jumps to an address that it works out");
+    assert_refused(
+        "start:\n rcall one\n rjmp start\none:\n push r2\n push r3\n ret",
+        "one returns with a stack that is not as it found it",
+    );
+}
+
+#[test]
+fn a_stack_that_grows_in_a_loop_is_refused() {
+    assert_refused("start:\n push r2\n rjmp start", "puts more onto the stack in every turn of a loop");
+    assert_refused("start:\n rcall 1f\n1: rjmp start", "puts more onto the stack in every turn of a loop");
+    assert_refused("start:\n pop r2\n rjmp start", "takes more from the stack than it has put there");
+}
+
+#[test]
+fn a_handler_that_lets_others_in_is_refused() {
+    let main = "start:\n sei\n1: rjmp 1b\n";
+    assert_refused(&format!("{main}handler:\n sei\n nop\n reti"), "the handler of vector 1 turns interrupts on");
+    assert_refused(
+        &format!("{main}handler:\n rcall opens\n reti\nopens:\n sei\n ret"),
+        "the handler of vector 1 turns interrupts on",
+    );
+    assert_refused(
+        &format!("{main}handler:\n lds r2, 0x0100\n out 0x3f, r2\n reti"),
+        "a value that is not a saved SREG",
+    );
+    assert_refused(&format!("{main}handler:\n ret"), "ends a handler by `ret`");
+}
+
+#[test]
+fn a_loop_in_a_handler_or_in_a_critical_section_has_to_have_a_bound() {
+    let looping = "1: dec r24\n brne 1b\n";
+    assert_refused(
+        &format!("start:\n sei\n2: rjmp 2b\nhandler:\n {} reti", saving(looping)),
+        "the handler of vector 1 has a loop without a bound",
+    );
+    assert_refused(
+        &format!("start:\n sei\n2: cli\n {looping} sei\n rjmp 2b"),
+        "a stretch without interrupts has a loop without a bound",
+    );
+    // The start-up code may take its time before it turns interrupts on.
+    proved(&format!("start:\n {looping} sei\n2: rjmp 2b"));
+}
+
+/// A handler's body with what it changes put back.
+fn saving(body: &str) -> String {
+    format!(
+        "push r24\n push r25\n in r24, 0x3f\n push r24\n lds r24, 0x0100\n{body} pop r24\n out 0x3f, r24\n pop r25\n pop r24\n"
+    )
+}
+
+/// A record that says how often the program comes by the place right behind it.
+fn at_most(turns: u32) -> String {
+    format!("7: .pushsection .loop_bounds, \"\", @progbits\n .long 7b, {turns}\n .popsection\n")
+}
+
+#[test]
+fn a_loop_that_says_how_often_it_turns_takes_so_many_turns_and_the_way_out() {
+    let saved = "push r24\n push r25\n in r24, 0x3f\n push r24\n";
+    let restored = "pop r24\n out 0x3f, r24\n pop r25\n pop r24\n";
+    let handler =
+        |body: &str| format!("start:\n sei\n2: rjmp 2b\nhandler:\n {saved} ldi r24, 8\n{body} {restored} reti");
+    let cycles = |body: &str| proved(&handler(body)).handlers[0].cycles.expect("it returns");
+    // Response 4, jmp 3, ldi 1, reti 4, and 7 each to save and to restore; eight turns of dec 1 and brne 2, and one more up to the
+    // way out, 2.
+    assert_eq!(cycles(&format!("1:\n {} dec r24\n brne 1b\n", at_most(8))), 26 + 8 * 3 + 2);
+    // Three turns of ldi 1, of the inner loop's eight with their way out, and of dec 1 and brne 2; the last one's way out is 1 shorter.
+    let inner = format!("3:\n {} dec r25\n brne 3b\n", at_most(8));
+    let outer = format!("1: ldi r25, 8\n {inner} {} dec r24\n brne 1b\n", at_most(3));
+    assert_eq!(cycles(&outer), 26 + 3 * (1 + 26 + 3) + (1 + 26 + 2));
+}
+
+#[test]
+fn a_record_that_a_turn_can_go_round_bounds_nothing() {
+    let main = "start:\n sei\n2: rjmp 2b\n";
+    let round = format!("1: sbrs r2, 0\n rjmp 3f\n {} nop\n3: dec r24\n brne 1b\n", at_most(8));
+    assert_refused(
+        &format!("{main}handler:\n {} reti", saving(&round)),
+        "the handler of vector 1 has a loop without a bound",
+    );
+    // The inner loop's record says nothing of the outer one.
+    let outer = format!("1: ldi r25, 8\n3:\n {} dec r25\n brne 3b\n dec r24\n brne 1b\n", at_most(8));
+    assert_refused(
+        &format!("{main}handler:\n {} reti", saving(&outer)),
+        "the handler of vector 1 has a loop without a bound",
+    );
+}
+
+#[test]
+fn what_is_said_of_a_function_holds_for_each_of_its_loops_and_a_record_at_one_goes_before_it() {
+    let cycles = |body: &str, passes: &[u64]| {
+        let program = format!("start:\n clr r1\n1: wdr\n rcall waits\n rjmp 1b\nwaits:\n ldi r24, 8\n{body} ret");
+        let bound = LoopBound { passes: passes.into(), by_length: false, because: "it counts".into() };
+        let bounds = try_to_prove_with(&program, None, &[("waits".into(), bound)].into()).expect("it has bounds");
+        bounds.turn.expect("the watchdog is fed").cycles
+    };
+    // wdr 1, rcall 3, ldi 1, so many turns and the way out, ret 4, rjmp 2.
+    assert_eq!(cycles("3: dec r24\n brne 3b\n", &[9]), Some(11 + 9 * 3 + 2));
+    assert_eq!(cycles(&format!("3:\n {} dec r24\n brne 3b\n", at_most(8)), &[9]), Some(11 + 8 * 3 + 2));
+    // Entered in its middle as well: by the longer way, sbrc 1 and rjmp 2; nine times by either beginning, and three cycles from
+    // one to the other at most.
+    let twice = "sbrc r2, 0\n rjmp 4f\n3: nop\n4: dec r24\n brne 3b\n";
+    assert_eq!(cycles(twice, &[9]), Some(11 + 3 + 2 * 9 * 3 + 2));
+    // Nine turns of ldi 1, of the inner loop's nine with their way out, and of dec 1 and brne 2; the last way out is 1 shorter.
+    let nested = "2: ldi r25, 3\n3: dec r25\n brne 3b\n dec r24\n brne 2b\n";
+    assert_eq!(cycles(nested, &[9]), Some(11 + 9 * (1 + 29 + 3) + (1 + 29 + 2)));
+    // The same, with another number for the loop within: three of its turns with their way out.
+    assert_eq!(cycles(nested, &[9, 3]), Some(11 + 9 * (1 + 11 + 3) + (1 + 11 + 2)));
+}
+
+#[test]
+fn a_function_that_goes_over_as_many_bytes_as_its_caller_says_does_so_where_that_is_a_constant() {
+    let cycles = |length: &str| {
+        let program = format!(
+            "start:\n clr r1\n1: wdr\n {length}\n rcall fills\n rjmp 1b\n\
+             fills:\n rjmp 3f\n2: st X+, r22\n3: subi r20, 1\n sbci r21, 0\n brcc 2b\n ret"
+        );
+        let bound = LoopBound { passes: vec![100], by_length: true, because: "a byte a turn".into() };
+        let bounds = try_to_prove_with(&program, None, &[("fills".into(), bound)].into()).expect("it has bounds");
+        bounds.turn.expect("the watchdog is fed").cycles.expect("every loop has a bound")
+    };
+    // A byte more is a turn more: st 2, subi 1, sbci 1, brcc 2.
+    assert_eq!(cycles("ldi r20, 8\n ldi r21, 0") - cycles("ldi r20, 7\n ldi r21, 0"), 6);
+    assert_eq!(cycles("ldi r20, 99\n ldi r21, 0"), cycles("mov r20, r2\n ldi r21, 0"), "the number of the table");
+    assert!(cycles("ldi r20, 0\n ldi r21, 1") > cycles("ldi r20, 255\n ldi r21, 0"));
+}
+
+#[test]
+fn a_bound_for_the_loops_of_a_function_that_is_gone_is_refused() {
+    let bound = LoopBound { passes: vec![3], by_length: false, because: "it counted".into() };
+    let loops = LoopBounds::from([("gone".to_owned(), bound)]);
+    let error = try_to_prove_with("start: rjmp start", None, &loops).expect_err("it has no such function").to_string();
+    assert!(error.contains("no function of the program is called gone"), "{error}");
+}
+
+#[test]
+fn a_turn_of_the_loop_that_feeds_the_watchdog_has_a_bound_once_every_loop_in_it_has() {
+    let program = |record: &str| {
+        format!(
+            "start:\n sei\n1: wdr\n ldi r24, 8\n rcall waits\n rjmp 1b\nwaits:\n3:\n {record} dec r24\n brne 3b\n ret"
+        )
+    };
+    let turn = proved(&program("")).turn.expect("the watchdog is fed");
+    assert_eq!((turn.cycles, turn.without_bound.len()), (None, 1));
+    assert_eq!(turn.without_bound[0].function, "waits");
+    // wdr 1, ldi 1, rcall 3, eight turns and the way out, ret 4, rjmp 2.
+    let turn = proved(&program(&at_most(8))).turn.expect("the watchdog is fed");
+    assert_eq!(turn.cycles, Some(1 + 1 + 3 + 26 + 4 + 2));
+    assert_eq!(proved("start:\n rjmp start").turn, None);
+}
+
+/// A program whose first function calls the second one, with r1 zero.
+fn calling(caller: &str, called: &str) -> String {
+    format!("start:\n clr r1\n sei\n1: rcall caller\n rjmp 1b\ncaller:\n {caller}\n ret\ncalled:\n {called}\n ret")
+}
+
+#[test]
+fn a_value_lasts_over_a_call_where_the_function_leaves_it_alone_or_puts_it_back() {
+    let lasts = |caller: &str, called: &str| proved(&calling(caller, called)).lasting.expect("it is followed");
+    let keep = "ldi r20, 5\n rcall called\n sts 0x0100, r20";
+    let lasting = lasts(keep, "ldi r21, 1\n sts 0x0101, r21");
+    assert_eq!((lasting.calls, lasting.bytes), (2, 1));
+    // Saved on the stack, and elsewhere.
+    for saved in [
+        "push r20\n lds r20, 0x0101\n inc r20\n sts 0x0101, r20\n pop r20",
+        "mov r30, r20\n ldi r20, 1\n sts 0x0101, r20\n mov r20, r30",
+    ] {
+        assert_eq!(lasts(keep, saved).bytes, 1, "{saved}");
+    }
+    // What is saved and put back is not used by that.
+    assert_eq!(lasts("push r2\n rcall called\n pop r2", "clr r2\n inc r2\n sts 0x0100, r2").bytes, 0);
+}
+
+#[test]
+fn a_register_that_only_a_convention_would_keep_is_found_where_it_is_clobbered() {
+    let clobbers = "lds r16, 0x0101\n inc r16\n sts 0x0101, r16";
+    let program = calling("ldi r16, 5\n rcall called\n sts 0x0100, r16", clobbers);
+    assert_refused(&program, "caller calls called, which clobbers r16");
+    // On one of two paths is enough; and so is a function further down.
+    assert_refused(
+        &calling("ldi r16, 5\n rcall called\n sts 0x0100, r16", "sbrc r24, 0\n ldi r16, 1\n sts 0x0101, r16"),
+        "caller calls called, which clobbers r16",
+    );
+    let deeper = format!(
+        "{}\ndeeper:\n {clobbers}\n ret",
+        calling("ldi r16, 5\n rcall called\n sts 0x0100, r16", "rcall deeper")
+    );
+    assert_refused(&deeper, "caller calls called, which clobbers r16");
+    // Only where it is needed.
+    proved(&calling("ldi r16, 5\n sts 0x0100, r16\n rcall called\n ldi r16, 6\n sts 0x0100, r16", clobbers));
+    // What the caller's caller keeps there.
+    let above = format!(
+        "start:\n clr r1\n ldi r16, 5\n1: rcall caller\n sts 0x0100, r16\n rjmp 1b\ncaller:\n rcall called\n ret\ncalled:\n {clobbers}\n ret"
+    );
+    assert_refused(&above, "start calls caller, which clobbers r16");
+    // Set for what comes behind the call, where another way there has a value of its own.
+    let joined = "sbrs r24, 0\n rjmp 3f\n ldi r16, 5\n rcall called\n rjmp 4f\n3: ldi r16, 6\n4: sts 0x0100, r16";
+    assert_refused(&calling(joined, clobbers), "caller calls called, which clobbers r16");
+}
+
+#[test]
+fn a_result_is_no_clobbered_value_and_what_a_function_uses_itself_is_no_result() {
+    // Given back, alone and in several bytes.
+    proved(&calling("ldi r24, 5\n rcall called\n sts 0x0100, r24", "lds r24, 0x0101\n inc r24"));
+    proved(&calling(
+        "rcall called\n sts 0x0100, r22\n sts 0x0101, r25",
+        "lds r22, 0x0101\n lds r23, 0x0102\n clr r24\n clr r25",
+    ));
+    // Worked out in a loop, in which it is read again.
+    let shifts = "ldi r18, 3\n2: lsl r24\n rol r25\n dec r18\n brne 2b";
+    proved(&calling("ldi r24, 1\n clr r25\n rcall called\n sts 0x0100, r24\n sts 0x0101, r25", shifts));
+    // Given back by what it calls.
+    let deeper =
+        format!("{}\ndeeper:\n lds r24, 0x0101\n ret", calling("rcall called\n sts 0x0100, r24", "rcall deeper"));
+    proved(&deeper);
+    // The loop's counter is what the function counts with.
+    let counts = "ldi r18, 3\n2: sts 0x0101, r18\n dec r18\n brne 2b";
+    assert_refused(
+        &calling("ldi r18, 5\n rcall called\n sts 0x0100, r18", counts),
+        "caller calls called, which clobbers r18",
+    );
+    // So it is where the caller counts with it, too.
+    assert_refused(
+        &calling("ldi r18, 5\n3: sts 0x0100, r18\n rcall called\n dec r18\n brne 3b", counts),
+        "caller calls called, which clobbers r18",
+    );
+    // A pointer, and a flag, are never given back.
+    assert_refused(&calling("rcall called\n st X, r1", "lds r26, 0x0101\n lds r27, 0x0102"), "which clobbers r26, r27");
+    assert_refused(&calling("rcall called\n brts 3f\n sts 0x0100, r1\n3:", "bst r24, 0"), "which clobbers flag T");
+}
+
+#[test]
+fn r1_is_zero_wherever_a_function_takes_it_for_that() {
+    let product = "mul r24, r22\n movw r24, r0";
+    let caller = "rcall called\n sts 0x0100, r24\n sts 0x0101, r1";
+    assert_refused(&calling(caller, product), "caller calls called, which clobbers r1");
+    proved(&calling(caller, &format!("{product}\n clr r1")));
+    assert_refused(
+        &calling("inc r1\n rcall called\n clr r1", "sts 0x0100, r1"),
+        "caller calls called, which clobbers r1",
+    );
+    // Counted down to zero.
+    let counted = "ldi r26, 3\n mov r1, r26\n2: dec r1\n brne 2b";
+    proved(&calling("rcall called\n sts 0x0101, r1", counted));
+    assert_refused(&calling("rcall called\n sts 0x0101, r1", &counted.replace("brne", "brpl")), "clobbers r1");
+}
+
+#[test]
+fn a_handler_puts_every_register_and_every_flag_back() {
+    let main = "start:\n sei\n1: rjmp 1b\n";
+    let flags = "push r24\n in r24, 0x3f\n out 0x1e, r24\n inc r24\n in r24, 0x1e\n out 0x3f, r24\n pop r24\n reti";
+    proved(&format!("{main}handler:\n {flags}"));
+    let without = |line: &str| format!("{main}handler:\n {}", flags.replacen(line, "nop\n", 1));
+    assert_refused(&without("out 0x3f, r24\n"), "does not put back what it found in flag Z, flag N, flag V, flag S");
+    assert_refused(&without("out 0x1e, r24\n"), "a value that is not a saved SREG");
+    assert_refused(&format!("{main}handler:\n in r24, 0x09\n reti"), "handler, does not put back what it found in r24");
+    // On one of two paths.
+    assert_refused(&format!("{main}handler:\n sbic 0x09, 2\n in r24, 0x09\n reti"), "what it found in r24");
+}
+
+#[test]
+fn words_that_are_no_instructions_are_refused() {
+    assert_refused(
+        "start:\n .word 0xFFFF",
+        "start comes to a place where there is no instruction of the chip, at 0x0068",
+    );
+}
+
+#[test]
+fn a_bound_over_its_budget_is_told_and_so_is_a_rate_under_it() {
+    let budgets = |stack: u64, rate: u64| {
+        let file = tempfile::NamedTempFile::new().expect("there is room for a file");
+        let text = format!(
+            "stack_bytes = {stack}\nhandler_cycles = 14\ncritical_section_cycles = 0\nloops_without_bound = 0\nturn_cycles = 7\n\
+             never_lost_per_s = {rate}\n[input]\nvectors = [1]\nport = 0x29\nedges_between_looks = 2\n"
+        );
+        std::fs::write(file.path(), text).expect("it can be written");
+        Budgets::read(file.path()).expect("it is whole")
+    };
+    // A push and an interrupt: 3 bytes of stack. Response 4, jmp 3, sbic and nop 2, reti 4: 13 cycles.
+    let program = "start:\n sei\n1: wdr\n push r2\n pop r2\n rjmp 1b\nhandler:\n sbic 9, 0\n nop\n reti";
+    let bounds = try_to_prove(program, Some(&INPUT())).expect("it has bounds");
+    let rate = bounds.edges.as_ref().expect("they were asked for").never_lost_per_s;
+    let over = |budgets: Budgets| -> Vec<&str> {
+        budgets
+            .hold(&bounds)
+            .expect("every time has a bound")
+            .iter()
+            .filter(|held| !held.keeps)
+            .map(|held| held.name)
+            .collect()
+    };
+    assert_eq!(over(budgets(3, rate)), [""; 0]);
+    assert_eq!(over(budgets(2, rate + 1)), ["stack_bytes", "never_lost_per_s"]);
+    let error = Budgets::read("no-such.toml".as_ref()).expect_err("there is none").to_string();
+    assert!(error.starts_with("no-such.toml: "), "{error}");
+}
+
+#[test]
+fn a_program_sleeps_with_interrupts_on_and_its_handlers_take_longer_to_answer() {
+    let handler = "handler:\n reti";
+    let bounds = proved(&format!("start:\n sei\n1: sleep\n rjmp 1b\n{handler}"));
+    // Response 4, out of sleep 4 more, jmp 3, reti 4.
+    assert_eq!(bounds.handlers[0].cycles, Some(15));
+    // What sleeps with interrupts off has no time.
+    assert_refused(&format!("start:\n sei\n1: cli\n sleep\n sei\n rjmp 1b\n{handler}"), "a stretch without interrupts");
+}
+
+#[test]
+fn a_loop_that_counts_registers_from_a_constant_is_counted() {
+    let cycles = |set: &str, turn: &str| {
+        let program = format!("start:\n clr r1\n1: wdr\n rcall waits\n rjmp 1b\nwaits:\n {set}\n3: {turn}\n ret");
+        proved(&program).turn.expect("the watchdog is fed").cycles
+    };
+    // wdr 1, rcall 3, ret 4, rjmp 2; what is set, and the last turn's branch takes 1 less.
+    assert_eq!(cycles("ldi r24, 8", "dec r24\n brne 3b"), Some(10 + 1 + 8 * 3 - 1));
+    // Up to a limit, by two bytes, with a pointer, and by a register that holds the step.
+    assert_eq!(cycles("ldi r24, 0", "subi r24, 0xFF\n cpi r24, 10\n brne 3b"), Some(10 + 1 + 10 * 4 - 1));
+    assert_eq!(cycles("ldi r24, 0x2C\n ldi r25, 1", "subi r24, 1\n sbci r25, 0\n brne 3b"), Some(10 + 2 + 300 * 4 - 1));
+    assert_eq!(cycles("ldi r24, 0x2C\n ldi r25, 1", "sbiw r24, 1\n brne 3b"), Some(10 + 2 + 300 * 4 - 1));
+    assert_eq!(
+        cycles("ldi r30, 0\n ldi r31, 1\n ldi r18, 1", "st Z+, r1\n cpi r30, 20\n cpc r31, r18\n brne 3b"),
+        Some(10 + 3 + 20 * 6 - 1)
+    );
+    assert_eq!(cycles("ldi r24, 100\n ldi r25, 25", "sub r24, r25\n brne 3b"), Some(10 + 2 + 4 * 3 - 1));
+    // A turn may go round something else, and what is called leaves the counter alone.
+    assert_eq!(cycles("ldi r24, 8", "sbrc r2, 0\n nop\n dec r24\n brne 3b"), Some(10 + 1 + 8 * 5 - 1));
+    // Loops within loops.
+    assert_eq!(
+        cycles("ldi r25, 3", "ldi r24, 8\n4: dec r24\n brne 4b\n dec r25\n brne 3b"),
+        Some(10 + 1 + 3 * (1 + 8 * 3 - 1 + 3) - 1)
+    );
+}
+
+#[test]
+fn a_loop_whose_counter_is_not_followed_to_its_end_has_no_bound() {
+    let refused = |set: &str, turn: &str| {
+        let program = format!("start:\n clr r1\n1: wdr\n rcall waits\n rjmp 1b\nwaits:\n {set}\n3: {turn}\n ret");
+        let turn = proved(&program).turn.expect("the watchdog is fed");
+        assert_eq!(turn.cycles, None, "{set} {turn:?}");
+        assert!(!turn.without_bound.is_empty());
+    };
+    refused("lds r24, 0x0100", "dec r24\n brne 3b");
+    // A turn can go round the counting, or count again; memory decides; it never comes to its end.
+    refused("ldi r24, 8", "sbrc r2, 0\n dec r24\n cpi r24, 0\n brne 3b");
+    refused("ldi r24, 8", "sbrc r2, 0\n ldi r24, 8\n dec r24\n brne 3b");
+    refused("ldi r24, 8", "lds r24, 0x0100\n dec r24\n brne 3b");
+    refused("ldi r24, 7", "subi r24, 2\n brne 3b");
+    refused("ldi r24, 8", "rcall clobbers\n dec r24\n brne 3b\n ret\nclobbers:\n lds r24, 0x0100");
+}
+
+#[test]
+fn a_call_by_a_constant_address_is_followed_and_one_by_an_unknown_address_leads_to_what_the_program_takes_the_address_of()
+ {
+    let main = |body: &str| {
+        format!(
+            "start:\n clr r1\n1: {body}\n rjmp 1b\none:\n push r2\n pop r2\n ret\ntwo:\n push r2\n push r3\n pop r3\n pop r2\n ret"
+        )
+    };
+    let known = proved(&main("ldi r30, lo8(gs(one))\n ldi r31, hi8(gs(one))\n icall"));
+    assert_eq!(known.stack_bytes, 2 + 1);
+    assert_eq!(known.indirect.len(), 1);
+    // From a variable, which both can have been put into.
+    let take = |name: &str| {
+        format!("ldi r24, lo8(gs({name}))\n ldi r25, hi8(gs({name}))\n sts 0x0100, r24\n sts 0x0101, r25\n")
+    };
+    let call = "lds r30, 0x0100\n lds r31, 0x0101\n icall";
+    assert_eq!(proved(&main(&format!("{}{call}", take("one")))).stack_bytes, 2 + 1);
+    assert_eq!(proved(&main(&format!("{}{}{call}", take("one"), take("two")))).stack_bytes, 2 + 2);
+    // A jump by what a table in memory has could be a computed goto.
+    assert_refused(&main("ld r30, X+\n ld r31, X\n ijmp"), "start calls or jumps to an address that it works out");
+}
+
+#[test]
+fn the_calls_of_a_function_can_be_listed_and_its_recursion_bounded() {
+    let facts = |budgets: &str| -> Budgets { toml::from_str(budgets).expect("it is whole") };
+    let listed = "start:\n clr r1\n1: icall\n rjmp 1b\none:\n push r2\n pop r2\n ret";
+    let bounds = try_to_prove_by(listed, &facts("[calls]\nstart = [\"one\"]")).expect("it has bounds");
+    assert_eq!(bounds.stack_bytes, 3);
+    let error = try_to_prove_by(listed, &facts("[calls]\nstart = [\"gone\"]")).expect_err("there is none");
+    assert!(error.to_string().contains("no function of the program is called gone, which the budgets name in [calls]"));
+    let recursive = "start:\n clr r1\n1: rcall one\n rjmp 1b\none:\n push r2\n sbrc r24, 0\n rcall two\n pop r2\n ret\ntwo:\n rcall one\n ret";
+    let bounded = facts("[recursion]\none = { depth = 3, because = \"it counts down\" }");
+    let bounds = try_to_prove_by(recursive, &bounded).expect("it has bounds");
+    // Three times one with its push, and two in between; the third calls two, which calls no fourth.
+    assert_eq!(bounds.stack_bytes, 2 + 3 * (1 + 2) + 2 * 2);
+}
+
+#[test]
+fn a_switch_jumps_to_every_entry_of_its_table_and_to_no_other_function() {
+    // The table stands in front of the code, and behind it stands another function's.
+    let program = "table:\n .word gs(4f), gs(5f), gs(elsewhere)\n\
+        start:\n clr r1\n1: lds r30, 0x0100\n ldi r31, 0\n cpi r30, 2\n brcc 1b\n subi r30, lo8(-(gs(table)))\n sbci r31, hi8(-(gs(table)))\n \
+        rjmp __tablejump2__\n4: push r2\n pop r2\n rjmp 1b\n5: push r2\n push r2\n pop r2\n pop r2\n rjmp 1b\n\
+        elsewhere:\n push r2\n push r2\n push r2\n pop r2\n pop r2\n pop r2\n rjmp elsewhere\n\
+        __tablejump2__:\n lsl r30\n rol r31\n lpm r0, Z+\n lpm r31, Z\n mov r30, r0\n ijmp";
+    assert_eq!(proved(program).stack_bytes, 2);
+}
+
+#[test]
+fn a_function_that_breaks_the_convention_is_found() {
+    let convention = Budgets::default();
+    let refused = |called: &str| {
+        let program = calling("rcall called", called);
+        try_to_prove_by(&program, &convention).expect_err("it is broken").to_string()
+    };
+    assert!(refused("lds r16, 0x0100").contains("called does not preserve r16"));
+    assert!(refused("mul r24, r22").contains("called does not preserve r1"));
+    for kept in ["push r16\n lds r16, 0x0100\n pop r16", "lds r24, 0x0100", "mul r24, r22\n clr r1"] {
+        try_to_prove_by(&calling("rcall called", kept), &convention).expect("it is kept");
+    }
+    // Saved in a frame, as `-mcall-prologues` does.
+    let frame = "push r28\n push r29\n in r28, 0x3d\n in r29, 0x3e\n push r1\n std Y+0, r16\n lds r16, 0x0100\n ldd r16, Y+0\n pop r0\n pop r29\n pop r28";
+    try_to_prove_by(&calling("rcall called", frame), &convention).expect("it is kept");
+    let handler = |body: &str| format!("start:\n clr r1\n sei\n1: rjmp 1b\nhandler:\n {body}\n reti");
+    let error = try_to_prove_by(&handler("in r24, 0x09"), &convention).expect_err("it is broken").to_string();
+    assert!(error.contains("does not put back what it found in r24"), "{error}");
+}
+
+#[test]
+fn a_chip_with_more_flash_puts_longer_addresses_onto_the_stack() {
+    let program = "start:\n clr r1\n sei\n1: rcall one\n rjmp 1b\none:\n rcall two\n ret\ntwo:\n ret\nhandler:\n reti";
+    let bounds = |chip| {
+        let elf = assembled_for(program, chip == "atmega2560");
+        prove(&Program::read(elf.path(), Some(chip)).expect("it is an ELF"), &Budgets::default())
+            .expect("it has bounds")
+    };
+    let (small, large) = (bounds("atmega328p"), bounds("atmega2560"));
+    assert_eq!((small.stack_bytes, large.stack_bytes), (2 * 2 + 2, 3 * 3));
+    assert_eq!((small.handlers[0].cycles, large.handlers[0].cycles), (Some(4 + 3 + 4), Some(5 + 3 + 5)));
+    let error = Program::read(assembled(program).path(), Some("atmega4")).expect_err("there is none").to_string();
+    assert!(error.contains("atmega328p"), "{error}");
+}

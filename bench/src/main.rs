@@ -1,0 +1,229 @@
+//! The bench on the chip: runs the tasks of `Task::ALL` and shows each call on D13.
+//!
+//! It runs the firmware's own search of examples in flash, compiled by the firmware's own profile. When all is measured
+//! it classifies the same queries again, now by the plain search of the crate `knn`, and counts the answers that differ, those
+//! of a search of examples in SRAM too.
+//! It prints nothing: `cargo bench-uno` reads the pin and the variables.
+
+#![no_std]
+#![no_main]
+#![feature(asm_experimental_arch)]
+
+#[path = "../../src/examples.rs"]
+mod examples;
+
+use avr_progmem::progmem;
+use control::ground::{
+    examples::{RADIUS, scale},
+    features::{self, Features, SPEED_CLASSES_MM_S},
+};
+use core::{arch::asm, hint::black_box};
+use examples::{BuiltIn, InFlash, Row, rows};
+use knn::{Answer, ClassifyError, Example, Examples, MAX_K, Nearest, Neighbour, VACANT, classify};
+use knn_bench::{CLASSES, K, QUERIES, Random, Task};
+
+progmem! {
+    static progmem RANDOM_8: [Row; 8] = rows(&knn_bench::examples());
+    static progmem RANDOM_16: [Row; 16] = rows(&knn_bench::examples());
+    static progmem RANDOM_32: [Row; 32] = rows(&knn_bench::examples());
+    static progmem RANDOM_64: [Row; 64] = rows(&knn_bench::examples());
+    static progmem RANDOM_128: [Row; 128] = rows(&knn_bench::examples());
+}
+
+/// Where the stack stood at the first call: what lies below it is the classifier's.
+#[unsafe(no_mangle)]
+static mut STACK_POINTER: u16 = 0;
+
+/// Answers that differ from the plain search's, and 0xFFFF until all are compared.
+#[unsafe(no_mangle)]
+static mut DIFFERENT_ANSWERS: u16 = u16::MAX;
+
+type Query = [u8; features::COUNT];
+type Result = core::result::Result<Answer<CLASSES>, ClassifyError>;
+
+#[avr_device::entry]
+fn main() -> ! {
+    // SAFETY: bit 5 of DDRB makes D13 an output, which nobody else uses.
+    unsafe { asm!("sbi 0x04, 5") };
+    // SAFETY: no interrupt is on, so that nobody else refers to the variable; SP is at 0x3D and 0x3E.
+    unsafe { asm!("in {0:l}, 0x3d", "in {0:h}, 0x3e", out(reg_pair) STACK_POINTER) };
+    let found: &mut Nearest<CLASSES> = &mut Nearest::<CLASSES, _>::new([Neighbour::NONE; MAX_K as usize]);
+    for task in Task::ALL {
+        match task {
+            Task::Quantise => {
+                for object in objects() {
+                    measured(|| black_box(scale().quantise(black_box(&object.values()))));
+                }
+            }
+            Task::Classify(count) => {
+                for query in queries() {
+                    let _ = black_box(measured_search(found, &random(count), &query));
+                }
+            }
+            Task::ClassifyObjects => {
+                for object in objects() {
+                    let _ = black_box(measured_search(found, &BuiltIn::table(), &scale().quantise(&object.values())));
+                }
+            }
+        }
+    }
+    let mut different = 0;
+    for task in Task::ALL {
+        match task {
+            Task::Quantise => {}
+            Task::Classify(count) => {
+                for query in queries() {
+                    different +=
+                        u16::from(search(found, &random(count), &query) != plain_search(&random(count), &query));
+                }
+            }
+            Task::ClassifyObjects => {
+                for object in objects() {
+                    let query = scale().quantise(&object.values());
+                    different +=
+                        u16::from(search(found, &BuiltIn::table(), &query) != plain_search(&BuiltIn::table(), &query));
+                }
+            }
+        }
+    }
+    let mut taught = InMemory { places: [Example::new([0; features::COUNT], VACANT); TAUGHT], is_plain: false };
+    for (number, place) in taught.places.iter_mut().enumerate() {
+        // Some places stay vacant.
+        if let Some(example) = random(TAUGHT as u8).example(number).filter(|_| number % 5 > 0) {
+            *place = example;
+        }
+    }
+    for query in queries() {
+        for k in [K, MAX_K] {
+            let [fast, plain] = [false, true].map(|is_plain| {
+                taught.is_plain = is_plain;
+                search_taught(&taught, &query, k)
+            });
+            different += u16::from(fast != plain);
+        }
+    }
+    // SAFETY: as above.
+    unsafe { (&raw mut DIFFERENT_ANSWERS).write_volatile(different) };
+    loop {
+        core::hint::spin_loop();
+    }
+}
+
+/// Shows on D13 how long this takes: the pin is high for the call's cycles and the two of `sbi`.
+#[inline(always)]
+fn measured<T>(task: impl FnOnce() -> T) -> T {
+    // SAFETY: bit 5 of PORTB is D13, which nobody else uses.
+    unsafe { asm!("sbi 0x05, 5") };
+    let result = task();
+    // SAFETY: as above.
+    unsafe { asm!("cbi 0x05, 5") };
+    result
+}
+
+fn measured_search(found: &mut Nearest<CLASSES>, examples: &InFlash, query: &Query) -> Result {
+    measured(|| search(found, examples, query))
+}
+
+/// As the firmware searches: it keeps the places.
+#[inline(never)]
+fn search(found: &mut Nearest<CLASSES>, examples: &InFlash, query: &Query) -> Result {
+    found.begin(black_box(K))?;
+    examples.keep_nearest(query, found);
+    found.answer(RADIUS)
+}
+
+#[inline(never)]
+fn plain_search(examples: &InFlash, query: &Query) -> Result {
+    classify(&OneByOne(examples), query, black_box(K), RADIUS)
+}
+
+/// Hands examples out one by one, for the crate's plain search.
+struct OneByOne<'a>(&'a InFlash);
+
+impl Examples<{ features::COUNT }> for OneByOne<'_> {
+    fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    fn example(&self, index: usize) -> Option<Example<{ features::COUNT }>> {
+        self.0.example(index)
+    }
+}
+
+/// Examples in SRAM.
+const TAUGHT: usize = 32;
+
+/// They, and whether the crate's plain search goes over them.
+struct InMemory {
+    places: [Example<{ features::COUNT }>; TAUGHT],
+    is_plain: bool,
+}
+
+impl InMemory {
+    fn held(&self) -> impl Iterator<Item = &Example<{ features::COUNT }>> {
+        self.places.iter().filter(|example| example.label != VACANT)
+    }
+}
+
+impl Examples<{ features::COUNT }> for InMemory {
+    fn len(&self) -> usize {
+        self.held().count()
+    }
+
+    fn example(&self, index: usize) -> Option<Example<{ features::COUNT }>> {
+        self.held().nth(index).copied()
+    }
+
+    #[inline(never)]
+    fn keep_nearest<const CLASSES: usize>(&self, query: &Query, nearest: &mut Nearest<CLASSES>) {
+        if self.is_plain {
+            self.held().for_each(|example| nearest.join(example.neighbour_of(query)));
+        } else {
+            BuiltIn.keep_nearest_of(&self.places, query, nearest);
+        }
+    }
+}
+
+#[inline(never)]
+fn search_taught(examples: &InMemory, query: &Query, k: u8) -> Result {
+    classify(examples, query, black_box(k), RADIUS)
+}
+
+/// So many random examples: 8, 16, 32, 64 or 128.
+fn random(count: u8) -> InFlash {
+    match count {
+        8 => InFlash::new(&RANDOM_8),
+        16 => InFlash::new(&RANDOM_16),
+        32 => InFlash::new(&RANDOM_32),
+        64 => InFlash::new(&RANDOM_64),
+        _ => InFlash::new(&RANDOM_128),
+    }
+}
+
+/// Random queries.
+fn queries() -> impl Iterator<Item = Query> {
+    let mut random = Random::new(0x0123_4567);
+    (0..QUERIES).map(move |_| random.features())
+}
+
+/// Objects as they come along a row: plants and tall weeds, half each, at the paper's four speeds.
+fn objects() -> impl Iterator<Item = Features> {
+    let mut random = Random::new(0x0123_4567);
+    (0..QUERIES).map(move |_| {
+        let mut between = |lowest: i16, highest: i16| {
+            lowest + (i32::from(random.byte()) * i32::from(highest - lowest + 1) / 256) as i16
+        };
+        let speed = SPEED_CLASSES_MM_S[usize::from(between(0, 3) as u8) % SPEED_CLASSES_MM_S.len()];
+        match between(0, 1) {
+            0 => Features::describe(speed, between(60, 700), between(12, 20)),
+            _ => Features::describe(speed, between(480, 620), between(100, 180)),
+        }
+    })
+}
+
+#[panic_handler]
+fn panic(_: &core::panic::PanicInfo) -> ! {
+    loop {
+        core::hint::spin_loop();
+    }
+}

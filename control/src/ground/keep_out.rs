@@ -1,0 +1,356 @@
+//! The schedule: ground where the tool must not work, and the paper's Y, Z and R.
+//!
+//! A window is a canopy with a margin on both sides. The schedule remembers canopies as ground seen, not as a list of
+//! timed events, so that stopping, rolling back and changing speed need no bookkeeping: whether the tool may be in the
+//! row is a question about a stretch of ground. Ground never seen, or forgotten, is closed: what is unknown is a plant.
+//! Whatever is forgotten is closed, with a margin ahead of it for the plant that may end there.
+//!
+//! Windows need not be merged: two that overlap close the ground between them, and a gap too short to swing in and out
+//! again is closed by the length of the stretch that the tool asks about.
+
+use super::{
+    detection::{Detection, End},
+    reach::Geometry,
+};
+use crate::units::{Length, Ticks, WrappedPosition};
+use heapless::Vec;
+
+/// Canopies remembered at once, ahead of the tool and behind it: four plants between beam and tool at the longest
+/// distance and the closest spacing, and some six metres of row to roll back over.
+pub const CAPACITY: usize = 16;
+
+/// What is known of the ground behind the place from which on it is known.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Behind {
+    /// It was never seen.
+    Unseen,
+    /// It was seen, and a fault has made it worth nothing.
+    Spoiled,
+    /// It was seen, and lies too far behind.
+    Left,
+}
+
+/// A canopy that is kept: all of it, or where it is that of a single plant, the zone round its stem.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Canopy {
+    /// Where it begins.
+    pub leading: WrappedPosition,
+    /// Where it ends.
+    pub trailing: WrappedPosition,
+    /// So much of it on either side is leaves alone, under which the tool may work.
+    pub trim: u8,
+}
+
+impl Canopy {
+    /// What is kept of a detection, should it be a plant: all of it, or a zone of so much around its middle.
+    ///
+    /// A stem stands near the middle of its canopy, but the beam cannot tell one plant from two that have grown together, or from one with
+    /// a weed at its side. So either end is given up by a fifth of the zone at the most: no stem stands so near to it.
+    pub(super) fn of(detection: &Detection, zone: Length) -> Self {
+        let beside = detection.width() - zone;
+        let most = (zone.0 as u16 * 13) >> 6;
+        let trim = if beside > Length::ZERO { (beside.0 as u16 >> 1).min(most) as u8 } else { 0 };
+        Self { leading: detection.leading, trailing: detection.trailing, trim }
+    }
+
+    /// Where the tool has to be out, less the margin.
+    fn from(&self) -> WrappedPosition {
+        self.leading + Length(self.trim.into())
+    }
+
+    /// Where it may come back, less the margin.
+    fn to(&self) -> WrappedPosition {
+        self.trailing - Length(self.trim.into())
+    }
+
+    /// The second beam sees something from one place to another, an end of it or all; whether that belongs to the canopy, because it lies
+    /// within `reach` of it.
+    ///
+    /// An end of a single plant that both beams have within a quarter of `within` is where the second has it, from where less distance is
+    /// left to slip on. Else the canopy goes as far as that, and is kept whole: one of the beams has not seen all of it.
+    #[cfg_attr(target_arch = "avr", inline(never))]
+    pub(super) fn widen(
+        &mut self,
+        from: WrappedPosition,
+        to: WrappedPosition,
+        reach: Length,
+        within: Length,
+        end: End,
+    ) -> bool {
+        if self.leading - to > reach || from - self.trailing > reach {
+            return false;
+        }
+        let (before, behind) = (self.leading - from, to - self.trailing);
+        let near = if self.trim > 0 { Length(within.0 >> 2) } else { Length::ZERO };
+        if before > near {
+            (self.leading, self.trim) = (from, 0);
+        } else if end == End::Leading && before >= -near {
+            self.leading = from;
+        }
+        if behind > near {
+            (self.trailing, self.trim) = (to, 0);
+        } else if end == End::Trailing && behind >= -near {
+            self.trailing = to;
+        }
+        true
+    }
+}
+
+/// The canopies known, in the order in which the beam saw them.
+#[derive(Clone, Debug)]
+pub struct KeepOut {
+    canopies: Vec<Canopy, CAPACITY, u8>,
+    /// Everything behind this place is unknown.
+    known_from: WrappedPosition,
+    behind: Behind,
+}
+
+/// The schedule holds as many canopies ahead of the tool as it can; one more would have to be forgotten.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ScheduleFull;
+
+impl KeepOut {
+    /// A schedule of no ground.
+    pub const NONE: Self = Self::new(WrappedPosition::new(0));
+
+    /// An empty schedule that knows the ground from `known_from` on.
+    pub const fn new(known_from: WrappedPosition) -> Self {
+        Self { canopies: Vec::new(), known_from, behind: Behind::Unseen }
+    }
+
+    /// The place from which on the ground is known.
+    pub fn known_from(&self) -> WrappedPosition {
+        self.known_from
+    }
+
+    /// Whether a place lies so far behind that the ground there, although it was seen, had to be forgotten.
+    #[cfg_attr(not(target_arch = "avr"), inline)]
+    pub fn has_left(&self, place: WrappedPosition) -> bool {
+        self.behind == Behind::Left && self.known_from.is_ahead_of(place)
+    }
+
+    /// Declares the ground from `place` on known, which lies behind what the beam has seen.
+    pub fn trust_from(&mut self, place: WrappedPosition) {
+        (self.known_from, self.behind) = (place, Behind::Unseen);
+    }
+
+    /// Forgets everything, as none of it is to be relied on: from `place` on, the ground is seen anew.
+    pub fn spoil(&mut self, place: WrappedPosition) {
+        self.canopies.clear();
+        (self.known_from, self.behind) = (place, Behind::Spoiled);
+    }
+
+    /// Adds a canopy. When all places are taken, the oldest one behind the tool is forgotten, and the ground up to its
+    /// end with it.
+    ///
+    /// # Errors
+    /// [`ScheduleFull`] when even the oldest window lies at the tool or ahead of it; the canopy is then not added.
+    pub fn push(&mut self, canopy: Canopy, tool: WrappedPosition, margin: Length) -> Result<(), ScheduleFull> {
+        if self.canopies.is_full() {
+            let oldest = self.canopies.first().ok_or(ScheduleFull)?;
+            if !tool.is_ahead_of(oldest.trailing + margin) {
+                return Err(ScheduleFull);
+            }
+            let place = oldest.trailing;
+            self.leave(place);
+        }
+        self.canopies.push(canopy).map_err(|_| ScheduleFull)
+    }
+
+    /// A canopy that reaches to within a distance of what stands from one place to another goes as far as that, unless one does
+    /// already; whether any does. A zone that was trimmed to the stem is widened as `Canopy::widen` says.
+    pub fn widen(&mut self, from: WrappedPosition, to: WrappedPosition, within: Length, end: End) -> bool {
+        // One that reaches as far beyond it as it is long has all of it, and is asked for first.
+        let mut reach = from - to;
+        loop {
+            if self.canopies.iter_mut().any(|canopy| canopy.widen(from, to, reach, within, end)) {
+                return true;
+            }
+            if reach == within {
+                return false;
+            }
+            reach = within;
+        }
+    }
+
+    /// Forgets what ends at a place or behind it: the machine has left it behind.
+    #[cfg_attr(not(target_arch = "avr"), inline)]
+    pub fn leave(&mut self, place: WrappedPosition) {
+        if !place.is_ahead_of(self.known_from) {
+            return;
+        }
+        (self.known_from, self.behind) = (place, Behind::Left);
+        // They stand in order, so that only the first can lie behind.
+        while self.canopies.first().is_some_and(|canopy| !canopy.trailing.is_ahead_of(place)) {
+            self.canopies.remove(0);
+        }
+    }
+
+    /// Whether any of the ground between two places is closed: unknown, or within `margin` of a canopy.
+    #[cfg_attr(not(target_arch = "avr"), inline)]
+    pub fn is_closed(&self, near: WrappedPosition, far: WrappedPosition, margin: Length) -> bool {
+        let open_from = if self.behind == Behind::Unseen { self.known_from } else { self.known_from + margin };
+        if open_from.is_ahead_of(near) {
+            return true;
+        }
+        // Compared by distance from the near end, the counter's wrapping does no harm.
+        let length = (far - near) + margin;
+        // Most lie behind the tool, and are told by their end.
+        self.canopies.iter().any(|canopy| (canopy.to() - near) >= -margin && (canopy.from() - near) <= length)
+    }
+
+    /// Where the zone begins and ends that is kept at a place or nearest to it, if the place is within `margin` of one.
+    pub fn zone_at(&self, place: WrappedPosition, margin: Length) -> Option<(WrappedPosition, WrappedPosition)> {
+        let zones = self.canopies.iter().map(|canopy| (canopy.leading, canopy.trailing));
+        let off =
+            |&(begin, end): &(WrappedPosition, WrappedPosition)| (begin - place).max(place - end).max(Length::ZERO);
+        zones.min_by_key(off).filter(|zone| off(zone) <= margin)
+    }
+
+    /// Windows at the tool or ahead of it.
+    pub fn ahead(&self, tool: WrappedPosition, margin: Length) -> u8 {
+        self.canopies.iter().filter(|canopy| !tool.is_ahead_of(canopy.trailing + margin)).count() as u8
+    }
+}
+
+/// The paper's schedule of one canopy, from the place where the beam broke.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Plan {
+    /// Y: the tool leaves the row (Eq. 1).
+    pub delay: Ticks,
+    /// Z: how long it stays out (Eq. 2).
+    pub hold: Ticks,
+}
+
+impl Plan {
+    /// The schedule of a canopy of `width`, each within two units of the scale of its equation.
+    pub fn new(geometry: &Geometry, width: Length) -> Self {
+        let Geometry { scale, beam_to_tool, margin, .. } = *geometry;
+        let delay = (beam_to_tool - margin).max(Length::ZERO);
+        Self { delay: scale.ticks(delay), hold: scale.ticks(width + margin + margin) }
+    }
+
+    /// R: the tool is back in the row (Eq. 3).
+    pub fn actuation(&self) -> Ticks {
+        self.delay + self.hold
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MARGIN: Length = Length(95);
+
+    fn canopy(leading: i16, trailing: i16) -> Canopy {
+        Canopy { leading: WrappedPosition::new(leading), trailing: WrappedPosition::new(trailing), trim: 0 }
+    }
+
+    fn closed(keep_out: &KeepOut, from: i16, to: i16) -> bool {
+        keep_out.is_closed(WrappedPosition::new(from), WrappedPosition::new(to), MARGIN)
+    }
+
+    #[test]
+    fn a_window_reaches_from_margin_to_margin() {
+        let mut keep_out = KeepOut::new(WrappedPosition::new(0));
+        keep_out.push(canopy(1000, 1300), WrappedPosition::new(0), MARGIN).unwrap();
+        assert!(!closed(&keep_out, 904, 904));
+        assert!(closed(&keep_out, 905, 905));
+        assert!(closed(&keep_out, 1395, 1395));
+        assert!(!closed(&keep_out, 1396, 1396));
+        assert!(closed(&keep_out, 800, 905), "a stretch that ends in the window");
+        assert!(closed(&keep_out, 0, 5000), "a stretch across the window");
+        assert!(!closed(&keep_out, 0, 904));
+    }
+
+    #[test]
+    fn the_window_of_a_single_plant_is_its_zone_with_the_margins() {
+        let seen = |leading, trailing| Detection {
+            leading: WrappedPosition::new(leading),
+            trailing: WrappedPosition::new(trailing),
+            ..Detection::NONE
+        };
+        let zone = Length(160);
+        for (width, trim) in [(100, 0), (160, 0), (170, 5), (222, 31), (224, 32), (225, 32), (300, 32)] {
+            assert_eq!(Canopy::of(&seen(1000, 1000 + width), zone).trim, trim, "{width}");
+        }
+        let plant = seen(1000, 1300);
+        assert_eq!(Canopy::of(&plant, Length::ZERO).trim, 0);
+        let mut keep_out = KeepOut::new(WrappedPosition::new(0));
+        keep_out.push(Canopy::of(&plant, zone), WrappedPosition::new(0), MARGIN).unwrap();
+        assert!(!closed(&keep_out, 936, 936) && closed(&keep_out, 937, 937));
+        assert!(closed(&keep_out, 1363, 1363) && !closed(&keep_out, 1364, 1364));
+    }
+
+    #[test]
+    fn ground_never_seen_is_closed() {
+        let keep_out = KeepOut::new(WrappedPosition::new(0));
+        assert!(closed(&keep_out, -1, -1));
+        assert!(closed(&keep_out, -1, 5));
+        assert!(!closed(&keep_out, 0, 5));
+    }
+
+    #[test]
+    fn a_full_schedule_forgets_only_what_lies_behind_the_tool() {
+        let mut keep_out = KeepOut::new(WrappedPosition::new(0));
+        for plant in 0..CAPACITY as i16 {
+            keep_out.push(canopy(plant * 1000, plant * 1000 + 200), WrappedPosition::new(0), MARGIN).unwrap();
+        }
+        assert_eq!(keep_out.push(canopy(20_000, 20_200), WrappedPosition::new(295), MARGIN), Err(ScheduleFull));
+        assert_eq!(keep_out.push(canopy(20_000, 20_200), WrappedPosition::new(296), MARGIN), Ok(()));
+        assert!(keep_out.has_left(WrappedPosition::new(199)) && !keep_out.has_left(WrappedPosition::new(200)));
+        assert!(closed(&keep_out, 294, 294), "what was forgotten is unknown");
+        assert!(!closed(&keep_out, 295, 295));
+        let (place, wider) = (WrappedPosition::new(299), Length(100));
+        assert!(keep_out.is_closed(place, place, wider), "its margin is kept, even one that was set later");
+        assert!(closed(&keep_out, 20_000, 20_000));
+    }
+
+    #[test]
+    fn windows_ahead_are_counted_until_the_tool_has_passed_them() {
+        let mut keep_out = KeepOut::new(WrappedPosition::new(0));
+        keep_out.push(canopy(1000, 1300), WrappedPosition::new(0), MARGIN).unwrap();
+        keep_out.push(canopy(2000, 2300), WrappedPosition::new(0), MARGIN).unwrap();
+        assert_eq!(keep_out.ahead(WrappedPosition::new(0), MARGIN), 2);
+        assert_eq!(keep_out.ahead(WrappedPosition::new(1395), MARGIN), 2);
+        assert_eq!(keep_out.ahead(WrappedPosition::new(1396), MARGIN), 1);
+        assert_eq!(keep_out.ahead(WrappedPosition::new(2396), MARGIN), 0);
+    }
+
+    #[test]
+    fn what_lies_far_behind_is_left_before_the_counter_can_wrap_around_it() {
+        let mut keep_out = KeepOut::new(WrappedPosition::new(0));
+        keep_out.push(canopy(1000, 1300), WrappedPosition::new(0), MARGIN).unwrap();
+        for step in 1..5000 {
+            let tool = WrappedPosition::new(i16::wrapping_mul(step, 1 << 8));
+            keep_out.leave(tool - Length(8000));
+            assert!(step < 10 || !keep_out.is_closed(tool, tool, MARGIN), "{step}");
+            assert_eq!(keep_out.ahead(tool, MARGIN), u8::from(step < 6));
+            assert!(!keep_out.has_left(tool));
+        }
+        assert!(keep_out.has_left(WrappedPosition::new(i16::wrapping_mul(4999, 1 << 8)) - Length(8001)));
+    }
+
+    #[test]
+    fn what_is_spoiled_is_closed_with_a_margin_behind_it() {
+        let mut keep_out = KeepOut::new(WrappedPosition::new(0));
+        keep_out.push(canopy(1000, 1300), WrappedPosition::new(0), MARGIN).unwrap();
+        keep_out.spoil(WrappedPosition::new(1310));
+        assert!(closed(&keep_out, 0, 0) && closed(&keep_out, 1310, 1310));
+        assert!(closed(&keep_out, 1404, 1404));
+        assert!(!closed(&keep_out, 1405, 1405));
+        assert!(!keep_out.has_left(WrappedPosition::new(1000)), "nobody left it");
+    }
+
+    #[test]
+    fn windows_close_the_same_ground_where_the_counter_wraps() {
+        let base = i16::MAX - 1100;
+        let at = |offset: i16| WrappedPosition::new(base.wrapping_add(offset));
+        let mut keep_out = KeepOut::new(at(0));
+        let canopy = Canopy { leading: at(1000), trailing: at(1300), trim: 0 };
+        keep_out.push(canopy, at(0), MARGIN).unwrap();
+        for (offset, closed) in [(904, false), (905, true), (1150, true), (1395, true), (1396, false)] {
+            assert_eq!(keep_out.is_closed(at(offset), at(offset), MARGIN), closed, "{offset}");
+        }
+    }
+}

@@ -1,0 +1,110 @@
+//! The detections that were classified last, so that they can be looked at and labelled.
+
+use crate::ground::{class::Vote, features::Features};
+use heapless::Vec;
+
+/// Detections remembered.
+const CAPACITY: usize = 16;
+
+/// A detection as it was classified: what its features follow from, in less room than they take.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Classified {
+    pub(crate) speed_class_mm_s: i16,
+    pub(crate) spacing_mm: i16,
+    pub(crate) width_mm: i16,
+    /// What it was taken for.
+    pub vote: Vote,
+    /// What the operator said that it is, one of [`label`](crate::ground::class::label).
+    pub label: Option<u8>,
+}
+
+impl Classified {
+    /// Its features.
+    pub fn features(&self) -> Features {
+        Features::describe(self.speed_class_mm_s, self.spacing_mm, self.width_mm)
+    }
+}
+
+/// The last detections.
+#[derive(Clone, Debug)]
+pub struct Detections {
+    detections: Vec<Classified, CAPACITY, u8>,
+    /// The place of the oldest, which the next one takes where there is no room.
+    oldest: u8,
+}
+
+impl Detections {
+    /// None.
+    pub const NONE: Self = Self { detections: Vec::new(), oldest: 0 };
+
+    /// Remembers a detection, and drops the oldest one where there is no room.
+    pub fn remember(&mut self, detection: Classified) {
+        if let Err(detection) = self.detections.push(detection)
+            && let Some(oldest) = self.detections.get_mut(usize::from(self.oldest))
+        {
+            *oldest = detection;
+            self.oldest = (self.oldest + 1) % CAPACITY as u8;
+        }
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.detections.is_empty()
+    }
+
+    /// How many there are.
+    pub fn len(&self) -> u8 {
+        self.detections.len() as u8
+    }
+
+    /// One of them, counted from the oldest.
+    pub fn get(&self, number: u8) -> Option<&Classified> {
+        if number < self.len() { self.detections.get(self.place(number)) } else { None }
+    }
+
+    /// The last one.
+    pub fn last(&self) -> Option<&Classified> {
+        self.get(self.len().checked_sub(1)?)
+    }
+
+    /// The last one.
+    pub fn newest(&mut self) -> Option<&mut Classified> {
+        let last = self.place(self.len().checked_sub(1)?);
+        self.detections.get_mut(last)
+    }
+
+    /// Where one of them lies.
+    fn place(&self, number: u8) -> usize {
+        usize::from((self.oldest + number) % CAPACITY as u8)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use crate::ground::class::Class;
+    use std::vec::Vec;
+
+    fn classified(width_mm: i16) -> Classified {
+        let vote = Vote { class: Class::Plant, votes: 3 };
+        Classified { speed_class_mm_s: 556, spacing_mm: 300, width_mm, vote, label: None }
+    }
+
+    #[test]
+    fn the_last_detections_are_kept_in_their_order_and_the_last_one_is_labelled() {
+        let mut detections = Detections::NONE;
+        assert!(detections.newest().is_none());
+        for seen in 1..=40_i16 {
+            detections.remember(classified(seen));
+            let oldest = (seen - CAPACITY as i16).max(0) + 1;
+            let widths: Vec<_> =
+                (0..detections.len()).filter_map(|number| detections.get(number)).map(|o| o.width_mm).collect();
+            assert_eq!(widths, (oldest..=seen).collect::<Vec<_>>());
+            assert_eq!(detections.get(detections.len()), None);
+            let last = detections.newest().expect("it was remembered");
+            assert_eq!(last.width_mm, seen);
+            last.label = Some(1);
+        }
+    }
+}

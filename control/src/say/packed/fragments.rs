@@ -1,0 +1,112 @@
+//! The fragments of what is said, sorted: as the pairs that come most often are joined again and again. The test below finds them, and
+//! `UPDATE_EXPECT=1 cargo test -p control fragments` writes them here.
+
+#[rustfmt::skip]
+pub(super) const FRAGMENTS: &[&str] = &[
+    "\r\n", " [", " exampl", " f", " mm", " ms", " o", " ob", " obj", " obje", " p", " s",
+    " t", " tak", " th", " the", " the ", " the tool ", " ti", " to", " to ", " to the ", " tool", "# ",
+    "#,", "#,#,", ", ", ", or ", "0 ", "00", "100", ":#", "; ", "; 0 ", "; 0 n", "=#",
+    "=# ", "_f", "_mm", "_mm,", "_mm_s", "_ms", "_p", "_s", "a ", "ac", "ack", "ak",
+    "al", "alar", "alarm ", "ali", "alibr", "alibrat", "all", "am", "ampl", "an", "and", "and ",
+    "ar", "are ", "ast", "at", "at ", "back", "bea", "beam", "beam_", "bel", "br", "by",
+    "calibrat", "ce", "ch", "ch ", "chan", "ck", "co", "cod", "comm", "con", "ct", "d ",
+    "d_", "de", "di", "e ", "e the ", "e=", "ea", "ed", "ed ", "eed", "eed ", "eed_mm_s",
+    "eel", "el", "en", "en ", "encod", "ep", "er", "er_", "ervo", "es", "es ", "est",
+    "et", "ex", "exampl", "fi", "fir", "first", "for", "ga", "he ", "hol", "il", "in",
+    "ind", "ing", "is", "is ", "it", "lea", "lead_", "li", "list", "lists", "lo", "m ",
+    "ma", "mm", "ms", "nam", "no", "not ", "now", "of", "off", "ol", "oll", "on",
+    "one", "op", "or", "or ", "ou", "oun", "out", "ow", "pl", "plan", "plant", "re",
+    "ro", "roll", "row", "s ", "sa", "sav", "se", "servo", "servo_", "set", "sett", "setting",
+    "sp", "speed_mm_s", "st", "star", "start", "stat", "sw", "t ", "ter", "th", "the ", "to",
+    "tool", "tool ", "tu", "ul", "um", "un", "unse", "us", "ver", "vo", "wh", "wheel",
+];
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::FRAGMENTS;
+    use crate::say::packed::{CHARACTERS, DIGITS, HALVINGS, WAITING};
+    use crate::say::texts::GROUPS;
+    use crate::say::version;
+    use std::collections::{BTreeMap, BTreeSet};
+    use std::{format, fs, string::String, vec::Vec};
+
+    /// The parts that a fragment is unpacked to, as the table has them.
+    fn parts<'a>(fragment: &'a str, fragments: &BTreeSet<String>) -> (&'a str, &'a str) {
+        let is_known = |part: &str| part.len() == 1 || fragments.contains(part);
+        let mut splits = (1..fragment.len()).map(|at| fragment.split_at(at));
+        splits.find(|(first, second)| is_known(first) && is_known(second)).expect("a fragment consists of two")
+    }
+
+    /// Second halves that wait at once, and how often the first half is halved.
+    fn depth(part: &str, fragments: &BTreeSet<String>) -> (usize, usize) {
+        if part.len() == 1 {
+            return (0, 0);
+        }
+        let (first, second) = parts(part, fragments);
+        let ((waiting, halvings), (of_second, _)) = (depth(first, fragments), depth(second, fragments));
+        ((waiting + 1).max(of_second), halvings + 1)
+    }
+
+    fn can_be_unpacked(fragments: &BTreeSet<String>) -> bool {
+        fragments.iter().all(|fragment| {
+            let (waiting, halvings) = depth(fragment, fragments);
+            waiting + DIGITS < WAITING && halvings <= HALVINGS
+        })
+    }
+
+    /// Of all texts but the version, so that a commit changes nothing: joins the most frequent pair again and again, as long as bytes are left and a pair is worth its two bytes.
+    fn found() -> BTreeSet<String> {
+        let said = GROUPS.iter().copied().flatten().filter(|text| **text != version::NAME);
+        let mut texts: Vec<Vec<String>> = said.map(|text| text.chars().map(String::from).collect()).collect();
+        let (mut fragments, mut refused) = (BTreeSet::new(), BTreeSet::new());
+        while fragments.len() + CHARACTERS.1 < 256 {
+            let mut pairs: BTreeMap<(&str, &str), u32> = BTreeMap::new();
+            for pair in texts.iter().flat_map(|text| text.windows(2)) {
+                *pairs.entry((&pair[0], &pair[1])).or_default() += 1;
+            }
+            let free = pairs
+                .iter()
+                .filter(|((first, second), count)| **count > 2 && !refused.contains(&format!("{first}{second}")));
+            let Some((first, second)) = free.rev().max_by_key(|(_, count)| **count).map(|(pair, _)| *pair) else {
+                break;
+            };
+            let (first, second) = (String::from(first), String::from(second));
+            let joined = format!("{first}{second}");
+            let mut more = fragments.clone();
+            more.insert(joined.clone());
+            if !can_be_unpacked(&more) {
+                refused.insert(joined);
+                continue;
+            }
+            fragments = more;
+            for text in &mut texts {
+                let mut at = 0;
+                while at + 1 < text.len() {
+                    if text[at] == first && text[at + 1] == second {
+                        text.splice(at..at + 2, [joined.clone()]);
+                    }
+                    at += 1;
+                }
+            }
+        }
+        fragments
+    }
+
+    #[test]
+    fn the_fragments_are_those_that_are_found() {
+        let found: Vec<_> = found().into_iter().collect();
+        if std::env::var_os("UPDATE_EXPECT").is_none() {
+            assert_eq!(FRAGMENTS, found, "`UPDATE_EXPECT=1 cargo test -p control fragments` writes them");
+            return;
+        }
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/src/say/packed/fragments.rs");
+        let file = fs::read_to_string(path).expect("this file can be read");
+        let (begin, end) = ("= &[\n", "\n];\n");
+        let (head, rest) = file.split_once(begin).expect("the list begins");
+        let (_, tail) = rest.split_once(end).expect("the list ends");
+        let words: Vec<_> = found.iter().map(|fragment| format!("{fragment:?},")).collect();
+        let lines: Vec<_> = words.chunks(12).map(|some| format!("    {}", some.join(" "))).collect();
+        fs::write(path, format!("{head}{begin}{}{end}{tail}", lines.join("\n"))).expect("this file can be written");
+    }
+}

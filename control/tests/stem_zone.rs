@@ -1,0 +1,163 @@
+//! A stem's zone: of a single plant that was seen whole, the tool keeps off the middle alone, and of anything else off all of it.
+
+mod common;
+#[path = "common/rolling.rs"]
+mod rolling;
+
+use common::{ByWidth, machine_that_judges};
+use control::settings::Setting;
+use proptest::prelude::*;
+use rolling::{BEAM_TO_TOOL_MM, Rolling, SECOND_BEAM_MM};
+
+const ZONE_MM: f64 = 96.0;
+const MARGIN_MM: f64 = 10.0;
+
+/// So much of either side is given up at the most.
+const MOST_MM: f64 = ZONE_MM * 13.0 / 64.0;
+
+/// Two ticks at either end, what is rolled in a turn, and the answer that comes a turn later.
+const TOLERANCE_MM: f64 = 2.5;
+
+/// A tool that swings in no time, and so tells where the ground is kept.
+const SETTINGS: [(Setting, u16); 4] = [
+    (Setting::StemZoneMm, ZONE_MM as u16),
+    (Setting::MarginMm, MARGIN_MM as u16),
+    (Setting::LeadOutMs, 0),
+    (Setting::LeadInMs, 0),
+];
+
+fn along(seen_mm: Vec<(f64, f64)>) -> Rolling {
+    Rolling::along(seen_mm, Vec::new(), &SETTINGS)
+}
+
+fn with_beams(first_mm: Vec<(f64, f64)>, second_mm: Vec<(f64, f64)>) -> Rolling {
+    let second = [(Setting::SecondBeamMm, SECOND_BEAM_MM as u16)];
+    Rolling::along(first_mm, second_mm, &[&SETTINGS[..], &second].concat())
+}
+
+impl Rolling {
+    /// The ground that was left alone around a place, less the margins.
+    fn kept_mm(&self, place_mm: f64) -> (f64, f64) {
+        let before = self.weeded_mm.iter().copied().filter(|&mm| mm < place_mm).fold(f64::MIN, f64::max);
+        let behind = self.weeded_mm.iter().copied().filter(|&mm| mm > place_mm).fold(f64::MAX, f64::min);
+        (before + MARGIN_MM, behind - MARGIN_MM)
+    }
+
+    #[track_caller]
+    fn assert_kept(&self, from_mm: f64, to_mm: f64) {
+        let (from, to) = self.kept_mm((from_mm + to_mm) / 2.0);
+        let is_right = (from - from_mm).abs() < TOLERANCE_MM && (to - to_mm).abs() < TOLERANCE_MM;
+        assert!(is_right, "{from:.1} to {to:.1} instead of {from_mm:.1} to {to_mm:.1}");
+    }
+}
+
+#[test]
+fn the_tool_works_under_the_leaves_of_a_single_plant_by_a_part_of_the_zone_at_the_most() {
+    for width_mm in [70.0, 96.0, 110.0, 132.0, 150.0, 190.0, 300.0] {
+        let mut rolling = along(vec![(600.0 - width_mm / 2.0, 600.0 + width_mm / 2.0)]);
+        rolling.roll_to(1400.0, 300.0);
+        let half_mm = (width_mm / 2.0).min((ZONE_MM / 2.0).max(width_mm / 2.0 - MOST_MM));
+        rolling.assert_kept(600.0 - half_mm, 600.0 + half_mm);
+    }
+}
+
+#[test]
+fn without_a_zone_the_canopy_is_kept_from_end_to_end() {
+    let mut rolling = Rolling::along(vec![(500.0, 650.0)], Vec::new(), &SETTINGS[1..]);
+    rolling.roll_to(1400.0, 300.0);
+    rolling.assert_kept(500.0, 650.0);
+}
+
+#[test]
+fn leaves_are_a_plants_and_parts_that_stand_farther_from_each_other_are_kept_from_end_to_end() {
+    for (gap_mm, is_one) in [(2.0, true), (9.0, true), (12.0, false), (18.0, false)] {
+        let mut rolling = along(vec![(520.0, 590.0), (590.0 + gap_mm, 680.0)]);
+        rolling.roll_to(1400.0, 300.0);
+        let trimmed_mm = if is_one { MOST_MM } else { 0.0 };
+        rolling.assert_kept(520.0 + trimmed_mm, 680.0 - trimmed_mm);
+    }
+}
+
+#[test]
+fn the_rest_of_something_is_kept_from_end_to_end() {
+    let mut rolling = along(vec![(-50.0, 100.0)]);
+    rolling.roll_to(1400.0, 300.0);
+    assert!((rolling.kept_mm(0.0).1 - 100.0).abs() < TOLERANCE_MM, "{:?}", rolling.kept_mm(0.0));
+}
+
+#[test]
+fn what_is_not_known_before_the_next_one_comes_is_kept_from_end_to_end() {
+    let plants = vec![(500.0, 650.0), (680.0, 830.0)];
+    let machine = machine_that_judges(ByWidth::late_by(1250));
+    let mut rolling = Rolling::with(machine, plants, Vec::new(), &SETTINGS);
+    rolling.roll_to(1600.0, 300.0);
+    rolling.assert_kept(500.0, 650.0);
+    rolling.assert_kept(680.0 + MOST_MM, 830.0 - MOST_MM);
+}
+
+#[test]
+fn the_second_beam_has_the_last_word_on_where_a_plant_ends() {
+    for off_mm in [-8.0, 8.0] {
+        let plant = (500.0, 650.0);
+        let mut rolling = with_beams(vec![plant], vec![(plant.0 + off_mm, plant.1 + off_mm)]);
+        rolling.roll_to(1400.0, 300.0);
+        rolling.assert_kept(500.0 + off_mm + MOST_MM, 650.0 + off_mm - MOST_MM);
+    }
+}
+
+#[test]
+fn a_leaf_near_the_end_moves_nothing_however_often_it_is_passed() {
+    let leaves = vec![(500.0, 509.0), (514.0, 520.0), (525.0, 630.0), (634.0, 639.0), (643.0, 650.0)];
+    let mut rolling = with_beams(leaves.clone(), leaves);
+    rolling.roll_to(880.0, 300.0);
+    for _ in 0..4 {
+        rolling.roll_to(660.0, 300.0);
+        rolling.roll_to(880.0, 300.0);
+    }
+    rolling.roll_to(1400.0, 300.0);
+    rolling.assert_kept(500.0 + MOST_MM, 650.0 - MOST_MM);
+}
+
+#[test]
+fn a_plant_that_the_second_beam_sees_go_on_is_kept_from_end_to_end() {
+    let mut rolling = with_beams(vec![(500.0, 650.0)], vec![(500.0, 680.0)]);
+    rolling.roll_to(1400.0, 300.0);
+    rolling.assert_kept(500.0, 680.0);
+}
+
+#[test]
+fn what_only_the_second_beam_sees_is_kept_from_end_to_end() {
+    let mut rolling = with_beams(vec![(500.0, 650.0)], vec![(500.0, 650.0), (1000.0, 1150.0)]);
+    rolling.roll_to(1800.0, 300.0);
+    rolling.assert_kept(1000.0, 1150.0);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(200))]
+
+    /// Plants that have grown together, ragged ones, and weeds that touch: nowhere does the tool come nearer to a stem than what a single
+    /// plant gives up on either side, wherever in its own canopy that stem stands.
+    #[test]
+    fn no_stem_is_nearer_to_the_tool_than_its_own_leaves_reach_less_what_one_side_gives_up(
+        plants in prop::collection::vec((70.0..200.0_f64, prop::option::of((20.0..120.0_f64, 70.0..200.0_f64)), 150.0..400.0_f64), 1..8),
+        speed_mm_s in 100.0..900.0_f64,
+    ) {
+        let (mut place_mm, mut seen_mm, mut stems_mm) = (400.0, Vec::new(), Vec::new());
+        for (width_mm, double, gap_mm) in plants {
+            let mut grown = vec![(place_mm + 100.0, width_mm)];
+            grown.extend(double.map(|(apart_mm, width_mm)| (place_mm + 100.0 + apart_mm, width_mm)));
+            let spans = grown.iter().map(|&(middle_mm, width_mm)| (middle_mm - width_mm / 2.0, middle_mm + width_mm / 2.0));
+            let (from_mm, to_mm) = spans.fold((f64::MAX, f64::MIN), |(from, to), span| (from.min(span.0), to.max(span.1)));
+            seen_mm.push((from_mm, to_mm));
+            stems_mm.extend(grown);
+            place_mm = to_mm + gap_mm;
+        }
+        let mut rolling = along(seen_mm);
+        rolling.roll_to(place_mm + 2.0 * BEAM_TO_TOOL_MM, speed_mm_s);
+        for (stem_mm, width_mm) in stems_mm {
+            let (from, to) = rolling.kept_mm(stem_mm);
+            let beside_mm = width_mm / 2.0 - MOST_MM - TOLERANCE_MM - 0.002 * speed_mm_s;
+            prop_assert!(stem_mm - from > beside_mm && to - stem_mm > beside_mm, "{from:.1} to {to:.1} round {stem_mm:.1}");
+        }
+    }
+}

@@ -1,0 +1,278 @@
+//! Alarms and commands: a fault is played, and the tester measures when the tool is out and which code the LED flashes.
+//!
+//! Each scene begins at work with the tool in, on ground that the weeder was told to take as seen. The time counts from the fault's edge to the
+//! first pulse for out.
+
+use crate::error::CheckError;
+use crate::plan::Plan;
+use crate::servo::{self, Measured, ORIGIN};
+use crate::tester::{Tester, ms};
+use crate::wiring::{self, Weeder};
+use control::alarm::Alarm;
+use tester_core::message::{Command, Record};
+use tester_core::piece::Action;
+use tester_core::pins::{AT_REST, Line};
+use uno::CYCLES_PER_SECOND;
+
+/// From the plan's start to the fault, or to the roll ahead of it, in ms.
+const STILL_MS: u32 = 200;
+
+/// Time behind the fault in which the tool has to go out, in ms.
+const AFTER_MS: u32 = 1000;
+
+/// Counts a second where the machine rolls: 1.9 km/h with the factory settings' wheel.
+const COUNTS_PER_S: f64 = 1000.0;
+
+/// A quarter of a second of the LED, in ms: 2^16 steps of 4 us.
+const QUARTER_MS: f64 = 262.144;
+
+/// A width between the factory settings' in (1500 us) and out (2000 us).
+const MIDDLE_US: f64 = 1750.0;
+
+/// What goes wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scene {
+    /// The beam stays broken while the machine rolls on.
+    BlockedBeam,
+    /// The beam changes every millisecond while the machine rolls on.
+    FlickeringBeam,
+    /// The beam breaks three times, and the encoder is silent.
+    SilentEncoder,
+    /// Channel B stops while the machine rolls on.
+    DeadChannel,
+    /// The end switch closes while the tool is in.
+    EndSwitch,
+}
+
+impl Scene {
+    /// Every scene.
+    pub const ALL: [Self; 5] =
+        [Self::BlockedBeam, Self::FlickeringBeam, Self::SilentEncoder, Self::DeadChannel, Self::EndSwitch];
+
+    /// The alarm that it should raise.
+    pub const fn alarm(self) -> Alarm {
+        match self {
+            Self::BlockedBeam => Alarm::BeamBlocked,
+            Self::FlickeringBeam => Alarm::BeamFlickers,
+            Self::SilentEncoder => Alarm::EncoderSilent,
+            Self::DeadChannel => Alarm::EncoderChannelDead,
+            Self::EndSwitch => Alarm::ToolStuck,
+        }
+    }
+
+    /// What it is, in the report.
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::BlockedBeam => "blocked beam",
+            Self::FlickeringBeam => "flickering beam",
+            Self::SilentEncoder => "silent encoder",
+            Self::DeadChannel => "dead encoder channel",
+            Self::EndSwitch => "end switch closed with the tool in",
+        }
+    }
+
+    /// The plan, and the cycle of the fault.
+    fn plan(self) -> (Plan, u64) {
+        let mut plan = Plan::new();
+        plan.at(ms(STILL_MS).into(), Action::Pause);
+        let level =
+            |line: Line, high: bool| Action::Levels { mask: line.bit(), levels: if high { line.bit() } else { 0 } };
+        let begin = plan.end();
+        match self {
+            Self::BlockedBeam => {
+                plan.roll(300, COUNTS_PER_S);
+                plan.at(plan.end(), level(Line::Beam, false));
+                let fault = plan.end();
+                plan.roll(1000, COUNTS_PER_S);
+                return (plan, fault);
+            }
+            Self::FlickeringBeam => {
+                plan.roll(100, COUNTS_PER_S);
+                let fault = plan.end() + u64::from(ms(1));
+                plan.repeat(200, ms(1), Action::Flicker { mask: Line::Beam.bit() });
+                return (plan, fault);
+            }
+            Self::SilentEncoder => {
+                for edge in 0..6 {
+                    plan.at(begin + u64::from(ms(1 + 150 * edge)), level(Line::Beam, edge % 2 == 1));
+                }
+            }
+            Self::DeadChannel => {
+                plan.roll(300, COUNTS_PER_S);
+                plan.at(plan.end(), Action::Freeze { mask: Line::EncoderB.bit() });
+                let fault = plan.end();
+                plan.roll(700, COUNTS_PER_S);
+                return (plan, fault);
+            }
+            Self::EndSwitch => plan.at(begin + u64::from(ms(200)), level(Line::EndSwitch, false)),
+        }
+        let fault = if self == Self::EndSwitch { plan.end() } else { begin + u64::from(ms(1)) };
+        (plan, fault)
+    }
+}
+
+/// What came of a scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Raised {
+    /// From the fault to the first pulse for out, in ms by the weeder's clock; infinite if none came.
+    pub out_ms: f64,
+    /// Whether the expected alarm was raised.
+    pub is_expected: bool,
+    /// The code that the LED flashed, as a number of two digits; NaN if it was none.
+    pub code: f64,
+}
+
+/// Plays a scene. The weeder is in hold afterwards.
+///
+/// # Errors
+/// If a board does not answer.
+pub fn play(scene: Scene, weeder: &mut Weeder, tester: &mut Tester, clock_ratio: f64) -> Result<Raised, CheckError> {
+    to_work(weeder, tester, scene == Scene::EndSwitch)?;
+    let (mut plan, fault) = scene.plan();
+    plan.at(fault + u64::from(ms(AFTER_MS)), Action::Pause);
+    let played = tester.play(&plan.finish(), || weeder.drain())?;
+    let status = weeder.status()?;
+    let (first, second) = scene.alarm().code();
+    // The record may begin anywhere: a code with the pauses ahead of it and behind it.
+    let code_ms = f64::from(2 * (2 * u16::from(first + second) + 8) + 10) * QUARTER_MS;
+    let records = tester.record_for_ms(code_ms as u32)?;
+    tester.play(&freed(), || weeder.drain())?;
+    tester.set(AT_REST, AT_REST)?;
+    tester.record_for_ms(STILL_MS)?;
+    weeder.to_hold()?;
+    let out_ms = first_out(&servo::pulses(&played.records, played.start), ORIGIN + fault, clock_ratio);
+    let code = code(&records, clock_ratio).map_or(f64::NAN, |(first, second)| f64::from(10 * first + second));
+    Ok(Raised { out_ms, is_expected: status.alarm == Some(scene.alarm()), code })
+}
+
+/// Frees every line of a plan.
+fn freed() -> Vec<tester_core::piece::Piece> {
+    let mut plan = Plan::new();
+    plan.at(u64::from(ms(1)), Action::Freeze { mask: 0 });
+    plan.finish()
+}
+
+/// Puts the weeder to work with the tool in, and with the end switch if it is asked for.
+fn to_work(weeder: &mut Weeder, tester: &mut Tester, has_end_switch: bool) -> Result<(), CheckError> {
+    // What the weeder remembers of an earlier scene or burst, such as a wheel that stopped dead, counts toward some alarms.
+    wiring::reset(weeder, tester)?;
+    weeder.to_hold()?;
+    let end_switch = Line::EndSwitch.bit();
+    if has_end_switch {
+        tester.set(end_switch, 0)?;
+        tester.record_for_ms(STILL_MS)?;
+        weeder.ask("set end_switch on")?;
+    }
+    weeder.ask("start now")?;
+    tester.set(end_switch, end_switch)?;
+    tester.record_for_ms(2 * STILL_MS)?;
+    Ok(())
+}
+
+/// From a moment to the beginning of the first pulse for out behind it, in ms; infinite without one, and NaN if the tool was out before.
+fn first_out(pulses: &[Measured], moment: u64, clock_ratio: f64) -> f64 {
+    let is_out = |measured: &&Measured| measured.pulse.width_us() * clock_ratio > MIDDLE_US;
+    let behind = pulses.iter().position(|measured| measured.pulse.rise >= moment).unwrap_or(pulses.len());
+    // A tool that was out before is no answer to the fault.
+    if pulses[..behind].last().is_none_or(|last| is_out(&last)) {
+        return f64::NAN;
+    }
+    let first = pulses[behind..].iter().find(is_out).map(|measured| (measured.pulse.rise - moment) as f64);
+    first.map_or(f64::INFINITY, |cycles| cycles * 1000.0 / CYCLES_PER_SECOND as f64 * clock_ratio)
+}
+
+/// The code that the LED flashed from pause to pause, if it did.
+fn code(records: &[Record], clock_ratio: f64) -> Option<(u8, u8)> {
+    let lit = |record: &Record| match *record {
+        Record::Led { time, lit: true } => Some(time),
+        _ => None,
+    };
+    let rises: Vec<u32> = records.iter().filter_map(lit).collect();
+    // A flash is two quarters, one with the gap between the digits behind it four, and one with the pause eight.
+    let gaps = rises.windows(2).map(|two| {
+        let ms = f64::from(two[1].wrapping_sub(two[0])) * 1000.0 / CYCLES_PER_SECOND as f64 * clock_ratio;
+        (ms / QUARTER_MS).round() as u32
+    });
+    let mut digits = [0_u8; 2];
+    let (mut digit, mut is_begun) = (0, false);
+    for gap in gaps {
+        if is_begun {
+            *digits.get_mut(digit)? += 1;
+        }
+        match gap {
+            2 => {}
+            4 => digit += 1,
+            8 if is_begun => return (digit == 1).then_some((digits[0], digits[1])),
+            8 => (is_begun, digit) = (true, 0),
+            _ => return None,
+        }
+    }
+    None
+}
+
+/// From the work switch's opening to the first pulse for out, in ms.
+///
+/// # Errors
+/// If a board does not answer.
+pub fn switch_to_out_ms(weeder: &mut Weeder, tester: &mut Tester, clock_ratio: f64) -> Result<f64, CheckError> {
+    let switch = Line::WorkSwitch.bit();
+    tester.set(switch, 0)?;
+    // `start now` at work would leave the ground unseen, so `to_work` goes to hold ahead of it.
+    to_work(weeder, tester, false)?;
+    let mut plan = Plan::new();
+    plan.at(u64::from(ms(2 * STILL_MS)), Action::Levels { mask: switch, levels: switch });
+    let opened = plan.end();
+    plan.at(opened + u64::from(ms(AFTER_MS)), Action::Pause);
+    let played = tester.play(&plan.finish(), || weeder.drain())?;
+    Ok(first_out(&servo::pulses(&played.records, played.start), ORIGIN + opened, clock_ratio))
+}
+
+/// From before `hold` is typed to the first pulse for out, in ms: what the computer and the lines take is in it.
+///
+/// # Errors
+/// If a board does not answer.
+pub fn hold_to_out_ms(weeder: &mut Weeder, tester: &mut Tester, clock_ratio: f64) -> Result<f64, CheckError> {
+    to_work(weeder, tester, false)?;
+    let mut records = tester.record_for_ms(STILL_MS)?;
+    let typed = tester.command(&Command::Clock)?.time;
+    weeder.send("hold")?;
+    records.extend(tester.record_for_ms(AFTER_MS)?);
+    weeder.drain()?;
+    weeder.to_hold()?;
+    Ok(first_out(&servo::pulses(&records, typed), ORIGIN, clock_ratio))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The LED's edges of a code, from its pause on.
+    fn flashed(first: u8, second: u8) -> Vec<Record> {
+        let quarter = QUARTER_MS * CYCLES_PER_SECOND as f64 / 1000.0;
+        let mut quarters = 5;
+        let mut records = Vec::new();
+        for _ in 0..4 {
+            for (flashes, dark) in [(first, 2), (second, 6)] {
+                for _ in 0..flashes {
+                    let time = |quarters: u32| (f64::from(quarters) * quarter) as u32;
+                    records.push(Record::Led { time: time(quarters), lit: true });
+                    records.push(Record::Led { time: time(quarters + 1), lit: false });
+                    quarters += 2;
+                }
+                quarters += dark;
+            }
+        }
+        records
+    }
+
+    #[test]
+    fn a_code_is_read_from_pause_to_pause_wherever_the_record_begins() {
+        for (first, second) in [(1, 1), (2, 3), (4, 1), (5, 2)] {
+            let records = flashed(first, second);
+            for begin in 0..4 {
+                assert_eq!(code(&records[begin..], 1.0), Some((first, second)), "{first}-{second} from {begin}");
+            }
+        }
+        assert_eq!(code(&flashed(2, 2)[..6], 1.0), None);
+    }
+}

@@ -1,0 +1,110 @@
+//! Two virtual Unos on a desk: wire to wire, each at a pseudo terminal, in a thread of their own.
+//!
+//! They run as fast as the computer can. Opening a port resets its board, as the modem line DTR does on a real one.
+
+use crate::pair::{Pair, Side, Wiring};
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::{self, JoinHandle};
+use thiserror::Error;
+use uno::pty::{Pty, PtyError};
+use uno::{CYCLES_PER_SECOND, UnoError};
+
+/// Bytes that may be on their way to a board. More are left to the terminal.
+const MOST_BYTES_ON_THEIR_WAY: usize = 64;
+
+/// Why the desk could not be set up, or stopped.
+#[derive(Debug, Error)]
+pub enum DeskError {
+    /// A virtual Uno stopped.
+    #[error(transparent)]
+    Uno(#[from] UnoError),
+    /// A pseudo terminal failed.
+    #[error(transparent)]
+    Pty(#[from] PtyError),
+    /// The thread could not be started, or panicked.
+    #[error("the virtual Unos do not run")]
+    Thread(#[source] io::Error),
+}
+
+/// Two virtual Unos. Dropped, they stop.
+pub struct Desk {
+    stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<Result<(), DeskError>>>,
+    tester: PathBuf,
+    weeder: PathBuf,
+}
+
+impl Desk {
+    /// Powers both up.
+    ///
+    /// # Errors
+    /// If an ELF cannot be run, or no pseudo terminal is to be had.
+    pub fn start(tester_elf: &Path, weeder_elf: &Path) -> Result<Self, DeskError> {
+        let (tester_pty, weeder_pty) = (Pty::open()?, Pty::open()?);
+        let (tester, weeder) = (tester_pty.path().to_owned(), weeder_pty.path().to_owned());
+        let stop = Arc::new(AtomicBool::new(false));
+        let is_to_stop = Arc::clone(&stop);
+        let elves = (tester_elf.to_owned(), weeder_elf.to_owned());
+        let run = move || {
+            let mut pair = Pair::power_up(&elves.0, &elves.1, &[], Wiring::right())?;
+            let mut ptys = [(Side::Tester, tester_pty), (Side::Weeder, weeder_pty)];
+            while !is_to_stop.load(Ordering::Relaxed) {
+                for (side, pty) in &mut ptys {
+                    take_turn(&mut pair, *side, pty)?;
+                }
+                pair.run_for(CYCLES_PER_SECOND / 1000)?;
+            }
+            Ok(())
+        };
+        let thread = thread::Builder::new().name("desk".to_owned()).spawn(run).map_err(DeskError::Thread)?;
+        Ok(Self { stop, thread: Some(thread), tester, weeder })
+    }
+
+    /// The tester's port.
+    pub fn tester(&self) -> &Path {
+        &self.tester
+    }
+
+    /// The weeder's port.
+    pub fn weeder(&self) -> &Path {
+        &self.weeder
+    }
+
+    /// Stops both.
+    ///
+    /// # Errors
+    /// If one of them had stopped by itself.
+    pub fn stop(mut self) -> Result<(), DeskError> {
+        self.stop.store(true, Ordering::Relaxed);
+        let panicked = |_| Err(DeskError::Thread(io::Error::other("the thread panicked")));
+        self.thread.take().map_or(Ok(()), |thread| thread.join().unwrap_or_else(panicked))
+    }
+}
+
+impl Drop for Desk {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+    }
+}
+
+/// Moves bytes between a board and its terminal.
+fn take_turn(pair: &mut Pair, side: Side, pty: &mut Pty) -> Result<(), DeskError> {
+    if pty.was_opened()? {
+        pair.reset(side);
+    }
+    let room = MOST_BYTES_ON_THEIR_WAY.saturating_sub(pair.board(side).bytes_on_their_way());
+    let mut bytes = [0; MOST_BYTES_ON_THEIR_WAY];
+    let count = pty.read(&mut bytes[..room])?;
+    if count > 0 {
+        pair.send(side, &bytes[..count]);
+    }
+    let received = pair.received(side);
+    if !received.is_empty() {
+        let written = pty.write(received.make_contiguous())?;
+        received.drain(..written);
+    }
+    Ok(())
+}

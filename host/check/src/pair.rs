@@ -1,0 +1,283 @@
+//! Two virtual Unos, wire to wire, in the place of the boards.
+//!
+//! Both run in lock step, [`STEP`] cycles at a time. The tester's clock is the world's, and the weeder's is faster or slower by a known share.
+//! An edge from the tester reaches the weeder at its cycle. One from the weeder reaches the tester [`STEP`] cycles late, always, so widths
+//! and distances are right. [`Wiring`] can be wrong on purpose, for tests of the check.
+
+use std::cell::RefCell;
+use std::collections::VecDeque;
+use std::io::{self, Read, Write};
+use std::path::{Path, PathBuf};
+use std::rc::Rc;
+use tester_core::pins::Line;
+use uno::{CYCLES_PER_SECOND, Pin, PinChange, Uno, UnoError};
+
+/// Cycles between two looks at the wires: 1 us.
+pub const STEP: u64 = 16;
+
+/// Steps between two looks at the reset, which is pulled for milliseconds.
+const STEPS_TO_RESET: u64 = 64;
+
+/// The difference of the clocks in parts per million: the weeder's is faster by 0.3 %.
+pub const CLOCK_PPM: i64 = 3000;
+
+/// The tester's pins; the firmware's own are in `tester/src/lines.rs`.
+const TESTER_LINES: [(Line, Pin); 6] = [
+    (Line::EncoderA, Pin::A0),
+    (Line::EncoderB, Pin::A1),
+    (Line::Beam, Pin::A2),
+    (Line::SecondBeam, Pin::A3),
+    (Line::EndSwitch, Pin::A4),
+    (Line::WorkSwitch, Pin::A5),
+];
+const TESTER_RESET: Pin = Pin::D7;
+const TESTER_LED: Pin = Pin::D6;
+const TESTER_SERVO: Pin = Pin::D8;
+
+/// A line from the tester, the weeder's pin that it leads to, and whether something inverts it on the way.
+pub type InputWire = (Line, Pin, bool);
+
+/// Changes an edge on its way from the weeder: what it becomes, and nothing if it is lost. Cycles are the tester's.
+pub type Edge = Box<dyn FnMut(PinChange) -> Option<PinChange>>;
+
+/// Changes the content of an EEPROM.
+pub type Spoil = Box<dyn FnMut(&mut [u8])>;
+
+/// The wires, right or wrong.
+pub struct Wiring {
+    /// The lines from the tester.
+    pub inputs: Vec<InputWire>,
+    /// Whether the reset is wired.
+    pub has_reset: bool,
+    /// Whether the servo's and the LED's lines are.
+    pub outputs: Vec<Pin>,
+    /// How much faster the weeder's clock is, in parts per million.
+    pub clock_ppm: i64,
+    /// What happens to edges from the weeder.
+    pub from_weeder: Option<Edge>,
+    /// What happens to edges to the weeder. Cycles are the tester's.
+    pub to_weeder: Option<Edge>,
+    /// What becomes of the weeder's EEPROM when its reset is pulled. It starts as at power-up then.
+    pub eeprom_at_reset: Option<Spoil>,
+}
+
+impl Wiring {
+    /// All wires as they should be.
+    pub fn right() -> Self {
+        use field::wiring::{BEAM, ENCODER_A, ENCODER_B, END_SWITCH, LED, SECOND_BEAM, SERVO, WORK_SWITCH};
+        let pins = [ENCODER_A, ENCODER_B, BEAM, SECOND_BEAM, END_SWITCH, WORK_SWITCH];
+        Self {
+            inputs: Line::ALL.into_iter().zip(pins).map(|(line, pin)| (line, pin, false)).collect(),
+            has_reset: true,
+            outputs: vec![SERVO, LED],
+            clock_ppm: CLOCK_PPM,
+            from_weeder: None,
+            to_weeder: None,
+            eeprom_at_reset: None,
+        }
+    }
+}
+
+/// The two boards.
+pub struct Pair {
+    tester: Uno,
+    weeder: Uno,
+    weeder_elf: PathBuf,
+    wiring: Wiring,
+    /// The tester's and the weeder's cycle at the last moment that both share.
+    shared: (u64, u64),
+    steps: u64,
+    is_reset_pulled: bool,
+    from_tester: VecDeque<u8>,
+    from_weeder: VecDeque<u8>,
+}
+
+impl Pair {
+    /// Powers both up, with the weeder's EEPROM.
+    ///
+    /// # Errors
+    /// If an ELF cannot be run.
+    pub fn power_up(tester: &Path, weeder: &Path, eeprom: &[u8], wiring: Wiring) -> Result<Self, UnoError> {
+        let weeder_elf = weeder.to_owned();
+        let (tester, weeder) = (Uno::boot(tester)?, Uno::boot_with_eeprom(weeder, eeprom)?);
+        let weeder = weeder.wired(&field::wiring::WIRES);
+        let shared = (tester.cycle(), weeder.cycle());
+        let (from_tester, from_weeder) = (VecDeque::new(), VecDeque::new());
+        Ok(Self {
+            tester,
+            weeder,
+            weeder_elf,
+            wiring,
+            shared,
+            steps: 0,
+            is_reset_pulled: false,
+            from_tester,
+            from_weeder,
+        })
+    }
+
+    fn weeder_cycle(&self, tester_cycle: u64) -> u64 {
+        let since = tester_cycle.saturating_sub(self.shared.0) as i64;
+        self.shared.1 + (since + since * self.wiring.clock_ppm / 1_000_000) as u64
+    }
+
+    fn tester_cycle(&self, weeder_cycle: u64) -> u64 {
+        let since = weeder_cycle.saturating_sub(self.shared.1) as i64;
+        self.shared.0 + (since * 1_000_000 / (1_000_000 + self.wiring.clock_ppm)) as u64
+    }
+
+    /// Lets the tester's clock run by so many cycles, and the weeder's as long.
+    ///
+    /// # Errors
+    /// If one of them stops.
+    pub fn run_for(&mut self, cycles: u64) -> Result<(), UnoError> {
+        let end = self.tester.cycle() + cycles;
+        while self.tester.cycle() < end {
+            self.step()?;
+        }
+        self.from_tester.extend(self.tester.received_bytes().into_iter().map(|received| received.byte));
+        self.from_weeder.extend(self.weeder.received_bytes().into_iter().map(|received| received.byte));
+        Ok(())
+    }
+
+    fn step(&mut self) -> Result<(), UnoError> {
+        let until = self.tester.cycle() + STEP;
+        self.tester.run_until(until)?;
+        for change in self.tester.take_changes() {
+            self.carry_to_weeder(change);
+        }
+        if self.steps.is_multiple_of(STEPS_TO_RESET) {
+            self.look_at_reset()?;
+        }
+        self.steps += 1;
+        if self.is_reset_pulled {
+            return Ok(());
+        }
+        self.weeder.run_until(self.weeder_cycle(until))?;
+        for change in self.weeder.take_changes() {
+            self.carry_to_tester(change);
+        }
+        Ok(())
+    }
+
+    /// While the reset is pulled, the weeder's clock stands still, and both are counted from there on.
+    fn look_at_reset(&mut self) -> Result<(), UnoError> {
+        if self.is_reset_pulled {
+            self.shared = (self.tester.cycle(), self.weeder.cycle());
+        }
+        let pulled = self.wiring.has_reset && self.tester.output(TESTER_RESET) == Some(false);
+        if pulled && !self.is_reset_pulled {
+            if let Some(spoil) = &mut self.wiring.eeprom_at_reset {
+                let mut eeprom = self.weeder.eeprom();
+                spoil(&mut eeprom);
+                self.weeder = Uno::boot_with_eeprom(&self.weeder_elf, &eeprom)?.wired(&field::wiring::WIRES);
+            }
+            self.shared = (self.tester.cycle(), self.weeder.cycle());
+            self.weeder.reset();
+            for change in self.weeder.take_changes() {
+                self.carry_to_tester(change);
+            }
+        }
+        self.is_reset_pulled = pulled;
+        Ok(())
+    }
+
+    /// Resets a board, as opening its port does by the modem line DTR.
+    pub fn reset(&mut self, side: Side) {
+        self.board(side).reset();
+    }
+
+    /// One of the boards.
+    pub fn board(&mut self, side: Side) -> &mut Uno {
+        match side {
+            Side::Tester => &mut self.tester,
+            Side::Weeder => &mut self.weeder,
+        }
+    }
+
+    fn carry_to_weeder(&mut self, change: PinChange) {
+        let Some(&(line, _)) = TESTER_LINES.iter().find(|&&(_, pin)| pin == change.pin) else { return };
+        let change = match &mut self.wiring.to_weeder {
+            Some(becomes) => becomes(change),
+            None => Some(change),
+        };
+        let Some(change) = change else { return };
+        let cycle = self.weeder_cycle(change.cycle);
+        let wires = self.wiring.inputs.iter().filter(|&&(wired, ..)| wired == line);
+        let changes: Vec<_> =
+            wires.map(|&(_, pin, inverted)| PinChange { cycle, pin, high: change.high != inverted }).collect();
+        self.weeder.drive(changes);
+    }
+
+    fn carry_to_tester(&mut self, change: PinChange) {
+        if !self.wiring.outputs.contains(&change.pin) {
+            return;
+        }
+        let pin = if change.pin == field::wiring::SERVO { TESTER_SERVO } else { TESTER_LED };
+        let change = PinChange { cycle: self.tester_cycle(change.cycle) + STEP, pin, ..change };
+        let change = match &mut self.wiring.from_weeder {
+            Some(becomes) => becomes(change),
+            None => Some(change),
+        };
+        self.tester.drive(change);
+    }
+}
+
+/// Which board a port is of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// The tester.
+    Tester,
+    /// The weeder.
+    Weeder,
+}
+
+/// A port of one of the boards, without a terminal between. Both clocks run while it is read, as fast as they can.
+pub struct PairPort {
+    /// Both boards.
+    pub pair: Rc<RefCell<Pair>>,
+    /// Whose port it is.
+    pub side: Side,
+}
+
+/// Longest time that a read waits for a byte, by the tester's clock.
+const READ_MS: u64 = 20;
+
+impl Pair {
+    /// Types bytes into a board's port.
+    pub fn send(&mut self, side: Side, bytes: &[u8]) {
+        self.board(side).send(bytes);
+    }
+
+    /// What has come from a board and was not read yet.
+    pub fn received(&mut self, side: Side) -> &mut VecDeque<u8> {
+        match side {
+            Side::Tester => &mut self.from_tester,
+            Side::Weeder => &mut self.from_weeder,
+        }
+    }
+}
+
+impl Read for PairPort {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let mut pair = self.pair.borrow_mut();
+        for _ in 0..READ_MS {
+            if !pair.received(self.side).is_empty() {
+                return pair.received(self.side).read(buffer);
+            }
+            pair.run_for(CYCLES_PER_SECOND / 1000).map_err(io::Error::other)?;
+        }
+        Err(io::ErrorKind::TimedOut.into())
+    }
+}
+
+impl Write for PairPort {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.pair.borrow_mut().send(self.side, bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}

@@ -1,0 +1,147 @@
+//! Plans: from levels at cycles to the pieces that the tester plays.
+//!
+//! A wheel makes thousands of counts a second, and the serial line carries 11 bytes a millisecond. So counts that follow each other evenly
+//! become one piece. Each count is at most `TOLERANCE` away from its time, and what comes after is not shifted by it.
+
+use field::wiring;
+use tester_core::piece::{Action, Piece};
+use tester_core::pins::Line;
+use uno::{Pin, PinChange};
+
+/// How far a count may be from its time, in cycles: 20 us, 0.02 mm at 4 km/h.
+const TOLERANCE: f64 = 320.0;
+
+/// The shortest time between two events, in cycles.
+const SHORTEST: u64 = 200;
+
+/// The line of a pin of the weeder.
+pub fn line(pin: Pin) -> Option<Line> {
+    match pin {
+        wiring::ENCODER_A => Some(Line::EncoderA),
+        wiring::ENCODER_B => Some(Line::EncoderB),
+        wiring::BEAM => Some(Line::Beam),
+        wiring::SECOND_BEAM => Some(Line::SecondBeam),
+        wiring::END_SWITCH => Some(Line::EndSwitch),
+        wiring::WORK_SWITCH => Some(Line::WorkSwitch),
+        _ => None,
+    }
+}
+
+/// A plan that is being made: its pieces, and the cycle of its last event.
+#[derive(Clone, Debug, Default)]
+pub struct Plan {
+    pieces: Vec<Piece>,
+    last: u64,
+}
+
+impl Plan {
+    /// A plan without an event, which begins at cycle 0.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// An event at a cycle, or as soon after the one before as it can be.
+    pub fn at(&mut self, cycle: u64, action: Action) {
+        let cycle = cycle.max(self.last + SHORTEST);
+        self.pieces.push(Piece { wait: (cycle - self.last) as u32, count: 1, action });
+        self.last = cycle;
+    }
+
+    /// So many counts at a rate, from the last event on.
+    pub fn roll(&mut self, counts: i32, per_s: f64) {
+        let action = if counts > 0 { Action::Forward } else { Action::Backward };
+        let wait = (uno::CYCLES_PER_SECOND as f64 / per_s).round() as u32;
+        let mut left = counts.unsigned_abs();
+        while left > 0 {
+            let count = left.min(255);
+            self.pieces.push(Piece { wait, count: count as u8, action });
+            self.last += u64::from(wait) * u64::from(count);
+            left -= count;
+        }
+    }
+
+    /// The same action up to 255 times, each so many cycles after the one before.
+    pub fn repeat(&mut self, count: u8, wait: u32, action: Action) {
+        self.pieces.push(Piece { wait, count, action });
+        self.last += u64::from(wait) * u64::from(count);
+    }
+
+    /// The cycle of the last event.
+    pub fn end(&self) -> u64 {
+        self.last
+    }
+
+    /// The pieces, with the end.
+    pub fn finish(mut self) -> Vec<Piece> {
+        self.at(self.last + SHORTEST, Action::End);
+        self.pieces
+    }
+
+    /// Counts at these cycles, all in one direction.
+    fn counts(&mut self, cycles: &[u64], action: Action) {
+        let mut rest = cycles;
+        while !rest.is_empty() {
+            let (length, wait) = self.even(rest);
+            let count = length.min(255);
+            self.pieces.push(Piece { wait, count: count as u8, action });
+            self.last += u64::from(wait) * count as u64;
+            rest = &rest[count..];
+        }
+    }
+
+    /// How many of these counts can be one piece, and its wait.
+    fn even(&self, cycles: &[u64]) -> (usize, u32) {
+        let since = |cycle: u64| cycle.saturating_sub(self.last) as f64;
+        let (mut lowest, mut highest) = (0.0_f64, f64::INFINITY);
+        let mut found = (1, since(cycles[0]).max(SHORTEST as f64));
+        for (number, &cycle) in (1_usize..=255).zip(cycles) {
+            lowest = lowest.max((since(cycle) - TOLERANCE) / number as f64);
+            highest = highest.min((since(cycle) + TOLERANCE) / number as f64);
+            let wait = since(cycle) / number as f64;
+            let wait = wait.clamp(lowest, highest.max(lowest)).round();
+            if lowest.ceil() > highest.floor() || wait < lowest || wait > highest {
+                break;
+            }
+            found = (number, wait.max(SHORTEST as f64));
+        }
+        (found.0, found.1 as u32)
+    }
+
+    /// Adds what happens on the weeder's pins, `offset` cycles later; in the order of time.
+    pub fn follow(&mut self, changes: &[PinChange], offset: u64) {
+        let (mut a, mut b) = (false, false);
+        let mut run: (Vec<u64>, Option<Action>) = (Vec::new(), None);
+        for change in changes {
+            let Some(line) = line(change.pin) else { continue };
+            let cycle = change.cycle + offset;
+            let action = match line {
+                Line::EncoderA if a != change.high => {
+                    a = change.high;
+                    if a == b { Action::Backward } else { Action::Forward }
+                }
+                Line::EncoderB if b != change.high => {
+                    b = change.high;
+                    if a == b { Action::Forward } else { Action::Backward }
+                }
+                Line::EncoderA | Line::EncoderB => continue,
+                line => Action::Levels { mask: line.bit(), levels: if change.high { line.bit() } else { 0 } },
+            };
+            let is_count = matches!(action, Action::Forward | Action::Backward);
+            if let Some(running) = run.1
+                && running != action
+            {
+                self.counts(&run.0, running);
+                run = (Vec::new(), None);
+            }
+            if is_count {
+                run.0.push(cycle);
+                run.1 = Some(action);
+            } else {
+                self.at(cycle, action);
+            }
+        }
+        if let Some(running) = run.1 {
+            self.counts(&run.0, running);
+        }
+    }
+}

@@ -1,0 +1,144 @@
+//! Rates: bursts of the encoder, up to the rate that is proved, and whether the weeder has lost a count.
+//!
+//! The tester counts cycles between two edges, so a rate is exact by its clock. The weeder is in hold. Busy means that it prints all its
+//! settings meanwhile, and that the beam changes once in 128 counts.
+
+use crate::error::CheckError;
+use crate::tester::Tester;
+use crate::wiring::Weeder;
+use link::ConsoleLine;
+use tester_core::message::{Command, PATTERN_STEPS, REPEAT_CYCLES, Step, step_cycles};
+use tester_core::pins::Line;
+use uno::CYCLES_PER_SECOND;
+
+/// Counts of a burst behind its run-up: 0.1 s at the highest rate, less than the time after which the weeder takes its loop for dead.
+const COUNTS: u32 = 29_000;
+
+/// Counts of the run-up, and how much longer its steps are, in units of 3 cycles: 40,000 counts a second. The weeder takes the jumps of a
+/// wheel that is fast from one moment to the next for noise.
+const RUN_UP_COUNTS: u32 = 1280;
+const SLOWER: u8 = 115;
+
+/// The share of the time between two edges by which each comes early or late, with jitter: a disc that is worn or off its centre.
+const JITTER: f64 = 0.3;
+
+/// Time in which the weeder answers the last question, in ms.
+const SETTLE_MS: u32 = 100;
+
+/// Reads of 20 ms in which it has to.
+const ANSWER_READS: usize = 100;
+
+/// How the encoder turns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Turning {
+    /// Cycles from one count to the next in the mean, 13 or more.
+    pub cycles: u32,
+    /// Which way.
+    pub forward: bool,
+    /// Whether edges come early and late.
+    pub jittered: bool,
+    /// Whether the weeder prints and the beam changes.
+    pub busy: bool,
+}
+
+impl Turning {
+    /// The rate in counts a second, by the tester's clock.
+    pub fn per_s(self) -> f64 {
+        CYCLES_PER_SECOND as f64 / f64::from(self.cycles)
+    }
+
+    /// The pattern: one change of a channel in each step, from these levels.
+    fn pattern(self, levels: u8) -> Vec<Step> {
+        let is_even = (levels & Line::EncoderA.bit() != 0) == (levels & Line::EncoderB.bit() != 0);
+        let mut next_is_a = is_even == self.forward;
+        let (mut due, mut done) = (0.0, 0.0);
+        let mut random = 1_u32;
+        let step = |number| {
+            let line = if next_is_a { Line::EncoderA } else { Line::EncoderB };
+            next_is_a = !next_is_a;
+            let beam = if self.busy && number == 0 { Line::Beam.bit() } else { 0 };
+            due += f64::from(self.cycles);
+            // The multiplier of Numerical Recipes' generator; the upper bits are random enough for a wheel.
+            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            let share = f64::from(random >> 16) / f64::from(1 << 15) - 1.0;
+            let shift = if self.jittered { JITTER * share * f64::from(self.cycles) } else { 0.0 };
+            let repeated = if number == 0 { f64::from(REPEAT_CYCLES) } else { 0.0 };
+            let wait = due + shift - done - repeated - f64::from(step_cycles(0));
+            let delay = (wait / 3.0).round().clamp(1.0, f64::from(u8::MAX - SLOWER));
+            done += f64::from(step_cycles(delay as u8)) + repeated;
+            Step { delay: delay as u8, toggle: line.bit() | beam }
+        };
+        (0..PATTERN_STEPS).map(step).collect()
+    }
+}
+
+/// Counts that the weeder has less than were made; `None` if it has started afresh.
+///
+/// # Errors
+/// If a board does not answer.
+pub fn lost(turning: Turning, weeder: &mut Weeder, tester: &mut Tester) -> Result<Option<i64>, CheckError> {
+    weeder.to_hold()?;
+    let before = weeder.status()?.position;
+    let levels = tester.command(&Command::Clock)?.levels;
+    tester.load(&turning.pattern(levels))?;
+    weeder.drain()?;
+    if turning.busy {
+        weeder.send("get")?;
+    }
+    let (run_up, repeats) = (RUN_UP_COUNTS / PATTERN_STEPS as u32, COUNTS / PATTERN_STEPS as u32);
+    let burst =
+        Command::Burst { steps: PATTERN_STEPS as u8, run_up: run_up as u16, slower: SLOWER, repeats: repeats as u16 };
+    tester.command(&burst)?;
+    tester.set(Line::Beam.bit(), Line::Beam.bit())?;
+    tester.record_for_ms(SETTLE_MS)?;
+    if turning.busy {
+        for _ in 0..ANSWER_READS {
+            match weeder.next_line()?.map(|line| ConsoleLine::parse(&line)) {
+                Some(ConsoleLine::Done) => break,
+                Some(ConsoleLine::Greeting { .. }) => return Ok(None),
+                _ => {}
+            }
+        }
+    }
+    weeder.drain()?;
+    let made = i64::from((run_up + repeats) * PATTERN_STEPS as u32) * if turning.forward { 1 } else { -1 };
+    let counted = i64::from(weeder.status()?.position.wrapping_sub(before));
+    Ok(Some((made - counted).abs()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The cycles at which the counts of two patterns in a row come.
+    fn times(turning: Turning) -> Vec<u32> {
+        let pattern = turning.pattern(0);
+        let twice = pattern.iter().chain(&pattern).enumerate();
+        let mut time = 0;
+        let count = |(number, step): (usize, &Step)| {
+            let repeated = if number % PATTERN_STEPS == 0 && number > 0 { REPEAT_CYCLES } else { 0 };
+            time += step_cycles(step.delay) + repeated;
+            time
+        };
+        twice.map(count).collect()
+    }
+
+    #[test]
+    fn the_proved_rate_is_even_to_the_cycle() {
+        let turning = Turning { cycles: 55, forward: true, jittered: false, busy: false };
+        let times = times(turning);
+        assert!(times.windows(2).all(|two| two[1] - two[0] == 55), "{times:?}");
+        assert_eq!(turning.per_s().round(), 290_909.0);
+    }
+
+    #[test]
+    fn jitter_keeps_the_mean_and_no_gap_is_shorter_than_it_may_be() {
+        let turning = Turning { cycles: 79, forward: false, jittered: true, busy: true };
+        let times = times(turning);
+        let mean = f64::from(times[2 * PATTERN_STEPS - 1] - times[PATTERN_STEPS - 1]) / PATTERN_STEPS as f64;
+        assert!((mean - 79.0).abs() < 0.5, "{mean}");
+        let gaps = times.windows(2).map(|two| two[1] - two[0]);
+        let (shortest, longest) = gaps.fold((u32::MAX, 0), |(least, most), gap| (least.min(gap), most.max(gap)));
+        assert!((28..45).contains(&shortest) && (113..130).contains(&longest), "{shortest} {longest}");
+    }
+}

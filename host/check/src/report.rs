@@ -1,0 +1,317 @@
+//! The report: what was measured, beside what the simulation shows and what is proved.
+//!
+//! A [`Line`] is one figure. It fails if it is outside its limits, and it differs if it is within them, but farther from the simulation's figure
+//! than its tolerance. The simulation's figures are in `simulated.json`, written by the same check of two virtual Unos.
+
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+/// The version of the report's form.
+pub const FORM: u32 = 1;
+
+/// What the simulation shows, by the lines' ids.
+const SIMULATED: &str = include_str!("simulated.json");
+
+/// What came of a line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Verdict {
+    /// Within its limits, and as simulated.
+    Pass,
+    /// Within its limits, and not as simulated.
+    Differs,
+    /// Outside its limits.
+    Fail,
+}
+
+impl Verdict {
+    /// As the report has it.
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Pass => "pass",
+            Self::Differs => "differs",
+            Self::Fail => "FAIL",
+        }
+    }
+}
+
+/// A figure.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Line {
+    /// Its name in files, which never changes.
+    pub id: String,
+    /// What it is.
+    pub what: String,
+    /// Its unit; empty for a number of things.
+    pub unit: String,
+    /// What was measured; `None` if it never came, such as a pulse behind a fault.
+    pub measured: Option<f64>,
+    /// What the simulation shows; `None` if nothing is recorded.
+    pub simulated: Option<f64>,
+    /// What is proved of the firmware; `None` if nothing is.
+    pub proved: Option<f64>,
+    /// The lowest value that is right; `None` if there is no limit.
+    pub lowest: Option<f64>,
+    /// The highest.
+    pub highest: Option<f64>,
+    /// How far it may be from the simulation's.
+    pub tolerance: f64,
+    /// What came of it.
+    pub verdict: Verdict,
+}
+
+/// A line without its verdict.
+#[derive(Clone, Debug)]
+pub struct Figure {
+    line: Line,
+}
+
+impl Figure {
+    /// A figure without limits, which may be that far from the simulation's. If `measured` is no finite number, it never came.
+    pub fn new(id: &str, what: &str, unit: &str, measured: f64, tolerance: f64) -> Self {
+        let line = Line {
+            id: id.to_owned(),
+            what: what.to_owned(),
+            unit: unit.to_owned(),
+            // JSON has no other numbers.
+            measured: measured.is_finite().then_some(measured),
+            simulated: None,
+            proved: None,
+            lowest: None,
+            highest: None,
+            tolerance,
+            verdict: Verdict::Pass,
+        };
+        Self { line }
+    }
+
+    /// The same, right from this value on.
+    #[must_use]
+    pub fn at_least(mut self, lowest: f64) -> Self {
+        self.line.lowest = Some(lowest);
+        self
+    }
+
+    /// The same, right up to this value.
+    #[must_use]
+    pub fn at_most(mut self, highest: f64) -> Self {
+        self.line.highest = Some(highest);
+        self
+    }
+
+    /// The same, with what is proved of it.
+    #[must_use]
+    pub fn proved(mut self, proved: f64) -> Self {
+        self.line.proved = Some(proved);
+        self
+    }
+
+    /// The line, with its verdict.
+    pub fn judge(self, simulated: Option<f64>) -> Line {
+        let mut line = self.line;
+        line.simulated = simulated;
+        let is_within = |measured: &f64| {
+            line.lowest.is_none_or(|lowest| *measured >= lowest)
+                && line.highest.is_none_or(|highest| *measured <= highest)
+        };
+        line.verdict = match (line.measured.filter(is_within), simulated) {
+            (None, _) => Verdict::Fail,
+            (Some(measured), Some(simulated)) if (measured - simulated).abs() > line.tolerance => Verdict::Differs,
+            (Some(_), _) => Verdict::Pass,
+        };
+        line
+    }
+}
+
+/// All that was measured on a board.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Report {
+    /// The version of this form.
+    pub form: u32,
+    /// The weeder's board, as the user named it; empty if it was not named.
+    pub board: String,
+    /// The weeder's firmware.
+    pub firmware: String,
+    /// What was checked: `boards` or `simulated`.
+    pub checked: String,
+    /// Whether the check was the brief one.
+    pub brief: bool,
+    /// What is wrong with the wires. If anything is, nothing else was measured.
+    pub wires: Vec<String>,
+    /// The figures.
+    pub lines: Vec<Line>,
+}
+
+impl Report {
+    /// A report of these figures.
+    pub fn new(firmware: &str, checked: &str, brief: bool, figures: Vec<Figure>) -> Self {
+        let simulated = simulated(brief);
+        let judge = |figure: Figure| {
+            let found = simulated.get(&figure.line.id).copied();
+            figure.judge(found)
+        };
+        Self {
+            form: FORM,
+            board: String::new(),
+            firmware: firmware.to_owned(),
+            checked: checked.to_owned(),
+            brief,
+            wires: Vec::new(),
+            lines: figures.into_iter().map(judge).collect(),
+        }
+    }
+
+    /// Reads a report, and checks its form: what a file in `reports/` has to be.
+    ///
+    /// # Errors
+    /// If it is no report, of another form, or its verdicts do not follow from its figures.
+    pub fn parse(json: &str) -> Result<Self, String> {
+        let report: Self = serde_json::from_str(json).map_err(|error| error.to_string())?;
+        if report.form != FORM {
+            return Err(format!("the form is {}, and {FORM} is known", report.form));
+        }
+        for line in &report.lines {
+            let judged = Figure { line: line.clone() }.judge(line.simulated);
+            if judged.verdict != line.verdict {
+                return Err(format!("{}: the verdict does not follow from the figures", line.id));
+            }
+        }
+        Ok(report)
+    }
+
+    /// The report as JSON.
+    pub fn json(&self) -> String {
+        // Numbers and texts are always JSON.
+        serde_json::to_string_pretty(self).unwrap_or_default() + "\n"
+    }
+
+    /// Whether the wires are right, and no line failed.
+    pub fn is_good(&self) -> bool {
+        self.wires.is_empty() && self.lines.iter().all(|line| line.verdict != Verdict::Fail)
+    }
+
+    /// The lines with this verdict.
+    pub fn with(&self, verdict: Verdict) -> impl Iterator<Item = &Line> {
+        self.lines.iter().filter(move |line| line.verdict == verdict)
+    }
+
+    /// The page: one file of HTML, without anything from elsewhere.
+    pub fn page(&self) -> String {
+        let mut page = String::from(HEAD);
+        let mode = if self.brief { "brief check" } else { "whole check" };
+        let _ = write!(
+            page,
+            "<p>{} Firmware {}, {}, {mode}.</p>",
+            escaped(&self.board),
+            escaped(&self.firmware),
+            escaped(&self.checked)
+        );
+        for wrong in &self.wires {
+            let _ = write!(page, "<p class=fail>{}</p>", escaped(wrong));
+        }
+        page.push_str("<table><tr><th>figure<th>simulated<th>proved<th>measured<th>right<th>unit<th>result</tr>\n");
+        for line in &self.lines {
+            let _ = writeln!(
+                page,
+                "<tr class={:?}><td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}</tr>",
+                line.verdict.word().to_lowercase(),
+                escaped(&line.what),
+                number(line.simulated),
+                number(line.proved),
+                measured(line),
+                limits(line),
+                escaped(&line.unit),
+                line.verdict.word()
+            );
+        }
+        page.push_str("</table>\n");
+        page
+    }
+
+    /// The report as text, a line for each figure.
+    pub fn text(&self) -> String {
+        let mut text = String::new();
+        for wrong in &self.wires {
+            let _ = writeln!(text, "WIRE  {wrong}");
+        }
+        for line in &self.lines {
+            let _ = writeln!(
+                text,
+                "{:8} {:<58} {:>10} {:<7} simulated {:>9}  proved {:>7}  right {}",
+                line.verdict.word(),
+                line.what,
+                measured(line),
+                line.unit,
+                number(line.simulated),
+                number(line.proved),
+                limits(line)
+            );
+        }
+        text
+    }
+}
+
+/// The simulation's figures by their ids, of the brief check or the whole.
+fn simulated(brief: bool) -> BTreeMap<String, f64> {
+    let both: BTreeMap<String, BTreeMap<String, f64>> = serde_json::from_str(SIMULATED).unwrap_or_default();
+    both.get(if brief { "brief" } else { "whole" }).cloned().unwrap_or_default()
+}
+
+fn measured(line: &Line) -> String {
+    line.measured.map_or_else(|| "none".to_owned(), |measured| number(Some(measured)))
+}
+
+fn limits(line: &Line) -> String {
+    match (line.lowest, line.highest) {
+        (Some(lowest), Some(highest)) => format!("{} to {}", number(Some(lowest)), number(Some(highest))),
+        (Some(lowest), None) => format!("{} or more", number(Some(lowest))),
+        (None, Some(highest)) => format!("{} or less", number(Some(highest))),
+        (None, None) => String::new(),
+    }
+}
+
+fn number(value: Option<f64>) -> String {
+    let Some(value) = value else { return String::new() };
+    let text = format!("{value:.4}");
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
+
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+}
+
+const HEAD: &str = "<!doctype html>\n<html lang=en><meta charset=utf-8><meta name=viewport content='width=device-width'>\n\
+    <title>Check of a board</title>\n<style>body{font-family:sans-serif;margin:2em;max-width:70em}\
+    table{border-collapse:collapse}td,th{border:1px solid #999;padding:.3em .6em;text-align:left}\
+    .fail{background:#fcc}.differs{background:#ffd}</style>\n<h1>Check of a board</h1>\n";
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn figure(measured: f64) -> Figure {
+        Figure::new("width", "pulse < width", "us", measured, 1.0).at_least(1499.0).at_most(1505.0)
+    }
+
+    #[test]
+    fn a_figure_passes_differs_or_fails() {
+        assert_eq!(figure(1500.0).judge(Some(1500.5)).verdict, Verdict::Pass);
+        assert_eq!(figure(1500.0).judge(None).verdict, Verdict::Pass);
+        assert_eq!(figure(1503.0).judge(Some(1500.0)).verdict, Verdict::Differs);
+        assert_eq!(figure(1540.0).judge(Some(1540.0)).verdict, Verdict::Fail);
+        assert_eq!(figure(f64::NAN).judge(None).verdict, Verdict::Fail);
+        assert_eq!(figure(f64::INFINITY).judge(Some(1500.0)).verdict, Verdict::Fail);
+    }
+
+    #[test]
+    fn a_report_is_read_as_it_was_written_and_a_changed_one_is_refused() {
+        let report = Report::new("0.2.0", "boards", true, vec![figure(1500.0), figure(1540.0), figure(f64::INFINITY)]);
+        let json = report.json();
+        assert_eq!(Report::parse(&json).unwrap(), report);
+        assert!(!report.is_good());
+        assert!(Report::parse(&json.replace("\"fail\"", "\"pass\"")).is_err());
+        assert!(Report::parse(&json.replace("\"form\": 1", "\"form\": 9")).is_err());
+        assert!(report.page().contains("pulse &lt; width") && report.text().contains("FAIL"));
+    }
+}

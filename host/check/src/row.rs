@@ -1,0 +1,113 @@
+//! A row: the weeder weeds it, the tester plays wheel and beam and records the pulses, and `weeder sim`'s measure judges them.
+
+use crate::error::CheckError;
+use crate::plan::Plan;
+use crate::servo::{self, Measured, ORIGIN};
+use crate::tester::{Tester, ms};
+use crate::wiring::Weeder;
+use field::conditions::Conditions;
+use field::planting::Planting;
+use field::trial::Trial;
+use field::verdict::{Judgement, Verdict, judge};
+use link::settings::name;
+use tester_core::piece::Action;
+use uno::{CYCLES_PER_SECOND, Pulse};
+
+/// The presets' field, as `weeder sim` has it.
+const FIELD: &str = "set-up";
+
+/// The seed of row and machine.
+const SEED: u64 = 1;
+
+/// From the plan's start to the motion's, in ms: some pulses come before.
+const STILL_MS: u32 = 100;
+
+/// What came of a row.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// What happened to the plants and weeds.
+    pub judgement: Judgement,
+    /// Counts that the weeder has less than were played.
+    pub lost_counts: i64,
+    /// Events that the tester played more than 10 us late.
+    pub late: u16,
+}
+
+impl Outcome {
+    /// Plants that were damaged.
+    pub fn damaged(&self) -> usize {
+        self.judgement.count(Verdict::Damaged)
+    }
+
+    /// Weeds that were cut.
+    pub fn cut(&self) -> usize {
+        self.judgement.weeds.iter().filter(|weed| weed.cut).count()
+    }
+
+    /// The mean and the largest absolute error of a swing, in counts; 0 without a swing.
+    pub fn swing_errors(&self) -> (f64, f64) {
+        let errors: Vec<f64> = self.judgement.swing_errors_ticks().into_iter().map(f64::abs).collect();
+        let mean = errors.iter().sum::<f64>() / errors.len().max(1) as f64;
+        (mean, errors.iter().copied().fold(0.0, f64::max))
+    }
+}
+
+/// The row of `weeder sim` with so many plants and tall weeds, at a speed.
+///
+/// # Errors
+/// If it cannot be grown.
+pub fn trial(plants: usize, weeds: usize, speed_km_h: f64) -> Result<Trial, CheckError> {
+    let row = |error: &dyn std::fmt::Display| CheckError::Row(error.to_string());
+    let conditions = Conditions::preset(FIELD).ok_or_else(|| row(&FIELD))?.map_err(|error| row(&error))?;
+    let planting = Planting {
+        plants,
+        spacing_mm: 500.0,
+        spacing_scatter_mm: 40.0,
+        canopy_mm: 150.0,
+        canopy_scatter_mm: 22.5,
+        weeds,
+        ragged: false,
+    };
+    let stand = planting.grow_with_room(SEED).map_err(|error| row(&error))?;
+    let speed = field::motion::mm_s(speed_km_h);
+    let mut trial = Trial::at_speed(stand, conditions.machine(SEED), conditions.timing(), speed);
+    trial.settings = conditions.firmware_settings();
+    Ok(trial)
+}
+
+/// A width that is this near to one of the two that the servo is set to is taken for it, in us: the simulated servo would follow less.
+const SAME_WIDTH_US: f64 = 1.0;
+
+/// Has the weeder weed a row. `clock_ratio` is its clock over the tester's. It is in hold afterwards, with settings that are not saved.
+///
+/// # Errors
+/// If one of the boards does not answer.
+pub fn weed(trial: &Trial, weeder: &mut Weeder, tester: &mut Tester, clock_ratio: f64) -> Result<Outcome, CheckError> {
+    let Trial { row, machine, motion, .. } = trial;
+    weeder.to_hold()?;
+    for (setting, value) in trial.firmware_settings() {
+        weeder.ask(&format!("set {} {value}", name(setting)))?;
+    }
+    let before = weeder.status()?.position;
+    weeder.ask("start")?;
+    let mut plan = Plan::new();
+    let begin = u64::from(ms(STILL_MS));
+    plan.follow(&machine.pin_changes(row, motion, 0), begin);
+    plan.at(begin + (motion.duration_s() * CYCLES_PER_SECOND as f64) as u64, Action::Pause);
+    let played = tester.play(&plan.finish(), || weeder.drain())?;
+    let status = weeder.status()?;
+    weeder.ask("hold")?;
+    // By the weeder's clock, as its settings are.
+    let corrected = |Measured { pulse, .. }| {
+        let width_us = Pulse::width_us(pulse) * clock_ratio;
+        let set_us = [machine.servo.in_us, machine.servo.out_us].into_iter();
+        let width_us = set_us.clone().find(|set| (width_us - set).abs() < SAME_WIDTH_US).unwrap_or(width_us);
+        Pulse { fall: pulse.rise + (width_us * CYCLES_PER_SECOND as f64 / 1e6).round() as u64, ..pulse }
+    };
+    let pulses: Vec<_> = servo::pulses(&played.records, played.start).into_iter().map(corrected).collect();
+    Ok(Outcome {
+        judgement: judge(row, machine, motion, trial.timing, &pulses, ORIGIN + begin),
+        lost_counts: i64::from(played.ticks) - i64::from(status.position.wrapping_sub(before)),
+        late: played.late,
+    })
+}

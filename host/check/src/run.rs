@@ -1,0 +1,215 @@
+//! The check, from the wires to the report.
+
+use crate::alarms::{self, Scene};
+use crate::error::CheckError;
+use crate::rates::{self, Turning};
+use crate::report::{Figure, Report};
+use crate::resets;
+use crate::row;
+use crate::servo::{self, Steady};
+use crate::tester::Tester;
+use crate::wiring::{self, Weeder};
+
+/// What to check.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Extent {
+    /// Less of everything.
+    pub brief: bool,
+    /// Whether the boards are virtual ones.
+    pub simulated: bool,
+}
+
+impl Extent {
+    /// Plants and tall weeds of a row, and the speeds in km/h.
+    fn rows(self) -> (usize, usize, &'static [f64]) {
+        if self.brief { (3, 1, &[2.5]) } else { (20, 5, &[1.0, 2.5, 4.0]) }
+    }
+
+    /// Time for which pulses are recorded, in ms.
+    fn pulses_ms(self) -> u32 {
+        if self.brief { 400 } else { 10_000 }
+    }
+}
+
+/// Checks a board. `progress` is told what comes next, and the share done from 0 to 1.
+///
+/// # Errors
+/// If a board does not answer. Wrong wires are no error: the report has them, and nothing else then.
+pub fn run(
+    weeder: &mut Weeder,
+    tester: &mut Tester,
+    extent: Extent,
+    mut progress: impl FnMut(&'static str, f64),
+) -> Result<Report, CheckError> {
+    progress("wires", 0.0);
+    let checked = if extent.simulated { "simulated" } else { "boards" };
+    let report = |figures| Report::new(weeder.version(), checked, extent.brief, figures);
+    let mut empty = report(vec![]);
+    let wires = wiring::look(weeder, tester)?;
+    if !wires.is_empty() {
+        empty.wires = wires;
+        return Ok(empty);
+    }
+    let mut figures = Vec::new();
+    progress("pulses", 0.1);
+    let steady = pulses(tester, extent)?;
+    figures.extend(of_pulses(&steady));
+    progress("rates", 0.15);
+    figures.extend(rates(weeder, tester, extent)?);
+    progress("alarms", 0.2);
+    figures.extend(alarms(weeder, tester, extent, steady.clock_ratio)?);
+    progress("resets", 0.4);
+    figures.extend(resets(weeder, tester, extent, steady.clock_ratio)?);
+    let (plants, weeds, speeds) = extent.rows();
+    for (number, &speed) in speeds.iter().enumerate() {
+        progress("rows", 0.6 + 0.4 * number as f64 / speeds.len() as f64);
+        let trial = row::trial(plants, weeds, speed)?;
+        let outcome = row::weed(&trial, weeder, tester, steady.clock_ratio)?;
+        figures.extend(of_row(&outcome, plants, weeds, speed));
+    }
+    wiring::reset(weeder, tester)?;
+    progress("done", 1.0);
+    Ok(Report::new(weeder.version(), checked, extent.brief, figures))
+}
+
+/// The pulses in hold: the clocks' ratio, width and spread.
+fn pulses(tester: &mut Tester, extent: Extent) -> Result<Steady, CheckError> {
+    tester.take_records();
+    let records = tester.record_for_ms(extent.pulses_ms())?;
+    servo::steady(&servo::pulses(&records, 0)).ok_or(CheckError::NoPulses)
+}
+
+fn of_pulses(steady: &Steady) -> Vec<Figure> {
+    vec![
+        Figure::new("clock_ratio", "the weeder's clock over the tester's", "", steady.clock_ratio, 0.005)
+            .at_least(0.99)
+            .at_most(1.01),
+        Figure::new("pulse_out_us", "pulse, tool out", "us", steady.width_us, 1.0).at_least(1998.0).at_most(2002.0),
+        Figure::new("pulse_spread_us", "longest less shortest pulse", "us", steady.width_spread_us, 0.5).at_most(1.0),
+        Figure::new("frame_spread_us", "longest less shortest frame", "us", steady.frame_spread_us, 0.5).at_most(1.0),
+    ]
+}
+
+/// The bursts' figures.
+fn rates(weeder: &mut Weeder, tester: &mut Tester, extent: Extent) -> Result<Vec<Figure>, CheckError> {
+    let mut figures = Vec::new();
+    // 55 cycles are the proved rate. With jitter of 30 %, two counts come in 1.4 times the mean at least: 79 cycles keep to the proof.
+    let turnings: &[(u32, bool)] =
+        if extent.brief { &[(106, false), (55, false)] } else { &[(106, false), (55, false), (79, true)] };
+    let (ways, loads): (&[bool], &[bool]) =
+        if extent.brief { (&[true], &[true]) } else { (&[true, false], &[false, true]) };
+    for &(cycles, jittered) in turnings {
+        for &forward in ways {
+            for &busy in loads {
+                let turning = Turning { cycles, forward, jittered, busy };
+                let rate = turning.per_s().round();
+                let way = if forward { "forward" } else { "backward" };
+                let load = if busy { "busy" } else { "idle" };
+                let id = format!("lost_{cycles}_{way}_{load}");
+                let jitter = if jittered { ", 30 % jitter" } else { "" };
+                let what = format!("counts lost at {rate}/s {way}, {load}{jitter}");
+                // A weeder that has started afresh has lost all.
+                let lost = rates::lost(turning, weeder, tester)?.map_or(f64::INFINITY, |lost| lost as f64);
+                figures.push(Figure::new(&id, &what, "", lost, 0.0).at_most(0.0).proved(0.0));
+            }
+        }
+    }
+    Ok(figures)
+}
+
+/// The time within which the tool has to be out behind a fault, in ms: what the manual says of each, and a frame and a half of the servo.
+const fn limit_ms(scene: Scene) -> f64 {
+    match scene {
+        // The tool goes out for a plant first. The alarm comes after `max_width_mm`, 400 mm: 764 counts of the scene.
+        Scene::BlockedBeam => 794.0,
+        // 41 edges.
+        Scene::FlickeringBeam => 71.0,
+        // Three breaks of 150 ms each and 150 ms between.
+        Scene::SilentEncoder => 780.0,
+        // More than 80 edges in 0.5 s.
+        Scene::DeadChannel => 530.0,
+        // `lead_out_ms` of 230 ms, and 100 ms.
+        Scene::EndSwitch => 360.0,
+    }
+}
+
+/// Figures of times may differ by a servo's frame, and some turns of the loop, in ms.
+const TIME_TOLERANCE_MS: f64 = 25.0;
+
+/// The alarms' figures, and those of the commands that take the tool out.
+fn alarms(weeder: &mut Weeder, tester: &mut Tester, extent: Extent, ratio: f64) -> Result<Vec<Figure>, CheckError> {
+    let mut figures = Vec::new();
+    let scenes: &[Scene] = if extent.brief { &[Scene::FlickeringBeam, Scene::DeadChannel] } else { &Scene::ALL };
+    for &scene in scenes {
+        let raised = alarms::play(scene, weeder, tester, ratio)?;
+        let name = scene.alarm().text().to_string();
+        let (first, second) = scene.alarm().code();
+        let expected = f64::from(10 * first + second);
+        let what = |what: &str| format!("{}: {what}", scene.words());
+        let is_raised = f64::from(u8::from(raised.is_expected));
+        figures.extend([
+            Figure::new(&format!("{name}_out"), &what("until the tool is out"), "ms", raised.out_ms, TIME_TOLERANCE_MS)
+                .at_most(limit_ms(scene)),
+            Figure::new(&format!("{name}_raised"), &what("alarm raised"), "", is_raised, 0.0).at_least(1.0),
+            Figure::new(&format!("{name}_code"), &what("code of the LED"), "", raised.code, 0.0)
+                .at_least(expected)
+                .at_most(expected),
+        ]);
+    }
+    let switch = alarms::switch_to_out_ms(weeder, tester, ratio)?;
+    let hold = alarms::hold_to_out_ms(weeder, tester, ratio)?;
+    let time = |id: &str, what: &str, value| Figure::new(id, what, "ms", value, TIME_TOLERANCE_MS);
+    figures.extend([
+        time("switch_out", "work switch opened, until the tool is out", switch).at_most(100.0),
+        time("hold_out", "`hold` typed, until the tool is out, computer included", hold).at_most(300.0),
+    ]);
+    Ok(figures)
+}
+
+/// The resets' figures.
+fn resets(weeder: &mut Weeder, tester: &mut Tester, extent: Extent, ratio: f64) -> Result<Vec<Figure>, CheckError> {
+    let at_work = resets::at_work(weeder, tester, ratio, extent.simulated)?;
+    let moments = if extent.brief { 6 } else { 50 };
+    let saves = resets::while_saving(moments, weeder, tester)?;
+    // A bootloader takes 2 s at most, and a virtual Uno has none: only the whole is limited.
+    Ok(vec![
+        Figure::new("reset_pulse", "reset at work: without a pulse", "ms", at_work.without_pulse_ms, 2500.0)
+            .at_most(2500.0),
+        Figure::new(
+            "reset_out",
+            "reset at work: the tool is out behind it",
+            "",
+            f64::from(u8::from(at_work.is_out)),
+            0.0,
+        )
+        .at_least(1.0),
+        Figure::new(
+            "save_torn",
+            &format!("settings torn by {moments} resets while saving"),
+            "",
+            saves.torn.into(),
+            0.0,
+        )
+        .at_most(0.0),
+        Figure::new("save_new", "of these, new settings kept", "", saves.new.into(), moments.into()),
+    ])
+}
+
+/// How far the mean error of a swing may be from the simulation's, in counts. Where two zones nearly touch, a run merges them or does not,
+/// by a fraction of a count: single swings of 79 counts come and go with that, and runs of the same firmware had means from 9.1 to 13.0.
+const SWING_MEAN_TOLERANCE: f64 = 6.0;
+
+/// A row's figures.
+fn of_row(outcome: &row::Outcome, plants: usize, weeds: usize, speed: f64) -> Vec<Figure> {
+    let (mean, worst) = outcome.swing_errors();
+    let id = |what: &str| format!("row_{speed}_{what}");
+    let what = |what: &str| format!("row of {plants} plants and {weeds} weeds at {speed} km/h: {what}");
+    let count = |id_part: &str, words: &str, value: f64| Figure::new(&id(id_part), &what(words), "", value, 0.0);
+    vec![
+        count("damaged", "plants damaged", outcome.damaged() as f64).at_most(0.0),
+        count("cut", "tall weeds cut", outcome.cut() as f64),
+        count("lost", "counts lost", outcome.lost_counts.abs() as f64).at_most(0.0),
+        Figure::new(&id("swing_mean"), &what("mean error of a swing"), "counts", mean, SWING_MEAN_TOLERANCE),
+        Figure::new(&id("swing_worst"), &what("largest error of a swing"), "counts", worst, 6.0),
+    ]
+}

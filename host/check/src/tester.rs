@@ -1,0 +1,220 @@
+//! The computer's end of the tester's serial line.
+//!
+//! A command that gets no answer is sent again with the same number. Records are kept in the order in which they came, and a gap in their
+//! numbers is an error. The line may be real, or a simulated one whose clock runs only while it is read; so time is the tester's own.
+
+use crate::error::CheckError;
+use link::Port;
+use std::collections::VecDeque;
+use std::io;
+use tester_core::frame::{self, Receiver};
+use tester_core::message::{Command, PIECES, PROTOCOL, Record, STEPS, Step};
+use tester_core::piece::Piece;
+use uno::CYCLES_PER_SECOND;
+
+/// Reads after which a command is sent again: up to 20 ms each, and shorter while the servo's pulses come.
+const READS: usize = 30;
+
+/// Times that a command is sent. A board that opening the port has reset needs up to 2 s to start.
+const TRIES: usize = 8;
+
+/// What the tester answered.
+#[derive(Clone, Copy, Debug)]
+pub struct Done {
+    /// Pieces that have room.
+    pub room: u8,
+    /// The time in cycles, modulo 2^32.
+    pub time: u32,
+    /// Counts forward less counts back since the tester's start, without those of bursts.
+    pub position: i32,
+    /// The levels that the lines have, by their bits.
+    pub levels: u8,
+}
+
+/// What came of a plan.
+#[derive(Clone, Debug)]
+pub struct Played {
+    /// When it began, in cycles modulo 2^32.
+    pub start: u32,
+    /// The tester's position before it.
+    pub before: i32,
+    /// Counts forward less counts back.
+    pub ticks: i32,
+    /// Events that came more than 10 us late.
+    pub late: u16,
+    /// Everything else that was recorded meanwhile.
+    pub records: Vec<Record>,
+}
+
+/// The tester.
+pub struct Tester {
+    port: Box<dyn Port>,
+    receiver: Receiver,
+    number: u8,
+    /// The number of the next record; none before the first.
+    expected: Option<u8>,
+    missing: u32,
+    records: VecDeque<Record>,
+}
+
+impl Tester {
+    /// The tester at this port, with its lines at rest.
+    ///
+    /// # Errors
+    /// If something else is at the port, or nothing.
+    pub fn over(port: impl Port + 'static) -> Result<Self, CheckError> {
+        let mut tester = Self {
+            port: Box::new(port),
+            receiver: Receiver::new(),
+            number: 0,
+            expected: None,
+            missing: 0,
+            records: VecDeque::new(),
+        };
+        tester.command(&Command::Hello)?;
+        tester.records.clear();
+        tester.missing = 0;
+        Ok(tester)
+    }
+
+    /// Has the tester obey a command.
+    ///
+    /// # Errors
+    /// If it does not answer, refuses, or records are missing.
+    pub fn command(&mut self, command: &Command) -> Result<Done, CheckError> {
+        self.number = self.number.wrapping_add(1);
+        let frame = frame::encode(self.number, command).expect("the longest command fits a frame");
+        for _ in 0..TRIES {
+            // The zero byte in front ends what noise has begun.
+            self.port.write_all(&[0]).map_err(CheckError::TesterGone)?;
+            self.port.write_all(&frame).map_err(CheckError::TesterGone)?;
+            self.port.flush().map_err(CheckError::TesterGone)?;
+            for _ in 0..READS {
+                self.hear()?;
+                let is_answer =
+                    |record: &Record| matches!(record, Record::Done { number, .. } if *number == self.number);
+                if let Some(at) = self.records.iter().position(is_answer)
+                    && let Some(Record::Done { refusal, room, time, position, levels, protocol, .. }) =
+                        self.records.remove(at)
+                {
+                    self.records.retain(|record| !matches!(record, Record::Done { .. }));
+                    return match refusal {
+                        _ if protocol != PROTOCOL => Err(CheckError::Protocol(protocol)),
+                        Some(refusal) => Err(CheckError::Refused(refusal)),
+                        None if self.missing > 0 => Err(CheckError::Missing(self.missing)),
+                        None => Ok(Done { room, time, position, levels }),
+                    };
+                }
+            }
+        }
+        Err(CheckError::TesterSilent)
+    }
+
+    /// Reads what is there, or waits up to 20 ms for it. Returns whether something came.
+    fn hear(&mut self) -> Result<bool, CheckError> {
+        let mut bytes = [0; 256];
+        let count = match self.port.read(&mut bytes) {
+            Ok(0) => return Err(CheckError::TesterGone(io::ErrorKind::UnexpectedEof.into())),
+            Ok(count) => count,
+            Err(error) if matches!(error.kind(), io::ErrorKind::TimedOut | io::ErrorKind::Interrupted) => {
+                return Ok(false);
+            }
+            Err(error) => return Err(CheckError::TesterGone(error)),
+        };
+        for &byte in &bytes[..count] {
+            // A damaged record is missed by its number.
+            let Some(Ok((number, record))) = self.receiver.take::<Record>(byte) else { continue };
+            let gap = self.expected.map_or(0, |expected| number.wrapping_sub(expected));
+            self.missing += u32::from(gap);
+            self.expected = Some(number.wrapping_add(1));
+            if let Record::Lost { pulses } = record {
+                self.missing += u32::from(pulses);
+            }
+            self.records.push_back(record);
+        }
+        Ok(true)
+    }
+
+    /// Everything that was recorded and not yet taken, oldest first.
+    pub fn take_records(&mut self) -> Vec<Record> {
+        self.records.drain(..).collect()
+    }
+
+    /// Sets lines, by their bits.
+    ///
+    /// # Errors
+    /// As [`Tester::command`].
+    pub fn set(&mut self, mask: u8, levels: u8) -> Result<Done, CheckError> {
+        self.command(&Command::Lines { mask, levels })
+    }
+
+    /// Waits by the tester's clock, in milliseconds up to 60,000, and returns what was recorded since the last taking.
+    ///
+    /// # Errors
+    /// As [`Tester::command`].
+    pub fn record_for_ms(&mut self, time_ms: u32) -> Result<Vec<Record>, CheckError> {
+        let begin = self.command(&Command::Clock)?.time;
+        while self.command(&Command::Clock)?.time.wrapping_sub(begin) < ms(time_ms) {
+            self.hear()?;
+        }
+        Ok(self.take_records())
+    }
+
+    /// Plays a plan to its end. `meanwhile` is called some times a second.
+    ///
+    /// # Errors
+    /// As [`Tester::command`], and if the plan reached the tester too late.
+    pub fn play(
+        &mut self,
+        plan: &[Piece],
+        mut meanwhile: impl FnMut() -> Result<(), CheckError>,
+    ) -> Result<Played, CheckError> {
+        self.command(&Command::Stop)?;
+        self.take_records();
+        let mut pieces = plan.chunks(PIECES).peekable();
+        let Done { mut room, position: before, .. } = self.command(&Command::Clock)?;
+        let mut is_started = false;
+        let (mut start, mut records) = (0, Vec::new());
+        loop {
+            match pieces.next_if(|next| next.len() <= usize::from(room)) {
+                Some(next) => room = self.command(&Command::Pieces(next.iter().copied().collect()))?.room,
+                None => {
+                    if !is_started {
+                        self.command(&Command::Start)?;
+                        is_started = true;
+                    }
+                    self.hear()?;
+                    meanwhile()?;
+                    room = self.command(&Command::Clock)?.room;
+                }
+            }
+            for record in self.take_records() {
+                match record {
+                    Record::Started { time } => start = time,
+                    Record::Ended { position, late, .. } => {
+                        return Ok(Played { start, before, ticks: position.wrapping_sub(before), late, records });
+                    }
+                    Record::Dry { .. } => return Err(CheckError::Dry),
+                    record => records.push(record),
+                }
+            }
+        }
+    }
+
+    /// Puts steps into the tester's pattern.
+    ///
+    /// # Errors
+    /// As [`Tester::command`].
+    pub fn load(&mut self, steps: &[Step]) -> Result<(), CheckError> {
+        for (number, part) in steps.chunks(STEPS).enumerate() {
+            let from = (number * STEPS) as u8;
+            self.command(&Command::Pattern { from, steps: part.iter().copied().collect() })?;
+        }
+        Ok(())
+    }
+}
+
+/// Milliseconds in cycles.
+pub const fn ms(time_ms: u32) -> u32 {
+    time_ms * (CYCLES_PER_SECOND / 1000) as u32
+}

@@ -1,0 +1,93 @@
+//! The check of two virtual Unos, wire to wire.
+
+mod common;
+
+use check::desk::Desk;
+use check::pair::{Side, Wiring};
+use check::report::{Report, Verdict};
+use check::run::{Extent, run};
+use check::tester::Tester;
+use check::wiring::{self, Weeder};
+use common::{boards, boards_and_pair};
+use std::collections::BTreeMap;
+use std::path::Path;
+use trial::firmware;
+
+/// The most SRAM that the tester may need, static and stack, of 2048 bytes.
+const SRAM_USED: usize = 1750;
+
+fn checked(weeder: &mut Weeder, tester: &mut Tester, brief: bool) -> Report {
+    run(weeder, tester, Extent { brief, simulated: true }, |_, _| {}).expect("the check ends")
+}
+
+fn check(wiring: Wiring, brief: bool) -> Report {
+    let (mut weeder, mut tester) = boards(wiring);
+    checked(&mut weeder, &mut tester, brief)
+}
+
+/// The figures by their ids.
+fn figures(report: &Report) -> BTreeMap<String, f64> {
+    report.lines.iter().map(|line| (line.id.clone(), line.measured.expect("it was measured"))).collect()
+}
+
+/// Whether the whole check is tried too, and whether what it shows is recorded.
+fn is_set(variable: &str) -> bool {
+    std::env::var_os(variable).is_some()
+}
+
+#[test]
+fn the_shipped_firmware_passes_and_is_as_recorded() {
+    let (pair, mut weeder, mut tester) = boards_and_pair(Wiring::right());
+    let brief = checked(&mut weeder, &mut tester, true);
+    assert!(brief.is_good(), "{}", brief.text());
+    let mut pair = pair.borrow_mut();
+    let tester = pair.board(Side::Tester);
+    let used = tester.size().sram as usize + tester.deepest_stack();
+    assert!(used <= SRAM_USED, "the tester needs {used} bytes of SRAM");
+    let recorded = concat!(env!("CARGO_MANIFEST_DIR"), "/src/simulated.json");
+    if is_set("UPDATE_EXPECT") {
+        let whole = check(Wiring::right(), false);
+        let both = BTreeMap::from([("brief", figures(&brief)), ("whole", figures(&whole))]);
+        std::fs::write(recorded, serde_json::to_string_pretty(&both).unwrap() + "\n").unwrap();
+        return;
+    }
+    let mut reports = vec![brief];
+    if is_set("WEEDER_THOROUGH") {
+        reports.push(check(Wiring::right(), false));
+    }
+    for report in reports {
+        assert!(report.lines.iter().all(|line| line.verdict == Verdict::Pass), "{}", report.text());
+        assert!(report.lines.iter().all(|line| line.simulated.is_some()), "{}", report.text());
+    }
+}
+
+#[test]
+fn a_row_is_measured_as_the_simulation_judges_it() {
+    let (mut weeder, mut tester) = boards(Wiring::right());
+    let trial = check::row::trial(8, 2, 2.5).expect("the row grows");
+    let measured = check::row::weed(&trial, &mut weeder, &mut tester, 1.003).expect("the row is weeded").judgement;
+    let elf = firmware::build().expect("the weeder's firmware is built");
+    let simulated = trial::run(&trial, &elf, |_| {}).expect("it is simulated").judgement;
+    for (measured, simulated) in measured.plants.iter().zip(&simulated.plants) {
+        assert_eq!(measured.verdict, simulated.verdict);
+        let errors = [measured, simulated].map(|plant| [plant.out_error_ticks, plant.in_error_ticks]);
+        for (measured, simulated) in errors[0].into_iter().zip(errors[1]) {
+            let difference = measured.zip(simulated).map_or(0.0, |(measured, simulated)| measured - simulated);
+            // What the loop's turn and the servo's frame come to at this speed.
+            assert!(measured.is_some() == simulated.is_some() && difference.abs() < 10.0, "{measured:?} {simulated:?}");
+        }
+    }
+}
+
+#[test]
+fn the_boards_are_reached_through_two_terminals() {
+    let (tester, weeder) = (firmware::build_tester().expect("it is built"), firmware::build().expect("it is built"));
+    let desk = Desk::start(&tester, &weeder).expect("it starts");
+    let name = |path: &Path| path.to_str().expect("it is text").to_owned();
+    let port = link::open_other(&name(desk.tester())).expect("it opens");
+    let mut tester = Tester::over(port).expect("the tester answers");
+    let mut weeder = Weeder::open(&name(desk.weeder())).expect("the weeder answers");
+    assert_eq!(wiring::look(&mut weeder, &mut tester).expect("both answer"), Vec::<String>::new());
+    drop((weeder, tester));
+    desk.stop().expect("neither has stopped");
+}

@@ -1,0 +1,25 @@
+//! What the tests of the check share.
+
+use check::pair::{Pair, PairPort, Side, Wiring};
+use check::tester::Tester;
+use check::wiring::Weeder;
+use std::cell::RefCell;
+use std::rc::Rc;
+use trial::firmware;
+
+/// Two virtual Unos with the firmware of this workspace, wire to wire.
+pub fn boards(wiring: Wiring) -> (Weeder, Tester) {
+    let (_, weeder, tester) = boards_and_pair(wiring);
+    (weeder, tester)
+}
+
+/// The same, with the Unos to look at.
+pub fn boards_and_pair(wiring: Wiring) -> (Rc<RefCell<Pair>>, Weeder, Tester) {
+    let tester = firmware::build_tester().expect("the tester's firmware is built");
+    let weeder = firmware::build().expect("the weeder's firmware is built");
+    let pair = Rc::new(RefCell::new(Pair::power_up(&tester, &weeder, &[], wiring).expect("both start")));
+    let port = |side| PairPort { pair: Rc::clone(&pair), side };
+    let tester = Tester::over(port(Side::Tester)).expect("the tester answers");
+    let weeder = Weeder::over(port(Side::Weeder), true).expect("the weeder answers");
+    (pair, weeder, tester)
+}

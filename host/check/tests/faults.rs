@@ -1,0 +1,221 @@
+//! Faults in the wires and in the weeder: the check finds each, and names it.
+
+mod common;
+
+use check::alarms::{Scene, play};
+use check::pair::Wiring;
+use check::rates::{self, Turning};
+use check::{resets, row, servo, wiring};
+use common::boards;
+use field::wiring as pins;
+use std::cell::RefCell;
+use std::rc::Rc;
+use uno::{Pin, PinChange};
+
+/// What the check says of these wires.
+fn said(wires: Wiring) -> Vec<String> {
+    let (mut weeder, mut tester) = boards(wires);
+    wiring::look(&mut weeder, &mut tester).expect("both boards answer")
+}
+
+/// The check says a sentence with all of these words of wires that are changed like this.
+#[track_caller]
+fn assert_named(change: impl FnOnce(&mut Wiring), words: &[&str]) {
+    let mut wires = Wiring::right();
+    change(&mut wires);
+    let said = said(wires);
+    assert!(said.iter().any(|sentence| words.iter().all(|word| sentence.contains(word))), "{said:?}");
+}
+
+/// Leads two lines to each other's pins.
+fn swap(wires: &mut Wiring, one: Pin, other: Pin) {
+    for (_, pin, _) in &mut wires.inputs {
+        *pin = match *pin {
+            pin if pin == one => other,
+            pin if pin == other => one,
+            pin => pin,
+        };
+    }
+}
+
+#[test]
+fn right_wires_are_right() {
+    assert_eq!(said(Wiring::right()), Vec::<String>::new());
+}
+
+#[test]
+fn swapped_channels_are_named() {
+    assert_named(|wires| swap(wires, pins::ENCODER_A, pins::ENCODER_B), &["encoder", "swapped"]);
+}
+
+#[test]
+fn an_open_wire_of_the_encoder_is_named() {
+    assert_named(|wires| wires.inputs.retain(|wire| wire.1 != pins::ENCODER_B), &["encoder B", "D3"]);
+}
+
+#[test]
+fn an_inverted_beam_is_named() {
+    let invert =
+        |wires: &mut Wiring| wires.inputs.iter_mut().filter(|wire| wire.1 == pins::BEAM).for_each(|wire| wire.2 = true);
+    assert_named(invert, &["beam", "at rest", "inverted"]);
+}
+
+#[test]
+fn swapped_beams_are_named() {
+    assert_named(|wires| swap(wires, pins::BEAM, pins::SECOND_BEAM), &["second beam", "the beam (D8)", "swapped"]);
+}
+
+#[test]
+fn swapped_switches_are_named() {
+    assert_named(
+        |wires| swap(wires, pins::WORK_SWITCH, pins::END_SWITCH),
+        &["work switch", "end switch (D5)", "swapped"],
+    );
+}
+
+#[test]
+fn a_missing_second_beam_is_named() {
+    assert_named(|wires| wires.inputs.retain(|wire| wire.1 != pins::SECOND_BEAM), &["second beam", "D10"]);
+}
+
+#[test]
+fn a_missing_reset_is_named() {
+    assert_named(|wires| wires.has_reset = false, &["reset", "D7"]);
+}
+
+#[test]
+fn a_missing_servo_and_a_missing_led_are_named() {
+    assert_named(|wires| wires.outputs.retain(|pin| *pin != pins::SERVO), &["servo", "D9"]);
+    assert_named(|wires| wires.outputs.retain(|pin| *pin != pins::LED), &["LED", "D13"]);
+}
+
+/// The pulses in hold, with edges from the weeder that are changed like this.
+fn steady(change: impl FnMut(PinChange) -> Option<PinChange> + 'static, clock_ppm: i64) -> servo::Steady {
+    let wires = Wiring { from_weeder: Some(Box::new(change)), clock_ppm, ..Wiring::right() };
+    let (mut weeder, mut tester) = boards(wires);
+    weeder.to_hold().expect("it holds");
+    tester.take_records();
+    let records = tester.record_for_ms(400).expect("it records");
+    servo::steady(&servo::pulses(&records, 0)).expect("there are pulses")
+}
+
+/// A line's edge on the tester's side of the servo's wire.
+fn is_servo(change: &PinChange) -> bool {
+    change.pin == Pin::D8
+}
+
+#[test]
+fn a_clock_that_is_slow_by_two_percent_is_measured() {
+    let ratio = steady(Some, -20_000).clock_ratio;
+    assert!((ratio - 0.98).abs() < 1e-4, "{ratio}");
+}
+
+#[test]
+fn a_pulse_that_is_too_long_by_40_us_is_measured() {
+    let longer = |change: PinChange| {
+        let late = if is_servo(&change) && !change.high { 640 } else { 0 };
+        Some(PinChange { cycle: change.cycle + late, ..change })
+    };
+    let width_us = steady(longer, 3000).width_us;
+    assert!((width_us - 2040.0).abs() < 1.0, "{width_us}");
+}
+
+#[test]
+fn a_pulse_that_trembles_by_10_us_is_measured() {
+    let mut number = 0;
+    let tremble = move |change: PinChange| {
+        number += 1;
+        let late = if is_servo(&change) && !change.high && number % 4 == 0 { 160 } else { 0 };
+        Some(PinChange { cycle: change.cycle + late, ..change })
+    };
+    let spread_us = steady(tremble, 3000).width_spread_us;
+    assert!((spread_us - 10.0).abs() < 1.0, "{spread_us}");
+}
+
+#[test]
+fn counts_that_are_lost_above_150_000_a_second_are_counted() {
+    let mut last = 0;
+    let slow = move |change: PinChange| {
+        let is_encoder = change.pin == Pin::A0 || change.pin == Pin::A1;
+        let is_too_fast = is_encoder && change.cycle - last < 16_000_000 / 150_000 - 6;
+        last = if is_encoder { change.cycle } else { last };
+        (!is_too_fast).then_some(change)
+    };
+    let wires = Wiring { to_weeder: Some(Box::new(slow)), ..Wiring::right() };
+    let (mut weeder, mut tester) = boards(wires);
+    let mut lost = |cycles| {
+        let turning = Turning { cycles, forward: true, jittered: false, busy: true };
+        rates::lost(turning, &mut weeder, &mut tester).expect("both answer").expect("it does not start afresh")
+    };
+    assert_eq!(lost(106), 0);
+    assert!(lost(55) > 10_000);
+}
+
+#[test]
+fn a_code_of_the_led_that_is_off_by_one_is_read_as_it_is_flashed() {
+    // The first flash behind each pause does not come through.
+    let (mut fell, mut hides) = (0, false);
+    let swallow = move |change: PinChange| {
+        if is_servo(&change) {
+            return Some(change);
+        }
+        if change.high {
+            hides = change.cycle - fell > 16_000_000;
+        } else {
+            fell = change.cycle;
+        }
+        (!hides).then_some(change)
+    };
+    let wires = Wiring { from_weeder: Some(Box::new(swallow)), ..Wiring::right() };
+    let (mut weeder, mut tester) = boards(wires);
+    let raised = play(Scene::DeadChannel, &mut weeder, &mut tester, 1.003).expect("both answer");
+    assert!(raised.is_expected && raised.code != 22.0, "{raised:?}");
+}
+
+#[test]
+fn a_swing_that_is_late_by_10_ms_is_measured() {
+    let swings = |late_cycles: u64| {
+        let late = move |change: PinChange| {
+            let late = if is_servo(&change) { late_cycles } else { 0 };
+            Some(PinChange { cycle: change.cycle + late, ..change })
+        };
+        let wires = Wiring { from_weeder: Some(Box::new(late)), ..Wiring::right() };
+        let (mut weeder, mut tester) = boards(wires);
+        let trial = row::trial(3, 1, 2.5).expect("it grows");
+        let outcome = row::weed(&trial, &mut weeder, &mut tester, 1.003).expect("both answer");
+        outcome.judgement.swing_errors_ticks()
+    };
+    let (right, wrong) = (swings(0), swings(160_000));
+    // 10 ms at 2.5 km/h are 13.3 counts.
+    for (right, wrong) in right.iter().zip(&wrong) {
+        assert!((wrong - right - 13.3).abs() < 6.0, "{right} {wrong}");
+    }
+}
+
+#[test]
+fn a_channel_that_falls_silent_on_the_way_costs_counts_in_a_row() {
+    let position = Rc::new(RefCell::new(0_u32));
+    let seen = Rc::clone(&position);
+    let drops = move |change: PinChange| {
+        let is_a = change.pin == Pin::A0;
+        *seen.borrow_mut() += u32::from(is_a);
+        // One edge of a thousand, and the next with it: two steps in all.
+        (!is_a || *seen.borrow() % 1000 > 1).then_some(change)
+    };
+    let wires = Wiring { to_weeder: Some(Box::new(drops)), ..Wiring::right() };
+    let (mut weeder, mut tester) = boards(wires);
+    let trial = row::trial(3, 1, 2.5).expect("it grows");
+    let outcome = row::weed(&trial, &mut weeder, &mut tester, 1.003).expect("both answer");
+    assert!(outcome.lost_counts > 0, "{}", outcome.lost_counts);
+}
+
+#[test]
+fn a_save_that_tears_is_counted() {
+    // Each reset spoils the half of the EEPROM that has the settings.
+    let tear = |eeprom: &mut [u8]| eeprom[..512].iter_mut().for_each(|byte| *byte &= 0xF0);
+    let wires = Wiring { eeprom_at_reset: Some(Box::new(tear)), ..Wiring::right() };
+    let (mut weeder, mut tester) = boards(wires);
+    weeder.to_hold().expect("it holds");
+    let saves = resets::while_saving(3, &mut weeder, &mut tester).expect("both answer");
+    assert_eq!(saves.torn, 3);
+}

@@ -1,0 +1,101 @@
+//! `weeder check-board`: a second Uno, the tester, drives the weeder's inputs and measures its outputs.
+
+use crate::destination::{FileName, Replace};
+use crate::finding::Finding;
+use crate::output::{print, say, tell};
+use crate::progress::Progress;
+use anyhow::Result;
+use check::desk::Desk;
+use check::run::{Extent, run as check_run};
+use check::tester::Tester;
+use check::wiring::Weeder;
+use clap::Args;
+use std::cell::Cell;
+use std::path::Path;
+use trial::firmware;
+
+/// What the user asks of the check.
+#[derive(Args)]
+#[command(after_help = "\
+The tester is an Uno with the tester's firmware, wired to the weeder's Uno: docs/check-board.md has the wires.
+Remove the machine's own wires from the weeder's Uno before. Settings are not changed for good.
+
+  cargo tester-firmware
+  weeder flash --port /dev/ttyACM1 --elf target/avr-none/firmware/tester-firmware.elf
+  weeder check-board --port /dev/ttyACM0 --tester /dev/ttyACM1 --json --board 'Uno R3' > uno-r3.json
+  weeder check-board --simulated --brief
+
+Status 1: a wire is wrong, or a figure is outside its limits.")]
+pub struct Arguments {
+    /// The weeder's port.
+    #[arg(long, required_unless_present = "simulated")]
+    port: Option<String>,
+    /// The tester's port.
+    #[arg(long, required_unless_present = "simulated")]
+    tester: Option<String>,
+    /// The board's name, for the report.
+    #[arg(long, value_name = "NAME", default_value = "", hide_default_value = true)]
+    board: String,
+    /// Check two virtual Unos, wire to wire, each at a pseudo terminal. Their clocks differ by 0.3 %.
+    #[arg(long, conflicts_with_all = ["port", "tester"])]
+    simulated: bool,
+    /// Check less of everything, in a tenth of the time.
+    #[arg(long)]
+    brief: bool,
+    /// Print JSON instead of text: the report to send in.
+    #[arg(long)]
+    json: bool,
+    /// Write a page as well.
+    #[arg(long, value_name = "FILE.html")]
+    page: Option<FileName>,
+    #[command(flatten)]
+    replace: Replace,
+}
+
+/// Checks, and prints the report.
+///
+/// # Errors
+/// If a board does not answer, or the page cannot be written.
+pub fn run(arguments: &Arguments) -> Result<Finding> {
+    let page = arguments.page.as_ref().map(|page| page.check(arguments.replace)).transpose()?;
+    let desk = match arguments.simulated {
+        true => Some(Desk::start(&firmware::build_tester()?, &firmware::build()?)?),
+        false => None,
+    };
+    let name = |path: &Path| path.to_string_lossy().into_owned();
+    let (port, tester) = match &desk {
+        Some(desk) => (name(desk.weeder()), name(desk.tester())),
+        None => (arguments.port.clone().unwrap_or_default(), arguments.tester.clone().unwrap_or_default()),
+    };
+    let mut tester = Tester::over(link::open_other(&tester)?)?;
+    let mut weeder = Weeder::open(&port)?;
+    let bar = Progress::new("checking");
+    let extent = Extent { brief: arguments.brief, simulated: arguments.simulated };
+    let last = Cell::new("");
+    let result = check_run(&mut weeder, &mut tester, extent, |what, share| {
+        if last.replace(what) != what {
+            tell!("Next: {what}");
+        }
+        bar.show(share);
+    });
+    bar.finish();
+    drop((weeder, tester));
+    if let Some(desk) = desk {
+        desk.stop()?;
+    }
+    let mut report = result?;
+    report.board.clone_from(&arguments.board);
+    let printed = if arguments.json {
+        print(format_args!("{}", report.json()))
+    } else {
+        print(format_args!("{}", report.text()))
+    };
+    if let Some(page) = page {
+        page.write(|to| to.write_all(report.page().as_bytes()))?;
+        if !arguments.json {
+            say!("Written     {}", page.path().display())?;
+        }
+    }
+    printed?;
+    if report.is_good() { Ok(Finding::Good) } else { Ok(Finding::Bad) }
+}

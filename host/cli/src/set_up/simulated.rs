@@ -1,0 +1,49 @@
+//! What each step of the manual brings in the simulated field.
+
+use anyhow::Result;
+use comfy_table::{CellAlignment, Table, presets};
+use experiments::experiment::{Engine, Experiment, Treatment, totals};
+use field::conditions::Conditions;
+use link::set_up::steps;
+use trial::by_the_manual::Novice;
+
+/// Plots of each spacing.
+const REPLICATIONS: u32 = 10;
+
+/// Which of all the possible fields and measurements.
+const SEED: u64 = 1;
+
+/// A line for the machine from the box and for each step, when those before it are done.
+pub fn table() -> Result<Table> {
+    let mut table = Table::new();
+    table.load_style(presets::UTF8_BORDERS_ONLY);
+    table.set_header(["step", "", "ground of the\nrow weeded, %", "plants\ndamaged, %", "zones\nreached, %"]);
+    let mut novice = Novice::new(Conditions::default(), SEED);
+    let mut line = |number: String, title: &str, conditions: &Conditions| {
+        let experiment = Experiment {
+            speeds_km_h: vec![2.5],
+            replications: REPLICATIONS,
+            controllers: vec![Treatment::Firmware],
+            ..Experiment::as_in_the_paper(conditions.clone(), SEED)
+        };
+        for total in totals(&experiment.run(&Engine::Native, |_| ())?) {
+            table.add_row([
+                number.clone(),
+                title.to_owned(),
+                format!("{:.1}", 100.0 * total.weeded_share),
+                format!("{:.1}", total.plant_damage_percent()),
+                format!("{:.1}", total.zones_reached_percent()),
+            ]);
+        }
+        anyhow::Ok(())
+    };
+    line(String::new(), "straight from the box", &novice.conditions)?;
+    for step in steps() {
+        novice.follow(&step)?;
+        line(step.number.to_string(), step.title, &novice.conditions)?;
+    }
+    for (index, column) in table.column_iter_mut().enumerate() {
+        column.set_cell_alignment(if index == 1 { CellAlignment::Left } else { CellAlignment::Right });
+    }
+    Ok(table)
+}

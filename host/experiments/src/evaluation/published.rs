@@ -1,0 +1,278 @@
+//! What the paper printed of its own trial: equations, slopes, fits and ranges, and where these contradict each other.
+//!
+//! The trial had four speeds, two spacings and three replications: 24 plots, which the adjusted R2 of Eq. 30 and 31 agree with.
+//!
+//! **Which of its figures fit Eq. 27?** The paper's capacity of 0.041 ha/h, with some 85 % of the weeds gone, 2 % of
+//! the plants damaged and its engine of 2.5 hp, makes a performance index of 137, and no machine of that capacity and
+//! power could exceed 164. The printed 185 to 202 need 0.056 to 0.060 ha/h at 2.5 hp, or 1.8 to 1.7 hp at 0.041 ha/h.
+//! With the capacities that Eq. 24 and 25 give for its width of 0.40 m and its field efficiencies, the index doubles
+//! from 123 at 1 km/h to 257 at 2.5 km/h, since capacity grows with speed: for 202 and 185 the power would have to grow
+//! with it, from 1.5 to 3.5 hp. So Fig. 10, where the index rises with speed, is what Eq. 27 says of one engine; Eq.
+//! 30, where it falls, is not.
+
+use super::response::Response;
+use serde::Serialize;
+
+/// The speeds of its trial, least and greatest, km/h: beyond them its slopes say nothing.
+pub const SPEEDS_KM_H: (f64, f64) = (1.0, 2.5);
+
+/// A machine that weeds in the row, as its authors measured it in a field or on a test track. Each counts weeds in its own way.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct PublishedMachine {
+    /// Who built it.
+    pub name: &'static str,
+    /// In which crop it worked.
+    pub crop: &'static str,
+    /// What tells it where a plant stands.
+    pub sees_by: &'static str,
+    /// Its speeds.
+    pub speed_km_h: &'static str,
+    /// Weeds that were gone, and of which ground.
+    pub weeds_gone_percent: &'static str,
+    /// Crop plants that were damaged.
+    pub damaged_percent: &'static str,
+    /// Where it is published.
+    pub source: &'static str,
+}
+
+/// Where nothing is said.
+const NOT_SAID: &str = "\u{2013}";
+
+/// Published machines, those with a beam first.
+pub const MACHINES: &[PublishedMachine] = &[
+    PublishedMachine {
+        name: "the paper's",
+        crop: "chilli",
+        sees_by: "a light beam",
+        speed_km_h: "1 to 2.5",
+        weeds_gone_percent: "80.1 to 89.5, in the plot",
+        damaged_percent: "0 to 3.92",
+        source: "the paper, Eq. 28 and 29",
+    },
+    PublishedMachine {
+        name: "Jia et al., a tool that moves in a spiral",
+        crop: "maize",
+        sees_by: "an infrared beam",
+        speed_km_h: "4 to 7",
+        weeds_gone_percent: "95.8",
+        damaged_percent: "0.6",
+        source: "Int. J. Agric. Biol. Eng. 14(6), 2021, doi 10.25165/j.ijabe.20211406.6542",
+    },
+    PublishedMachine {
+        name: "Cordill and Grift, two tines",
+        crop: "maize",
+        sees_by: "the stalk's width",
+        speed_km_h: NOT_SAID,
+        weeds_gone_percent: NOT_SAID,
+        damaged_percent: "8.8 without weeds, 23.7 among weeds",
+        source: "Biosystems Engineering, 2011, doi 10.1016/j.biosystemseng.2011.07.007",
+    },
+    PublishedMachine {
+        name: "Tillett et al., a rotating disc",
+        crop: "cabbage",
+        sees_by: "a camera",
+        speed_km_h: "1.8",
+        weeds_gone_percent: "62 to 87, within 240 mm of a plant",
+        damaged_percent: "low",
+        source: "Biosystems Engineering, 2008",
+    },
+    PublishedMachine {
+        name: "Jiang et al., knives and herbicide",
+        crop: "maize; cabbage",
+        sees_by: "a camera",
+        speed_km_h: "2.0",
+        weeds_gone_percent: "90.0; 94.5",
+        damaged_percent: "1.9; 0.8",
+        source: "Soil and Tillage Research, 2023, doi 10.1016/j.still.2023.105837",
+    },
+    PublishedMachine {
+        name: "electric swinging knives",
+        crop: "cabbage",
+        sees_by: "a camera",
+        speed_km_h: "low, in a laboratory",
+        weeds_gone_percent: "96.67",
+        damaged_percent: "0.83",
+        source: "Agronomy 15(1) 112, 2025",
+    },
+];
+
+/// A response as a linear function of speed (A, km/h) and plant spacing (B, cm), as far as it was printed.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Coefficients {
+    /// At speed 0 and spacing 0, in the response's unit.
+    pub constant: Option<f64>,
+    /// For each km/h.
+    pub per_km_h: Option<f64>,
+    /// For each cm of spacing.
+    pub per_cm: Option<f64>,
+}
+
+impl Coefficients {
+    /// The response at a speed in km/h and a spacing in cm, where all coefficients are known.
+    pub fn at(&self, speed_km_h: f64, spacing_cm: f64) -> Option<f64> {
+        Some(self.constant? + self.per_km_h? * speed_km_h + self.per_cm? * spacing_cm)
+    }
+}
+
+/// The paper's figures for one response.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Published {
+    /// The equation's number in the paper.
+    pub equation_number: u32,
+    /// Its coefficients; all `None` where the equation cannot be read in the copy at hand.
+    pub equation: Coefficients,
+    /// The coefficients as the text around it gives them.
+    pub text: Coefficients,
+    /// R2, 0 to 1.
+    pub r_squared: f64,
+    /// Adjusted R2, 0 to 1.
+    pub adjusted_r_squared: Option<f64>,
+    /// Ranges that the text gives, lowest and highest, in the response's unit: they should be one.
+    pub ranges: &'static [(f64, f64)],
+    /// What contradicts what, a sentence each.
+    pub contradictions: &'static [&'static str],
+}
+
+impl Published {
+    /// The paper's figures for a response.
+    pub fn of(response: Response) -> Self {
+        match response {
+            Response::PlantDamage => PLANT_DAMAGE,
+            Response::WeedingEfficiency => WEEDING_EFFICIENCY,
+            Response::PerformanceIndex => PERFORMANCE_INDEX,
+            Response::FieldEfficiency => FIELD_EFFICIENCY,
+        }
+    }
+}
+
+const UNKNOWN: Coefficients = Coefficients { constant: None, per_km_h: None, per_cm: None };
+
+const PLANT_DAMAGE: Published = Published {
+    equation_number: 28,
+    equation: UNKNOWN,
+    text: Coefficients { constant: None, per_km_h: Some(1.26), per_cm: Some(-0.081) },
+    r_squared: 0.79,
+    adjusted_r_squared: None,
+    ranges: &[(0.0, 3.92)],
+    contradictions: &["Eq. 28 cannot be read in the copy at hand: the text gives its slopes, but not its constant."],
+};
+
+const WEEDING_EFFICIENCY: Published = Published {
+    equation_number: 29,
+    equation: Coefficients { constant: Some(97.2841), per_km_h: Some(-0.1990), per_cm: Some(-0.2068) },
+    text: Coefficients { constant: None, per_km_h: Some(-5.06), per_cm: Some(0.2068) },
+    r_squared: 0.8361,
+    adjusted_r_squared: None,
+    ranges: &[(80.11, 89.49), (66.66, 86.66), (76.0, 84.0)],
+    contradictions: &[
+        "Eq. 29 has -0.1990 a km/h, where the text has -5.06.",
+        "Eq. 29 has -0.2068 a cm, where the text has +0.2068: one sign is wrong.",
+        "At the trial's speeds and spacings Eq. 29 stays between 84.4 and 86.7 %, whereas the text's slopes span 9.7 points, as 80.11 to 89.49 % does.",
+        "Three ranges are printed, and the efficiencies at the best and the worst treatment (89.49 and 80.11 %) lie in one of them alone.",
+        "The best spacing at 1 km/h is 60 cm in one chapter and 50 cm in another.",
+    ],
+};
+
+const PERFORMANCE_INDEX: Published = Published {
+    equation_number: 30,
+    equation: Coefficients { constant: Some(204.83), per_km_h: Some(-6.08), per_cm: Some(0.015) },
+    text: Coefficients { constant: None, per_km_h: Some(-6.08), per_cm: Some(0.015) },
+    r_squared: 0.6787,
+    adjusted_r_squared: Some(0.6482),
+    ranges: &[(185.41, 202.20)],
+    contradictions: &[
+        "Eq. 30 and its text have the index fall with speed; the discussion of Fig. 10 has it rise.",
+        "The text says that speed and spacing both lower the index; Eq. 30 has +0.015 a cm.",
+        "By Eq. 27, an engine of 2.5 hp and the paper's 0.041 ha/h make an index of 137, and 164 at the most: not 185 to 202.",
+        "By Eq. 24, 25 and 27, the index at 2.5 hp and 0.40 m doubles from 123 at 1 km/h to 257 at 2.5 km/h.",
+    ],
+};
+
+const FIELD_EFFICIENCY: Published = Published {
+    equation_number: 31,
+    equation: Coefficients { constant: Some(82.50), per_km_h: Some(-2.06), per_cm: Some(0.09) },
+    text: Coefficients { constant: None, per_km_h: Some(-2.06), per_cm: None },
+    r_squared: 0.6831,
+    adjusted_r_squared: Some(0.6529),
+    ranges: &[(81.25, 86.25), (80.0, 90.0)],
+    contradictions: &[
+        "The text has field efficiency higher at 50 than at 60 cm; Eq. 31 has +0.09 a cm, which is the reverse.",
+        "The lowest efficiency is 81.25 % in the range, and 83.33 % at the treatment that is called the lowest.",
+        "86.25 % is reached at 1 km/h in the results, and at 2.5 km/h in the abstract.",
+    ],
+};
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::evaluation::{Performance, PlotRecord};
+
+    /// The engine that was chosen, hp.
+    const POWER_HP: f64 = 2.5;
+
+    /// The working width with the inter-row tools, m.
+    const WIDTH_M: f64 = 0.40;
+
+    /// The index of a plot with these counts out of 10,000, as the paper prints two digits behind the point.
+    fn index(capacity_ha_h: f64, damaged: u32, weeds_after: u32, power_hp: f64) -> f64 {
+        let record = PlotRecord {
+            replication: 1,
+            speed_km_h: 1.0,
+            spacing_cm: 60.0,
+            weeds_before: 10_000,
+            weeds_after,
+            plants: 10_000,
+            damaged,
+            area_m2: capacity_ha_h * 10_000.0,
+            time_s: 3600.0,
+            width_m: WIDTH_M,
+            power_hp,
+        };
+        let Performance { performance_index, .. } = record.performance();
+        performance_index
+    }
+
+    #[test]
+    fn the_printed_index_needs_what_the_docs_say() {
+        assert_eq!(index(0.041, 200, 1500, POWER_HP).round(), 137.0);
+        assert_eq!(index(0.041, 0, 0, POWER_HP).round(), 164.0);
+        // The best and the worst treatment: 89.49 % and no damage, 80.11 % and 3.92 %.
+        let best = |capacity_ha_h, power_hp| index(capacity_ha_h, 0, 1051, power_hp);
+        let worst = |capacity_ha_h, power_hp| index(capacity_ha_h, 392, 1989, power_hp);
+        let near = |value: f64, printed: f64| (value / printed - 1.0).abs() < 0.02;
+        assert!(near(best(0.0565, POWER_HP), 202.20) && near(worst(0.0602, POWER_HP), 185.41));
+        assert!(near(best(0.041, 1.8), 202.20) && near(worst(0.041, 1.7), 185.41));
+        let (slow, fast) = (1.0 * WIDTH_M / 10.0 * 0.8625, 2.5 * WIDTH_M / 10.0 * 0.8333);
+        assert_eq!((best(slow, POWER_HP).round(), worst(fast, POWER_HP).round()), (123.0, 257.0));
+        assert!(near(best(slow, 1.53), 202.20) && near(worst(fast, 3.46), 185.41));
+    }
+
+    #[test]
+    fn the_printed_equations_reach_what_the_contradictions_say() {
+        let all = |response| {
+            let of_speed = |speed| [50.0, 60.0].map(|spacing| Published::of(response).equation.at(speed, spacing));
+            [1.0, 1.5, 2.0, 2.5].into_iter().flat_map(of_speed).collect::<Option<Vec<f64>>>()
+        };
+        assert_eq!(all(Response::PlantDamage), None);
+        let within = |response, lowest: f64, highest: f64| {
+            let values = all(response).unwrap();
+            let (low, high) = values.iter().fold((f64::MAX, f64::MIN), |(low, high), v| (low.min(*v), high.max(*v)));
+            assert!((low - lowest).abs() < 0.05 && (high - highest).abs() < 0.05, "{low} to {high}");
+        };
+        within(Response::WeedingEfficiency, 84.4, 86.7);
+        within(Response::PerformanceIndex, 190.4, 199.65);
+        within(Response::FieldEfficiency, 81.85, 85.84);
+        let Coefficients { per_km_h, per_cm, .. } = Published::of(Response::WeedingEfficiency).text;
+        let span = 1.5 * per_km_h.unwrap() - 10.0 * per_cm.unwrap();
+        assert!((span - -9.7).abs() < 0.05, "{span}");
+    }
+
+    #[test]
+    fn the_printed_fits_are_those_of_24_plots() {
+        for response in [Response::PerformanceIndex, Response::FieldEfficiency] {
+            let Published { r_squared, adjusted_r_squared, .. } = Published::of(response);
+            let adjusted = 1.0 - (1.0 - r_squared) * 23.0 / 21.0;
+            assert!((adjusted - adjusted_r_squared.unwrap()).abs() < 2e-4, "{adjusted}");
+        }
+    }
+}

@@ -1,0 +1,185 @@
+//! The plots of a trial as a CSV table, which a spreadsheet or a simulated trial may have written.
+//!
+//! The columns are the fields of [`PlotRecord`], in any order, with others among them that are not read; lines that begin
+//! with `#` are comments. Every line is checked before anything follows from one.
+
+use super::plot::PlotRecord;
+pub use files::FileError;
+use files::csv_table::{CsvTable, Line};
+use std::io;
+use std::path::Path;
+use std::str::FromStr;
+
+/// The columns, which carry their units.
+pub const COLUMNS: [&str; 11] = [
+    "replication",
+    "speed_km_h",
+    "spacing_cm",
+    "weeds_before",
+    "weeds_after",
+    "plants",
+    "damaged",
+    "area_m2",
+    "time_s",
+    "width_m",
+    "power_hp",
+];
+
+/// Reads the plots of a trial.
+///
+/// # Errors
+/// Names the file, the line and the column, and what would be right: a missing column, plots that are not filled in, text in a
+/// number, a value out of its range, more weeds after than before, more damaged plants than plants, or a replication of a speed and spacing that stood there before.
+pub fn read_csv(path: &Path) -> Result<Vec<PlotRecord>, FileError> {
+    let table = CsvTable::read(path, &COLUMNS)?;
+    let empty = |line: Line| COLUMNS.into_iter().find(|column| line.text(column).is_empty());
+    let mut unfilled = table.lines().filter_map(|line| Some((line, empty(line)?)));
+    if let Some((line, column)) = unfilled.next() {
+        let (count, all) = (1 + unfilled.count(), table.lines().count());
+        let verb = if count == 1 { "is" } else { "are" };
+        return Err(line.error(format!("{count} of {all} plots {verb} not filled in: here {column} is empty")));
+    }
+    let mut plots: Vec<(u64, PlotRecord)> = Vec::new();
+    for line in table.lines() {
+        let plot = record(line)?;
+        let same = |other: &PlotRecord| {
+            (other.replication, other.speed_km_h, other.spacing_cm)
+                == (plot.replication, plot.speed_km_h, plot.spacing_cm)
+        };
+        if let Some((first, _)) = plots.iter().find(|(_, other)| same(other)) {
+            return Err(line.error(format!(
+                "replication {} of {} km/h and {} cm stands in line {first} already: each plot has a replication of its own",
+                plot.replication, plot.speed_km_h, plot.spacing_cm
+            )));
+        }
+        plots.push((line.number(), plot));
+    }
+    Ok(plots.into_iter().map(|(_, plot)| plot).collect())
+}
+
+/// One line of the table.
+fn record(line: Line) -> Result<PlotRecord, FileError> {
+    let plot = PlotRecord {
+        replication: count(line, "replication", 0)?,
+        speed_km_h: number(line, "speed_km_h")?,
+        spacing_cm: number(line, "spacing_cm")?,
+        weeds_before: count(line, "weeds_before", 1)?,
+        weeds_after: count(line, "weeds_after", 0)?,
+        plants: count(line, "plants", 1)?,
+        damaged: count(line, "damaged", 0)?,
+        area_m2: number(line, "area_m2")?,
+        time_s: number(line, "time_s")?,
+        width_m: number(line, "width_m")?,
+        power_hp: number(line, "power_hp")?,
+    };
+    plot.check().map_err(|problem| line.error(problem.to_string()))?;
+    Ok(plot)
+}
+
+/// A count, whose least value [`PlotRecord::check`] holds it to.
+fn count(line: Line, column: &str, least: u32) -> Result<u32, FileError> {
+    line.value(column, &format!("a whole number, {least} or more"))
+}
+
+fn number(line: Line, column: &str) -> Result<f64, FileError> {
+    let Number(value) = line.value(column, "a number, like 1.5")?;
+    Ok(value)
+}
+
+/// A number as people write it: neither `inf` nor `nan`.
+struct Number(f64);
+
+impl FromStr for Number {
+    type Err = ();
+
+    fn from_str(text: &str) -> Result<Self, ()> {
+        text.parse().ok().filter(|value: &f64| value.is_finite()).map(Self).ok_or(())
+    }
+}
+
+/// Writes the plots as a table that [`read_csv`] reads.
+///
+/// # Errors
+/// Those of the writer.
+pub fn write_csv(records: &[PlotRecord], to: impl io::Write) -> Result<(), csv::Error> {
+    let mut writer = csv::Writer::from_writer(to);
+    for record in records {
+        writer.serialize(record)?;
+    }
+    writer.flush()?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    const HEADER: &str =
+        "replication,speed_km_h,spacing_cm,weeds_before,weeds_after,plants,damaged,area_m2,time_s,width_m,power_hp\n";
+    const LINE: &str = "1,1.5,50,200,30,50,1,24,180,0.4,2.5\n";
+
+    /// The plots of a table of this text, or what is said of it.
+    fn read(text: &str) -> Result<Vec<PlotRecord>, String> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("trial.csv");
+        fs::write(&path, text).unwrap();
+        read_csv(&path).map_err(|error| error.to_string().replace(&format!("{}/", folder.path().display()), ""))
+    }
+
+    #[test]
+    fn what_was_written_is_read_again() {
+        let plots = read(&format!("{HEADER}{LINE}2,2.25,60,10,0,7,7,1.5,0.1,0.055,0.5\n")).unwrap();
+        let mut text = Vec::new();
+        write_csv(&plots, &mut text).unwrap();
+        let text = String::from_utf8(text).unwrap();
+        assert!(text.starts_with(HEADER), "{text}");
+        assert_eq!(read(&text), Ok(plots));
+    }
+
+    #[test]
+    fn columns_may_come_in_any_order_with_others_comments_and_a_byte_order_mark() {
+        let columns: Vec<&str> = HEADER.trim().split(',').rev().collect();
+        let values: Vec<&str> = LINE.trim().split(',').rev().collect();
+        let text = format!("\u{feff}# a plot\n{},engine\n{},native\n", columns.join(","), values.join(","));
+        assert_eq!(read(&text), read(&format!("{HEADER}{LINE}")));
+    }
+
+    #[test]
+    fn each_wrong_value_is_named_by_file_line_and_column() {
+        for (wrong, said) in [
+            ("1,fast,50,200,30,50,1,24,180,0.4,2.5", "speed_km_h is `fast`: it has to be a number, like 1.5"),
+            ("1,nan,50,200,30,50,1,24,180,0.4,2.5", "speed_km_h is `nan`: it has to be a number, like 1.5"),
+            ("1,,50,200,30,50,1,24,180,0.4,2.5", "1 of 1 plots is not filled in: here speed_km_h is empty"),
+            ("1,0.05,50,200,30,50,1,24,180,0.4,2.5", "speed_km_h is 0.05: it has to be from 0.1 to 15 km/h"),
+            ("1,1.5,0.5,200,30,50,1,24,180,0.4,2.5", "spacing_cm is 0.5: it has to be from 5 to 500 cm"),
+            ("1,1.5,50,200,201,50,1,24,180,0.4,2.5", "weeds_after is 201: it cannot exceed weeds_before"),
+            ("1,1.5,50,-2,30,50,1,24,180,0.4,2.5", "weeds_before is `-2`: it has to be a whole number, 1 or more"),
+            (
+                "1,1.5,50,0,0,50,1,24,180,0.4,2.5",
+                "weeds_before is 0: without a weed before weeding there is no weeding efficiency",
+            ),
+            ("1,1.5,50,200,30,0,0,24,180,0.4,2.5", "plants is 0: without a plant there is no plant damage in percent"),
+            ("1,1.5,50,200,30,50,51,24,180,0.4,2.5", "damaged is 51: it cannot exceed plants"),
+            ("1,1.5,50,200,30,50,1,0,180,0.4,2.5", "area_m2 is 0: it has to be from 0.01 to 1000000 m2"),
+            ("1,1.5,50,200,30,50,1,24,0,0.4,2.5", "time_s is 0: it has to be from 0.1 to 1000000 s"),
+            ("1,1.5,50,200,30,50,1,24,180,0,2.5", "width_m is 0: it has to be from 0.01 to 50 m"),
+            ("1,1.5,50,200,30,50,1,24,180,0.4,-1", "power_hp is -1: it has to be from 0.001 to 1000 hp"),
+        ] {
+            assert_eq!(read(&format!("# a trial\n{HEADER}{wrong}\n")), Err(format!("trial.csv, line 3: {said}")));
+        }
+    }
+
+    #[test]
+    fn a_replication_that_stands_there_twice_is_named_with_both_lines() {
+        let said = read(&format!("{HEADER}{LINE}\n{LINE}")).unwrap_err();
+        let right = "trial.csv, line 4: replication 1 of 1.5 km/h and 50 cm stands in line 2 already: ";
+        assert!(said.starts_with(right), "{said}");
+    }
+
+    #[test]
+    fn a_missing_column_is_named() {
+        let said = read(&format!("{HEADER}{LINE}").replace("width_m", "width_cm")).unwrap_err();
+        assert!(said.starts_with("trial.csv, line 1: the column `width_m` is missing: "), "{said}");
+    }
+}

@@ -1,0 +1,499 @@
+//! The paper's experiment: speeds by plant spacings by replications, in a simulated field, with several controllers on the
+//! same ground.
+//!
+//! Each plot's rows grow and are driven from the seed, the plot and the row alone, so that the result depends neither
+//! on the number of threads or machines nor on which controllers take part. The firmware is either its native run
+//! ([`field::native`]) or the ELF on the virtual Uno ([`mod@trial`]); its baselines ([`field::baselines`]) are models in both
+//! cases. A plot comes out as somebody with a notebook would write it down ([`PlotRecord`]), and is judged by the same
+//! code as a real one.
+
+mod taught;
+
+pub mod table;
+pub mod total;
+
+use crate::evaluation::PlotRecord;
+use crate::shard::{Numbered, Shard};
+use control::ground::features;
+use control::operate::state::State;
+use field::baselines;
+use field::budget::{Budget, Reason};
+use field::conditions::Conditions;
+use field::driving::{Drive, drive};
+use field::native::{self, Refused, Sensors};
+use field::optimum::undamaged_share;
+use field::row::{MAX_WIDTH_MM, Problem, Row};
+use field::stand::Stand;
+use field::tool_path::{Effect, effect};
+use field::trial::{Start, Trial};
+use field::verdict::{Judgement, Timing, Verdict, judge};
+use knn::Example;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::cell::LazyCell;
+use std::ops::AddAssign;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use thiserror::Error;
+use trial::TrialError;
+use uno::Pulse;
+
+pub use table::write_csv;
+pub use total::{Total, compare, totals};
+
+/// What runs the firmware.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Engine {
+    /// Its code, compiled for the host.
+    Native,
+    /// This ELF, on the virtual Uno.
+    Uno(PathBuf),
+}
+
+/// Who swings the tool: what the plots of an experiment are given to compare.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Treatment {
+    /// The firmware with its leads.
+    Firmware,
+    /// The firmware with both leads at 0: a queue of windows, without look-ahead.
+    WithoutLookAhead,
+    /// The paper's: one slot, no look-ahead, a loop that polls.
+    Paper,
+    /// Who knows where each stem stands and allows for the servo's slowest swing: whose damage, if any, nobody can avoid.
+    Ideal,
+}
+
+impl Treatment {
+    /// All, the firmware first.
+    pub const ALL: [Self; 4] = [Self::Firmware, Self::WithoutLookAhead, Self::Paper, Self::Ideal];
+
+    /// What it is called.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Firmware => "this firmware",
+            Self::WithoutLookAhead => "a queue without look-ahead",
+            Self::Paper => "the paper's controller",
+            Self::Ideal => "the ideal controller",
+        }
+    }
+}
+
+/// An experiment: the full factorial of speeds and spacings.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Experiment {
+    /// Forward speeds, km/h.
+    pub speeds_km_h: Vec<f64>,
+    /// Plant spacings, cm.
+    pub spacings_cm: Vec<f64>,
+    /// How often each speed and spacing is tried.
+    pub replications: u32,
+    /// Who weeds.
+    pub controllers: Vec<Treatment>,
+    /// Where.
+    pub conditions: Conditions,
+    /// What the firmware is taught beforehand.
+    #[serde(with = "taught")]
+    pub examples: Vec<Example<{ features::COUNT }>>,
+    /// Which of all the possible fields.
+    pub seed: u64,
+}
+
+/// One plot, weeded by one controller.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PlotOutcome {
+    /// Who weeded it.
+    pub controller: Treatment,
+    /// What is written down.
+    pub record: PlotRecord,
+    /// Plants and weeds, counted.
+    pub effect: Effect,
+    /// Plants' zones, counted.
+    pub zones: Zones,
+    /// Share of the rows' ground that the tool weeded, from 0 to 1.
+    pub weeded_share: f64,
+    /// Share that could be weeded at best with this servo and every margin kept ([`field::verdict::weedable_share`]).
+    pub weedable_share: f64,
+    /// Share that could be weeded at best without a plant damaged ([`field::optimum::undamaged_share`]).
+    pub undamaged_share: f64,
+    /// Where the rows' ground went ([`field::budget`]).
+    pub budget: Budget,
+    /// Rows in which an alarm took the tool out.
+    pub alarms: u32,
+    /// Time that was simulated, run-ups included and turns not, s.
+    pub moved_s: f64,
+}
+
+/// What the firmware keeps of each plant, and how the tool passed it: the canopy, or with `stem_zone_mm` the zone round its stem
+/// ([`field::verdict`]). A stricter measure than damage, which is the tool in the zone that no tool may enter.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Zones {
+    /// All of them; plants that have grown together have one.
+    pub all: u32,
+    /// Those over which the tool was not fully out.
+    pub reached: u32,
+    /// Those whose margin was cut, but not they.
+    pub margins_cut: u32,
+}
+
+impl AddAssign for Zones {
+    fn add_assign(&mut self, other: Self) {
+        self.all += other.all;
+        self.reached += other.reached;
+        self.margins_cut += other.margins_cut;
+    }
+}
+
+/// Why an experiment had no outcome.
+#[derive(Debug, Error)]
+pub enum ExperimentError {
+    /// The plants close up.
+    #[error(
+        "plants {spacing_cm} cm apart grow together to more than {MAX_WIDTH_MM} mm: \
+         ask for a larger spacing or narrower canopies"
+    )]
+    TooClose {
+        /// The spacing.
+        spacing_cm: f64,
+    },
+    /// There is no plant, or none that the beam could see.
+    #[error(
+        "nothing for the beam stands in a row of {row_m} m with plants {spacing_cm} cm apart: \
+         ask for a longer row or a smaller spacing"
+    )]
+    TooShort {
+        /// The row's length.
+        row_m: f64,
+        /// The spacing.
+        spacing_cm: f64,
+    },
+    /// The decisions refuse their settings.
+    #[error(transparent)]
+    Refused(#[from] Refused),
+    /// The virtual Uno failed.
+    #[error(transparent)]
+    Trial(#[from] TrialError),
+}
+
+/// A plot's place in the experiment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Plot {
+    index: u64,
+    replication: u32,
+    speed_km_h: f64,
+    spacing_cm: f64,
+}
+
+/// What one controller did in one row.
+#[derive(Clone, Copy, Debug)]
+struct RowOutcome {
+    effect: Effect,
+    zones: Zones,
+    weeded_share: f64,
+    weedable_share: f64,
+    undamaged_share: f64,
+    budget: Budget,
+    /// For the row and its turn, and of these what was simulated.
+    seconds: f64,
+    moved_s: f64,
+    alarm: bool,
+}
+
+/// Rows of a plot that are kept in memory at once.
+const BATCH: u32 = 256;
+
+/// Ground of the row that is drawn.
+const DRAWN_MM: f64 = 4500.0;
+
+impl Experiment {
+    /// The paper's: its Table 2, by all controllers.
+    pub fn as_in_the_paper(conditions: Conditions, seed: u64) -> Self {
+        Self {
+            speeds_km_h: vec![1.0, 1.5, 2.0, 2.5],
+            spacings_cm: vec![50.0, 60.0],
+            replications: 3,
+            controllers: Treatment::ALL.to_vec(),
+            conditions,
+            examples: Vec::new(),
+            seed,
+        }
+    }
+
+    /// All plots, by speed, spacing and replication.
+    fn plots(&self) -> Vec<Plot> {
+        let treatments = self.speeds_km_h.iter().flat_map(|&speed| self.spacings_cm.iter().map(move |&s| (speed, s)));
+        treatments
+            .flat_map(|treatment| (1..=self.replications).map(move |replication| (treatment, replication)))
+            .zip(0..)
+            .map(|(((speed_km_h, spacing_cm), replication), index)| Plot { index, replication, speed_km_h, spacing_cm })
+            .collect()
+    }
+
+    /// Number of plots, each of which all controllers weed.
+    pub fn size(&self) -> u64 {
+        self.plots().len() as u64
+    }
+
+    /// Number of rows that each controller weeds.
+    pub fn rows(&self) -> usize {
+        self.plots().len() * self.conditions.plot.rows as usize
+    }
+
+    /// Number of plants, roughly: as many as there are places for.
+    pub fn plants(&self) -> f64 {
+        let row_cm = 100.0 * self.conditions.plot.row_m;
+        let of_rows: f64 = self.spacings_cm.iter().map(|spacing_cm| row_cm / spacing_cm).sum();
+        of_rows * self.speeds_km_h.len() as f64 * f64::from(self.replications) * f64::from(self.conditions.plot.rows)
+    }
+
+    /// Weeds the field: an outcome for each plot and each controller, by speed, spacing and replication. `progress` is told
+    /// the share of the rows done, from 0 to 1.
+    ///
+    /// # Errors
+    /// The first that a row meets.
+    pub fn run(&self, engine: &Engine, progress: impl Fn(f64) + Sync) -> Result<Vec<PlotOutcome>, ExperimentError> {
+        let of_plots = self.run_shard(Shard::WHOLE, engine, progress)?;
+        Ok(of_plots.into_iter().flat_map(|plot| plot.outcome).collect())
+    }
+
+    /// Weeds a shard's plots: for each an outcome of each controller. All shards' together are what [`Experiment::run`] gives.
+    ///
+    /// # Errors
+    /// As [`Experiment::run`].
+    pub fn run_shard(
+        &self,
+        shard: Shard,
+        engine: &Engine,
+        progress: impl Fn(f64) + Sync,
+    ) -> Result<Vec<Numbered<Vec<PlotOutcome>>>, ExperimentError> {
+        let plots = self.plots();
+        let mine: Vec<&Plot> = shard.numbers(self.size()).map(|number| &plots[number as usize]).collect();
+        let (done, all) = (AtomicUsize::new(0), (mine.len() * self.conditions.plot.rows as usize) as f64);
+        let row_done = || progress((done.fetch_add(1, Ordering::Relaxed) + 1) as f64 / all);
+        let weed = |plot: &&Plot| {
+            let outcome = self.weed_plot(plot, engine, &row_done)?;
+            Ok(Numbered { number: plot.index, outcome })
+        };
+        mine.par_iter().map(weed).collect()
+    }
+
+    /// One row of the experiment, the first plot's at the highest speed, and what the firmware did to it: its first metres, to
+    /// be drawn.
+    ///
+    /// # Errors
+    /// As [`Experiment::run`].
+    pub fn example(&self, engine: &Engine) -> Result<Option<(Row, Judgement)>, ExperimentError> {
+        let fastest = self.plots().into_iter().reduce(|a, b| if b.speed_km_h > a.speed_km_h { b } else { a });
+        let Some(plot) = fastest else { return Ok(None) };
+        let (stand, _, trial) = self.grow(&plot, 0)?;
+        let weeded = weed(&trial, &sensors(&trial), &stand, Treatment::Firmware, engine)?;
+        let Trial { row, machine, motion, timing, .. } = &trial;
+        let judgement = judge(row, machine, motion, *timing, &weeded.pulses, weeded.start_cycle);
+        Ok(row.beginning(DRAWN_MM).map(|beginning| (beginning, judgement)))
+    }
+
+    fn weed_plot(
+        &self,
+        plot: &Plot,
+        engine: &Engine,
+        row_done: &(impl Fn() + Sync),
+    ) -> Result<Vec<PlotOutcome>, ExperimentError> {
+        let rows = self.conditions.plot.rows;
+        let mut outcomes: Vec<PlotOutcome> =
+            self.controllers.iter().map(|&controller| self.untouched(plot, controller)).collect();
+        for first in (0..rows).step_by(BATCH as usize) {
+            let batch = first..rows.min(first + BATCH);
+            let weeded: Vec<Vec<RowOutcome>> = batch
+                .into_par_iter()
+                .map(|row| {
+                    let outcomes = self.weed_row(plot, row, engine)?;
+                    row_done();
+                    Ok(outcomes)
+                })
+                .collect::<Result<_, ExperimentError>>()?;
+            for by_controller in weeded {
+                for (outcome, row) in outcomes.iter_mut().zip(by_controller) {
+                    outcome.add(&row, rows);
+                }
+            }
+        }
+        Ok(outcomes)
+    }
+
+    /// A plot that nobody has weeded yet.
+    fn untouched(&self, plot: &Plot, controller: Treatment) -> PlotOutcome {
+        let Conditions { plot: area, machine, .. } = &self.conditions;
+        let width_m = area.row_spacing_mm / 1000.0;
+        let record = PlotRecord {
+            replication: plot.replication,
+            speed_km_h: plot.speed_km_h,
+            spacing_cm: plot.spacing_cm,
+            weeds_before: 0,
+            weeds_after: 0,
+            plants: 0,
+            damaged: 0,
+            area_m2: f64::from(area.rows) * area.row_m * width_m,
+            time_s: 0.0,
+            width_m,
+            power_hp: machine.power_hp,
+        };
+        PlotOutcome {
+            controller,
+            record,
+            effect: Effect::default(),
+            zones: Zones::default(),
+            weeded_share: 0.0,
+            weedable_share: 0.0,
+            undamaged_share: 0.0,
+            budget: Budget::default(),
+            alarms: 0,
+            moved_s: 0.0,
+        }
+    }
+
+    /// What every controller does in the same row.
+    fn weed_row(&self, plot: &Plot, row: u32, engine: &Engine) -> Result<Vec<RowOutcome>, ExperimentError> {
+        let (stand, drive, trial) = self.grow(plot, row)?;
+        let sensors = sensors(&trial);
+        let undamaged_share = undamaged_share(&stand, &trial.machine, &drive.motion, &drive.steering);
+        let outcome = |&controller: &Treatment| {
+            let weeded = weed(&trial, &sensors, &stand, controller, engine)?;
+            let Trial { row, machine, motion, timing, .. } = &trial;
+            let (pulses, start_cycle) = (&weeded.pulses, weeded.start_cycle);
+            let judgement = judge(row, machine, motion, *timing, pulses, start_cycle);
+            let span_mm = row.span_mm();
+            Ok(RowOutcome {
+                budget: Budget::of(&span_mm, &judgement.weeded_mm, &weeded.reasons, machine, motion),
+                effect: effect(
+                    &stand,
+                    machine,
+                    &self.conditions.machine,
+                    (motion, &drive.steering),
+                    pulses,
+                    start_cycle,
+                ),
+                zones: Zones {
+                    all: judgement.plants.len() as u32,
+                    reached: judgement.count(Verdict::Damaged) as u32,
+                    margins_cut: judgement.count(Verdict::MarginCut) as u32,
+                },
+                weeded_share: judgement.weeded_share,
+                weedable_share: judgement.weedable_share,
+                undamaged_share,
+                seconds: drive.row_s + drive.turn_s,
+                moved_s: motion.duration_s(),
+                alarm: weeded.alarm,
+            })
+        };
+        self.controllers.iter().map(outcome).collect()
+    }
+
+    /// A row that has grown, how it is driven, and both as a trial for the firmware.
+    fn grow(&self, plot: &Plot, row: u32) -> Result<(Stand, Drive, Trial), ExperimentError> {
+        // What grows, how it is driven and what the machine is like have a chance of their own each.
+        let chance = |of: u64| {
+            let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
+            rng.set_stream(plot.index << 34 | u64::from(row) << 2 | of);
+            rng
+        };
+        let spacing_cm = plot.spacing_cm;
+        let stand =
+            Stand::grow(&self.conditions, spacing_cm * 10.0, &mut chance(0)).map_err(|problem| match problem {
+                Problem::Empty => ExperimentError::TooShort { row_m: self.conditions.plot.row_m, spacing_cm },
+                _ => ExperimentError::TooClose { spacing_cm },
+            })?;
+        let drive = drive(&self.conditions, &stand.span_mm, plot.speed_km_h, &mut chance(1));
+        let trial = Trial {
+            row: stand.row.clone(),
+            machine: self.conditions.machine(chance(2).random()),
+            motion: drive.motion.clone(),
+            timing: self.conditions.timing(),
+            start: Start::Command,
+            settings: self.conditions.firmware_settings(),
+            examples: self.examples.clone(),
+        };
+        Ok((stand, drive, trial))
+    }
+}
+
+/// What came of a row.
+struct Weeded {
+    pulses: Vec<Pulse>,
+    start_cycle: u64,
+    alarm: bool,
+    reasons: Vec<Reason>,
+}
+
+/// What a trial's sensors tell the native run, whatever it is set to; worked out where somebody asks.
+fn sensors(trial: &Trial) -> LazyCell<Sensors, impl FnOnce() -> Sensors> {
+    LazyCell::new(|| Sensors::new(trial, native::TURN_S))
+}
+
+/// Has a controller weed a row.
+fn weed(
+    trial: &Trial,
+    sensors: &LazyCell<Sensors, impl FnOnce() -> Sensors>,
+    stand: &Stand,
+    controller: Treatment,
+    engine: &Engine,
+) -> Result<Weeded, ExperimentError> {
+    let firmware = |trial: &Trial| {
+        // The ELF does not say why it swings: its native run decides the same, within a servo's frame.
+        let native::Weeded { pulses, state, reasons } = native::weed(trial, sensors)?;
+        match engine {
+            Engine::Native => Ok(Weeded { pulses, start_cycle: 0, alarm: state != State::Work, reasons }),
+            Engine::Uno(elf) => {
+                let outcome = trial::run(trial, elf, |_| ())?;
+                let alarm = outcome.status.state != "work";
+                Ok(Weeded { pulses: outcome.pulses, start_cycle: outcome.start_cycle, alarm, reasons })
+            }
+        }
+    };
+    let baseline = |baselines::Weeded { pulses, reasons }| Ok(Weeded { pulses, start_cycle: 0, alarm: false, reasons });
+    match controller {
+        Treatment::Firmware => firmware(trial),
+        Treatment::WithoutLookAhead => {
+            let timing = Timing { lead_out_ms: 0, lead_in_ms: 0, ..trial.timing };
+            firmware(&Trial { timing, ..trial.clone() })
+        }
+        Treatment::Paper => baseline(baselines::as_in_the_paper(trial)),
+        Treatment::Ideal => baseline(baselines::ideal(trial, &stand.stems)),
+    }
+}
+
+impl PlotOutcome {
+    /// Adds one of the plot's rows.
+    fn add(&mut self, row: &RowOutcome, rows: u32) {
+        self.effect += row.effect;
+        self.zones += row.zones;
+        self.weeded_share += row.weeded_share / f64::from(rows);
+        self.weedable_share += row.weedable_share / f64::from(rows);
+        self.undamaged_share += row.undamaged_share / f64::from(rows);
+        self.budget += row.budget / f64::from(rows);
+        self.alarms += u32::from(row.alarm);
+        self.moved_s += row.moved_s;
+        let Effect { plants, in_plot, counted, .. } = self.effect;
+        // As many as a plot can have stand in its record.
+        let in_a_plot = |weeds: u64| u32::try_from(weeds).unwrap_or(u32::MAX);
+        // Where no weed stands on the ground that was to be counted, somebody counts the plot.
+        let weeds = if counted.before > 0 { counted } else { in_plot };
+        self.record = PlotRecord {
+            weeds_before: in_a_plot(weeds.before),
+            weeds_after: in_a_plot(weeds.after),
+            plants,
+            damaged: self.effect.injured(),
+            time_s: self.record.time_s + row.seconds,
+            ..self.record
+        };
+    }
+}
+
+/// The records of what one controller did.
+pub fn records(outcomes: &[PlotOutcome], controller: Treatment) -> Vec<PlotRecord> {
+    outcomes.iter().filter(|outcome| outcome.controller == controller).map(|outcome| outcome.record).collect()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,254 @@
+//! The experiment: what its controllers come to in the presets, whatever the threads, the seed and the parameters.
+
+use super::*;
+use crate::evaluation::Analysis;
+use field::budget::Part;
+use field::conditions::{PARAMETERS, presets};
+
+fn experiment(speeds_km_h: &[f64], preset: &str) -> Experiment {
+    let conditions = Conditions::preset(preset).unwrap().unwrap();
+    Experiment { speeds_km_h: speeds_km_h.to_vec(), replications: 1, ..Experiment::as_in_the_paper(conditions, 1) }
+}
+
+fn run(experiment: &Experiment) -> Vec<PlotOutcome> {
+    experiment.run(&Engine::Native, |_| ()).unwrap()
+}
+
+#[test]
+fn the_result_does_not_depend_on_the_number_of_threads() {
+    let experiment = experiment(&[2.0], "transplanted");
+    let on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| run(&experiment))
+    };
+    assert_eq!(on(1), on(3));
+}
+
+#[test]
+fn a_controller_finds_the_same_field_whoever_else_takes_part() {
+    let all = experiment(&[1.5], "transplanted");
+    let alone = Experiment { controllers: vec![Treatment::Firmware], ..all.clone() };
+    assert_eq!(records(&run(&all), Treatment::Firmware), records(&run(&alone), Treatment::Firmware));
+}
+
+#[test]
+fn the_firmware_damages_no_plant_and_weeds_up_to_the_bound_where_the_papers_damages_more_the_faster_it_goes() {
+    for seed in 1..=3 {
+        let mut experiment = Experiment { seed, ..experiment(&[1.0, 1.5, 2.0, 2.5, 3.0, 3.5], "transplanted") };
+        // A mean swing's: the margin and the slip, which has the tool swing early, cover the slowest.
+        experiment.conditions.set("lead_out_ms", 180.0).unwrap();
+        let totals = totals(&run(&experiment));
+        let of = |controller| totals.iter().filter(move |total| total.controller == controller);
+        for total in of(Treatment::Firmware) {
+            assert_eq!((total.effect.damaged, total.zones.reached, total.alarms), (0, 0, 0), "{total:?}");
+            assert!(total.weedable_share - total.weeded_share < 0.05, "{total:?}");
+        }
+        assert!(of(Treatment::Ideal).all(|total| total.effect.damaged == 0));
+        let damage: Vec<f64> = of(Treatment::Paper).map(Total::plant_damage_percent).collect();
+        // A weed as wide as a plant takes its one slot at any speed; what comes too late grows with it.
+        let (slow, fast) = damage.split_at(3);
+        assert!(slow.iter().all(|percent| *percent < 1.0) && fast[0] > 1.0, "{damage:?}");
+        assert!(fast.is_sorted() && fast[0] < fast[1] && fast[1] < fast[2], "{damage:?}");
+    }
+}
+
+#[test]
+fn whoever_knows_every_plant_damages_none_in_any_field_and_weeds_more_than_the_firmware() {
+    // Without look-ahead, the firmware weeds more, and over plants.
+    for preset in presets().filter(|preset| *preset != "paper") {
+        let totals = totals(&run(&experiment(&[1.0, 2.5], preset)));
+        for pair in totals.chunks(Treatment::ALL.len()) {
+            let (firmware, ideal) = (pair[0], pair[3]);
+            assert_eq!((firmware.controller, ideal.controller), (Treatment::Firmware, Treatment::Ideal));
+            assert_eq!(ideal.effect.damaged, 0, "{preset}");
+            assert!(ideal.weeded_share > firmware.weeded_share, "{preset}");
+        }
+    }
+}
+
+#[test]
+fn whoever_damages_no_plant_weeds_no_more_than_the_bound_in_any_field() {
+    for preset in presets() {
+        for seed in 1..=3 {
+            // Rows of their own: a plot with one damaged plant may weed more than its bound.
+            let mut experiment = Experiment { seed, ..experiment(&[1.0, 2.5], preset) };
+            experiment.conditions.set("plot.rows", 1.0).unwrap();
+            for outcome in run(&experiment).iter().filter(|outcome| outcome.effect.damaged == 0) {
+                let (share, bound) = (outcome.weeded_share, outcome.undamaged_share);
+                assert!(share <= bound + 1e-3, "{preset}, {:?}: {share} of {bound}", outcome.controller);
+            }
+        }
+    }
+}
+
+#[test]
+fn the_loss_budget_of_every_row_of_every_preset_adds_up_to_the_whole_row() {
+    for preset in presets() {
+        for seed in 1..=2 {
+            // A row a plot, so that none hides behind others.
+            let mut experiment = Experiment { seed, ..experiment(&[1.0, 2.5, 6.0], preset) };
+            experiment.conditions.set("plot.rows", 1.0).unwrap();
+            for outcome in run(&experiment) {
+                let PlotOutcome { controller, budget, weeded_share, .. } = outcome;
+                let sum: f64 = budget.shares().map(|(_, share)| share).sum();
+                assert!((sum - 1.0).abs() < 1e-9, "{preset}, {controller:?}: {sum} of {budget:?}");
+                assert!((budget[Part::Weeded] - weeded_share).abs() < 1e-12, "{preset}, {controller:?}: {budget:?}");
+                assert!(budget.shares().all(|(_, share)| share >= -1e-12), "{preset}, {controller:?}: {budget:?}");
+                assert_eq!(budget.tenths().iter().map(|(_, tenths)| tenths).sum::<u32>(), 1000);
+            }
+        }
+    }
+}
+
+#[test]
+fn the_loss_budget_is_what_a_hand_calculation_says() {
+    let mut experiment = experiment(&[2.5], "even-stand");
+    experiment.spacings_cm = vec![50.0];
+    // So short a lead that the tool comes in between two plants.
+    experiment.conditions.set("lead_out_ms", 180.0).unwrap();
+    let budget = totals(&run(&experiment))[0].budget;
+    // A canopy of 150 mm, a margin of 50 mm on both sides, a plant every 500 mm, 694.4 mm/s.
+    let mm_s = 2.5e6 / 3600.0;
+    // Out: led by 181 ms, of which 2 ms of pulse, 65 ms of dead time, and 12 ms to the 4.5 degrees at which the tool leaves the line go
+    // by before ground is lost. In: led by 41 ms, then pulse, dead time and 108 ms back to the line.
+    let swings_mm = mm_s * ((0.181 - 0.002 - 0.065 - 0.012) + (0.0015 + 0.065 + 0.108 - 0.041));
+    let expected = [
+        (Part::Plants, 150.0),
+        (Part::Margins, 100.0),
+        (Part::Swings, swings_mm),
+        (Part::Weeded, 500.0 - 250.0 - swings_mm),
+        (Part::Weeds, 0.0),
+        (Part::Guarded, 0.0),
+        (Part::Closed, 0.0),
+    ];
+    for (part, mm) in expected {
+        assert!((500.0 * budget[part] - mm).abs() < 4.0, "{part:?}: {} mm, not {mm}", 500.0 * budget[part]);
+    }
+}
+
+#[test]
+fn each_part_of_the_loss_budget_is_found_where_it_is_to_be_expected() {
+    let budget = |preset: &str, speed_km_h: f64, changes: &[(&str, f64)]| {
+        let mut experiment = Experiment { spacings_cm: vec![50.0], ..experiment(&[speed_km_h], preset) };
+        changes.iter().for_each(|&(name, value)| experiment.conditions.set(name, value).unwrap());
+        totals(&run(&experiment))[0].budget
+    };
+    // Weeds as wide as plants are kept, dust and narrow weeds are not.
+    let (even, weedy) = (budget("even-stand", 1.0, &[]), budget("weedy", 1.0, &[]));
+    assert!(even[Part::Weeds] == 0.0 && weedy[Part::Weeds] > 0.01, "{even:?}, {weedy:?}");
+    // Gaps in the crop are guarded where a plant is expected: 20 % of the places, with 80 mm and two margins of 50 mm.
+    let gaps = [("crop.missing_percent", 20.0), ("weeds.tall_per_m", 0.0)];
+    let guard = [("guard_spacing_mm", 500.0), ("guard_scatter_mm", 40.0)];
+    let (open, guarded) = (budget("even-stand", 1.0, &gaps), budget("even-stand", 1.0, &[gaps, guard].concat()));
+    let expected = 0.2 * 180.0 / 500.0;
+    assert!(open[Part::Guarded] == 0.0 && (guarded[Part::Guarded] - expected).abs() < 0.02, "{open:?}, {guarded:?}");
+    // A machine that outruns its beam ends in an alarm.
+    let fast = budget("transplanted", 7.0, &[]);
+    assert_eq!(fast.largest_loss().0, Part::Closed, "{fast:?}");
+    // A quicker tool loses less to swings, and as much to canopies.
+    let (slow, quick) = (budget("set-up", 2.5, &[]), budget("quick-tool", 2.5, &[]));
+    assert!(quick[Part::Swings] < slow[Part::Swings] / 3.0, "{slow:?}, {quick:?}");
+    assert!((quick[Part::Plants] - slow[Part::Plants]).abs() < 0.01, "{slow:?}, {quick:?}");
+}
+
+#[test]
+fn a_quick_tool_damages_no_plant_up_to_7_km_h() {
+    let mut experiment = experiment(&[0.36, 1.0, 2.5, 4.0, 6.0, 7.0], "quick-tool");
+    experiment.controllers = vec![Treatment::Firmware];
+    for total in totals(&run(&experiment)) {
+        assert_eq!((total.effect.injured(), total.alarms), (0, 0), "{total:?}");
+        assert!(total.weeded_share > 0.42, "{total:?}");
+    }
+}
+
+#[test]
+fn a_machine_steered_by_hand_spares_its_plants_once_it_is_set_up_for_that() {
+    let total = |preset: &str| {
+        let experiment = Experiment { replications: 3, ..experiment(&[1.0], preset) };
+        totals(&run(&experiment))[0]
+    };
+    let (from_the_box, set_up) = (total("hand-steered").effect, total("hand-steered-set-up").effect);
+    let percent = |damaged: u32| 100.0 * f64::from(damaged) / f64::from(from_the_box.plants);
+    assert!(percent(from_the_box.damaged) > 1.0 && percent(from_the_box.swept) > 5.0, "{from_the_box:?}");
+    assert!(from_the_box.unseen > 0 && from_the_box.unseen <= from_the_box.damaged, "{from_the_box:?}");
+    assert!(percent(set_up.damaged) <= 1.0 && set_up.swept == 0, "{set_up:?}");
+}
+
+#[test]
+fn a_shorter_stroke_that_the_firmware_is_told_weeds_more_and_reaches_no_canopy() {
+    let mut shorter = experiment(&[2.5], "transplanted");
+    let paper = totals(&run(&shorter))[0];
+    for (setting, value) in [("servo_out_us", 1750.0), ("lead_out_ms", 150.0)] {
+        shorter.conditions.set(setting, value).unwrap();
+    }
+    let shorter = totals(&run(&shorter))[0];
+    assert_eq!((shorter.effect.damaged, shorter.zones.reached), (0, 0), "{shorter:?}");
+    assert!(shorter.weeded_share > paper.weeded_share + 0.05, "{shorter:?}, {paper:?}");
+    // Too short for the canopies, and said to be.
+    let mut stub = experiment(&[1.0], "transplanted");
+    stub.conditions.set("servo_out_us", 1620.0).unwrap();
+    let stub = totals(&run(&stub))[0];
+    assert!(stub.zones.reached > stub.zones.all / 2, "{stub:?}");
+}
+
+#[test]
+fn field_efficiency_falls_with_speed_as_the_paper_s_equation_has_it() {
+    let outcomes = run(&Experiment { replications: 6, ..experiment(&[1.0, 1.5, 2.0, 2.5], "transplanted") });
+    let analysis = Analysis::of(records(&outcomes, Treatment::Firmware)).unwrap();
+    let slope = analysis.responses[3].model.as_ref().unwrap().term("speed").unwrap().clone();
+    assert!((slope.estimate - -2.06).abs() < 3.0 * slope.standard_error + 0.5, "{slope:?}");
+    for treatment in analysis.treatments() {
+        let percent = treatment.mean.field_efficiency_percent;
+        assert!((77.0..91.0).contains(&percent), "{percent} % at {} km/h", treatment.speed_km_h);
+    }
+}
+
+#[test]
+fn a_firmware_that_is_told_wrong_leads_damages_what_could_have_been_kept() {
+    let mut experiment = experiment(&[3.5], "transplanted");
+    for lead in ["lead_out_ms", "lead_in_ms"] {
+        experiment.conditions.set(lead, 0.0).unwrap();
+    }
+    let totals = totals(&run(&experiment));
+    assert!(totals[0].effect.damaged > 0 && totals[3].effect.damaged == 0, "{totals:?}");
+}
+
+#[test]
+fn a_machine_that_outruns_its_beam_ends_in_alarms_and_not_in_a_clean_result() {
+    let totals = totals(&run(&experiment(&[7.0], "transplanted")));
+    assert!(totals[0].alarms > 0, "{totals:?}");
+}
+
+#[test]
+fn no_parameter_at_an_end_of_its_range_upsets_a_trial() {
+    for parameter in PARAMETERS.iter().filter(|parameter| !["plot.rows", "plot.row_m"].contains(&parameter.name)) {
+        for end in [parameter.least, parameter.greatest] {
+            let mut experiment = experiment(&[1.0, 4.0], "transplanted");
+            let small = [("plot.rows", 1.0), ("plot.row_m", 4.0), ("machine.sweeps_a_side", 0.0)];
+            for (name, value) in small.into_iter().chain([(parameter.name, end)]) {
+                // Sweeps so wide would run through the next row, and are refused.
+                let _ = experiment.conditions.set(name, value);
+            }
+            match experiment.run(&Engine::Native, |_| ()) {
+                Ok(outcomes) => assert!(
+                    outcomes
+                        .iter()
+                        .all(|outcome| { outcome.record.check().is_ok() && outcome.weeded_share.is_finite() })
+                ),
+                Err(error) => {
+                    let place = format!("{} = {end}", parameter.name);
+                    let is_told = matches!(error, ExperimentError::TooClose { .. } | ExperimentError::TooShort { .. });
+                    assert!(is_told, "{place}: {error}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn every_plot_can_be_judged_like_a_real_one() {
+    let outcomes = run(&experiment(&[1.0, 2.5], "weedy"));
+    let analysis = Analysis::of(records(&outcomes, Treatment::Firmware)).unwrap();
+    assert_eq!(analysis.records.len(), 4);
+    assert!(analysis.performances.iter().all(|plot| plot.field_efficiency_percent < 100.0));
+}

@@ -1,0 +1,291 @@
+//! A trial's report as a page for a browser: one file with its charts and tables, that needs nothing beside it.
+//!
+//! [`Page`] says what is on it. The charts are SVG within the page, and its colours follow the reader's choice of light
+//! or dark. It holds no script, asks no network, and comes out the same for the same trial: there is no clock in it. The
+//! words and their order are in `templates/page.html`, its looks in `templates/page.css`.
+
+mod chart;
+mod comparison;
+mod figure;
+mod losses;
+mod response;
+mod table;
+
+pub use self::comparison::{Comparison, ControllerCurve, ControllerPoint, Work};
+
+use crate::evaluation::published::{MACHINES, PublishedMachine};
+use crate::evaluation::{Analysis, Performance, PlotRecord, Response};
+use askama::Template;
+use chart::DrawingError;
+use figure::Figure;
+use losses::Losses;
+use response::Chapter;
+use table::{Table, fixed, short};
+use thiserror::Error;
+
+/// One row drawn along the ground, as [`trial::picture::draw`] draws it.
+#[derive(Debug, Clone)]
+pub struct RowPicture {
+    /// The drawing, as SVG.
+    pub drawing: String,
+    /// What is to be seen in it, in a sentence.
+    pub caption: String,
+}
+
+/// A trial's report.
+#[derive(Debug, Clone)]
+pub struct Page<'a> {
+    /// What was tried, as in a heading.
+    pub title: &'a str,
+    /// What came out of it, in plain sentences; the first is the most important.
+    pub summary: Vec<String>,
+    /// The command line that makes the same report again.
+    pub command: &'a str,
+    /// What else it takes to repeat the trial, by name: the field, its seed, the engine, the version.
+    pub parameters: &'a [(String, String)],
+    /// The plots, and what follows from them.
+    pub analysis: &'a Analysis,
+    /// Controllers side by side; a real trial has none.
+    pub comparison: Option<&'a Comparison>,
+    /// One row of the trial; a real trial has none.
+    pub row: Option<&'a RowPicture>,
+}
+
+/// A page cannot be made.
+#[derive(Debug, Error)]
+pub enum PageError {
+    /// There is a figure that is none.
+    #[error("{what} is {value} at {speed_km_h} km/h: a report shows finite figures only")]
+    NotFinite {
+        /// Whose figure.
+        what: String,
+        /// Where it stands.
+        speed_km_h: f64,
+        /// What it is.
+        value: f64,
+    },
+    /// A chart.
+    #[error("a chart cannot be drawn")]
+    Drawing(#[from] DrawingError),
+    /// The page itself.
+    #[error("the page cannot be put together")]
+    Template(#[from] askama::Error),
+}
+
+impl Page<'_> {
+    /// The page as HTML, to be written to a file as it is.
+    ///
+    /// # Errors
+    /// Where a figure of the comparison is not finite, or plotters cannot draw.
+    pub fn html(&self) -> Result<String, PageError> {
+        let comparison = self.comparison.map(Headline::of).transpose()?;
+        let analysis = self.analysis;
+        let figures = Response::ALL.map(|response| figure::response(analysis, response));
+        let sheet = Sheet {
+            title: self.title,
+            summary: &self.summary,
+            command: self.command,
+            comparison,
+            figures: figures.into_iter().collect::<Result<_, _>>()?,
+            row: self.row.map(|row| (row.drawing.clone(), row.caption.as_str())),
+            chapters: analysis.responses.iter().map(|of| Chapter::of(analysis, of)).collect::<Result<_, _>>()?,
+            means: means(analysis),
+            plots: plots(analysis),
+            parameters: parameters(self.parameters),
+        };
+        Ok(sheet.render()?)
+    }
+}
+
+/// What the template puts on the page.
+#[derive(Template)]
+#[template(path = "page.html")]
+struct Sheet<'a> {
+    title: &'a str,
+    summary: &'a [String],
+    command: &'a str,
+    comparison: Option<Headline>,
+    figures: Vec<Figure>,
+    row: Option<(String, &'a str)>,
+    chapters: Vec<Chapter>,
+    means: Table,
+    plots: Table,
+    parameters: Table,
+}
+
+/// The controllers side by side, as charts and as tables.
+struct Headline {
+    figures: [Figure; 3],
+    tables: [Table; 3],
+    losses: Option<Losses>,
+    beside_others: Option<Table>,
+}
+
+impl Headline {
+    fn of(comparison: &Comparison) -> Result<Self, PageError> {
+        comparison.check()?;
+        let of_controllers = |value: fn(&ControllerPoint) -> f64| {
+            let curve = move |controller: &ControllerCurve| {
+                let points = controller.points.iter().map(|point| (point.speed_km_h, value(point)));
+                (controller.name.clone(), points.collect())
+            };
+            comparison.controllers.iter().map(curve).collect::<Vec<(String, Vec<(f64, f64)>)>>()
+        };
+        let damage = of_controllers(|point| point.plant_damage_percent);
+        let zones = of_controllers(|point| point.zones_reached_percent);
+        let mut weeding = of_controllers(|point| point.in_row_weeding_percent);
+        if !comparison.bound.is_empty() {
+            weeding.push((figure::BOUND.to_owned(), comparison.bound.clone()));
+        }
+        Ok(Self {
+            figures: [figure::damage(comparison)?, figure::weeding(comparison)?, figure::zones(comparison)?],
+            tables: [
+                by_speed("Plants damaged by each controller, %", &damage),
+                by_speed("Ground of the row weeded by each controller, %", &weeding),
+                by_speed("Zones reached by each controller, %", &zones),
+            ],
+            losses: Losses::of(&comparison.work),
+            beside_others: (!comparison.work.is_empty()).then(|| beside_others(&comparison.work)),
+        })
+    }
+}
+
+impl Comparison {
+    /// Every figure that is shown, with whose it is and at which speed.
+    fn check(&self) -> Result<(), PageError> {
+        let of_controllers = self.controllers.iter().flat_map(|controller| {
+            controller.points.iter().flat_map(|point| {
+                let figures = [point.plant_damage_percent, point.zones_reached_percent, point.in_row_weeding_percent];
+                figures.map(|value| (controller.name.as_str(), point.speed_km_h, value))
+            })
+        });
+        let of_bound = self.bound.iter().map(|&(speed_km_h, value)| ("the bound", speed_km_h, value));
+        let wrong = of_controllers.chain(of_bound).find(|(_, speed, value)| !(speed + value).is_finite());
+        wrong.map_or(Ok(()), |(what, speed_km_h, value)| {
+            Err(PageError::NotFinite { what: what.to_owned(), speed_km_h, value })
+        })
+    }
+}
+
+/// Curves over speed as a table, a row a speed.
+fn by_speed(caption: &str, curves: &[(String, Vec<(f64, f64)>)]) -> Table {
+    let mut speeds: Vec<f64> = curves.iter().flat_map(|(_, points)| points).map(|point| point.0).collect();
+    speeds.sort_by(f64::total_cmp);
+    speeds.dedup();
+    let names = curves.iter().map(|(name, _)| name.as_str());
+    let mut table = Table::new(caption, ["speed"].into_iter().chain(names));
+    for speed in speeds {
+        let at_speed = |points: &[(f64, f64)]| points.iter().find(|point| point.0 == speed).map(|point| point.1);
+        let cells = curves.iter().map(|(_, points)| table::optional(at_speed(points), |value| fixed(value, 1)));
+        table.rows.push([format!("{} km/h", short(speed))].into_iter().chain(cells).collect());
+    }
+    table
+}
+
+/// The simulated machine in the terms of published ones, and these.
+fn beside_others(work: &[Work]) -> Table {
+    let columns = ["machine", "crop", "sees by", "speed, km/h", "weeds gone, %", "plants damaged, %", "source"];
+    let mut table = Table { is_prose: true, ..Table::new("This machine, simulated, and machines in fields", columns) };
+    for at in work {
+        let gone = |percent: Option<f64>| table::optional(percent, |percent| fixed(percent, 1));
+        table.rows.push(vec![
+            "this firmware, SIMULATED".to_owned(),
+            "the simulated field's".to_owned(),
+            "a light beam".to_owned(),
+            short(at.speed_km_h),
+            format!("{} in the row, {} in the plot", gone(at.in_row_percent), gone(at.in_plot_percent)),
+            format!("{} ({})", fixed(at.damage.percent(), 2), at.damage),
+            "this report".to_owned(),
+        ]);
+    }
+    let published = |machine: &PublishedMachine| {
+        let PublishedMachine { name, crop, sees_by, speed_km_h, weeds_gone_percent, damaged_percent, source } =
+            *machine;
+        [name, crop, sees_by, speed_km_h, weeds_gone_percent, damaged_percent, source].map(str::to_owned).to_vec()
+    };
+    table.rows.extend(MACHINES.iter().map(published));
+    table
+}
+
+/// The measures of a plot or of a treatment, and what stands above them.
+const MEASURES: [&str; 6] = [
+    "plant damage, %",
+    "weeding efficiency, %",
+    "theoretical capacity, ha/h",
+    "effective capacity, ha/h",
+    "field efficiency, %",
+    "performance index",
+];
+
+fn measures(performance: &Performance) -> [String; 6] {
+    [
+        fixed(performance.plant_damage_percent, 2),
+        fixed(performance.weeding_efficiency_percent, 2),
+        fixed(performance.theoretical_capacity_ha_h, 4),
+        fixed(performance.effective_capacity_ha_h, 4),
+        fixed(performance.field_efficiency_percent, 2),
+        fixed(performance.performance_index, 2),
+    ]
+}
+
+/// The means by treatment.
+fn means(analysis: &Analysis) -> Table {
+    let columns = ["treatment", "plots"].into_iter().chain(MEASURES);
+    let mut table = Table::new("Means of the plots of each treatment", columns);
+    for treatment in analysis.treatments() {
+        let name = format!("{} km/h, {} cm", short(treatment.speed_km_h), short(treatment.spacing_cm));
+        let [damage, weeding, others @ ..] = measures(&treatment.mean);
+        let damage = format!("{damage} ({})", treatment.damaged);
+        let weeding =
+            treatment.weeding_efficiency.within.map_or(weeding.clone(), |it| format!("{weeding} ± {}", fixed(it, 2)));
+        let cells = [name, treatment.plots.to_string(), damage, weeding];
+        table.rows.push(cells.into_iter().chain(others).collect());
+    }
+    table
+}
+
+/// Each plot, as it was written down and what follows from it.
+fn plots(analysis: &Analysis) -> Table {
+    let written_down = [
+        "plot",
+        "replication",
+        "speed, km/h",
+        "spacing, cm",
+        "weeds before",
+        "weeds after",
+        "plants",
+        "damaged",
+        "area, m²",
+        "time, s",
+        "width, m",
+        "power, hp",
+    ];
+    let mut table =
+        Table::new("Each plot, counted and measured, and what follows", written_down.into_iter().chain(MEASURES));
+    for (index, (record, performance)) in analysis.records.iter().zip(&analysis.performances).enumerate() {
+        let cells = [(index + 1).to_string()].into_iter().chain(counted(record)).chain(measures(performance));
+        table.rows.push(cells.collect());
+    }
+    table
+}
+
+fn counted(record: &PlotRecord) -> [String; 11] {
+    [
+        record.replication.to_string(),
+        short(record.speed_km_h),
+        short(record.spacing_cm),
+        record.weeds_before.to_string(),
+        record.weeds_after.to_string(),
+        record.plants.to_string(),
+        record.damaged.to_string(),
+        fixed(record.area_m2, 2),
+        fixed(record.time_s, 1),
+        fixed(record.width_m, 2),
+        fixed(record.power_hp, 2),
+    ]
+}
+
+fn parameters(parameters: &[(String, String)]) -> Table {
+    let rows = parameters.iter().map(|(name, value)| vec![name.clone(), value.clone()]).collect();
+    Table { rows, is_prose: true, ..Table::new("What the trial was made with", ["parameter", "value"]) }
+}

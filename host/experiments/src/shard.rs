@@ -1,0 +1,357 @@
+//! A study on several machines: which of its plots, points or runs each of them computes, and how the parts that they write
+//! become the whole again.
+//!
+//! A study numbers what it computes from 0. Each of these has random numbers of its own, from the seed and its number.
+//! Shard I of N has every Nth, from the Ith on, so that each has some of what is quick and of what takes long. A part is
+//! lines of JSON: a [`Header`] that says what decides the study's result, then each outcome with its number. Numbers
+//! are written such that the same bits are read. [`together`] holds parts against each other, and [`outcomes`] puts
+//! them in order; from there on it does not matter where they were computed.
+//!
+//! Nothing here computes, opens files or starts anything: who runs the shards is the user's scheduler.
+
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::fmt;
+use std::io::{self, BufRead, Write};
+use std::str::FromStr;
+use thiserror::Error;
+
+/// The form of a part; another one gets the next number.
+const FORM: u32 = 1;
+
+/// Most shards of a study.
+pub const MOST_SHARDS: u64 = 100_000;
+
+/// Missing parts that an error names one by one.
+const MOST_NAMED: usize = 8;
+
+/// A share of a study's plots, points or runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Shard {
+    /// Which one, from 1.
+    number: u64,
+    /// Of how many.
+    of: u64,
+}
+
+/// A text is no shard.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[error("it has to be I/N, such as 2/4 for the second of four, with I from 1 to N and N at most {MOST_SHARDS}")]
+pub struct NoShard;
+
+impl Shard {
+    /// All of a study.
+    pub const WHOLE: Self = Self { number: 1, of: 1 };
+
+    /// What it computes of so many plots, points or runs: their numbers, from 0, going up.
+    pub fn numbers(self, all: u64) -> impl ExactSizeIterator<Item = u64> {
+        let count = all.saturating_sub(self.number - 1).div_ceil(self.of);
+        // A range of u64 does not know its length.
+        (0..usize::try_from(count).unwrap_or(usize::MAX)).map(move |turn| self.number - 1 + turn as u64 * self.of)
+    }
+}
+
+impl FromStr for Shard {
+    type Err = NoShard;
+
+    fn from_str(text: &str) -> Result<Self, NoShard> {
+        let (number, of) = text.split_once('/').ok_or(NoShard)?;
+        let whole = |text: &str| text.trim().parse::<u64>().map_err(|_| NoShard);
+        let shard = Self { number: whole(number)?, of: whole(of)? };
+        if (1..=shard.of).contains(&shard.number) && shard.of <= MOST_SHARDS { Ok(shard) } else { Err(NoShard) }
+    }
+}
+
+impl fmt::Display for Shard {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/{}", self.number, self.of)
+    }
+}
+
+/// The program that computes: two that are the same give the same outcomes.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Program {
+    /// Its version.
+    pub version: String,
+    /// What tells its builds apart, such as a check sum.
+    pub build: String,
+}
+
+/// What a part says of itself.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Header {
+    /// The form of what follows: [`FORM`].
+    weeder_part: u32,
+    /// Who computed it.
+    pub program: Program,
+    /// The command, such as `trial`.
+    pub command: String,
+    /// Which of the parts it is.
+    pub shard: Shard,
+    /// How many plots, points or runs the whole study has.
+    pub all: u64,
+    /// All else that decides the study's result.
+    pub settings: Value,
+}
+
+/// A part of a study, as it was read.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Part<T> {
+    /// Where it is from: its file's name.
+    pub name: String,
+    /// What it says of itself.
+    pub header: Header,
+    /// The outcomes of its shard, by their numbers.
+    pub outcomes: Vec<Numbered<T>>,
+}
+
+/// An outcome, and the number of the plot, point or run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Numbered<T> {
+    /// Which one, from 0.
+    pub number: u64,
+    /// What came of it.
+    pub outcome: T,
+}
+
+/// Parts make no study. Each names the part in question.
+#[derive(Debug, Error)]
+pub enum PartError {
+    /// It cannot be read.
+    #[error("{name} cannot be read: {problem}")]
+    Unreadable {
+        /// The part.
+        name: String,
+        /// Why.
+        problem: io::Error,
+    },
+    /// It is something else.
+    #[error("{name} is no part of a study, as `weeder trial --shard 1/4 --out {name}` would write it: {problem}")]
+    NoPart {
+        /// The file.
+        name: String,
+        /// What is wrong with its first line.
+        problem: String,
+    },
+    /// Another program wrote it.
+    #[error(
+        "{name} is of weeder {theirs}, and this is weeder {ours}: put parts together with the very program that computed them"
+    )]
+    OtherProgram {
+        /// The part.
+        name: String,
+        /// Version and build of its program.
+        theirs: String,
+        /// Version and build of this program.
+        ours: String,
+    },
+    /// It belongs to another study.
+    #[error("{name} is of another study than {other}: its {what} is {theirs}, and there it is {ours}")]
+    OtherStudy {
+        /// The part.
+        name: String,
+        /// The first part.
+        other: String,
+        /// Which of the settings differs.
+        what: String,
+        /// Its value in the part.
+        theirs: String,
+        /// Its value in the first part.
+        ours: String,
+    },
+    /// A shard is there twice.
+    #[error("{name} and {other} are both part {shard}: name each part once")]
+    Doubled {
+        /// A part.
+        name: String,
+        /// The one before it.
+        other: String,
+        /// What both are.
+        shard: Shard,
+    },
+    /// Shards are not there.
+    #[error("{missing} missing: name all parts of the study, or compute what is missing by --shard")]
+    Missing {
+        /// Which ones, with a verb.
+        missing: String,
+    },
+    /// A line of it is wrong.
+    #[error("{name}, line {line}: {problem}; compute part {shard} again, with --force")]
+    Spoiled {
+        /// The part.
+        name: String,
+        /// The line, from 1.
+        line: usize,
+        /// What is wrong.
+        problem: String,
+        /// What it is.
+        shard: Shard,
+    },
+}
+
+impl fmt::Display for Program {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} (build {})", self.version, self.build)
+    }
+}
+
+impl Header {
+    /// That of a shard of a study of `all` plots, points or runs.
+    pub fn new(program: Program, command: &str, shard: Shard, all: u64, settings: Value) -> Self {
+        Self { weeder_part: FORM, program, command: command.to_owned(), shard, all, settings }
+    }
+}
+
+/// Writes a part, a line each: the header, and the outcomes as they come.
+///
+/// # Errors
+/// Those of the writer.
+pub fn write<T: Serialize>(
+    header: &Header,
+    outcomes: impl IntoIterator<Item = Numbered<T>>,
+    to: &mut dyn Write,
+) -> io::Result<()> {
+    serde_json::to_writer(&mut *to, header)?;
+    writeln!(to)?;
+    for outcome in outcomes {
+        serde_json::to_writer(&mut *to, &outcome)?;
+        writeln!(to)?;
+    }
+    Ok(())
+}
+
+/// Reads the first line of a part, called `name`.
+///
+/// # Errors
+/// Where it cannot be read, or is something else.
+pub fn read_header(name: &str, from: &mut dyn BufRead) -> Result<Header, PartError> {
+    let no_part = |problem: String| PartError::NoPart { name: name.to_owned(), problem };
+    let mut line = Vec::new();
+    let read = io::Read::take(from, MOST_HEADER).read_until(b'\n', &mut line);
+    read.map_err(|problem| PartError::Unreadable { name: name.to_owned(), problem })?;
+    if line.is_empty() {
+        return Err(no_part("it is empty".to_owned()));
+    }
+    // Where the parser stopped says nothing to a user who named the wrong file.
+    let value: Value = serde_json::from_slice(&line)
+        .map_err(|_| no_part("line 1 is not the head of a part, or was cut".to_owned()))?;
+    match value.get("weeder_part").and_then(Value::as_u64) {
+        Some(form) if form == u64::from(FORM) => {}
+        Some(form) => return Err(no_part(format!("it has form {form}, and this program knows form {FORM}"))),
+        None => return Err(no_part("line 1 has no `weeder_part`".to_owned())),
+    }
+    let header: Header = serde_json::from_value(value).map_err(|error| no_part(format!("line 1: {error}")))?;
+    let Shard { number, of } = header.shard;
+    if number == 0 || number > of || of > MOST_SHARDS {
+        return Err(no_part(format!("line 1: shard {}: {NoShard}", header.shard)));
+    }
+    Ok(header)
+}
+
+/// Longest header that is read, in bytes: what is no part may have no end of a line.
+const MOST_HEADER: u64 = 1 << 24;
+
+/// Reads the outcomes of a part behind its header: all of them, in the order of their numbers.
+///
+/// # Errors
+/// Where it cannot be read, a line is wrong, or one is missing or too many.
+pub fn read_outcomes<T: DeserializeOwned>(
+    name: &str,
+    header: Header,
+    from: &mut dyn BufRead,
+) -> Result<Part<T>, PartError> {
+    let shard = header.shard;
+    let spoiled = |line: usize, problem: String| PartError::Spoiled { name: name.to_owned(), line, problem, shard };
+    let mut expected = shard.numbers(header.all);
+    let mut outcomes = Vec::new();
+    let mut last = 1;
+    for (line, text) in (2..).zip(from.lines()) {
+        let text = text.map_err(|problem| PartError::Unreadable { name: name.to_owned(), problem })?;
+        let outcome: Numbered<T> = serde_json::from_str(&text)
+            .map_err(|_| spoiled(line, "this is not an outcome of this study, or was cut".to_owned()))?;
+        match expected.next() {
+            Some(number) if number == outcome.number => outcomes.push(outcome),
+            Some(number) => {
+                return Err(spoiled(line, format!("this is number {}, but has to be {number}", outcome.number)));
+            }
+            None => return Err(spoiled(line, "this is one more than the part has".to_owned())),
+        }
+        last = line;
+    }
+    match expected.next() {
+        Some(number) => Err(spoiled(last + 1, format!("the part ends before number {number}"))),
+        None => Ok(Part { name: name.to_owned(), header, outcomes }),
+    }
+}
+
+/// Whether parts, each with its name, make one whole study that this program computed.
+///
+/// # Errors
+/// The first thing that is wrong: a part of another program, of another study, one that is there twice, or those that are
+/// missing.
+pub fn together(parts: &[(String, Header)], ours: &Program) -> Result<(), PartError> {
+    let Some((first_name, first)) = parts.first() else {
+        return Err(PartError::Missing { missing: "all parts are".to_owned() });
+    };
+    for (name, header) in parts {
+        if header.program != *ours {
+            let (theirs, ours) = (header.program.to_string(), ours.to_string());
+            return Err(PartError::OtherProgram { name: name.clone(), theirs, ours });
+        }
+        let theirs = [("command", header.command.clone().into()), ("settings", header.settings.clone())];
+        let ours = [("command", first.command.clone().into()), ("settings", first.settings.clone())];
+        let counts = |header: &Header| [("number of parts", header.shard.of.into()), ("size", header.all.into())];
+        let theirs = theirs.into_iter().chain(counts(header));
+        let ours = ours.into_iter().chain(counts(first));
+        let differs = theirs.zip(ours).find_map(|((what, theirs), (_, ours))| difference(what, &theirs, &ours));
+        if let Some((what, theirs, ours)) = differs {
+            return Err(PartError::OtherStudy { name: name.clone(), other: first_name.clone(), what, theirs, ours });
+        }
+    }
+    let mut holders: Vec<Option<&str>> = vec![None; first.shard.of as usize];
+    for (name, header) in parts {
+        let holder = &mut holders[header.shard.number as usize - 1];
+        if let Some(other) = holder.replace(name.as_str()) {
+            return Err(PartError::Doubled { name: name.clone(), other: other.to_owned(), shard: header.shard });
+        }
+    }
+    let missing = (1..).zip(&holders).filter(|(_, holder)| holder.is_none());
+    let missing: Vec<String> = missing.map(|(number, _)| Shard { number, of: first.shard.of }.to_string()).collect();
+    match missing.as_slice() {
+        [] => Ok(()),
+        [one] => Err(PartError::Missing { missing: format!("part {one} is") }),
+        [named @ .., last] if named.len() < MOST_NAMED => {
+            Err(PartError::Missing { missing: format!("parts {} and {last} are", named.join(", ")) })
+        }
+        _ => {
+            let (named, rest) = missing.split_at(MOST_NAMED);
+            Err(PartError::Missing { missing: format!("parts {} and {} more are", named.join(", "), rest.len()) })
+        }
+    }
+}
+
+/// All outcomes in the order of their numbers, of parts that are [`together`].
+pub fn outcomes<T>(parts: Vec<Part<T>>) -> Vec<T> {
+    let mut outcomes: Vec<Numbered<T>> = parts.into_iter().flat_map(|part| part.outcomes).collect();
+    outcomes.sort_by_key(|outcome| outcome.number);
+    outcomes.into_iter().map(|outcome| outcome.outcome).collect()
+}
+
+/// Where two values differ first: the place within them, behind `place`, and what stands there.
+fn difference(place: &str, theirs: &Value, ours: &Value) -> Option<(String, String, String)> {
+    let (theirs_fields, ours_fields) = match (theirs, ours) {
+        _ if theirs == ours => return None,
+        (Value::Object(theirs), Value::Object(ours)) if theirs.keys().eq(ours.keys()) => (theirs, ours),
+        _ => return Some((place.to_owned(), theirs.to_string(), ours.to_string())),
+    };
+    let mut pairs = theirs_fields.iter().zip(ours_fields.values());
+    pairs.find_map(|((name, theirs), ours)| {
+        // What stands in the settings has names enough.
+        let place = if place == "settings" { name.clone() } else { format!("{place}.{name}") };
+        difference(&place, theirs, ours)
+    })
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,363 @@
+//! Sweeps: a result of the experiment as a function of one or two of its parameters.
+//!
+//! An axis is a speed, a plant spacing, a parameter of the conditions or a setting of the firmware, with its values
+//! ([`Axis`]). At each point the firmware's native run weeds a plot, always the same ground for the same conditions.
+
+use crate::experiment::{Engine, Experiment, ExperimentError, PlotOutcome, Treatment};
+use crate::shard::{Numbered, Shard};
+use field::conditions::{Conditions, WrongValue};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::str::FromStr;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use thiserror::Error;
+
+/// Forward speeds that are tried, least and greatest, in km/h.
+pub const SPEEDS_KM_H: (f64, f64) = (0.1, 8.0);
+
+/// Plant spacings that are tried, least and greatest, in cm.
+pub const SPACINGS_CM: (f64, f64) = (5.0, 500.0);
+
+/// Most values of an axis.
+const MOST_VALUES: usize = 1000;
+
+/// A parameter and the values that it takes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Axis {
+    /// `speed` in km/h, `spacing` in cm, or a name that [`Conditions::set`] takes.
+    pub parameter: String,
+    /// The values, in order.
+    pub values: Vec<f64>,
+}
+
+/// A text is no axis.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+pub enum AxisError {
+    /// It has another form.
+    #[error("`{0}` has to be NAME=FROM..TO:STEP, as lead_out_ms=0..300:20")]
+    Form(String),
+    /// It never ends, or has too many values.
+    #[error("`{0}` has to go up, in steps above 0, with at most {MOST_VALUES} values")]
+    Range(String),
+}
+
+impl FromStr for Axis {
+    type Err = AxisError;
+
+    fn from_str(text: &str) -> Result<Self, AxisError> {
+        let parts = || {
+            let (parameter, range) = text.split_once('=')?;
+            let (from, rest) = range.split_once("..")?;
+            let (to, step) = rest.split_once(':')?;
+            let number = |text: &str| text.trim().parse::<f64>().ok().filter(|number| number.is_finite());
+            Some((parameter.trim().to_owned(), number(from)?, number(to)?, number(step)?))
+        };
+        let (parameter, from, to, step) = parts().ok_or_else(|| AxisError::Form(text.to_owned()))?;
+        // A step more or less by rounding does not lose the last value.
+        let steps = (to - from) / step + 1e-9;
+        if step <= 0.0 || !(0.0..MOST_VALUES as f64).contains(&steps) {
+            return Err(AxisError::Range(text.to_owned()));
+        }
+        // Three decimals are kept, so that 0.1 + 0.2 is 0.3.
+        let values = (0..=steps as u32).map(|index| ((from + f64::from(index) * step) * 1e3).round() / 1e3).collect();
+        Ok(Self { parameter, values })
+    }
+}
+
+/// What a point of a sweep came to.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Results {
+    /// Plants damaged, % (Eq. 23).
+    pub plant_damage_percent: f64,
+    /// Weeds gone from the whole plot, % (Eq. 22).
+    pub weeding_efficiency_percent: f64,
+    /// Ground of the row that was weeded, %.
+    pub in_row_weeding_percent: f64,
+    /// The most of it that the servo allows with every canopy and its margin kept, %.
+    pub in_row_bound_percent: f64,
+    /// Field efficiency, % (Eq. 24).
+    pub field_efficiency_percent: f64,
+    /// Performance index, ha %2/(h hp) (Eq. 27).
+    pub performance_index: f64,
+    /// Rows in which an alarm took the tool out, %.
+    pub alarms_percent: f64,
+}
+
+impl Results {
+    /// What they are called, in the order of [`Results::values`].
+    pub const NAMES: [&str; 7] = [
+        "plant_damage",
+        "weeding_efficiency",
+        "in_row_weeding",
+        "in_row_bound",
+        "field_efficiency",
+        "performance_index",
+        "alarms",
+    ];
+
+    /// All of them.
+    pub fn values(&self) -> [f64; 7] {
+        [
+            self.plant_damage_percent,
+            self.weeding_efficiency_percent,
+            self.in_row_weeding_percent,
+            self.in_row_bound_percent,
+            self.field_efficiency_percent,
+            self.performance_index,
+            self.alarms_percent,
+        ]
+    }
+
+    fn of(outcome: &PlotOutcome, rows: u32) -> Self {
+        let performance = outcome.record.performance();
+        Self {
+            plant_damage_percent: performance.plant_damage_percent,
+            // Of all weeds: a square metre's scatter would hide what is swept.
+            weeding_efficiency_percent: outcome
+                .effect
+                .in_plot
+                .efficiency_percent()
+                .unwrap_or(performance.weeding_efficiency_percent),
+            in_row_weeding_percent: 100.0 * outcome.weeded_share,
+            in_row_bound_percent: 100.0 * outcome.weedable_share,
+            field_efficiency_percent: performance.field_efficiency_percent,
+            performance_index: performance.performance_index,
+            alarms_percent: 100.0 * f64::from(outcome.alarms) / f64::from(rows),
+        }
+    }
+}
+
+/// A sweep.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Sweep {
+    /// The first axis.
+    pub x: Axis,
+    /// The second axis, if there is one.
+    pub y: Option<Axis>,
+    /// Who weeds.
+    pub controller: Treatment,
+    /// What does not vary.
+    pub conditions: Conditions,
+    /// Speed where no axis has it, km/h.
+    pub speed_km_h: f64,
+    /// Plant spacing where no axis has it, cm.
+    pub spacing_cm: f64,
+    /// Which of all the possible fields.
+    pub seed: u64,
+}
+
+/// A point of a sweep.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Point {
+    /// Its value on the first axis.
+    pub x: f64,
+    /// Its value on the second axis.
+    pub y: Option<f64>,
+    /// What came of it.
+    pub results: Results,
+}
+
+/// Where a point is, and what is tried there.
+struct Place {
+    x: f64,
+    y: Option<f64>,
+    experiment: Experiment,
+}
+
+/// Why a sweep had no outcome.
+#[derive(Debug, Error)]
+pub enum SweepError {
+    /// An axis has a value that cannot be.
+    #[error(transparent)]
+    Value(#[from] WrongValue),
+    /// Both axes have the same parameter.
+    #[error("both axes are `{0}`: the second one needs a parameter of its own")]
+    Twice(String),
+    /// Speed or spacing are none that a machine works at.
+    #[error("{name} is {value}, but has to be {least} to {greatest} {unit}")]
+    Treatment {
+        /// Which of both.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// The least value.
+        least: f64,
+        /// The greatest value.
+        greatest: f64,
+        /// Its unit.
+        unit: &'static str,
+    },
+    /// A point's plot could not be weeded.
+    #[error("at {place}: {problem}")]
+    Point {
+        /// The point.
+        place: String,
+        /// What went wrong.
+        problem: ExperimentError,
+    },
+}
+
+impl Sweep {
+    /// Weeds a plot at each point, the first axis running fastest. `progress` is told the share done, from 0 to 1.
+    ///
+    /// # Errors
+    /// Before anything is weeded where an axis has a value that cannot be; else the first that a plot meets.
+    pub fn run(&self, progress: impl Fn(f64) + Sync) -> Result<Vec<Point>, SweepError> {
+        let outcomes = self.run_shard(Shard::WHOLE, progress)?;
+        self.points(&outcomes.into_iter().map(|point| point.outcome).collect::<Vec<_>>())
+    }
+
+    /// Number of points.
+    pub fn size(&self) -> u64 {
+        (self.x.values.len() * self.y.as_ref().map_or(1, |y| y.values.len())) as u64
+    }
+
+    /// Weeds a plot at each of a shard's points.
+    ///
+    /// # Errors
+    /// As [`Sweep::run`].
+    pub fn run_shard(
+        &self,
+        shard: Shard,
+        progress: impl Fn(f64) + Sync,
+    ) -> Result<Vec<Numbered<PlotOutcome>>, SweepError> {
+        let places = self.places()?;
+        let mine: Vec<(u64, &Place)> =
+            shard.numbers(self.size()).map(|number| (number, &places[number as usize])).collect();
+        let done = AtomicUsize::new(0);
+        let weed = |&(number, place): &(u64, &Place)| {
+            let outcomes = place.experiment.run(&Engine::Native, |_| ());
+            let outcomes = outcomes.map_err(|problem| SweepError::Point { place: self.describe(place), problem })?;
+            progress((done.fetch_add(1, Ordering::Relaxed) + 1) as f64 / mine.len() as f64);
+            // One speed, one spacing, one replication and one controller: one plot.
+            Ok(outcomes.into_iter().map(move |outcome| Numbered { number, outcome }).collect::<Vec<_>>())
+        };
+        mine.par_iter().map(weed).collect::<Result<Vec<_>, SweepError>>().map(|outcomes| outcomes.concat())
+    }
+
+    /// The points, of what came of all their plots.
+    ///
+    /// # Errors
+    /// Where an axis has a value that cannot be.
+    pub fn points(&self, outcomes: &[PlotOutcome]) -> Result<Vec<Point>, SweepError> {
+        let point = |(place, outcome): (&Place, &PlotOutcome)| {
+            let results = Results::of(outcome, place.experiment.conditions.plot.rows);
+            Point { x: place.x, y: place.y, results }
+        };
+        Ok(self.places()?.iter().zip(outcomes).map(point).collect())
+    }
+
+    /// Where all points are, the first axis running fastest.
+    fn places(&self) -> Result<Vec<Place>, SweepError> {
+        if let Some(y) = self.y.as_ref().filter(|y| y.parameter == self.x.parameter) {
+            return Err(SweepError::Twice(y.parameter.clone()));
+        }
+        let ys: Vec<Option<f64>> =
+            self.y.as_ref().map_or(vec![None], |y| y.values.iter().map(|&value| Some(value)).collect());
+        let places = ys.iter().flat_map(|&y| self.x.values.iter().map(move |&x| (x, y)));
+        places.map(|(x, y)| Ok(Place { x, y, experiment: self.at(x, y)? })).collect()
+    }
+
+    /// A place on the axes, in words.
+    fn describe(&self, place: &Place) -> String {
+        let second = self.y.as_ref().zip(place.y).map(|(axis, y)| format!(", {} = {y}", axis.parameter));
+        format!("{} = {}{}", self.x.parameter, place.x, second.unwrap_or_default())
+    }
+
+    /// The experiment at a point.
+    fn at(&self, x: f64, y: Option<f64>) -> Result<Experiment, SweepError> {
+        let mut experiment = Experiment {
+            speeds_km_h: vec![self.speed_km_h],
+            spacings_cm: vec![self.spacing_cm],
+            replications: 1,
+            controllers: vec![self.controller],
+            conditions: self.conditions.clone(),
+            examples: Vec::new(),
+            seed: self.seed,
+        };
+        for (axis, value) in [(Some(&self.x), Some(x)), (self.y.as_ref(), y)] {
+            let (Some(axis), Some(value)) = (axis, value) else { continue };
+            match axis.parameter.as_str() {
+                "speed" => experiment.speeds_km_h = vec![value],
+                "spacing" => experiment.spacings_cm = vec![value],
+                name => experiment.conditions.set(name, value)?,
+            }
+        }
+        let treatment = [
+            ("speed", experiment.speeds_km_h[0], SPEEDS_KM_H, "km/h"),
+            ("spacing", experiment.spacings_cm[0], SPACINGS_CM, "cm"),
+        ];
+        for (name, value, (least, greatest), unit) in treatment {
+            if !(least..=greatest).contains(&value) {
+                return Err(SweepError::Treatment { name, value, least, greatest, unit });
+            }
+        }
+        Ok(experiment)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sweep(x: &str, y: Option<&str>) -> Sweep {
+        let mut conditions = Conditions::default();
+        conditions.set("plot.rows", 1.0).unwrap();
+        Sweep {
+            x: x.parse().unwrap(),
+            y: y.map(|y| y.parse().unwrap()),
+            controller: Treatment::Firmware,
+            conditions,
+            speed_km_h: 2.5,
+            spacing_cm: 50.0,
+            seed: 1,
+        }
+    }
+
+    #[test]
+    fn an_axis_has_both_its_ends() {
+        let axis: Axis = "lead_out_ms=0..300:20".parse().unwrap();
+        assert_eq!((axis.parameter.as_str(), axis.values.len()), ("lead_out_ms", 16));
+        let axis: Axis = "speed=1..4:0.1".parse().unwrap();
+        assert_eq!((axis.values.len(), axis.values[3], axis.values[30]), (31, 1.3, 4.0));
+        assert_eq!("k=3..3:1".parse::<Axis>().unwrap().values, [3.0]);
+    }
+
+    #[test]
+    fn what_is_no_axis_says_what_would_be_right() {
+        for text in ["lead_out_ms", "lead_out_ms=0..300", "=", "speed=a..b:c", "speed=0..inf:1"] {
+            assert_eq!(text.parse::<Axis>(), Err(AxisError::Form(text.to_owned())));
+        }
+        for text in ["speed=4..1:1", "speed=1..4:0", "speed=1..4:-1", "speed=0..1000000:1"] {
+            assert_eq!(text.parse::<Axis>(), Err(AxisError::Range(text.to_owned())));
+        }
+    }
+
+    #[test]
+    fn a_lead_that_is_too_short_damages_plants_and_a_longer_one_does_not() {
+        let points = sweep("lead_out_ms=0..180:90", Some("speed=1..4:3")).run(|_| ()).unwrap();
+        assert_eq!(points.len(), 6);
+        let damage = |x: f64, y: f64| {
+            let point = points.iter().find(|point| point.x == x && point.y == Some(y)).unwrap();
+            point.results.plant_damage_percent
+        };
+        assert!(damage(0.0, 4.0) > 20.0, "{points:?}");
+        assert_eq!((damage(0.0, 1.0), damage(180.0, 4.0)), (0.0, 0.0), "{points:?}");
+    }
+
+    #[test]
+    fn two_axes_of_one_parameter_are_refused() {
+        let error = sweep("speed=1..2:1", Some("speed=3..4:1")).run(|_| panic!("nothing is weeded")).unwrap_err();
+        assert!(error.to_string().starts_with("both axes are `speed`"), "{error}");
+    }
+
+    #[test]
+    fn a_value_that_cannot_be_is_refused_before_anything_is_weeded() {
+        let run = |x: &str| sweep(x, None).run(|_| panic!("nothing is weeded")).unwrap_err().to_string();
+        assert!(run("lead_out_ms=400..600:200").contains("settings.lead_out_ms is 600, but has to be 0 to 500"));
+        assert!(run("ground.slip_percent=20..40:10").contains("ground.slip_percent is 40, but has to be -30 to 30"));
+        assert!(run("speed=1..40:13").contains("speed is 14, but has to be 0.1 to 8 km/h"));
+        assert!(run("plot.rows=1..2:0.5").contains("plot.rows is 1.5, but has to be a whole number"));
+        assert!(run("slip=1..2:1").contains("slip is neither a parameter of the field nor a setting"));
+    }
+}

@@ -1,0 +1,118 @@
+//! Who was taken for whom.
+//!
+//! What is unknown is treated as a plant, so that two errors are told apart: a plant taken for a weed is cut, a weed
+//! taken for a plant or for unknown is left standing.
+
+use comfy_table::{CellAlignment, Table, presets};
+use control::ground::class::Class;
+use field::row::Kind;
+use std::fmt;
+
+/// How many objects of each kind were taken for each class.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Confusion {
+    plants: Counts,
+    weeds: Counts,
+}
+
+/// Objects of one kind.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Counts {
+    taken_for_plant: usize,
+    taken_for_weed: usize,
+    unknown: usize,
+}
+
+impl Counts {
+    fn total(self) -> usize {
+        self.taken_for_plant + self.taken_for_weed + self.unknown
+    }
+}
+
+impl FromIterator<(Kind, Class)> for Confusion {
+    fn from_iter<I: IntoIterator<Item = (Kind, Class)>>(classified: I) -> Self {
+        let mut confusion = Self::default();
+        for (kind, class) in classified {
+            let counts = match kind {
+                Kind::Plant => &mut confusion.plants,
+                Kind::Weed => &mut confusion.weeds,
+            };
+            *match class {
+                Class::Plant => &mut counts.taken_for_plant,
+                Class::Weed => &mut counts.taken_for_weed,
+                Class::Unknown => &mut counts.unknown,
+            } += 1;
+        }
+        confusion
+    }
+}
+
+impl Confusion {
+    /// The objects of a kind.
+    pub fn count(&self, kind: Kind) -> usize {
+        match kind {
+            Kind::Plant => self.plants.total(),
+            Kind::Weed => self.weeds.total(),
+        }
+    }
+
+    /// All objects.
+    pub fn total(&self) -> usize {
+        self.plants.total() + self.weeds.total()
+    }
+
+    /// Plants that the machine would cut.
+    pub fn plants_taken_for_weeds(&self) -> usize {
+        self.plants.taken_for_weed
+    }
+
+    /// Weeds that the machine would spare, those that are unknown included.
+    pub fn weeds_taken_for_plants(&self) -> usize {
+        self.weeds.taken_for_plant + self.weeds.unknown
+    }
+
+    /// Plants that are spared because they are unknown.
+    pub fn plants_unknown(&self) -> usize {
+        self.plants.unknown
+    }
+
+    /// Share of all objects that the machine treats as it should, from 0 to 1.
+    pub fn accuracy(&self) -> f64 {
+        1.0 - share(self.plants_taken_for_weeds() + self.weeds_taken_for_plants(), self.total())
+    }
+
+    /// What is bad about it, worst first: plants cut, weeds spared, plants not known.
+    pub(super) fn harm(&self) -> (usize, usize, usize) {
+        (self.plants_taken_for_weeds(), self.weeds_taken_for_plants(), self.plants_unknown())
+    }
+}
+
+impl fmt::Display for Confusion {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut table = Table::new();
+        table.load_style(presets::UTF8_BORDERS_ONLY).set_header([
+            "",
+            "taken for\nplant",
+            "\nunknown",
+            "taken for\nweed",
+        ]);
+        for (name, counts) in [("plants", self.plants), ("weeds", self.weeds)] {
+            let counts = [counts.taken_for_plant, counts.unknown, counts.taken_for_weed];
+            table.add_row([name.to_owned()].into_iter().chain(counts.map(|count| count.to_string())));
+        }
+        for column in table.column_iter_mut().skip(1) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+        writeln!(f, "{table}")?;
+        let percent = |part: usize, total: usize| format!("{part} of {total}, {:.2} %", 100.0 * share(part, total));
+        let (plants, weeds) = (self.plants.total(), self.weeds.total());
+        writeln!(f, "Plants taken for weeds   {}", percent(self.plants_taken_for_weeds(), plants))?;
+        writeln!(f, "Weeds taken for plants   {}", percent(self.weeds_taken_for_plants(), weeds))?;
+        writeln!(f, "Plants spared unknown    {}", percent(self.plants_unknown(), plants))?;
+        write!(f, "Treated as they should   {:.2} % of all", 100.0 * self.accuracy())
+    }
+}
+
+fn share(part: usize, total: usize) -> f64 {
+    if total == 0 { 0.0 } else { part as f64 / total as f64 }
+}

@@ -1,0 +1,231 @@
+//! Other controllers for the same field, to hold the firmware against: the paper's, and one that knows everything.
+//!
+//! The paper's sketch was never published. [`as_in_the_paper`] is what its text describes, in the kindest reading: one slot holds
+//! the place at which to swing out and the place at which to come back (Eq. 1 to 3), a loop polls beam and encoder, nothing is
+//! led, and the Arduino's servo library shows a new pulse in the next frame. It measures the next canopy while the slot is
+//! still in use, closes the gaps in a canopy as the firmware does, and takes no weed for a plant.
+//!
+//! Where the beam stands nearer to the tool than a canopy is wide, it is late for another reason than its authors knew.
+//!
+//! [`ideal`] knows where each stem stands and what the servo may take: it has the tool out over the zones round
+//! the stems, by the servo's slowest swing, and in the row everywhere else. Nobody could keep a plant that it damages. It is no
+//! bound: it allows for the slowest swing each time, and keeps the whole length of a zone that is round. The bound is
+//! [`crate::optimum`]. Both have the machine of the [`Trial`], with the same servo.
+
+use crate::budget::{Part, Reason, Reasons, part_of};
+use crate::ground::union;
+use crate::machine::Machine;
+use crate::native::{Levels, Sensors, ServoLine, Turn, turns};
+use crate::servo::Servo;
+use crate::stand::Stem;
+use crate::trial::Trial;
+use control::operate::servo;
+use std::ops::Range;
+use uno::Pulse;
+
+/// A turn of the paper's loop: `Arduino_KNN` takes 92,309 cycles for 32 examples, measured on the Uno.
+const PAPER_TURN_S: f64 = 92_309.0 / 16e6;
+
+/// Ground that the paper leaves alone on both sides of a canopy.
+const PAPER_MARGIN_MM: f64 = 50.0;
+
+/// Clear stretches shorter than this belong to the canopy: the firmware's default.
+const GAP_MM: f64 = 21.0;
+
+/// Objects narrower than this are no plants: half way between the built-in examples' widest weed and narrowest plant.
+const NARROWEST_PLANT_MM: f64 = 60.0;
+
+/// A turn of the loop that knows everything.
+const TURN_S: f64 = 0.001;
+
+/// Shortest gap between two servo pulses, the firmware's default; 0 for fixed frames.
+const SERVO_GAP_MS: u8 = 3;
+
+/// What a baseline did.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Weeded {
+    /// The first of the servo's pulses of each width.
+    pub pulses: Vec<Pulse>,
+    /// Why the tool was in the row or out of it.
+    pub reasons: Vec<Reason>,
+}
+
+/// The paper's controller weeds the trial's row.
+pub fn as_in_the_paper(trial: &Trial) -> Weeded {
+    let Trial { machine, motion, row, .. } = trial;
+    let Machine { beam_to_tool_mm, servo, .. } = *machine;
+    let tick_mm = trial.machine.tick_mm();
+    let ticks = |mm: f64| (mm / tick_mm).round() as i64;
+    let (delay, hold) = (ticks(beam_to_tool_mm - PAPER_MARGIN_MM), ticks(2.0 * PAPER_MARGIN_MM));
+    let margin = hold / 2;
+    let sensors = Sensors::new(trial, PAPER_TURN_S);
+    let mut turns = sensors.turns();
+    let Levels { mut broken, .. } = Levels::before(trial);
+    let mut canopy: Option<Range<i64>> = None;
+    let mut slot: Option<(Range<i64>, Part)> = None;
+    let mut reasons = Reasons::default();
+    let pulses = swing(trial, servo, PAPER_TURN_S, 0, |time_s| {
+        let Some(Turn { position, edges, .. }) = turns.next() else { return (false, time_s) };
+        if let Some(last) = edges.last() {
+            broken = last.levels.broken;
+        }
+        match &mut canopy {
+            None if broken => canopy = Some(position..position),
+            Some(canopy) if broken => canopy.end = position,
+            Some(Range { start, end }) if position - *end >= ticks(GAP_MM) => {
+                let (start, width) = (*start, *end - *start);
+                if width >= ticks(NARROWEST_PLANT_MM) {
+                    let out = start + delay;
+                    let place_mm = |place: i64| motion.position_mm(time_s) + (place - position) as f64 * tick_mm;
+                    let kept_for = part_of(&(place_mm(start)..place_mm(start + width)), row);
+                    slot = Some((out..out + width + hold, kept_for));
+                }
+                canopy = None;
+            }
+            _ => {}
+        }
+        let kept = slot.as_ref().filter(|(slot, _)| slot.contains(&position));
+        let part = kept.map_or(Part::Swings, |(slot, kept_for)| {
+            let is_in_margin = position < slot.start + margin || position >= slot.end - margin;
+            if is_in_margin && *kept_for == Part::Plants { Part::Margins } else { *kept_for }
+        });
+        reasons.turn_to(part, time_s);
+        (kept.is_some(), time_s)
+    });
+    Weeded { pulses, reasons: reasons.until(motion.duration_s()) }
+}
+
+/// Whoever knows where each stem stands weeds the trial's row.
+pub fn ideal(trial: &Trial, stems: &[Stem]) -> Weeded {
+    let Trial { machine, motion, .. } = trial;
+    let Servo { dead_time_ms, scatter, out_us, .. } = machine.servo;
+    // A command may wait for a pulse and the gap behind it, and the loop for its turn.
+    let wait_s = (out_us / 1000.0 + f64::from(SERVO_GAP_MS)) / 1000.0 + 2.0 * TURN_S;
+    let slowest_s = machine.servo.slowest_s() + wait_s;
+    let quickest_s = ((dead_time_ms - scatter.dead_time_ms) / 1000.0).max(0.0);
+    let passed_s = |place_mm: f64| Some(motion.passings(place_mm + machine.beam_to_tool_mm).next()?.time_s);
+    let zones =
+        union(stems.iter().map(|stem| stem.along_mm - stem.protected_mm..stem.along_mm + stem.protected_mm).collect());
+    // What is neither a zone nor weeded is lost to swings.
+    let mut reasons = vec![Reason { times_s: 0.0..motion.duration_s(), part: Part::Swings }];
+    reasons.extend(
+        zones.iter().filter_map(|zone| {
+            Some(Reason { times_s: passed_s(zone.start)?..passed_s(zone.end)?, part: Part::Plants })
+        }),
+    );
+    let windows: Vec<Range<f64>> = zones
+        .into_iter()
+        .filter_map(|zone| Some(passed_s(zone.start)? - slowest_s..passed_s(zone.end)? - quickest_s))
+        .collect();
+    // A tool that has no time to be in the row and out again stays out.
+    let swings_s = union(windows.into_iter().map(|window| window.start..window.end + slowest_s).collect());
+    let out_s = swings_s.into_iter().map(|swing| swing.start..swing.end - slowest_s).collect();
+    Weeded { pulses: swing(trial, machine.servo, TURN_S, SERVO_GAP_MS, out_during(out_s)), reasons }
+}
+
+/// For [`swing`]: out during these times, which are in ascending order.
+fn out_during(times_s: Vec<Range<f64>>) -> impl FnMut(f64) -> (bool, f64) {
+    let mut next = 0;
+    move |time_s| {
+        while times_s.get(next).is_some_and(|out| out.end <= time_s) {
+            next += 1;
+        }
+        match times_s.get(next) {
+            Some(out) if out.start <= time_s => (true, out.end),
+            Some(out) => (false, out.start),
+            None => (false, f64::INFINITY),
+        }
+    }
+}
+
+/// A loop that has the tool out whenever `is_out` at the time of a turn says so, which also says before which time it says nothing
+/// else: turns until then are passed over, once the line shows it. It begins in the row.
+fn swing(
+    trial: &Trial,
+    servo: Servo,
+    turn_s: f64,
+    gap_ms: u8,
+    mut is_out: impl FnMut(f64) -> (bool, f64),
+) -> Vec<Pulse> {
+    let [in_row, out] = [servo.in_us, servo.out_us].map(|microseconds| servo::from_us(microseconds.round() as u16));
+    let mut line = ServoLine::new(in_row, gap_ms);
+    let (mut turn, last) = (0, turns(trial, turn_s));
+    while turn <= last {
+        let time_s = f64::from(turn) * turn_s;
+        let (swings_out, until_s) = is_out(time_s);
+        let width = if swings_out { out } else { in_row };
+        line.command(width, time_s);
+        turn += 1;
+        if line.shows(width) {
+            turn = turn.max((until_s / turn_s) as u32);
+        }
+    }
+    line.into_pulses()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::motion::mm_s;
+    use crate::row::{Row, Thing};
+    use crate::verdict::{Timing, Verdict, judge};
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    const PLACES: [f64; 8] = [500.0, 1000.0, 1500.0, 2000.0, 2500.0, 3000.0, 3500.0, 4000.0];
+
+    /// Plants over whose canopy the tool was not fully out.
+    fn reached_by(controller: impl Fn(&Trial) -> Weeded, speed_km_h: f64) -> usize {
+        let row = Row::new(PLACES.map(|place_mm| Thing::plant(place_mm, 150.0)).to_vec()).unwrap();
+        let trial = Trial::at_speed(row, Machine::default(), Timing::default(), mm_s(speed_km_h));
+        let Weeded { pulses, .. } = controller(&trial);
+        let judgement = judge(&trial.row, &trial.machine, &trial.motion, trial.timing, &pulses, 0);
+        assert!(judgement.weeded_share > 0.1);
+        judgement.count(Verdict::Damaged)
+    }
+
+    #[test]
+    fn a_loop_that_passes_turns_over_gives_the_pulses_of_one_that_takes_them_all() {
+        let row = Row::new(PLACES.map(|place_mm| Thing::plant(place_mm, 150.0)).to_vec()).unwrap();
+        for seed in 0..200 {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let machine = Machine::default();
+            let trial = Trial::at_speed(row.clone(), machine, Timing::default(), rng.random_range(200.0..1500.0));
+            // From less than a turn to many frames, and some that begin with a turn.
+            let mut time_s = 0.0;
+            let out_s: Vec<Range<f64>> = (0..40)
+                .map(|_| {
+                    let start_s = time_s + rng.random_range(0.0..0.2);
+                    let start_s = if rng.random() { (start_s / TURN_S).round() * TURN_S } else { start_s };
+                    time_s = start_s.max(time_s) + rng.random_range(0.0_f64..0.6).powi(3);
+                    start_s..time_s
+                })
+                .collect();
+            let gap_ms = if rng.random() { SERVO_GAP_MS } else { 0 };
+            let mut each_turn = out_during(out_s.clone());
+            let passing_over = swing(&trial, machine.servo, TURN_S, gap_ms, out_during(out_s));
+            let taking_all = swing(&trial, machine.servo, TURN_S, gap_ms, |time_s| (each_turn(time_s).0, time_s));
+            assert!(taking_all.len() > 5);
+            assert_eq!(passing_over, taking_all, "seed {seed}");
+        }
+    }
+
+    #[test]
+    fn who_knows_everything_has_the_tool_out_over_whatever_zone_is_to_be_kept() {
+        for speed_km_h in [1.0, 1.5, 2.0, 2.5, 3.0] {
+            let reached = |protected_mm: f64| {
+                let stems = PLACES.map(|along_mm| Stem { along_mm, across_mm: 0.0, protected_mm, is_seen: true });
+                reached_by(|trial| ideal(trial, &stems), speed_km_h)
+            };
+            // As wide as the canopy, and narrower.
+            assert_eq!(reached(75.0), 0, "at {speed_km_h} km/h");
+            assert_eq!(reached(40.0), PLACES.len(), "at {speed_km_h} km/h");
+        }
+    }
+
+    #[test]
+    fn the_papers_controller_serves_every_plant_and_is_too_late_for_all_of_them_at_speed() {
+        assert_eq!(reached_by(as_in_the_paper, 0.5), 0);
+        assert_eq!(reached_by(as_in_the_paper, 2.5), 8);
+    }
+}

@@ -1,0 +1,253 @@
+//! The loss budget: where a row's ground goes. Its parts add up to the whole row.
+//!
+//! A controller hands over why it kept the tool out, over the time of the trial ([`Reason`]); the tool's path says what was weeded all
+//! the same ([`Budget::of`]). Ground that was weeded is [`Part::Weeded`], whatever the controller thought of it. The rest belongs
+//! to the reason that held when the tool passed it. Ground that the controller had open and the tool did not weed is
+//! [`Part::Swings`]: dead time, travel, and the lead that waits for both.
+//!
+//! A zone is the one that the controller kept: a stem zone where it keeps that, else a whole canopy. Whether a plant stands in it, the
+//! row says ([`part_of`]): what was kept for a weed, for dust or for something unknown is [`Part::Weeds`], with its margins. Ground
+//! that was passed several times belongs to the first part, in the order of [`Part::ALL`].
+
+use crate::ground::{share_of, union};
+use crate::machine::Machine;
+use crate::motion::Motion;
+use crate::row::{Kind, Row};
+use serde::{Deserialize, Serialize};
+use std::ops::{AddAssign, Div, Index, Range};
+
+/// What became of a stretch of the row.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// The tool worked the row's line.
+    Weeded,
+    /// The zone of a crop plant, without margins: its stem's, or its canopy.
+    Plants,
+    /// The margins of these zones.
+    Margins,
+    /// What was kept for something that is no crop plant, with its margins.
+    Weeds,
+    /// Ground that was guarded because a plant was expected, with its margins.
+    Guarded,
+    /// Open ground that the tool did not weed: it swung, or was about to.
+    Swings,
+    /// Ground that the beam had not seen, or that was lost to a hold, an alarm, or an encoder in doubt.
+    Closed,
+}
+
+impl Part {
+    /// All of them, in the order in which they claim ground.
+    pub const ALL: [Self; 7] =
+        [Self::Weeded, Self::Plants, Self::Margins, Self::Weeds, Self::Guarded, Self::Swings, Self::Closed];
+
+    /// A name for programs.
+    pub fn key(self) -> &'static str {
+        match self {
+            Self::Weeded => "weeded",
+            Self::Plants => "plants",
+            Self::Margins => "margins",
+            Self::Weeds => "weeds",
+            Self::Guarded => "guarded",
+            Self::Swings => "swings",
+            Self::Closed => "closed",
+        }
+    }
+
+    /// What it is called.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Weeded => "weeded",
+            Self::Plants => "stem zones and canopies",
+            Self::Margins => "margins",
+            Self::Weeds => "tall weeds and unknowns kept",
+            Self::Guarded => "guarded ground",
+            Self::Swings => "swings",
+            Self::Closed => "unseen ground, holds, alarms",
+        }
+    }
+}
+
+/// Shares of a row, from 0 to 1, or their sum over several rows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Budget([f64; Part::ALL.len()]);
+
+/// Why a controller did as it did for some time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reason {
+    /// When.
+    pub times_s: Range<f64>,
+    /// To what that puts the ground down which the tool passed meanwhile without weeding it.
+    pub part: Part,
+}
+
+impl Budget {
+    /// That of a row over whose ground `weeded_mm` the tool worked, a union; the reasons are those of the whole motion.
+    pub fn of(
+        span_mm: &Range<f64>,
+        weeded_mm: &[Range<f64>],
+        reasons: &[Reason],
+        machine: &Machine,
+        motion: &Motion,
+    ) -> Self {
+        let ground = |part: Part| {
+            let stretches = reasons.iter().filter(move |reason| reason.part == part).map(|reason| {
+                let stretch = motion.stretch_mm(&reason.times_s);
+                machine.tool_mm(stretch.start)..machine.tool_mm(stretch.end)
+            });
+            stretches.collect::<Vec<_>>()
+        };
+        let (mut taken, mut share) = (Vec::new(), 0.0);
+        Self(Part::ALL.map(|part| {
+            taken.extend(if part == Part::Weeded { weeded_mm.to_vec() } else { ground(part) });
+            taken = union(std::mem::take(&mut taken));
+            let before = std::mem::replace(&mut share, share_of(span_mm, &taken));
+            share - before
+        }))
+    }
+
+    /// Each part with its share.
+    pub fn shares(&self) -> impl Iterator<Item = (Part, f64)> {
+        Part::ALL.into_iter().zip(self.0)
+    }
+
+    /// Each part in tenths of a percent, rounded so that they add up to 1000: what was weeded to the nearest, as everywhere; of the
+    /// others the largest remainders are rounded up.
+    pub fn tenths(&self) -> [(Part, u32); Part::ALL.len()] {
+        let exact = self.0.map(|share| (1000.0 * share).max(0.0));
+        let mut tenths = exact.map(|tenths| tenths as u32);
+        tenths[0] = exact[0].round() as u32;
+        let mut by_remainder: Vec<usize> = (1..exact.len()).collect();
+        by_remainder.sort_by(|&a, &b| exact[b].fract().total_cmp(&exact[a].fract()));
+        let missing = 1000_u32.saturating_sub(tenths.iter().sum()) as usize;
+        by_remainder.into_iter().take(missing).for_each(|index| tenths[index] += 1);
+        let mut index = 0..;
+        Part::ALL.map(|part| (part, tenths[index.next().unwrap_or_default()]))
+    }
+
+    /// The part, other than what was weeded, to which most ground went: with its share.
+    pub fn largest_loss(&self) -> (Part, f64) {
+        let losses = self.shares().filter(|(part, _)| *part != Part::Weeded);
+        losses.fold((Part::Closed, 0.0), |most, loss| if loss.1 > most.1 { loss } else { most })
+    }
+}
+
+impl Index<Part> for Budget {
+    type Output = f64;
+
+    fn index(&self, part: Part) -> &f64 {
+        &self.0[part as usize]
+    }
+}
+
+impl AddAssign for Budget {
+    fn add_assign(&mut self, other: Self) {
+        self.0.iter_mut().zip(other.0).for_each(|(share, other)| *share += other);
+    }
+}
+
+impl Div<f64> for Budget {
+    type Output = Self;
+
+    fn div(self, rows: f64) -> Self {
+        Self(self.0.map(|share| share / rows))
+    }
+}
+
+/// The part of a zone that a controller keeps over some ground: a crop plant's, or else. A slipping wheel has the zone beside what
+/// it is kept for, so the nearest middle decides; a zone over a plant's middle is the plant's in any case.
+pub fn part_of(zone_mm: &Range<f64>, row: &Row) -> Part {
+    let middle_mm = (zone_mm.start + zone_mm.end) / 2.0;
+    let nearest_mm = |places_mm: &mut dyn Iterator<Item = f64>| {
+        places_mm.map(|place_mm| (place_mm - middle_mm).abs()).fold(f64::INFINITY, f64::min)
+    };
+    let of = |kind: Kind| row.things().iter().filter(move |thing| thing.kind == kind).map(|thing| thing.position_mm);
+    let dust = row.dust_mm().iter().map(|dust_mm| (dust_mm.start + dust_mm.end) / 2.0);
+    let to_plant_mm = nearest_mm(&mut of(Kind::Plant));
+    let is_over_plant = of(Kind::Plant).any(|place_mm| zone_mm.contains(&place_mm));
+    if is_over_plant || to_plant_mm <= nearest_mm(&mut of(Kind::Weed).chain(dust)) { Part::Plants } else { Part::Weeds }
+}
+
+/// Reasons as they are found, turn by turn: those of the same part become one.
+#[derive(Clone, Debug, Default)]
+pub struct Reasons(Vec<Reason>);
+
+impl Reasons {
+    /// From `time_s` on, and until another one comes, it is this.
+    #[inline]
+    pub fn turn_to(&mut self, part: Part, time_s: f64) {
+        if self.0.last().is_some_and(|last| last.part == part) {
+            return;
+        }
+        if let Some(last) = self.0.last_mut() {
+            last.times_s.end = time_s;
+        }
+        self.0.push(Reason { times_s: time_s..f64::INFINITY, part });
+    }
+
+    /// All of them, the last one until a motion ends.
+    pub fn until(mut self, end_s: f64) -> Vec<Reason> {
+        if let Some(last) = self.0.last_mut() {
+            last.times_s.end = end_s;
+        }
+        self.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::row::Thing;
+
+    #[test]
+    fn parts_in_tenths_of_a_percent_add_up_to_the_whole() {
+        let thirds = Budget([1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0, 0.0, 0.0, 0.0, 0.0]);
+        assert_eq!(thirds.tenths().map(|(_, tenths)| tenths), [333, 334, 333, 0, 0, 0, 0]);
+        let odd = Budget([0.489_46, 0.249_46, 0.120_46, 0.010_46, 0.0, 0.129_46, 0.000_7]);
+        assert_eq!(odd.tenths().iter().map(|(_, tenths)| tenths).sum::<u32>(), 1000);
+        assert_eq!(odd.largest_loss(), (Part::Plants, 0.249_46));
+    }
+
+    #[test]
+    fn ground_belongs_to_its_first_part_and_is_counted_once() {
+        let machine = Machine::default();
+        // The tool begins at 0 and rolls a metre in a second.
+        let motion = Motion::steady(400.0, 1e9, 1000.0, 1400.0);
+        let reason = |times_s: Range<f64>, part| Reason { times_s, part };
+        let reasons = [
+            reason(0.0..0.3, Part::Closed),
+            reason(0.3..0.5, Part::Margins),
+            reason(0.45..0.7, Part::Plants),
+            reason(0.7..1.0, Part::Swings),
+        ];
+        let budget = Budget::of(&(0.0..1000.0), &[900.0..1200.0], &reasons, &machine, &motion);
+        let expected = [0.1, 0.25, 0.15, 0.0, 0.0, 0.2, 0.3];
+        for ((part, share), expected) in budget.shares().zip(expected) {
+            assert!((share - expected).abs() < 1e-3, "{part:?}: {share}");
+        }
+    }
+
+    #[test]
+    fn a_zone_is_the_plant_s_whose_middle_is_nearest_even_where_the_wheel_slips() {
+        let row =
+            Row::new(vec![Thing::plant(1000.0, 150.0), Thing::weed(1110.0, 16.0), Thing::plant(1500.0, 20.0)]).unwrap();
+        let row = row.with_dust(vec![1300.0..1302.0]);
+        let part = |zone_mm: Range<f64>| part_of(&zone_mm, &row);
+        assert_eq!(part(905.0..1055.0), Part::Plants);
+        // The weed's, 20 mm early: nearer to the canopy than to the weed.
+        assert_eq!(part(1082.0..1098.0), Part::Weeds);
+        // Canopy and weed are one: the middle is nearer to the weed.
+        assert_eq!(part(995.0..1125.0), Part::Plants);
+        assert_eq!(part(1290.0..1292.0), Part::Weeds);
+        assert_eq!(part(1470.0..1480.0), Part::Plants);
+    }
+
+    #[test]
+    fn reasons_follow_each_other_without_a_gap() {
+        let mut reasons = Reasons::default();
+        for (part, time_s) in [(Part::Closed, 0.0), (Part::Closed, 0.1), (Part::Swings, 0.2), (Part::Plants, 0.5)] {
+            reasons.turn_to(part, time_s);
+        }
+        let times_s: Vec<Range<f64>> = reasons.until(0.9).into_iter().map(|reason| reason.times_s).collect();
+        assert_eq!(times_s, [0.0..0.2, 0.2..0.5, 0.5..0.9]);
+    }
+}

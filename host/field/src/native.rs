@@ -1,0 +1,533 @@
+//! The native run: the firmware's own decisions, compiled for the host, weed a row.
+//!
+//! [`weed`] does what `src/main.rs` does with the same [`control`] code and the same examples: a turn of the loop reads clock
+//! and encoder, takes the beam's edges with the position at which each came, and commands the servo. Turns come every
+//! millisecond, not as fast as a chip can; nothing else is simplified: motion, beam, encoder and servo are those that
+//! the virtual Uno is given. It is some twenty thousand times faster than real time, for studies of many rows.
+//!
+//! Beside the pulses it hands over why the tool was kept out, for the [loss budget](crate::budget).
+//!
+//! Console, EEPROM, interrupts and cycles are not in it: for those there is the virtual Uno.
+
+use crate::budget::{Part, Reason, Reasons, part_of};
+use crate::machine::{Machine, PULSE_TICKS, time_at_s};
+use crate::motion::{Course, Motion, marks};
+use crate::trial::{Start, Trial};
+use crate::wiring;
+use control::ground::AtTool;
+use control::ground::class::label;
+use control::ground::examples::EXAMPLES;
+use control::ground::features;
+use control::ground::nearest::Nearest;
+use control::measure::reset::Cause;
+use control::memory::Volatile;
+use control::operate::event::Event;
+use control::operate::servo::{self, Action, FRAME, HalfMicros};
+use control::operate::tool;
+use control::say;
+use control::say::command::LineBuffer;
+use control::say::line::Line;
+use control::settings::Setting;
+use control::units::{Instant, Interval, Position};
+use control::{
+    measure::readings::{Edge, Readings, Startup},
+    operate::state::State,
+    weeder::Controller,
+};
+use std::collections::VecDeque;
+use thiserror::Error;
+use uno::{CYCLES_PER_SECOND, PinChange, Pulse};
+
+type Weeder = Controller<Nearest<&'static [knn::Example<{ features::COUNT }>], Volatile>, Volatile>;
+
+/// A turn of the loop.
+pub const TURN_S: f64 = 0.001;
+const STEPS_A_TURN: u32 = Interval::STEPS_PER_SECOND / 1000;
+
+/// How long the machine stands before it rolls, so that the clock is not at its beginning: 0.1 s.
+const STILL_STEPS: u32 = Interval::STEPS_PER_SECOND / 10;
+
+/// Turns from one look at the reasons to the next: 3 mm at 2.5 km/h. A zone begins and ends late by as much in the mean, so that its
+/// length is right.
+const LOOK_TURNS: u32 = 4;
+
+/// What a command waits for a servo's frame at the longest.
+const SERVO_FRAME_S: f64 = 0.020;
+
+/// Cycles in a step of Timer1, behind its prescaler of 8.
+const CYCLES_A_STEP: u64 = 8;
+
+/// The decisions refuse to be set up or started.
+#[derive(Debug, Error, PartialEq)]
+#[error("the firmware answers `{command}` with `{answer}`")]
+pub struct Refused {
+    /// The line that was typed.
+    command: String,
+    /// What the console said.
+    answer: String,
+}
+
+/// What the decisions did.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Weeded {
+    /// The first of the servo's pulses of each width.
+    pub pulses: Vec<Pulse>,
+    /// The machine's state at the end.
+    pub state: State,
+    /// Why the tool was in the row or out of it, from the beginning of the motion to its end.
+    pub reasons: Vec<Reason>,
+}
+
+/// The servo's line: which pulses come of the widths that the loop commands.
+#[derive(Clone, Debug)]
+pub struct ServoLine {
+    width: HalfMicros,
+    gap_ms: u8,
+    /// Steps of half a microsecond at which the last pulse of another width began.
+    rise: u64,
+    pulses: Vec<Pulse>,
+}
+
+impl ServoLine {
+    /// A line with pulses of a width since time 0, for a servo that needs `gap_ms` between them; with 0, frames are fixed.
+    pub fn new(width: HalfMicros, gap_ms: u8) -> Self {
+        let mut line = Self { width, gap_ms, rise: 0, pulses: Vec::new() };
+        line.begin(width, 0);
+        line
+    }
+
+    /// Commands a width, to be called each turn of the loop as the firmware's is (`src/servo.rs`).
+    #[inline]
+    pub fn command(&mut self, width: HalfMicros, time_s: f64) {
+        if width == self.width {
+            return;
+        }
+        let now = (time_s * CYCLES_PER_SECOND as f64) as u64 / CYCLES_A_STEP;
+        let since_rise = now.saturating_sub(self.rise) % u64::from(FRAME);
+        match servo::action(since_rise as HalfMicros, self.width, self.gap_ms) {
+            Action::Wait => {}
+            Action::Change => self.begin(width, now + u64::from(FRAME) - since_rise),
+            Action::Restart => self.begin(width, now),
+        }
+    }
+
+    /// Whether no other width is on the line, or comes next.
+    pub fn shows(&self, width: HalfMicros) -> bool {
+        self.width == width
+    }
+
+    fn begin(&mut self, width: HalfMicros, rise: u64) {
+        (self.width, self.rise) = (width, rise);
+        let cycle = rise * CYCLES_A_STEP;
+        self.pulses.push(Pulse { rise: cycle, fall: cycle + u64::from(width) * CYCLES_A_STEP });
+    }
+
+    /// The first pulse of each width.
+    pub fn into_pulses(self) -> Vec<Pulse> {
+        self.pulses
+    }
+}
+
+/// What the machine's sensors say, turn by turn of a loop: the encoder's count, and the beams' edges since the turn before.
+///
+/// None of it depends on what the firmware does: whoever weeds the same row with the same machine and motion is told the same.
+pub struct Sensors {
+    turn_s: f64,
+    /// The encoder's count in each turn.
+    counts: Vec<i32>,
+    edges: Vec<Seen>,
+}
+
+/// Turns of which the counts are worked out at once.
+const AT_ONCE: usize = 64;
+
+/// What the sensors say in a turn.
+pub struct Turn<'a> {
+    /// When it is.
+    pub time_s: f64,
+    /// The encoder's count.
+    pub position: i64,
+    /// The beams' edges since the turn before, in their order.
+    pub edges: &'a [Seen],
+}
+
+/// An edge of a beam.
+#[derive(Clone, Copy, Debug)]
+pub struct Seen {
+    /// When it comes.
+    time_s: f64,
+    /// The encoder's count when it comes.
+    pub position: i64,
+    /// Which of the beams are broken from then on.
+    pub levels: Levels,
+}
+
+impl Sensors {
+    /// Those of a trial, whose motion begins at time 0, for a loop whose turns begin so far apart.
+    pub fn new(trial: &Trial, turn_s: f64) -> Self {
+        let Trial { machine, motion, row, .. } = trial;
+        let mut edges = machine.beam_changes(row, motion, 0);
+        edges.extend(machine.second_beam_changes(row, motion, 0));
+        edges.sort_by_key(|edge| edge.cycle);
+        let mut levels = Levels::before(trial);
+        let edges = edges.into_iter().map(|edge| {
+            levels = levels.behind(edge);
+            Seen { time_s: time_at_s(0, edge.cycle), position: 0, levels }
+        });
+        let mut edges: Vec<Seen> = edges.collect();
+        let mut to_come = edges.iter_mut().peekable();
+        let (mut course, mut encoder) = (Course::along(motion), Encoder::of(machine, motion));
+        let turns = 0..=turns(trial, turn_s);
+        let mut counts = Vec::with_capacity(turns.clone().count() + AT_ONCE);
+        for first in turns.step_by(AT_ONCE) {
+            let mut times_s = [0.0; AT_ONCE];
+            for (time_s, turn) in times_s.iter_mut().zip(first..) {
+                *time_s = f64::from(turn) * turn_s;
+            }
+            let mut wheel_mm = times_s;
+            course.roll(&mut wheel_mm);
+            // All of a clean encoder's first: they do not depend on each other, and the computer works on several at once.
+            let ticks = wheel_mm.map(|wheel_mm| encoder.clean_ticks(wheel_mm));
+            counts.extend(ticks.map(|ticks| encoder.count(ticks) as i32));
+            let [.., last_s] = times_s;
+            while let Some(edge) = to_come.next_if(|edge| edge.time_s <= last_s) {
+                edge.position = encoder.count(encoder.clean_ticks(motion.wheel_mm(edge.time_s)));
+            }
+        }
+        Self { turn_s, counts, edges }
+    }
+
+    /// What they say, from the first turn to some behind the end of the motion.
+    #[inline]
+    pub fn turns(&self) -> impl Iterator<Item = Turn<'_>> {
+        let mut to_come = &self.edges[..];
+        self.counts.iter().zip(0..).map(move |(&position, turn)| {
+            let time_s = f64::from(turn) * self.turn_s;
+            let mut edges = &to_come[..0];
+            // In most turns there is none.
+            if to_come.first().is_some_and(|edge| edge.time_s <= time_s) {
+                (edges, to_come) = to_come.split_at(to_come.partition_point(|edge| edge.time_s <= time_s));
+            }
+            Turn { time_s, position: position.into(), edges }
+        })
+    }
+}
+
+/// The encoder's count, as the wheel turns.
+#[derive(Clone, Copy)]
+struct Encoder<'a> {
+    machine: &'a Machine,
+    start_mm: f64,
+    tick_mm: f64,
+    /// The pulse in which a clean encoder is, whether dirt hides it, and the counts that it has hidden before.
+    pulse: i64,
+    is_hidden: bool,
+    hidden_ticks: i64,
+}
+
+impl<'a> Encoder<'a> {
+    /// That of a machine at the beginning of its motion.
+    fn of(machine: &'a Machine, motion: &Motion) -> Self {
+        Self {
+            machine,
+            start_mm: motion.start_mm(),
+            tick_mm: machine.tick_mm(),
+            pulse: 0,
+            is_hidden: machine.dirt.hides(0),
+            hidden_ticks: 0,
+        }
+    }
+
+    /// What a clean encoder counts until the wheel's rim is at a place.
+    #[inline]
+    fn clean_ticks(&self, wheel_mm: f64) -> i64 {
+        marks(wheel_mm - self.start_mm, self.tick_mm)
+    }
+
+    /// The count where a clean encoder's is `ticks`; the nearer to the last one asked for, the sooner.
+    #[inline(always)]
+    fn count(&mut self, ticks: i64) -> i64 {
+        let pulse = self.machine.pulse(ticks);
+        if pulse != self.pulse {
+            self.roll_to(pulse);
+        }
+        let in_pulse = if self.is_hidden { self.machine.hidden_in_pulse(ticks) } else { 0 };
+        ticks - self.hidden_ticks - in_pulse
+    }
+
+    /// Counts what dirt hides on the way to a pulse. What is lost on the way there comes back on the way back.
+    #[inline(always)]
+    fn roll_to(&mut self, pulse: i64) {
+        let step = (pulse - self.pulse).signum();
+        while self.pulse != pulse {
+            // The whole pulse is behind, or is ahead again.
+            self.hidden_ticks += if self.is_hidden && step > 0 { PULSE_TICKS } else { 0 };
+            self.pulse += step;
+            self.is_hidden = self.machine.dirt.hides(self.pulse);
+            self.hidden_ticks -= if self.is_hidden && step < 0 { PULSE_TICKS } else { 0 };
+        }
+    }
+}
+
+/// Which of the beams are broken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Levels {
+    /// The first.
+    pub broken: bool,
+    /// The second; no, where there is none.
+    pub second_broken: bool,
+}
+
+impl Levels {
+    /// Those before the motion begins.
+    pub fn before(trial: &Trial) -> Self {
+        let Trial { machine, motion, row, .. } = trial;
+        Self {
+            broken: !machine.beam_before(row, motion).high,
+            second_broken: machine.second_beam_before(row, motion).is_some_and(|before| !before.high),
+        }
+    }
+
+    /// Those from an edge on.
+    fn behind(self, edge: PinChange) -> Self {
+        let broken = !edge.high;
+        if edge.pin == wiring::BEAM { Self { broken, ..self } } else { Self { second_broken: broken, ..self } }
+    }
+}
+
+/// Has the decisions weed the trial's row. The motion begins at time and cycle 0; the sensors are those of its row, machine and
+/// motion in turns of [`TURN_S`].
+///
+/// # Errors
+/// Where they refuse a setting, or to start.
+pub fn weed(trial: &Trial, sensors: &Sensors) -> Result<Weeded, Refused> {
+    run(trial, sensors, |_| ())
+}
+
+/// The same, and the slip in thousandths as the second beam tells it, plant by plant.
+///
+/// # Errors
+/// As [`weed`].
+pub fn slips_permille(trial: &Trial, sensors: &Sensors) -> Result<Vec<i16>, Refused> {
+    let (mut slips, mut tells) = (Vec::new(), false);
+    run(trial, sensors, |weeder| {
+        if !tells {
+            weeder.tell_events(true);
+            tells = true;
+        }
+        while let Some(event) = weeder.next_event() {
+            if let Event::Slip { permille } = event {
+                slips.push(permille);
+            }
+        }
+    })?;
+    Ok(slips)
+}
+
+/// Weeds the row; `listen` is given the decisions behind each turn.
+#[inline(always)]
+fn run(trial: &Trial, sensors: &Sensors, mut listen: impl FnMut(&mut Weeder)) -> Result<Weeded, Refused> {
+    let Levels { broken, .. } = Levels::before(trial);
+    let readings = Readings::new(instant(0), Position::new(0));
+    let startup = Startup { readings, beam_broken: broken, cause: Cause::PowerOn };
+    let classifier = Nearest::new(&EXAMPLES[..], Volatile::new());
+    let mut weeder: Weeder = Controller::new(classifier, Volatile::new(), startup);
+    type_line(&mut weeder, "clear")?;
+    for (setting, value) in trial.firmware_settings() {
+        type_line(&mut weeder, &format!("set {} {value}", setting.text()))?;
+    }
+    for example in &trial.examples {
+        example.features.into_iter().for_each(|feature| weeder.tell_feature(feature));
+        type_line(&mut weeder, if example.label == label::PLANT { "teach plant" } else { "teach weed" })?;
+    }
+    type_line(&mut weeder, if trial.start == Start::Now { "start now" } else { "start" })?;
+
+    let mut why = Why::new(trial, &mut weeder)?;
+    let orders = weeder.orders();
+    let mut line = ServoLine::new(orders.pulse, orders.gap_ms);
+    for (turn, Turn { time_s, position, edges }) in (0..=turns(trial, TURN_S)).zip(sensors.turns()) {
+        let edges = edges.iter().map(|&Seen { position, levels: Levels { broken, second_broken }, .. }| Edge::Seen {
+            position: Position::new(position as i32),
+            broken,
+            second_broken,
+        });
+        let orders = weeder.turn(Readings::new(instant(turn), Position::new(position as i32)), edges);
+        line.command(orders.pulse, time_s);
+        listen(&mut weeder);
+        if turn % LOOK_TURNS == 0 {
+            why.look(&mut weeder, orders.pulse != orders.pulse_out, time_s);
+        }
+    }
+    let reasons = why.reasons.until(trial.motion.duration_s());
+    Ok(Weeded { pulses: line.into_pulses(), state: weeder.state(), reasons })
+}
+
+/// Why the decisions keep the tool out, turn by turn.
+struct Why<'a> {
+    trial: &'a Trial,
+    reasons: Reasons,
+    /// A tool that was told to be in the row for longer is there.
+    slowest_s: f64,
+    /// Since when it is told so.
+    in_since_s: Option<f64>,
+    /// The zone that was kept last, and what it was kept for.
+    zone: Option<((Position, Position), Part)>,
+    is_guarding: bool,
+    /// The middles of the guarded zones that are still ahead of the tool, or at it.
+    guarded: VecDeque<Position>,
+}
+
+impl<'a> Why<'a> {
+    fn new(trial: &'a Trial, weeder: &mut Weeder) -> Result<Self, Refused> {
+        let is_guarding = weeder.settings().get(Setting::GuardSpacingMm) > 0;
+        if is_guarding {
+            type_line(weeder, "events on")?;
+        }
+        let slowest_s = trial.machine.servo.slowest_s() + SERVO_FRAME_S;
+        Ok(Self {
+            trial,
+            reasons: Reasons::default(),
+            slowest_s,
+            in_since_s: None,
+            zone: None,
+            is_guarding,
+            guarded: VecDeque::new(),
+        })
+    }
+
+    /// After a turn, by whose orders the tool is to be in the row or not. Not a part of the loop, which is the faster for it.
+    #[inline(never)]
+    fn look(&mut self, weeder: &mut Weeder, is_in: bool, time_s: f64) {
+        while self.is_guarding
+            && let Some(event) = weeder.next_event()
+        {
+            if let Event::Guarded(middle) = event {
+                self.guarded.push_back(middle);
+            }
+        }
+        if !is_in {
+            self.in_since_s = None;
+        } else if time_s - *self.in_since_s.get_or_insert(time_s) > self.slowest_s {
+            // It weeds: there is nothing to explain, which saves asking.
+            return self.reasons.turn_to(Part::Swings, time_s);
+        }
+        let part = self.part(weeder, time_s);
+        self.reasons.turn_to(part, time_s);
+    }
+
+    fn part(&mut self, weeder: &Weeder, time_s: f64) -> Part {
+        if weeder.state() != State::Work {
+            return Part::Closed;
+        }
+        match weeder.ground_at_tool() {
+            AtTool::Unknown => Part::Closed,
+            AtTool::Open => match weeder.reason() {
+                None | Some(tool::Reason::Plant) => Part::Swings,
+                Some(_) => Part::Closed,
+            },
+            AtTool::Kept { tool, begin, end } => {
+                let kept_for = match self.zone {
+                    Some((zone, part)) if zone == (begin, end) => part,
+                    _ => self.kept_for(tool, begin, end, time_s),
+                };
+                self.zone = Some(((begin, end), kept_for));
+                let is_in_margin = begin.is_ahead_of(tool) || tool.is_ahead_of(end);
+                if is_in_margin && kept_for == Part::Plants { Part::Margins } else { kept_for }
+            }
+        }
+    }
+
+    /// What a zone is kept for.
+    fn kept_for(&mut self, tool: Position, begin: Position, end: Position, time_s: f64) -> Part {
+        self.guarded.retain(|middle| !begin.is_ahead_of(*middle));
+        if self.guarded.iter().any(|middle| !middle.is_ahead_of(end)) {
+            return Part::Guarded;
+        }
+        let Trial { machine, motion, row, .. } = self.trial;
+        let tool_mm = machine.tool_mm(motion.position_mm(time_s));
+        let place_mm = |place: Position| tool_mm + f64::from((place - tool).0) * machine.tick_mm();
+        part_of(&(place_mm(begin)..place_mm(end)), row)
+    }
+}
+
+/// The number of the last turn of a loop in a trial.
+pub(crate) fn turns(trial: &Trial, turn_s: f64) -> u32 {
+    (trial.motion.duration_s() / turn_s).ceil() as u32
+}
+
+/// The firmware's clock in a turn.
+fn instant(turn: u32) -> Instant {
+    Instant::new(turn.wrapping_mul(STEPS_A_TURN).wrapping_add(STILL_STEPS))
+}
+
+/// Types a line into the decisions' console.
+fn type_line(weeder: &mut Weeder, command: &str) -> Result<(), Refused> {
+    let mut line = LineBuffer::new();
+    let Some(typed) = command.bytes().chain(*b"\n").find_map(|byte| line.take(byte)) else { return Ok(()) };
+    let mut answer = say::execute(typed, weeder);
+    let mut said = String::new();
+    while !answer.is_done() {
+        let mut written = Line::new();
+        answer.write_line(weeder, &mut written);
+        said.extend(written.map(char::from));
+    }
+    if said.trim_end().ends_with("ok") {
+        return Ok(());
+    }
+    Err(Refused { command: command.to_owned(), answer: said.trim_end().to_owned() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::machine::Dirt;
+    use crate::planting::Planting;
+    use crate::verdict::Timing;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    /// The encoder's count at a time, all of the way to there looked at anew.
+    fn count_at(Trial { machine, motion, .. }: &Trial, time_s: f64) -> i64 {
+        let ticks = machine.ticks(motion, time_s);
+        let pulse = machine.pulse(ticks);
+        let hidden = |pulses: std::ops::Range<i64>| pulses.filter(|&pulse| machine.dirt.hides(pulse)).count() as i64;
+        let in_pulse = if machine.dirt.hides(pulse) { machine.hidden_in_pulse(ticks) } else { 0 };
+        ticks - PULSE_TICKS * (hidden(0..pulse) - hidden(pulse..0)) - in_pulse
+    }
+
+    #[test]
+    fn counts_that_are_worked_out_together_are_those_of_each_turn_and_each_edge_by_itself() {
+        for seed in 0..8 {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let row =
+                Planting { plants: 6, weeds: 4, ragged: true, ..Planting::default() }.grow_with_room(seed).unwrap();
+            let dirt = Dirt { share: rng.random_range(0.0..0.1), seed };
+            let machine = Machine { second_beam_mm: 150.0, dirt, ..Machine::default() };
+            let speed_mm_s = rng.random_range(300.0..900.0);
+            // Farther back than it began, too, where counts are negative.
+            let motion = Motion::starting_at(0.0)
+                .change_speed(speed_mm_s, 900.0)
+                .stop_at(1000.0, 900.0)
+                .go_on_for(0.3)
+                .change_speed(-speed_mm_s, 900.0)
+                .stop_at(-200.0, 900.0)
+                .change_speed(speed_mm_s, 900.0)
+                .roll_to(3500.0)
+                .with_slip(|| rng.random_range(-0.05..0.1));
+            let trial = Trial { motion, ..Trial::at_speed(row, machine, Timing::default(), speed_mm_s) };
+            let mut told = 0;
+            for Turn { time_s, position, edges } in Sensors::new(&trial, TURN_S).turns() {
+                assert_eq!(position, count_at(&trial, time_s), "seed {seed} at {time_s} s");
+                for edge in edges {
+                    assert!(time_s - TURN_S < edge.time_s && edge.time_s <= time_s, "seed {seed} at {time_s} s");
+                    assert_eq!(edge.position, count_at(&trial, edge.time_s), "seed {seed} at {} s", edge.time_s);
+                }
+                told += edges.len();
+            }
+            let all = trial.machine.pin_changes(&trial.row, &trial.motion, 0);
+            let of_beams = all.iter().filter(|change| [wiring::BEAM, wiring::SECOND_BEAM].contains(&change.pin));
+            assert!(told > 40, "{told}");
+            assert_eq!(told, of_beams.count(), "seed {seed}");
+        }
+    }
+}

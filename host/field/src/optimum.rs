@@ -1,0 +1,86 @@
+//! The most of a row's ground that anybody could weed with this machine and damage no plant: a bound, not a controller.
+//!
+//! Whoever keeps it would have to know each stem, the exact zone round it, how the machine strays and rolls, and each swing's dead time
+//! ahead; and each swing would have to be as quick as the servo is without load. At every place beside a stem the tool needs an angle at
+//! which its edge is past the zone. A servo that turns at its rate can be below the angle at which the tool works the row's
+//! line only so long before and behind. What is left of the row is the bound: no tool path that touches no zone weeds more.
+//!
+//! It asks nothing of canopies and margins. With these, [`crate::verdict::weedable_share`] is the bound.
+
+use crate::ground::{share_of, union};
+use crate::machine::Machine;
+use crate::motion::Motion;
+use crate::servo::OUT_DEGREES;
+use crate::stand::Stand;
+use crate::steering::Steering;
+use std::ops::Range;
+
+/// Distance of the places in a zone at which the angle is asked for. A zone is round, so that those between ask for no less
+/// than the lesser of both.
+const STEP_MM: f64 = 1.0;
+
+/// The share of the row's ground, from 0 to 1, that can be weeded at most without the tool touching the zone round a stem.
+pub fn undamaged_share(stand: &Stand, machine: &Machine, motion: &Motion, steering: &Steering) -> f64 {
+    let half_mm = machine.tool_width_mm / 2.0;
+    let degrees_a_s = OUT_DEGREES / (machine.servo.travel_ms / 1000.0);
+    let line_degrees = machine.line_degrees();
+    let mut lost = Vec::new();
+    for stem in &stand.stems {
+        let mut before: Option<Range<f64>> = None;
+        let steps = (2.0 * stem.protected_mm / STEP_MM).ceil() as u32;
+        for step in 1..steps {
+            let place_mm = stem.along_mm - stem.protected_mm + f64::from(step) * STEP_MM;
+            let beside_mm = place_mm - stem.along_mm;
+            let chord_mm = (stem.protected_mm.powi(2) - beside_mm.powi(2)).max(0.0).sqrt();
+            let across_mm = stem.across_mm - steering.across_mm(place_mm);
+            // A tool in the row that passes to the right of the zone, or to the left of one on the far side.
+            if half_mm <= across_mm - chord_mm || across_mm + chord_mm <= -half_mm {
+                before = None;
+                continue;
+            }
+            let aside = ((across_mm + chord_mm + half_mm) / machine.arm_mm).clamp(0.0, 1.0);
+            let before_s = (aside.asin().to_degrees() - line_degrees) / degrees_a_s;
+            let mut passed = motion.passings(place_mm + machine.beam_to_tool_mm);
+            if before_s > 0.0
+                && let Some(passing) = passed.next()
+            {
+                let ground = motion.stretch_mm(&(passing.time_s - before_s..passing.time_s + before_s));
+                let ground = machine.tool_mm(ground.start)..machine.tool_mm(ground.end);
+                let between_mm = before.as_ref().map_or(ground.start, |before| before.start.min(ground.start));
+                lost.push(between_mm..before.map_or(ground.end, |before| before.end.max(ground.end)));
+                before = Some(ground);
+            }
+        }
+    }
+    1.0 - share_of(&stand.span_mm, &union(lost))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::row::{Row, Thing};
+    use crate::stand::Stem;
+
+    #[test]
+    fn the_bound_is_the_row_less_each_zone_and_what_the_quickest_swings_take() {
+        let stand = Stand {
+            row: Row::new(vec![Thing::plant(1000.0, 150.0)]).unwrap(),
+            stems: vec![Stem { along_mm: 1000.0, across_mm: 0.0, protected_mm: 45.0, is_seen: true }],
+            neighbours: Vec::new(),
+            weeds: Vec::new(),
+            counted_mm: 0.0..2000.0,
+            span_mm: 0.0..2000.0,
+        };
+        let share = |speed_mm_s: f64| {
+            let motion = Motion::steady(-500.0, 1e6, speed_mm_s, 3000.0);
+            undamaged_share(&stand, &Machine::default(), &motion, &Steering::default())
+        };
+        // As good as standing still: the zone of 90 mm, but for its ends that the tool may touch.
+        assert!((share(1.0) - (1.0 - 90.0 / 2000.0)).abs() < 0.002, "{}", share(1.0));
+        // At 500 mm/s the tool has to be past the zone's middle by 72.5 mm aside, which takes 12 less 4.5 degrees: 20 ms, 10 mm.
+        // Nearer to its ends it needs less, but has less time: the stretch is a little wider than the zone.
+        let lost_mm = 2000.0 * (1.0 - share(500.0));
+        assert!((90.0..110.0).contains(&lost_mm), "{lost_mm} mm");
+        assert!(share(1500.0) < share(500.0));
+    }
+}

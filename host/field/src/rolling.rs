@@ -1,0 +1,291 @@
+//! A machine that rolls without an end, past a row that grows ahead of it.
+//!
+//! [`Machine::pin_changes`] knows a whole motion; here the motion is decided while it goes on. [`Rolling::roll_until`] gives what
+//! happens at the pins until a cycle of the Uno's clock, by the same arithmetic. Between two calls speed, slip, row and faults may
+//! change, and the servo hears what the Uno says ([`Rolling::hear`]).
+
+use crate::ground::union;
+use crate::machine::{Machine, Sensor, channels, cycle_at, time_at_s};
+use crate::motion::Motion;
+use crate::row::Thing;
+use crate::servo::Stroke;
+use crate::wiring;
+use std::ops::Range;
+use uno::{Pin, PinChange, Pulse};
+
+/// How fast the machine gains and loses speed.
+const ACCELERATION_MM_S2: f64 = 500.0;
+
+/// What is broken on the machine.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Faults {
+    /// The first beam's wire is torn: its pin stays on the pull-up, as over bare ground.
+    pub beam_wire_torn: bool,
+    /// The encoder says nothing more: its pins stay as they are.
+    pub encoder_dead: bool,
+}
+
+/// A machine that rolls, see the module's words. Its place is what the first beam sees.
+#[derive(Clone, Debug)]
+pub struct Rolling {
+    /// The machine.
+    pub machine: Machine,
+    /// What stands in the row so far, in ascending order of place and apart. More may be added at its end.
+    pub row: Vec<Thing>,
+    /// Changes of the tool's command so far. The first is not a swing.
+    pub commands: usize,
+    /// As far as it is decided: it ends now.
+    motion: Motion,
+    /// The cycle at which the motion began.
+    start_cycle: u64,
+    /// The speed that the machine has, or comes to.
+    speed_mm_s: f64,
+    /// Counts of a clean encoder, net, since the beginning.
+    ticks: i64,
+    beams: Vec<Sensor>,
+    /// The pulses that changed the tool's command, and what the servo makes of them.
+    pulses: Vec<Pulse>,
+    stroke: Stroke,
+    faults: Faults,
+}
+
+impl Rolling {
+    /// The machine stands at a place in front of, or in, a row.
+    pub fn new(machine: Machine, row: Vec<Thing>, start_mm: f64, start_cycle: u64) -> Self {
+        let leaves_mm = machine.seen_mm(union(row.iter().flat_map(Thing::blocks_mm).collect()));
+        let beam = |pin, behind_mm: f64| {
+            let is_broken = leaves_mm.iter().any(|leaf| leaf.contains(&(start_mm - behind_mm)));
+            Sensor::new(&machine, PinChange { cycle: start_cycle, pin, high: !is_broken }, behind_mm)
+        };
+        let second = machine.has_second_beam().then(|| beam(wiring::SECOND_BEAM, machine.second_beam_mm));
+        Self {
+            beams: [beam(wiring::BEAM, 0.0)].into_iter().chain(second).collect(),
+            row,
+            commands: 0,
+            motion: Motion::starting_at(start_mm),
+            start_cycle,
+            speed_mm_s: 0.0,
+            ticks: 0,
+            pulses: Vec::new(),
+            stroke: machine.servo.stroke(&[], start_cycle),
+            faults: Faults::default(),
+            machine,
+        }
+    }
+
+    /// Rolls on until a cycle, which is not before the one rolled to last, and gives what happens at the pins on the way.
+    pub fn roll_until(&mut self, cycle: u64) -> Vec<PinChange> {
+        let during_s = self.now_s()..time_at_s(self.start_cycle, cycle);
+        let speed_mm_s = self.speed_mm_s;
+        self.change(|motion| motion.change_speed(speed_mm_s, ACCELERATION_MM_S2).until(during_s.end));
+        let Self { machine, motion, start_cycle, ticks, faults, .. } = self;
+        let mut changes = machine.encoder_changes_since(ticks, during_s.start, motion, *start_cycle);
+        if faults.encoder_dead {
+            changes.clear();
+        }
+        let rolled_mm = motion.stretch_mm(&during_s);
+        for beam in &mut self.beams {
+            let near_mm =
+                rolled_mm.start - beam.behind_mm - machine.beam_mm..rolled_mm.end - beam.behind_mm + machine.beam_mm;
+            let leaves_mm = machine.seen_mm(union(within(&self.row, &near_mm).flat_map(Thing::blocks_mm).collect()));
+            let reports = beam.changes(&leaves_mm, motion, during_s.clone(), *start_cycle);
+            if !(faults.beam_wire_torn && beam.last.pin == wiring::BEAM) {
+                changes.extend(reports);
+            }
+        }
+        self.motion.join();
+        changes.sort_by_key(|change| change.cycle);
+        changes
+    }
+
+    /// From now on comes to a speed, and rolls on at that; negative backwards.
+    pub fn roll_at(&mut self, speed_mm_s: f64) {
+        self.speed_mm_s = speed_mm_s;
+    }
+
+    /// From now on loses this share of the wheel's way, below 1.
+    pub fn slip_by(&mut self, share: f64) {
+        self.change(|motion| motion.slipping(share));
+    }
+
+    /// From now on these faults are there, and no others. [`levels`](Self::levels) says what becomes of the pins.
+    pub fn have_faults(&mut self, faults: Faults) {
+        self.faults = faults;
+    }
+
+    /// The level of each pin that the machine drives. A dead encoder drives none.
+    pub fn levels(&self) -> Vec<(Pin, bool)> {
+        let (a, b) = channels(self.ticks);
+        let encoder = [(wiring::ENCODER_A, a), (wiring::ENCODER_B, b)];
+        let torn = |pin: Pin| self.faults.beam_wire_torn && pin == wiring::BEAM;
+        let beams = self.beams.iter().map(|beam| (beam.last.pin, beam.last.high || torn(beam.last.pin)));
+        encoder.into_iter().filter(|_| !self.faults.encoder_dead).chain(beams).collect()
+    }
+
+    /// The servo hears a pulse, behind its falling edge: whether it asks for another angle than the one before it.
+    pub fn hear(&mut self, pulse: Pulse) -> bool {
+        let last = self.pulses.last().copied();
+        let servo = &self.machine.servo;
+        let heard: Vec<Pulse> = last.into_iter().chain([pulse]).collect();
+        let is_command = servo.commands(&heard).len() > usize::from(last.is_some());
+        if is_command {
+            self.pulses.push(pulse);
+            self.commands += 1;
+            self.stroke = servo.stroke(&servo.commands(&self.pulses), self.start_cycle);
+        }
+        is_command
+    }
+
+    /// Now, as a time of the motion.
+    pub fn now_s(&self) -> f64 {
+        self.motion.duration_s()
+    }
+
+    /// The ground that the first beam sees now.
+    pub fn place_mm(&self) -> f64 {
+        self.motion.end_mm()
+    }
+
+    /// The ground under the tool now.
+    pub fn tool_mm(&self) -> f64 {
+        self.machine.tool_mm(self.place_mm())
+    }
+
+    /// The speed now, negative backwards.
+    pub fn speed_mm_s(&self) -> f64 {
+        self.motion.end_speed_mm_s()
+    }
+
+    /// The tool's angle now; 0 is in the row.
+    pub fn degrees(&self) -> f64 {
+        self.stroke.degrees(self.now_s())
+    }
+
+    /// Counts of a perfect encoder, net, since the beginning.
+    pub fn ticks(&self) -> i64 {
+        self.ticks
+    }
+
+    /// How far the machine rolls now while the encoder counts one.
+    pub fn ground_mm_a_tick(&self) -> f64 {
+        self.machine.tick_mm() * self.motion.ground_mm_a_wheel_mm()
+    }
+
+    /// Whether something stands in the first beam now.
+    pub fn is_beam_broken(&self) -> bool {
+        let place_mm = self.place_mm();
+        within(&self.row, &(place_mm..place_mm))
+            .any(|thing| thing.blocks_mm().iter().any(|leaf| leaf.contains(&place_mm)))
+    }
+
+    /// How it rolled from a time on, as a motion of its own, the pulses that the servo took for commands, and the cycle at which that
+    /// motion begins.
+    pub fn since(&self, time_s: f64) -> (Motion, &[Pulse], u64) {
+        (self.motion.since(time_s), &self.pulses, cycle_at(self.start_cycle, time_s))
+    }
+
+    /// When the machine's place first passed a place forward, from a time on.
+    pub fn passed_s(&self, place_mm: f64, from_s: f64) -> Option<f64> {
+        let mut passings = self.motion.passings(place_mm);
+        passings.find(|passing| passing.forward && passing.time_s >= from_s).map(|passing| passing.time_s)
+    }
+
+    /// Forgets how it rolled before a time, and the commands that were carried out by then.
+    pub fn forget(&mut self, time_s: f64) {
+        self.motion.forget(time_s);
+        let is_over = |pulse: &Pulse| time_at_s(self.start_cycle, pulse.fall) + self.machine.servo.slowest_s() < time_s;
+        // The tool rests where the last one of them told it.
+        let over = self.pulses.partition_point(is_over).saturating_sub(1);
+        self.pulses.drain(..over);
+    }
+
+    fn change(&mut self, change: impl FnOnce(Motion) -> Motion) {
+        self.motion = change(std::mem::replace(&mut self.motion, Motion::starting_at(0.0)));
+    }
+}
+
+/// What of a row stands on some ground.
+fn within<'a>(row: &'a [Thing], ground_mm: &Range<f64>) -> impl Iterator<Item = &'a Thing> {
+    let first = row.partition_point(|thing| thing.span_mm().end < ground_mm.start);
+    let behind = row.partition_point(|thing| thing.span_mm().start <= ground_mm.end);
+    row.get(first..behind).unwrap_or_default().iter()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::row::Row;
+    use proptest::prelude::*;
+
+    const START_CYCLE: u64 = 1_000_000;
+
+    /// What a machine does on the way: from a time on it comes to a speed, and its wheel slips.
+    fn way() -> impl Strategy<Value = Vec<(f64, f64, f64)>> {
+        prop::collection::vec((0.05..1.5, -500.0..1200.0, -0.05..0.2), 1..6)
+    }
+
+    proptest! {
+        #[test]
+        fn rolling_piece_by_piece_gives_what_the_whole_motion_gives(way in way(), slice_cycles in 1_000_u64..400_000) {
+            let row = vec![Thing::plant(300.0, 150.0), Thing::weed(500.0, 14.0), Thing::plant(800.0, 120.0)];
+            let machine = Machine { second_beam_mm: 220.0, beam_mm: 6.0, ..Machine::default() };
+            let mut rolling = Rolling::new(machine, row.clone(), 0.0, START_CYCLE);
+            let mut changes = Vec::new();
+            let mut motion = Motion::starting_at(0.0);
+            let (mut cycle, mut from_s) = (START_CYCLE, 0.0);
+            for (for_s, speed_mm_s, slip) in way {
+                rolling.roll_at(speed_mm_s);
+                rolling.slip_by(slip);
+                let end = cycle_at(START_CYCLE, from_s + for_s);
+                from_s = time_at_s(START_CYCLE, end);
+                motion = motion.slipping(slip).change_speed(speed_mm_s, ACCELERATION_MM_S2).until(from_s);
+                while cycle < end {
+                    cycle = end.min(cycle + slice_cycles);
+                    changes.extend(rolling.roll_until(cycle));
+                }
+            }
+            // What a sensor has not reported by now it does later.
+            let whole = machine.pin_changes(&Row::new(row).unwrap(), &motion, START_CYCLE);
+            let whole: Vec<PinChange> = whole.into_iter().filter(|change| change.cycle <= cycle).collect();
+            prop_assert_eq!(changes.len(), whole.len());
+            for (change, expected) in changes.iter().zip(&whole) {
+                prop_assert_eq!((change.pin, change.high), (expected.pin, expected.high));
+                prop_assert!(change.cycle.abs_diff(expected.cycle) <= 1, "{change:?}, not {expected:?}");
+            }
+            prop_assert!((rolling.place_mm() - motion.end_mm()).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn a_fault_shows_at_the_pins_until_it_is_mended() {
+        let mut rolling = Rolling::new(Machine::default(), vec![Thing::plant(300.0, 150.0)], 0.0, 0);
+        rolling.roll_at(500.0);
+        rolling.roll_until(16_000_000);
+        assert!(rolling.is_beam_broken() && rolling.levels().contains(&(wiring::BEAM, false)));
+        rolling.have_faults(Faults { beam_wire_torn: true, encoder_dead: true });
+        assert_eq!(rolling.levels(), [(wiring::BEAM, true)]);
+        assert_eq!(rolling.roll_until(32_000_000), []);
+        rolling.have_faults(Faults::default());
+        assert_eq!(rolling.levels().len(), 3);
+        assert!(!rolling.is_beam_broken() && rolling.levels().contains(&(wiring::BEAM, true)));
+        assert!(!rolling.roll_until(33_000_000).is_empty());
+    }
+
+    #[test]
+    fn the_servo_hears_what_changes_and_what_is_over_is_forgotten() {
+        let mut rolling = Rolling::new(Machine::default(), Vec::new(), 0.0, 0);
+        rolling.roll_at(500.0);
+        for frame in 0..200_u64 {
+            let (rise, width_us) = (frame * 320_000, if frame / 50 % 2 == 0 { 2000 } else { 1500 });
+            rolling.roll_until(rise);
+            let is_command = rolling.hear(Pulse { rise, fall: rise + width_us * 16 });
+            assert_eq!(is_command, frame % 50 == 0, "frame {frame}");
+        }
+        assert_eq!((rolling.commands, rolling.degrees()), (4, 0.0));
+        let time_s = rolling.passed_s(1500.0, 0.0).unwrap();
+        rolling.forget(time_s);
+        let (motion, pulses, _) = rolling.since(time_s);
+        assert_eq!(pulses.len(), 1);
+        assert!((motion.start_mm() - 1500.0).abs() < 1e-9 && (motion.end_mm() - rolling.place_mm()).abs() < 1e-9);
+    }
+}

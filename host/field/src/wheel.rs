@@ -1,0 +1,62 @@
+//! The ground wheel of a machine that is rolled tick by tick, with slip that changes.
+//!
+//! Over known ground the wheel turns as it did when it first came there. With another slip the ground would move under the count, and
+//! no beam can tell that.
+
+/// The greatest slip, as a share of the ground, over which a machine is held to its margin: three times what it makes over the distance
+/// from beam to tool is within the margin, for what was measured before a change and what is right behind it.
+pub fn most_slip(margin_mm: f64, beam_to_tool_mm: f64) -> f64 {
+    0.3 * margin_mm / beam_to_tool_mm
+}
+
+/// The wheel.
+#[derive(Clone, Debug)]
+pub struct Wheel {
+    /// How far it turns for a tick of new ground.
+    pub turns_a_tick: f64,
+    ticks: f64,
+    /// What it has turned for each tick of ground that it has come to.
+    turned: Vec<f64>,
+}
+
+impl Default for Wheel {
+    fn default() -> Self {
+        Self { turns_a_tick: 1.0, ticks: 0.0, turned: Vec::new() }
+    }
+}
+
+impl Wheel {
+    /// Counts of a perfect encoder, net.
+    pub fn ticks(&self) -> i64 {
+        self.ticks.floor() as i64
+    }
+
+    /// Rolls by a tick of ground, on from `ground` or back from it; the counts of a perfect encoder.
+    pub fn roll(&mut self, ground: i64, forward: bool) -> i64 {
+        let tick = usize::try_from(if forward { ground } else { ground - 1 });
+        while tick.is_ok_and(|tick| self.turned.len() <= tick) {
+            self.turned.push(self.turns_a_tick);
+        }
+        let (before, turned) = (self.ticks(), tick.map_or(1.0, |tick| self.turned[tick]));
+        self.ticks += if forward { turned } else { -turned };
+        self.ticks() - before
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_wheel_that_slips_now_turns_over_known_ground_as_it_did_before() {
+        let mut wheel = Wheel::default();
+        let forward =
+            |wheel: &mut Wheel, ground: std::ops::Range<i64>| -> i64 { ground.map(|g| wheel.roll(g, true)).sum() };
+        assert_eq!(forward(&mut wheel, 0..1000), 1000);
+        wheel.turns_a_tick = 1.0625;
+        assert_eq!((1..=1000).rev().map(|ground| wheel.roll(ground, false)).sum::<i64>(), -1000);
+        assert_eq!(forward(&mut wheel, 0..1000), 1000);
+        assert_eq!(forward(&mut wheel, 1000..1800), 850);
+        assert_eq!(wheel.ticks(), 1850);
+    }
+}

@@ -1,0 +1,532 @@
+//! A record read as a job: what the machine met and did, each with its distance, its place and its time.
+//!
+//! [`Job::read`] goes through a log's lines in their order. From one start of the Uno to the next, or to where its
+//! wheel is set anew, or the log was opened again, is a stretch: the wheel's distance goes on within one alone. In each
+//! the fixes get the distance at which they were taken, by the statuses around them, and what was told gets its place
+//! by [`Track`].
+//!
+//! - A plant or weed is the middle of what the beam saw of it, and stands where the beam was. So is ground that was
+//!   guarded.
+//! - Swings and alarms are where the tool was when they were told; a swing is the command, which the tool follows by
+//!   its lead.
+//! - Ground is weeded where the machine is at work and the tool is told to be in the row, not weeded where it is told
+//!   to be out. Ground is passed once: rolling back over it, and over it again, adds nothing.
+//! - A label is what the last detection was, where the machine took it.
+
+use crate::antenna::Antenna;
+use crate::plane::Place;
+use crate::receiver::{Counts, Fix, Heard, Mark, Receiver};
+use crate::track::{Basis, Found, Missing, Offset, Track};
+use link::log::{Entry, Kind};
+use link::settings::{Setting, Settings, shown};
+use link::{Class, ConsoleLine, EventLine, Mode, Status};
+use std::collections::VecDeque;
+use std::f64::consts::PI;
+use std::ops::Range;
+
+/// Time at either end of a stretch for which the machine is taken to have stood, in ms: a fix in it is where the
+/// stretch begins or ends.
+const STANDING_MS: f64 = 1000.0;
+
+/// The longest way between two statuses in ticks, some hundred metres.
+pub(crate) const LONGEST_WAY: u32 = 1_000_000;
+
+/// What is asked of a record beside what stands in it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Wanted {
+    /// Where beam and tool are, in place of what the record says.
+    pub antenna: Option<Antenna>,
+    /// The longest way between two fixes over which places are interpolated, in metres.
+    pub longest_outage_m: f64,
+}
+
+impl Default for Wanted {
+    fn default() -> Self {
+        Self { antenna: None, longest_outage_m: 20.0 }
+    }
+}
+
+/// What something is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum What {
+    /// A detection that the beam has seen.
+    Object {
+        /// What it was taken for.
+        class: Class,
+        /// Votes for that.
+        votes: u8,
+    },
+    /// Ground that is kept free, because a plant was due.
+    Guarded,
+    /// What somebody said that the last detection was.
+    Label(Class),
+    /// The tool was told to swing out of the row.
+    SwingOut,
+    /// The tool was told to swing into the row.
+    SwingIn,
+    /// A fault was latched.
+    Alarm,
+}
+
+impl What {
+    /// Its word on the map.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Object { class: Class::Plant, .. } => "plant",
+            Self::Object { class: Class::Weed, .. } => "weed",
+            Self::Object { class: Class::Unknown, .. } => "unknown",
+            Self::Guarded => "guarded",
+            Self::Label(Class::Plant) => "label_plant",
+            Self::Label(_) => "label_weed",
+            Self::SwingOut => "swing_out",
+            Self::SwingIn => "swing_in",
+            Self::Alarm => "alarm",
+        }
+    }
+}
+
+/// Something that happened.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Thing {
+    /// What.
+    pub what: What,
+    /// The log's line.
+    pub line: u64,
+    /// As it stands there.
+    pub text: String,
+    /// When it was recorded, by the record's clock.
+    pub time_ms: u64,
+    /// Metres by the wheel since the stretch began.
+    pub way_m: f64,
+    /// Its width along the row in mm; 0 for what has none.
+    pub width_mm: f64,
+    /// Where it is.
+    pub found: Result<Found, Missing>,
+}
+
+/// What the machine did with some ground.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Did {
+    /// It was at work, and the tool was to be in the row.
+    Weeded,
+    /// It was at work, and the tool was to be out.
+    Spared,
+    /// It was not at work.
+    Rolled,
+}
+
+/// Ground that was passed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ground {
+    /// What was done with it.
+    pub did: Did,
+    /// Metres by the wheel since the stretch began.
+    pub way_m: Range<f64>,
+    /// When, by the record's clock.
+    pub time_ms: Range<u64>,
+    /// Where the tool went, a line for each part that has places. Empty where nothing was done.
+    pub lines: Vec<Vec<Place>>,
+}
+
+/// A part of a record over which the wheel's distance goes on.
+#[derive(Clone, Debug, Default)]
+pub struct Stretch {
+    /// What happened, in the record's order.
+    pub things: Vec<Thing>,
+    /// The ground that was passed.
+    pub ground: Vec<Ground>,
+    /// When it began and ended, by the record's clock.
+    pub time_ms: Range<u64>,
+}
+
+/// A fix that has jumped.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Jump {
+    /// Where it says that the antenna is.
+    pub place: Place,
+    /// Metres from the last fix that is used.
+    pub far_m: f64,
+    /// The log's line.
+    pub line: u64,
+    /// When, by the record's clock.
+    pub time_ms: f64,
+}
+
+/// A record read.
+#[derive(Clone, Debug, Default)]
+pub struct Job {
+    /// Its parts.
+    pub stretches: Vec<Stretch>,
+    /// What was counted of the receiver.
+    pub counts: Counts,
+    /// Fixes that have jumped.
+    pub jumps: Vec<Jump>,
+    /// How often the receiver was lost, by the record.
+    pub unplugged: u64,
+    /// Milliseconds from 1970 to the midnight from which [`Found::utc_ms`] counts; none where the receiver told no
+    /// date.
+    pub midnight_ms: Option<i64>,
+    /// Where beam and tool were taken to be.
+    pub antenna: Antenna,
+}
+
+/// A stretch while it is read.
+#[derive(Default)]
+struct Reading {
+    settings: Option<Settings>,
+    /// When the wheel was where: milliseconds of the record, ticks since the stretch began.
+    wheel: Vec<(f64, i64)>,
+    last_position: Option<i32>,
+    last_status: Option<Status>,
+    fixes: Vec<Fix>,
+    things: Vec<Thing>,
+    ground: Vec<Passed>,
+    /// Commands that wait for their answers: the line, its time, and what was typed.
+    unanswered: VecDeque<(u64, u64, String)>,
+    time_ms: Option<Range<u64>>,
+}
+
+/// Ground in ticks since the stretch began.
+struct Passed {
+    did: Did,
+    ticks: Range<i64>,
+    time_ms: Range<u64>,
+}
+
+impl Job {
+    /// Reads a record.
+    pub fn read(log: &[Entry], wanted: &Wanted) -> Self {
+        let antenna = wanted.antenna.or_else(|| antenna_of(log)).unwrap_or_default();
+        let mut job = Self { antenna, ..Self::default() };
+        let mut receiver = Receiver::new(antenna.error_m());
+        let mut reading = Reading::default();
+        let mut last_ms = 0;
+        for entry in log {
+            if entry.time_ms < last_ms {
+                // The log was closed, and opened again.
+                job.heard(receiver.end(), &mut reading, entry);
+                receiver.wheel_lost();
+                job.close(&mut reading, wanted, None);
+            }
+            last_ms = entry.time_ms;
+            match entry.kind {
+                Kind::Connected | Kind::Lost => {
+                    job.heard(receiver.end(), &mut reading, entry);
+                    receiver.wheel_lost();
+                    job.close(&mut reading, wanted, None);
+                    if entry.kind == Kind::Connected {
+                        reading.settings = Some(Settings::new());
+                    }
+                }
+                Kind::Gps | Kind::GpsDamaged => {
+                    let heard = receiver.take(entry.time_ms as f64, &entry.text);
+                    job.heard(heard, &mut reading, entry);
+                }
+                Kind::GpsLost => {
+                    job.unplugged += 1;
+                    job.heard(receiver.silent(), &mut reading, entry);
+                }
+                Kind::Setting => reading.set(&entry.text),
+                Kind::Status => {
+                    if let Some(status) = Status::parse(&entry.text) {
+                        if reading.is_far(&status) {
+                            receiver.wheel_lost();
+                            let settings = reading.settings.clone();
+                            job.close(&mut reading, wanted, settings);
+                        }
+                        reading.status(status, entry.time_ms);
+                        if let (Some(&(_, ticks)), Some(status)) = (reading.wheel.last(), &reading.last_status) {
+                            let rolled_m = ticks as f64 * reading.tick_mm() / 1000.0;
+                            receiver.rolled(entry.time_ms as f64, rolled_m, f64::from(status.speed_mm_s));
+                        }
+                    }
+                }
+                Kind::Event => reading.event(entry),
+                Kind::Command => {
+                    reading.unanswered.push_back((entry.number, entry.time_ms, entry.text.clone()));
+                }
+                Kind::Answer => {
+                    if let Some(settings) = reading.answer(&entry.text) {
+                        job.heard(receiver.end(), &mut reading, entry);
+                        receiver.wheel_lost();
+                        // What waits for its answer still does, and the machine is where it was.
+                        let unanswered = std::mem::take(&mut reading.unanswered);
+                        let last_status = reading.last_status.take();
+                        job.close(&mut reading, wanted, Some(settings));
+                        reading.unanswered = unanswered;
+                        if let Some(status) = last_status {
+                            reading.status(status, entry.time_ms);
+                        }
+                    }
+                }
+                Kind::Example | Kind::Antenna | Kind::GpsFound | Kind::GpsMark => {}
+            }
+            reading.seen(entry.time_ms);
+        }
+        if let Some(last) = log.last() {
+            job.heard(receiver.end(), &mut reading, last);
+        }
+        job.close(&mut reading, wanted, None);
+        job.counts = receiver.counts();
+        job.midnight_ms = receiver.midnight_ms();
+        job
+    }
+
+    fn heard(&mut self, heard: Heard, reading: &mut Reading, entry: &Entry) {
+        for fix in heard.fixes {
+            reading.fixes.push(Fix { time_ms: fix.time_ms - self.antenna.delay_ms, ..fix });
+        }
+        for mark in heard.marks {
+            if let Mark::Jumped { place, far_m, time_ms, .. } = mark {
+                self.jumps.push(Jump { place, far_m, line: entry.number, time_ms });
+            }
+        }
+    }
+
+    /// A stretch ends; another begins with these settings.
+    fn close(&mut self, reading: &mut Reading, wanted: &Wanted, settings: Option<Settings>) {
+        let read = std::mem::replace(reading, Reading { settings, ..Reading::default() });
+        if read.wheel.is_empty() {
+            return;
+        }
+        let tick_m = read.tick_mm() / 1000.0;
+        let metres = move |ticks: f64| ticks * tick_m;
+        let mut fixes: Vec<(f64, Fix)> =
+            read.fixes.iter().filter_map(|fix| Some((metres(read.ticks_at(fix.time_ms)?), *fix))).collect();
+        // Where its least delay is known better, a later one may come out as an earlier.
+        fixes.sort_by(|(_, one), (_, other)| one.time_ms.total_cmp(&other.time_ms));
+        let track = Track::through(&fixes, self.antenna.error_m(), wanted.longest_outage_m);
+        let find = |way_m: f64, recorded_ms: u64, offset: Offset| match &track {
+            Some(track) => track.find(way_m, recorded_ms as f64, offset),
+            None => Err(Missing::NoFixBefore),
+        };
+        let beam_to_tool_mm = read.settings.as_ref().map_or(0.0, |to| f64::from(to.get(Setting::BeamToToolMm)));
+        let (beam, tool) = (self.antenna.beam(), self.antenna.tool(beam_to_tool_mm));
+        let mut things = read.things;
+        for thing in &mut things {
+            let offset = match thing.what {
+                What::Object { .. } | What::Guarded | What::Label(_) => beam,
+                What::SwingOut | What::SwingIn | What::Alarm => tool,
+            };
+            thing.found = find(thing.way_m, thing.time_ms, offset);
+        }
+        let passed = |passed: Passed| {
+            let way_m = metres(passed.ticks.start as f64)..metres(passed.ticks.end as f64);
+            let lines = match passed.did {
+                Did::Rolled => Vec::new(),
+                Did::Weeded | Did::Spared => lines(&way_m, |way_m| find(way_m, passed.time_ms.end, tool)),
+            };
+            Ground { did: passed.did, way_m, time_ms: passed.time_ms, lines }
+        };
+        let ground = read.ground.into_iter().map(passed).collect();
+        self.stretches.push(Stretch { things, ground, time_ms: read.time_ms.unwrap_or_default() });
+    }
+
+    /// Everything that happened.
+    pub fn things(&self) -> impl Iterator<Item = &Thing> {
+        self.stretches.iter().flat_map(|stretch| &stretch.things)
+    }
+}
+
+/// Metres between two places of a line.
+const LINE_STEP_M: f64 = 0.5;
+
+/// The lines along this way, as far as there are places.
+fn lines(way_m: &Range<f64>, find: impl Fn(f64) -> Result<Found, Missing>) -> Vec<Vec<Place>> {
+    let mut lines: Vec<Vec<Place>> = vec![Vec::new()];
+    let steps = ((way_m.end - way_m.start) / LINE_STEP_M).ceil().max(1.0);
+    for step in 0..=steps as u64 {
+        let share = step as f64 / steps;
+        match (find(way_m.start + share * (way_m.end - way_m.start)), lines.last_mut()) {
+            (Ok(found), Some(line)) => line.push(found.place),
+            (Err(_), Some(line)) if !line.is_empty() => lines.push(Vec::new()),
+            _ => {}
+        }
+    }
+    // A place alone is no line.
+    lines.retain(|line| line.len() > 1);
+    lines
+}
+
+impl Reading {
+    fn tick_mm(&self) -> f64 {
+        self.settings.as_ref().map_or(0.0, tick_mm)
+    }
+
+    fn mm(&self, setting: Setting) -> f64 {
+        self.settings.as_ref().map_or(0.0, |settings| f64::from(settings.get(setting)))
+    }
+
+    fn set(&mut self, line: &str) {
+        if let (Some((setting, value)), Some(settings)) = (shown(line), &mut self.settings) {
+            // A log of another version may have another range: then the default is as good.
+            let _ = settings.set(setting, value);
+        }
+    }
+
+    fn seen(&mut self, time_ms: u64) {
+        let range = self.time_ms.get_or_insert(time_ms..time_ms);
+        range.end = time_ms;
+    }
+
+    /// Ticks since the stretch began, of a position near the last one.
+    fn ticks(&self, position: i32) -> Option<i64> {
+        let (&(_, ticks), last) = (self.wheel.last()?, self.last_position?);
+        Some(ticks + i64::from(position.wrapping_sub(last)))
+    }
+
+    /// Whether no wheel has rolled so far since the last status: the log has lost what was between.
+    fn is_far(&self, status: &Status) -> bool {
+        self.last_position.is_some_and(|last| status.position.wrapping_sub(last).unsigned_abs() > LONGEST_WAY)
+    }
+
+    /// Where the wheel was at a time; none where that is outside of the stretch.
+    fn ticks_at(&self, time_ms: f64) -> Option<f64> {
+        let next = self.wheel.partition_point(|&(at_ms, _)| at_ms < time_ms);
+        let before = next.checked_sub(1).map(|place| self.wheel[place]);
+        match (before, self.wheel.get(next)) {
+            (Some((from_ms, from)), Some(&(to_ms, to))) => {
+                Some(from as f64 + (to - from) as f64 * (time_ms - from_ms) / (to_ms - from_ms))
+            }
+            (None, Some(&(at_ms, ticks))) | (Some((at_ms, ticks)), None) => {
+                ((time_ms - at_ms).abs() <= STANDING_MS).then_some(ticks as f64)
+            }
+            (None, None) => None,
+        }
+    }
+
+    fn status(&mut self, status: Status, time_ms: u64) {
+        let ticks = self.ticks(status.position).unwrap_or(0);
+        self.wheel.push((time_ms as f64, ticks));
+        self.last_position = Some(status.position);
+        let did = did(&status);
+        match self.ground.last_mut() {
+            None => self.ground.push(Passed { did, ticks: ticks..ticks, time_ms: time_ms..time_ms }),
+            Some(passed) => {
+                passed.ticks.end = passed.ticks.end.max(ticks);
+                passed.time_ms.end = time_ms;
+                // A swing is told with its own place.
+                let is_at_work = |did: Did| did != Did::Rolled;
+                if is_at_work(passed.did) != is_at_work(did) {
+                    self.turn_to(did, ticks, time_ms);
+                }
+            }
+        }
+        self.last_status = Some(status);
+    }
+
+    /// From here on something else is done with the ground.
+    fn turn_to(&mut self, did: Did, ticks: i64, time_ms: u64) {
+        let Some(passed) = self.ground.last_mut() else { return };
+        if passed.did == did {
+            return;
+        }
+        // A swing is told somewhat later than it is commanded, and behind a status that has the machine farther on.
+        let ticks = ticks.max(passed.ticks.start);
+        passed.ticks.end = ticks;
+        passed.time_ms.end = time_ms;
+        let ticks = ticks..ticks;
+        self.ground.push(Passed { did, ticks, time_ms: time_ms..time_ms });
+    }
+
+    fn event(&mut self, entry: &Entry) {
+        let Some(event) = EventLine::parse(&entry.text) else { return };
+        let (what, position, behind_mm, width_mm) = match event {
+            EventLine::Detection { class, position, votes, hold, .. } => {
+                let hold_mm = f64::from(hold) * self.tick_mm();
+                let width_mm = (hold_mm - 2.0 * self.mm(Setting::MarginMm)).max(0.0);
+                (What::Object { class, votes }, position, width_mm / 2.0, width_mm)
+            }
+            EventLine::Guarded { position } => (What::Guarded, position, 0.0, 0.0),
+            EventLine::Swing { out, position } => {
+                let is_at_work = self.last_status.as_ref().is_some_and(|status| status.mode == Mode::Work)
+                    || self.ground.last().is_some_and(|passed| passed.did != Did::Rolled);
+                if let Some(ticks) = self.ticks(position).filter(|_| is_at_work) {
+                    self.turn_to(if out { Did::Spared } else { Did::Weeded }, ticks, entry.time_ms);
+                }
+                (if out { What::SwingOut } else { What::SwingIn }, position, 0.0, 0.0)
+            }
+            EventLine::Alarm { position, .. } => (What::Alarm, position, 0.0, 0.0),
+            EventLine::State(mode) => {
+                if let Some(status) = &mut self.last_status {
+                    status.mode = mode;
+                }
+                if mode != Mode::Work
+                    && let Some(&(_, ticks)) = self.wheel.last()
+                {
+                    self.turn_to(Did::Rolled, ticks, entry.time_ms);
+                }
+                return;
+            }
+            EventLine::Slip { .. } | EventLine::Warning(_) | EventLine::Calibrated { .. } | EventLine::Plot => return,
+        };
+        let Some(ticks) = self.ticks(position) else { return };
+        self.things.push(Thing {
+            what,
+            line: entry.number,
+            text: entry.text.clone(),
+            time_ms: entry.time_ms,
+            way_m: (ticks as f64 * self.tick_mm() + behind_mm) / 1000.0,
+            width_mm,
+            found: Err(Missing::NoFixBefore),
+        });
+    }
+
+    /// A line of an answer; the settings of a stretch that begins with it, where it changes the wheel.
+    fn answer(&mut self, line: &str) -> Option<Settings> {
+        let before = self.tick_mm();
+        match ConsoleLine::parse(line) {
+            ConsoleLine::Done => {
+                let (number, time_ms, command) = self.unanswered.pop_front()?;
+                let words: Vec<&str> = command.split_whitespace().collect();
+                match words.as_slice() {
+                    ["set", name, value] => self.set(&format!("{name}={value}")),
+                    ["label", class, ..] => self.label(class, number, time_ms, &command),
+                    _ => {}
+                }
+            }
+            ConsoleLine::Refused(_) => {
+                self.unanswered.pop_front();
+            }
+            // What `get` and `calibrate` show.
+            ConsoleLine::Setting(_) => self.set(line),
+            _ => {}
+        }
+        (before != self.tick_mm()).then(|| self.settings.clone()).flatten()
+    }
+
+    fn label(&mut self, class: &str, line: u64, time_ms: u64, command: &str) {
+        let class = if class == "plant" { Class::Plant } else { Class::Weed };
+        let is_object = |thing: &&Thing| matches!(thing.what, What::Object { .. });
+        let Some(object) = self.things.iter().rev().find(is_object).cloned() else { return };
+        self.things.push(Thing { what: What::Label(class), line, text: command.to_owned(), time_ms, ..object });
+    }
+}
+
+/// Millimetres in a tick of the encoder.
+pub(crate) fn tick_mm(settings: &Settings) -> f64 {
+    let value = |setting| f64::from(settings.get(setting));
+    match value(Setting::TicksPerM) {
+        0.0 => PI * value(Setting::WheelMm) / value(Setting::TicksPerRev).max(1.0),
+        ticks_per_m => 1000.0 / ticks_per_m,
+    }
+}
+
+/// Where a record says that beam and tool are, the last time that it does.
+pub fn antenna_of(log: &[Entry]) -> Option<Antenna> {
+    log.iter().rev().find(|entry| entry.kind == Kind::Antenna).and_then(|entry| Antenna::parse(&entry.text))
+}
+
+/// What a machine of this status does with the ground.
+fn did(status: &Status) -> Did {
+    match (status.mode, status.tool_out) {
+        (Mode::Work, false) => Did::Weeded,
+        (Mode::Work, true) => Did::Spared,
+        (Mode::Hold | Mode::Alarm, _) => Did::Rolled,
+    }
+}
+
+/// Whether a place was interpolated over an outage.
+pub fn is_interpolated(thing: &Thing) -> bool {
+    thing.found.is_ok_and(|found| found.basis == Basis::Interpolated)
+}

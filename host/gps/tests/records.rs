@@ -1,0 +1,286 @@
+//! Records read as jobs, and their maps: a machine that rolls along a row, with a receiver's lines between those of the machine.
+
+use geojson::{FeatureCollection, GeometryValue};
+use gps::job::{Did, Thing, What};
+use gps::plane::{Metres, Place, Plane};
+use gps::summary::{Stand, Summary};
+use gps::{Job, Wanted, map, picture};
+use link::Class;
+use link::log::{Entry, Kind};
+use proptest::prelude::*;
+
+/// Ticks in a millimetre.
+const TICKS_A_MM: f64 = 2.0;
+
+/// The machine rolls so fast, in mm/s.
+const SPEED: f64 = 500.0;
+
+/// Where the antenna is when the machine sets off, near the 180th meridian.
+const FROM: Place = Place { latitude: -16.8, longitude: 179.999_9 };
+
+fn sentence(text: &str) -> String {
+    format!("${text}*{:02X}", text.bytes().fold(0, |sum, byte| sum ^ byte))
+}
+
+fn gga(time_ms: u64, place: Place) -> String {
+    let angle = |degrees: f64| (degrees.abs().floor(), degrees.abs().fract() * 60.0);
+    let ((south, minutes), (east, east_minutes)) = (angle(place.latitude), angle(place.longitude));
+    let side = if place.longitude < 0.0 { "W" } else { "E" };
+    let (second, part) = (time_ms / 1000, time_ms % 1000);
+    let time = format!("12{:02}{:02}.{part:03}", second / 60, second % 60);
+    let place = format!("{south:02}{minutes:010.7},S,{east:03}{east_minutes:010.7},{side}");
+    sentence(&format!("GPGGA,{time},{place},4,12,0.7,10.0,M,0.0,M,,"))
+}
+
+/// A record of a machine that rolls 30 m to the east, at work from 5 m on to 25 m, with a plant every half metre. What the receiver
+/// says each second may be changed, and is told from 2 s on.
+fn record(change: impl Fn(u64, String) -> Vec<(Kind, String)>) -> Vec<Entry> {
+    let plane = Plane::around(FROM);
+    let mut lines = vec![
+        (0, Kind::Antenna, "beam_ahead_mm=1000 beam_right_mm=0 delay_ms=0".to_owned()),
+        (0, Kind::Connected, "0.2.0".to_owned()),
+        (0, Kind::Setting, "ticks_per_m=2000".to_owned()),
+        (0, Kind::Setting, "margin_mm=50".to_owned()),
+        (0, Kind::Setting, "beam_to_tool_mm=400".to_owned()),
+    ];
+    for tenth in 0..=600_u64 {
+        let (time_ms, way_mm) = (100 * tenth, SPEED * tenth as f64 / 10.0);
+        let is_at_work = (5000.0..25_000.0).contains(&way_mm);
+        // The tool is out over the first 200 of each 500 mm.
+        let is_out = !is_at_work || way_mm % 500.0 < 200.0;
+        let (mode, tool) = (if is_at_work { "work" } else { "hold" }, if is_out { "out" } else { "in" });
+        if tenth.is_multiple_of(10) && tenth >= 20 {
+            let place = plane.place(Metres { east: way_mm / 1000.0, north: 0.0 });
+            lines.extend(change(tenth / 10, gga(time_ms, place)).into_iter().map(|(kind, line)| (time_ms, kind, line)));
+        }
+        let position = (TICKS_A_MM * way_mm) as i64;
+        if is_at_work && (way_mm % 500.0 == 200.0 || way_mm % 500.0 == 0.0) {
+            lines.push((time_ms, Kind::Event, format!("swing tool={tool} pos={position}")));
+        }
+        let status = format!("state={mode} tool={tool} pos={position} speed_mm_s=500 windows=0 unseen_mm=0");
+        lines.push((time_ms, Kind::Status, status));
+        if is_at_work && way_mm % 500.0 == 250.0 {
+            // The canopy is 100 mm wide, and ended here; the hold has both margins.
+            let leading = position - 200;
+            let plant = format!("plant pos={leading} votes=3 spacing=1000 delay=600 hold=400 actuation=1000");
+            lines.push((time_ms + 1, Kind::Event, plant));
+        }
+    }
+    let entry = |(at, (time_ms, kind, text))| Entry { number: at as u64 + 2, time_ms, kind, text };
+    lines.into_iter().enumerate().map(entry).collect()
+}
+
+fn whole() -> Vec<Entry> {
+    record(|_, line| vec![(Kind::Gps, line)])
+}
+
+/// Puts these lines into the middle of a record, told at one moment.
+fn insert(log: &mut Vec<Entry>, lines: Vec<(Kind, &str)>) {
+    let middle = log.len() / 2;
+    let time_ms = log[middle].time_ms;
+    let entry = |(kind, text): (Kind, &str)| Entry { number: 99_999, time_ms, kind, text: text.to_owned() };
+    let entries: Vec<Entry> = lines.into_iter().map(entry).collect();
+    log.splice(middle..middle, entries);
+}
+
+fn is_object(thing: &&Thing) -> bool {
+    matches!(thing.what, What::Object { .. })
+}
+
+/// Plants, and the swings between.
+const PLANTS: usize = 40;
+const SWINGS: usize = 80;
+
+#[test]
+fn a_plant_is_the_middle_of_its_canopy_and_stands_where_the_beam_was() {
+    let job = Job::read(&whole(), &Wanted::default());
+    let plane = Plane::around(FROM);
+    let plants: Vec<_> = job.things().filter(is_object).collect();
+    assert_eq!(plants.len(), PLANTS);
+    for (number, plant) in plants.iter().enumerate() {
+        // The leading edge was 100 mm before, the middle is 50 mm behind that, and the beam a metre ahead of the antenna.
+        let way_m = 5.2 + 0.5 * number as f64;
+        assert!((plant.way_m - way_m).abs() < 1e-9 && plant.width_mm == 100.0, "{plant:?}");
+        let at = plane.metres(plant.found.expect("it has a place").place);
+        assert!((at.east - way_m - 1.0).abs() < 1e-3 && at.north.abs() < 1e-3, "{at:?}");
+    }
+}
+
+#[test]
+fn a_summary_counts_the_stand_and_the_ground() {
+    let mut log = whole();
+    let stand = Stand { row_spacing_mm: 500.0, spacing_mm: None };
+    let summary = Summary::of(&Job::read(&log, &Wanted::default()), &stand);
+    assert_eq!((summary.plants, summary.missing, summary.swings), (PLANTS as u64, 0, 40));
+    assert!((summary.worked_m - 20.0).abs() < 1e-6 && (summary.weeded_m - 12.0).abs() < 0.1, "{summary:?}");
+    assert!((summary.area_ha - 0.001).abs() < 1e-9 && (summary.work_h - 40.0 / 3600.0).abs() < 1e-4, "{summary:?}");
+    assert_eq!(summary.spacing_mean_mm.map(f64::round), Some(500.0));
+    // Three have not come up, two of them side by side.
+    let plants: Vec<u64> =
+        log.iter().filter(|entry| entry.text.starts_with("plant")).map(|entry| entry.number).collect();
+    log.retain(|entry| ![plants[7], plants[20], plants[21]].contains(&entry.number));
+    let summary = Summary::of(&Job::read(&log, &Wanted::default()), &stand);
+    assert_eq!((summary.plants, summary.missing), (37, 3));
+    assert_eq!(summary.spacing_mean_mm.map(f64::round), Some(500.0), "without the gaps");
+}
+
+#[test]
+fn the_map_is_one_collection_with_a_geometry_or_the_reason_why_there_is_none() {
+    // Without a fix from 20 to 30 s, 5 m, and none at the end.
+    let lost = |second: u64, line: String| {
+        if (20..30).contains(&second) || second > 45 { vec![] } else { vec![(Kind::Gps, line)] }
+    };
+    let job = Job::read(&record(lost), &Wanted::default());
+    let text = map::features(&[("field.csv", &job)]).to_string();
+    let map: FeatureCollection = text.parse().expect("it is GeoJSON");
+    let of_kind = |kind: &str| -> Vec<_> {
+        map.features.iter().filter(|feature| feature.property("kind").is_some_and(|it| it == kind)).collect()
+    };
+    let plants = of_kind("plant");
+    let placed = |how: &str| plants.iter().filter(|plant| plant.property("place").is_some_and(|it| it == how)).count();
+    // The last fix is at 22.5 m.
+    assert_eq!((plants.len(), placed("none")), (PLANTS, 5));
+    assert!((10..=12).contains(&placed("interpolated")), "{}", placed("interpolated"));
+    for plant in plants {
+        let why = plant.property("why").is_some_and(|why| why == "no fix behind it");
+        assert_eq!((plant.geometry.is_none(), plant.contains_property("error_m")), (why, !why));
+        assert!(plant.property("record").is_some_and(|record| record == "field.csv"));
+    }
+    // None of the lines crosses the 180th meridian: RFC 7946 has them cut there.
+    let (mut ends, mut length) = ([0, 0], 0.0);
+    for feature in of_kind("weeded").into_iter().chain(of_kind("not_weeded")) {
+        length += feature.property("length_m").and_then(serde_json::Value::as_f64).expect("a number");
+        let parts = match feature.geometry.as_ref().map(|geometry| &geometry.value) {
+            Some(GeometryValue::LineString { coordinates }) => vec![coordinates.clone()],
+            Some(GeometryValue::MultiLineString { coordinates }) => coordinates.clone(),
+            None => Vec::new(),
+            other => panic!("{other:?}"),
+        };
+        for part in parts {
+            assert!(part.len() > 1 && part.windows(2).all(|two| (two[0][0] - two[1][0]).abs() < 1.0), "{part:?}");
+            ends[0] += part.iter().filter(|place| place[0] == 180.0).count();
+            ends[1] += part.iter().filter(|place| place[0] == -180.0).count();
+        }
+    }
+    assert!((length - 20.0).abs() < 0.01, "{length}");
+    assert_eq!(ends, [1, 1]);
+}
+
+#[test]
+fn the_drawing_has_a_circle_for_each_plant_and_none_without_a_place() {
+    let job = Job::read(&whole(), &Wanted::default());
+    let drawn = picture::draw(&[&job]).expect("it has places").to_string();
+    assert_eq!(drawn.matches("<circle").count(), PLANTS);
+    assert!(drawn.contains("5 m, north is up"), "{drawn}");
+    assert!(picture::draw(&[&Job::read(&record(|_, _| vec![]), &Wanted::default())]).is_none());
+}
+
+#[test]
+fn a_log_that_was_opened_again_and_an_uno_that_was_reset_begin_the_way_anew() {
+    let job = Job::read(&[whole(), whole()].concat(), &Wanted::default());
+    assert_eq!(job.things().filter(|thing| thing.found.is_ok()).count(), 2 * (PLANTS + SWINGS));
+    assert_eq!(job.stretches.len(), 2);
+    let mut log = whole();
+    let reset = vec![
+        (Kind::Lost, "the Uno was reset"),
+        (Kind::Connected, "0.2.0"),
+        (Kind::Setting, "ticks_per_m=2000"),
+        (Kind::Setting, "margin_mm=50"),
+    ];
+    insert(&mut log, reset);
+    let job = Job::read(&log, &Wanted::default());
+    assert_eq!((job.stretches.len(), job.things().count()), (2, PLANTS + SWINGS));
+    // What was between the last fix before it and the first behind it has no place.
+    let missing = job.things().filter(|thing| thing.found.is_err()).count();
+    assert!((1..=8).contains(&missing), "{missing}");
+}
+
+#[test]
+fn a_wheel_that_is_set_anew_begins_a_stretch_of_its_own() {
+    let mut log = whole();
+    let set = vec![
+        (Kind::Command, "set ticks_per_m 1000"),
+        (Kind::Command, "label plant"),
+        (Kind::Answer, "ok"),
+        (Kind::Event, "swing tool=out pos=30100"),
+        (Kind::Answer, "error: there is no object to label"),
+    ];
+    insert(&mut log, set);
+    let job = Job::read(&log, &Wanted::default());
+    assert_eq!(job.things().count(), PLANTS + SWINGS + 1, "nothing told is left out");
+    let [one, other] = job.stretches.as_slice() else { panic!("{}", job.stretches.len()) };
+    let spacing_m = |things: &[Thing]| {
+        let plants: Vec<f64> = things.iter().filter(is_object).map(|plant| plant.way_m).collect();
+        plants[2] - plants[1]
+    };
+    assert!((spacing_m(&one.things) - 0.5).abs() < 1e-9 && (spacing_m(&other.things) - 1.0).abs() < 1e-9);
+}
+
+#[test]
+fn ground_that_is_rolled_over_again_counts_once() {
+    let status = |time_ms, way_mm: i64| {
+        let text = format!("state=work tool=in pos={} speed_mm_s=0 windows=0 unseen_mm=0", 2 * way_mm);
+        Entry { number: 1, time_ms, kind: Kind::Status, text }
+    };
+    let entry = |kind, text: &str| Entry { number: 1, time_ms: 0, kind, text: text.to_owned() };
+    let mut log = vec![entry(Kind::Connected, "0.2.0"), entry(Kind::Setting, "ticks_per_m=2000")];
+    let ways_mm = [0, 500, 1000, 500, 200, 700, 1200];
+    log.extend(ways_mm.into_iter().enumerate().map(|(at, way_mm)| status(100 * at as u64, way_mm)));
+    let job = Job::read(&log, &Wanted::default());
+    let weeded = job.stretches[0].ground.iter().filter(|ground| ground.did == Did::Weeded);
+    let length_m: f64 = weeded.map(|ground| ground.way_m.end - ground.way_m.start).sum();
+    assert!((length_m - 1.2).abs() < 1e-9, "{length_m}");
+}
+
+#[test]
+fn a_label_lies_where_the_last_object_does_and_a_refused_one_is_none() {
+    let mut log = whole();
+    let said = vec![
+        (Kind::Command, "label weed"),
+        (Kind::Command, "label plant"),
+        (Kind::Answer, "ok"),
+        (Kind::Answer, "error: there is no object to label"),
+    ];
+    insert(&mut log, said);
+    let job = Job::read(&log, &Wanted::default());
+    let things: Vec<_> = job.things().collect();
+    let at = things.iter().position(|thing| matches!(thing.what, What::Label(_))).expect("a label");
+    assert_eq!(things[at].what, What::Label(Class::Weed));
+    let object = things[..at].iter().rev().find(|thing| is_object(thing)).expect("an object");
+    assert_eq!((object.found, object.way_m), (things[at].found, things[at].way_m));
+    assert_eq!(things.iter().filter(|thing| matches!(thing.what, What::Label(_))).count(), 1);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 64, ..ProptestConfig::default() })]
+
+    #[test]
+    fn whatever_happens_to_the_receivers_lines_nothing_of_the_machine_is_lost(
+        hurt in prop::collection::vec((2..60_u64, 0..100_usize, any::<u8>(), 0..4_u8), 0..40),
+    ) {
+        let change = |second: u64, line: String| {
+            let mut line = line.into_bytes();
+            let mut kind = Kind::Gps;
+            for &(_, at, byte, how) in hurt.iter().filter(|(when, ..)| *when == second) {
+                let at = at % line.len().max(1);
+                match how {
+                    0 => line.truncate(at),
+                    1 => line.get_mut(at).into_iter().for_each(|it| *it = byte),
+                    2 => kind = Kind::GpsDamaged,
+                    _ => return vec![(Kind::GpsLost, "unplugged".to_owned())],
+                }
+            }
+            vec![(kind, String::from_utf8_lossy(&line).into_owned())]
+        };
+        let job = Job::read(&record(change), &Wanted::default());
+        prop_assert_eq!(job.things().count(), PLANTS + SWINGS);
+        let plane = Plane::around(FROM);
+        for thing in job.things() {
+            let Ok(found) = thing.found else { continue };
+            let ahead_m = if is_object(&thing) { 1.0 } else { 0.6 };
+            let at = plane.metres(found.place);
+            prop_assert!((at.east - thing.way_m - ahead_m).abs() < 2e-3 && at.north.abs() < 2e-3, "{:?}", thing);
+        }
+        prop_assert!(map::features(&[("a record", &job)]).features.len() >= PLANTS + SWINGS);
+    }
+}

@@ -1,0 +1,358 @@
+//! What any line of the console is: the greeting, an end of an answer, a line of an answer, or something told unasked.
+//!
+//! Keys and words behind those that are known here are passed over, so that a newer firmware may say more; a line that lacks
+//! one of its parts is [`ConsoleLine::Other`]. Nothing here knows which command a line answers. Where a setting's name, range and unit
+//! stand in the line, they are taken from there and not from this version's table.
+
+use super::{EventLine, Status};
+use control::ground::class::Class;
+use control::ground::features::COUNT;
+
+/// What a line says.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum ConsoleLine {
+    /// The first line after a reset.
+    Greeting {
+        /// The firmware's version.
+        version: String,
+        /// Why it started, in its word.
+        cause: String,
+    },
+    /// The answer to `version`.
+    Version(String),
+    /// The end of an answer: what was asked is done.
+    Done,
+    /// The end of an answer: what was wrong, and what would be right.
+    Refused(String),
+    /// The first line of the answer to `status`.
+    Status(Status),
+    /// A line of the answer to `get`, or the one to `calibrate MM`, which shows what was measured.
+    Setting(SettingValue),
+    /// A line of the answer to `help`.
+    Help {
+        /// A setting's or a command's name.
+        name: String,
+        /// What it is.
+        help: String,
+    },
+    /// A line of the answer to `examples`.
+    Example {
+        /// Whether it was taught, and is not a built-in one.
+        from_field: bool,
+        /// Its number, of its kind.
+        number: u16,
+        /// What it is an example of.
+        label: Class,
+        /// Its features, on the scale of the firmware's own examples.
+        features: [u8; COUNT],
+    },
+    /// What the machine tells by itself.
+    Event(EventLine),
+    /// Something else.
+    Other,
+}
+
+/// A setting as `get` shows it. A switched one is 0 or 1.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SettingValue {
+    /// Its name.
+    pub name: String,
+    /// Its value in use.
+    pub value: u16,
+    /// Its unit; empty for a count.
+    pub unit: String,
+    /// The least and the greatest value; none for a switched one.
+    pub range: Option<(u16, u16)>,
+    /// Its value on a new machine.
+    pub default: u16,
+    /// The saved value; none where none are saved.
+    pub saved: Option<u16>,
+}
+
+/// What the firmware's name begins with, in its greeting and its version.
+const NAME: &str = "weeder ";
+
+impl ConsoleLine {
+    /// Reads a line.
+    pub fn parse(line: &str) -> Self {
+        // Before all others, as it may stand behind the beginning of any of them.
+        if let Some(greeting) = greeting(line) {
+            return greeting;
+        }
+        if line == "ok" {
+            return Self::Done;
+        }
+        if let Some(error) = line.strip_prefix("error:") {
+            return Self::Refused(error.trim().to_owned());
+        }
+        let by_itself = || EventLine::parse(line).map(Self::Event);
+        let answer = || Status::parse(line).map(Self::Status);
+        let shown = || SettingValue::parse(line).map(Self::Setting);
+        by_itself()
+            .or_else(answer)
+            .or_else(|| version(line))
+            .or_else(|| example(line))
+            .or_else(shown)
+            .or_else(|| help(line))
+            .unwrap_or(Self::Other)
+    }
+}
+
+/// `weeder VERSION, reset by CAUSE`, behind whatever line the reset has cut.
+fn greeting(line: &str) -> Option<ConsoleLine> {
+    let (before, behind) = line.split_once(", reset by ")?;
+    let version = before.get(before.rfind(NAME)? + NAME.len()..)?;
+    let cause = behind.split(|character| !is_of_a_name(character)).next().filter(|cause| !cause.is_empty())?;
+    is_version(version).then(|| ConsoleLine::Greeting { version: version.to_owned(), cause: cause.to_owned() })
+}
+
+/// `weeder VERSION`, where a version may have its commit behind it.
+fn version(line: &str) -> Option<ConsoleLine> {
+    line.strip_prefix(NAME)
+        .filter(|version| is_version(version))
+        .map(|version| ConsoleLine::Version(version.to_owned()))
+}
+
+/// `field|built_in NUMBER LABEL FEATURES`.
+fn example(line: &str) -> Option<ConsoleLine> {
+    let mut words = line.split(' ');
+    let from_field = match words.next()? {
+        "field" => true,
+        "built_in" => false,
+        _ => return None,
+    };
+    let number = words.next()?.parse().ok()?;
+    let label = match words.next()? {
+        "plant" => Class::Plant,
+        "weed" => Class::Weed,
+        _ => return None,
+    };
+    let mut features = [0; COUNT];
+    for feature in &mut features {
+        *feature = words.next()?.parse().ok()?;
+    }
+    Some(ConsoleLine::Example { from_field, number, label, features })
+}
+
+/// `NAME and what it takes - what it is`.
+fn help(line: &str) -> Option<ConsoleLine> {
+    let (usage, help) = line.split_once(" - ")?;
+    let name = usage.split(' ').next().filter(|name| is_name(name))?;
+    (!usage.contains('=')).then(|| ConsoleLine::Help { name: name.to_owned(), help: help.to_owned() })
+}
+
+impl SettingValue {
+    /// `NAME=VALUE UNIT from LEAST to GREATEST, default VALUE, saved VALUE`. A count has no unit, a switched setting has `on or off`
+    /// in the range's place, and nothing stands behind the default where the saved value is the one in use.
+    fn parse(line: &str) -> Option<Self> {
+        let mut parts = line.split(", ");
+        let (name, rest) = parts.next()?.split_once('=')?;
+        let mut words = rest.split(' ');
+        let value = value(words.next()?)?;
+        let words: Vec<&str> = words.collect();
+        let (unit, range) = match words.as_slice() {
+            ["on", "or", "off"] => ("", None),
+            ["from", least, "to", greatest] => ("", Some((least, greatest))),
+            [unit, "from", least, "to", greatest] => (*unit, Some((least, greatest))),
+            _ => return None,
+        };
+        let range = match range {
+            Some((least, greatest)) => Some((least.parse().ok()?, greatest.parse().ok()?)),
+            None => None,
+        };
+        let default = self::value(parts.next()?.strip_prefix("default ")?)?;
+        let saved = match parts.next() {
+            None => Some(value),
+            Some("not saved") => None,
+            Some(saved) => Some(self::value(saved.strip_prefix("saved ")?)?),
+        };
+        let is_shown = is_name(name) && parts.next().is_none();
+        is_shown.then(|| Self { name: name.to_owned(), value, unit: unit.to_owned(), range, default, saved })
+    }
+}
+
+fn value(word: &str) -> Option<u16> {
+    match word {
+        "on" => Some(1),
+        "off" => Some(0),
+        number => number.parse().ok(),
+    }
+}
+
+fn is_of_a_name(character: char) -> bool {
+    character.is_ascii_alphanumeric() || character == '_'
+}
+
+fn is_name(word: &str) -> bool {
+    !word.is_empty() && word.chars().all(is_of_a_name)
+}
+
+/// `NUMBER`, or `NUMBER (COMMIT)`.
+fn is_version(text: &str) -> bool {
+    let (number, commit) = text.split_once(' ').unwrap_or((text, "(0)"));
+    is_word(number) && commit.strip_prefix('(').and_then(|commit| commit.strip_suffix(')')).is_some_and(is_word)
+}
+
+fn is_word(text: &str) -> bool {
+    !text.is_empty() && !text.contains(' ')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Mode;
+    use crate::settings::{self, Setting};
+    use control::ground::{class::label, nearest::Nearest};
+    use control::measure::reset::Cause;
+    use control::memory::Volatile;
+    use control::say;
+    use control::say::command;
+    use control::say::line::Line;
+    use control::units::{Instant, Position};
+    use control::{
+        measure::readings::{Readings, Startup},
+        weeder::Controller,
+    };
+    use knn::Example;
+
+    #[test]
+    fn a_setting_is_read_with_its_range_and_what_is_saved() {
+        let wheel = |saved| SettingValue {
+            name: "wheel_mm".to_owned(),
+            value: 405,
+            unit: "mm".to_owned(),
+            range: Some((200, 800)),
+            default: 400,
+            saved,
+        };
+        let line = "wheel_mm=405 mm from 200 to 800, default 400";
+        for (rest, saved) in [("", Some(405)), (", not saved", None), (", saved 410", Some(410))] {
+            assert_eq!(ConsoleLine::parse(&format!("{line}{rest}")), ConsoleLine::Setting(wheel(saved)));
+        }
+        let switched = SettingValue {
+            name: "end_switch".to_owned(),
+            value: 0,
+            unit: String::new(),
+            range: None,
+            default: 0,
+            saved: Some(1),
+        };
+        assert_eq!(
+            ConsoleLine::parse("end_switch=off on or off, default off, saved on"),
+            ConsoleLine::Setting(switched)
+        );
+        let ConsoleLine::Setting(count) = ConsoleLine::parse("k=3 from 1 to 9, default 3") else {
+            panic!("no setting")
+        };
+        assert_eq!((count.unit.as_str(), count.range), ("", Some((1, 9))));
+    }
+
+    #[test]
+    fn the_firmware_says_its_name_by_itself_and_when_asked() {
+        let greeting = ConsoleLine::Greeting { version: "0.2.0".to_owned(), cause: "brown_out".to_owned() };
+        assert_eq!(
+            ConsoleLine::parse("weeder 0.2.0, reset by brown_out, state alarm 5-1 settings_lost, tool out"),
+            greeting
+        );
+        assert_eq!(ConsoleLine::parse("weeder 0.2.0"), ConsoleLine::Version("0.2.0".to_owned()));
+        assert_eq!(ConsoleLine::parse("weeder 0.2.0 (abc1234)"), ConsoleLine::Version("0.2.0 (abc1234)".to_owned()));
+        for foreign in ["weeder 0.2.0 abc1234", "weeder 0.2.0 ()", "weeder  (abc1234)", "weeder 0.2.0 (abc 1234)"] {
+            assert_eq!(ConsoleLine::parse(foreign), ConsoleLine::Other, "{foreign}");
+        }
+        let of_a_commit = ConsoleLine::Greeting { version: "0.2.0 (abc1234+)".to_owned(), cause: "button".to_owned() };
+        assert_eq!(ConsoleLine::parse("obj\u{fffd}weeder 0.2.0 (abc1234+), reset by button, state hold"), of_a_commit);
+        for cut in ["o", "status pos=123 to", "error: no such com", "state is=ho", "weeder 0.1"] {
+            let line = format!("{cut}weeder 0.2.0, reset by brown_out, state hold, tool out; help lists the commands");
+            assert_eq!(ConsoleLine::parse(&line), greeting, "{line}");
+        }
+    }
+
+    #[test]
+    fn lines_of_answers_are_told_apart() {
+        assert_eq!(ConsoleLine::parse("ok"), ConsoleLine::Done);
+        assert_eq!(ConsoleLine::parse("error: no such command"), ConsoleLine::Refused("no such command".to_owned()));
+        let taught =
+            ConsoleLine::Example { from_field: true, number: 7, label: Class::Weed, features: [1, 2, 3, 4, 5] };
+        assert_eq!(ConsoleLine::parse("field 7 weed 1 2 3 4 5"), taught);
+        let help = ConsoleLine::Help { name: "get".to_owned(), help: "shows settings".to_owned() };
+        assert_eq!(ConsoleLine::parse("get [name] - shows settings"), help);
+        let status = "state=work tool=in pos=1 speed_mm_s=2 windows=1 unseen_mm=0";
+        assert!(matches!(ConsoleLine::parse(status), ConsoleLine::Status(Status { mode: Mode::Work, .. })));
+        assert!(matches!(
+            ConsoleLine::parse("swing tool=in pos=3"),
+            ConsoleLine::Event(EventLine::Swing { out: false, position: 3 })
+        ));
+        for line in [
+            "",
+            "okay",
+            "weeder",
+            "weeder ",
+            "weeder 1, reset by ",
+            "field 7 grass 1 2 3 4 5",
+            "field 7 weed 1 2 3 4",
+            "field 7 weed 1 2 3 4 256",
+            "field x weed 1",
+            "k=3",
+        ] {
+            assert_eq!(ConsoleLine::parse(line), ConsoleLine::Other, "{line:?}");
+        }
+    }
+
+    /// All lines of the firmware's answer to a command.
+    fn answer(command: &str) -> Vec<ConsoleLine> {
+        let startup = Startup {
+            readings: Readings::new(Instant::new(0), Position::new(0)),
+            beam_broken: false,
+            cause: Cause::Unknown,
+        };
+        let examples = [Example::new([1, 2, 3, 4, 5], label::PLANT), Example::new([9, 8, 7, 6, 5], label::WEED)];
+        let mut controller = Controller::new(Nearest::new(&examples[..], Volatile::new()), Volatile::new(), startup);
+        let mut answer = say::execute(command::parse(command.as_bytes()), &mut controller);
+        let mut said = String::new();
+        while !answer.is_done() {
+            let mut line = Line::new();
+            answer.write_line(&controller, &mut line);
+            said.extend(line.map(char::from));
+        }
+        said.lines().map(ConsoleLine::parse).collect()
+    }
+
+    #[test]
+    fn every_line_of_the_firmwares_answers_is_read() {
+        let table = Setting::all().map(|setting| {
+            let description = setting.description();
+            ConsoleLine::Setting(SettingValue {
+                name: settings::name(setting),
+                value: description.default,
+                unit: settings::unit(setting),
+                range: (!setting.is_switched()).then_some((description.least, description.greatest)),
+                default: description.default,
+                saved: None,
+            })
+        });
+        assert_eq!(answer("get"), table.chain([ConsoleLine::Done]).collect::<Vec<_>>());
+        assert!(matches!(answer("version").as_slice(), [ConsoleLine::Version(_), ConsoleLine::Done]));
+        assert!(matches!(answer("status").as_slice(), [ConsoleLine::Status(_), ConsoleLine::Other, ConsoleLine::Done]));
+        assert!(matches!(answer("nothing").as_slice(), [ConsoleLine::Refused(_)]));
+        let examples = answer("examples");
+        let [
+            ConsoleLine::Example { from_field: false, .. },
+            ConsoleLine::Example { label: Class::Weed, .. },
+            rest @ ..,
+        ] = examples.as_slice()
+        else {
+            panic!("{examples:?}")
+        };
+        assert_eq!(rest.last(), Some(&ConsoleLine::Done));
+        let help = answer("help");
+        assert!(
+            help.len() > 15 && help[..help.len() - 1].iter().all(|said| matches!(said, ConsoleLine::Help { .. })),
+            "{help:?}"
+        );
+        for setting in Setting::all() {
+            let (name, help) = (settings::name(setting), settings::help(setting));
+            let said = answer(&format!("help {name}"));
+            assert!(said.contains(&ConsoleLine::Help { name, help }), "{said:?}");
+        }
+    }
+}

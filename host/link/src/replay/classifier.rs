@@ -1,0 +1,142 @@
+//! The classifier of a replay, which knows what the log tells of a detection and what it cannot.
+//!
+//! A detection's class rests on its width, on its distance from the plant before, and on the class of the machine's speed when it was
+//! classified. The first two stand in the log's line. The speed does not: the log has it only ten times a second, and near the edge
+//! between two speed classes it may have been in either. So a detection is classified in every speed class that the machine may have
+//! been in, and the log's vote stands where one of them gives it.
+
+use control::ground::features::{self, Features};
+use control::ground::{
+    class::{Class, Classifier, ExamplesFull, Listed, Vote},
+    nearest::Nearest,
+};
+use control::memory::Volatile;
+use knn::Example;
+use std::cell::{Cell, RefCell};
+use std::collections::VecDeque;
+use std::rc::Rc;
+
+/// By how much the machine's own measure of its speed may differ from what the log has around it, in mm/s.
+const SPEED_SLACK_MM_S: i32 = 25;
+
+/// Objects that a label may still mean, as many as the firmware remembers.
+const OBJECTS: usize = 16;
+
+/// What the log tells of the detection in the beam.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Seen {
+    /// What the machine took it for.
+    pub(super) vote: Vote,
+    /// Distance from the leading edge of the plant before, in mm.
+    pub(super) spacing_mm: i16,
+    /// Its width in mm.
+    pub(super) width_mm: i16,
+    /// Whether the log has to be believed, because what the vote rests on came before it began.
+    pub(super) is_given: bool,
+}
+
+/// What the classifier has to know of the log.
+#[derive(Debug, Default)]
+pub(super) struct Witness {
+    /// The detection that was in the beam last.
+    pub(super) seen: Cell<Option<Seen>>,
+    /// The machine's slowest and fastest speed about here, in mm/s.
+    pub(super) speeds_mm_s: Cell<(i32, i32)>,
+}
+
+impl Witness {
+    /// The speed classes that the machine may have been in.
+    fn speed_classes(&self) -> impl Iterator<Item = i16> {
+        let class = |speed: i32| features::speed_class(speed.clamp(i16::MIN.into(), i16::MAX.into()) as i16);
+        let (slowest, fastest) = self.speeds_mm_s.get();
+        let slowest = class(slowest.saturating_sub(SPEED_SLACK_MM_S));
+        let fastest = class(fastest.saturating_add(SPEED_SLACK_MM_S));
+        features::SPEED_CLASSES_MM_S.into_iter().filter(move |class| (slowest..=fastest).contains(class))
+    }
+}
+
+/// The firmware's classifier, asked with what the log tells.
+pub(super) struct ReplayClassifier<'a> {
+    /// The built-in examples alone, which a label may not contradict.
+    built_in: Nearest<&'a [Example<{ features::COUNT }>], Volatile>,
+    nearest: Nearest<&'a [Example<{ features::COUNT }>], Volatile>,
+    witness: Rc<Witness>,
+    /// The last detections: as the replay describes them, and as the machine did.
+    described: RefCell<VecDeque<(Features, Features)>>,
+}
+
+impl<'a> ReplayClassifier<'a> {
+    /// A classifier with a log's examples, of which so many are built in: the first.
+    pub(super) fn new(examples: &'a [Example<{ features::COUNT }>], built_in: usize, witness: Rc<Witness>) -> Self {
+        let nearest = |examples| Nearest::new(examples, Volatile::new());
+        let (built_in, all) = (nearest(&examples[..built_in]), nearest(examples));
+        Self { built_in, nearest: all, witness, described: RefCell::default() }
+    }
+
+    /// What the machine took for the features of a detection that the replay describes like this.
+    fn by_machine(&self, features: &Features) -> Features {
+        let described = self.described.borrow();
+        described.iter().find(|(by_replay, _)| by_replay == features).map_or(*features, |&(_, by_machine)| by_machine)
+    }
+}
+
+impl Classifier for ReplayClassifier<'_> {
+    fn init(&mut self) {}
+
+    fn classify(&self, features: &Features, k: u8) -> Vote {
+        let Some(seen) = self.witness.seen.get() else { return self.nearest.classify(features, k) };
+        let describe = |class| Features::describe(class, seen.spacing_mm, seen.width_mm);
+        let as_logged =
+            self.witness.speed_classes().map(describe).find(|features| self.nearest.classify(features, k) == seen.vote);
+        let by_machine = as_logged.unwrap_or_else(|| describe(features.speed_mm_s));
+        let mut described = self.described.borrow_mut();
+        described.truncate(OBJECTS - 1);
+        described.push_front((*features, by_machine));
+        if seen.is_given { seen.vote } else { self.nearest.classify(&by_machine, k) }
+    }
+
+    fn built_in_class(&mut self, features: &Features) -> Class {
+        self.built_in.built_in_class(&self.by_machine(features))
+    }
+
+    fn teach(&mut self, features: &Features, label: u8) -> Result<(), ExamplesFull> {
+        self.nearest.teach(&self.by_machine(features), label)
+    }
+
+    fn keep(&mut self, example: Example<{ features::COUNT }>) -> Result<(), ExamplesFull> {
+        self.nearest.keep(example)
+    }
+
+    fn forget(&mut self, number: u8) -> bool {
+        self.nearest.forget(number)
+    }
+
+    fn listed(&self, place: u8) -> Option<(Listed, u8)> {
+        self.nearest.listed(place)
+    }
+
+    fn spoiled(&self) -> u8 {
+        self.nearest.spoiled()
+    }
+
+    fn carry_on(&mut self) -> bool {
+        self.nearest.carry_on()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use control::ground::class::label;
+    use control::ground::examples::EXAMPLES;
+
+    #[test]
+    fn a_label_is_refused_by_the_built_in_examples_alone() {
+        let plant = Features::describe(556, 500, 150);
+        let taught = Example::new(control::ground::examples::scale().quantise(&plant.values()), label::WEED);
+        let examples = [&EXAMPLES[..], &[taught; 5]].concat();
+        let mut classifier = ReplayClassifier::new(&examples, EXAMPLES.len(), Rc::new(Witness::default()));
+        assert_eq!(classifier.classify(&plant, 3).class, Class::Weed, "the field has taught it so");
+        assert_eq!(classifier.built_in_class(&plant), Class::Plant);
+    }
+}

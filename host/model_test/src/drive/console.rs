@@ -1,0 +1,132 @@
+//! The lines that are typed into the machine: each is answered once, and what it changes is remembered for the checks.
+//!
+//! What an answer says is not checked here, but that it ends.
+
+use super::{Drive, is_alarm, scale};
+use crate::machine::{Attended, Checked, Machine};
+use control::{operate::state::State, settings::Setting};
+use proptest::prelude::*;
+
+/// Turns in which every line is answered, whatever is still to be written to the EEPROM.
+const PATIENCE: u32 = 20_000;
+
+/// A short line is carried out and answered within this.
+const ANSWERED_S: f64 = 0.05;
+
+impl<M: Machine> Drive<M> {
+    /// Types a line, or several, and waits until each of them has been answered: once.
+    pub(super) fn say(&mut self, text: &str) -> Checked {
+        if !M::IS_OPEN && text.contains("start now") {
+            // How much the operator is to vouch for.
+            self.say("status")?;
+        }
+        let lines = self.type_in(text);
+        let mut ends = 0;
+        for _ in 0..PATIENCE {
+            if self.machine.is_done() {
+                prop_assert_eq!(ends, lines.len(), "ends of answers to {:?}", lines);
+                return Ok(());
+            }
+            self.turn()?;
+            ends += self.written.iter().filter(|line| is_end(line)).count();
+        }
+        prop_assert!(false, "{text:?} is not answered");
+        Ok(())
+    }
+
+    /// Types a line, or several; those that are to be answered.
+    pub(super) fn type_in(&mut self, text: &str) -> Vec<String> {
+        self.disturb();
+        let lines = text.split(['\r', '\n']).map(str::trim).filter(|line| !line.is_empty());
+        let lines: Vec<String> = lines.map(str::to_owned).collect();
+        self.machine.put(text, &lines);
+        lines
+    }
+
+    /// The console's part of a turn.
+    pub(super) fn attend_to_the_console(&mut self) -> Checked {
+        let (before, unseen_mm) = (self.machine.state(), self.machine.unseen_mm());
+        let Attended { begun, written } = self.machine.attend()?;
+        if let Some(line) = begun {
+            self.begin(&line, before);
+            if M::IS_OPEN {
+                self.check_begun(&line, before)?;
+                if self.machine.state() == State::Work {
+                    self.trust(&line, unseen_mm);
+                }
+            }
+            self.current = line;
+        }
+        if self.scale != scale(self.machine.settings()) {
+            self.scale = scale(self.machine.settings());
+            self.model.begin_anew(self.here());
+        }
+        for end in written.iter().filter(|line| is_end(line)) {
+            self.end(end, unseen_mm);
+        }
+        written.iter().try_for_each(|line| self.check_guarded(line))?;
+        self.written = written;
+        Ok(())
+    }
+
+    /// A line is carried out, now or soon.
+    fn begin(&mut self, line: &str, before: State) {
+        let words = words(line);
+        self.is_tried |= matches!(words[0], "servo" | "calibrate" | "test");
+        if M::IS_OPEN {
+            self.is_tried &= self.machine.state() == State::Hold && !matches!(words[..], ["hold"] | ["servo", "out"]);
+        }
+        self.saving = (words == ["save"]).then(|| self.machine.settings().clone());
+        if self.saving.is_some() {
+            self.leads_in_doubt = self.machine.settings_are_in_doubt();
+        }
+        if self.machine.state() != before {
+            self.disturb();
+        }
+    }
+
+    fn check_begun(&self, line: &str, before: State) -> Checked {
+        let (words, after) = (words(line), self.machine.state());
+        prop_assert!(after == before || after != State::Work || words[0] == "start", "{line:?} had it work");
+        prop_assert!(after == before || !is_alarm(before) || words == ["clear"], "{line:?} cleared an alarm");
+        Ok(())
+    }
+
+    /// The line that was begun has been answered.
+    fn end(&mut self, end: &str, unseen_mm: i16) {
+        let (line, is_ok) = (std::mem::take(&mut self.current), end == "ok");
+        if let Some(saving) = self.saving.take()
+            && is_ok
+        {
+            self.saved = Some(saving);
+        }
+        let words = words(&line);
+        if matches!(words.first(), Some(&("label" | "teach" | "forget"))) {
+            self.taught = self.machine.examples();
+        }
+        if !M::IS_OPEN && is_ok {
+            self.is_tried &= !matches!(words[..], ["hold"] | ["servo", "out"] | ["start", ..]);
+            self.trust(&line, unseen_mm);
+        }
+    }
+
+    /// The operator's word, if the line is it, for the ground that the machine has not seen by so much.
+    fn trust(&mut self, line: &str, unseen_mm: i16) {
+        if words(line) == ["start", "now"] && unseen_mm > 0 {
+            let tool = self.here() - self.ticks(Setting::BeamToToolMm);
+            let unseen = f64::from(unseen_mm + 1) * f64::from(self.machine.settings().wheel().ticks(1000).0) / 1000.0;
+            // What the machine has rolled on since it was told.
+            let late = if M::IS_OPEN { 0 } else { (self.speed.abs() * ANSWERED_S) as i64 };
+            self.model.trust(tool - self.ticks(Setting::MarginMm) - late, tool + unseen as i64);
+        }
+    }
+}
+
+fn words(line: &str) -> Vec<&str> {
+    line.split([' ', '\t']).filter(|word| !word.is_empty()).collect()
+}
+
+/// Whether a line is the last one of an answer.
+pub fn is_end(line: &str) -> bool {
+    line == "ok" || line.starts_with("error: ")
+}

@@ -1,0 +1,96 @@
+//! Random runs of a weeder on a row, judged by a model of the ground that is slow and obvious.
+//!
+//! [`run`] says what happens, [`drive`] has it happen to a [`Machine`](machine::Machine) and checks it after each turn, [`model`]
+//! knows what the beam has shown. [`go_all`] goes many runs and shrinks one that fails to a few steps, printed as what a
+//! person would type and roll. The machine is the decisions alone (`control/tests/against_the_model/`) or the firmware in the
+//! virtual Uno (`tests/end_to_end/random_walks.rs`). What is held is the same for both, as far as it can be seen from outside.
+//!
+//! The runs are the same each time, so that a change is judged by them and not by luck. `WEEDER_SEED` gives others, and
+//! `WEEDER_CASES` as many as asked for. [`is_thorough`] and [`cases`] are for every test that takes its time.
+
+pub mod drive;
+pub mod machine;
+pub mod model;
+pub mod run;
+mod speeds;
+
+use machine::Checked;
+use proptest::{
+    strategy::{BoxedStrategy, Strategy, ValueTree},
+    test_runner::{Config, RngSeed, TestError, TestRunner},
+};
+use rayon::prelude::*;
+use run::Run;
+use std::env;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// How many runs are gone, and how they are shrunk.
+#[derive(Clone, Copy, Debug)]
+pub struct Extent {
+    /// How many runs, by [`cases`], unless the environment says another number.
+    pub runs: u32,
+    /// At least so many turns are to be checked in all of them, so that they have not become idle.
+    pub least_turns: u64,
+    /// At most so many shorter runs are tried where one fails.
+    pub shrinkings: u32,
+}
+
+/// Goes runs in parallel, each by `go`, which returns how many turns were checked.
+///
+/// # Panics
+/// With the first run that fails, shrunk; where too few turns were checked; and where the environment's numbers are none.
+pub fn go_all(extent: Extent, runs: &BoxedStrategy<Run>, go: impl Fn(&Run) -> Result<u64, Failure> + Sync) {
+    let asked = number("WEEDER_CASES");
+    let number_of_runs = asked.unwrap_or(cases(extent.runs.into()));
+    let seed = RngSeed::Fixed(number("WEEDER_SEED").unwrap_or(1));
+    let config =
+        Config { failure_persistence: None, max_shrink_iters: extent.shrinkings, rng_seed: seed, ..Config::default() };
+    let mut runner = TestRunner::new(config);
+    let turns = AtomicU64::new(0);
+    let check = |run: &Run| -> Checked {
+        turns.fetch_add(go(run)?, Ordering::Relaxed);
+        Ok(())
+    };
+    let mut left = number_of_runs;
+    while left > 0 {
+        // A run is shrunk by what it was drawn from, which stays in this thread.
+        let trees: Vec<_> = (0..left.min(BATCH))
+            .map(|_| runs.new_tree(&mut runner).unwrap_or_else(|reason| panic!("no run can be drawn: {reason}")))
+            .collect();
+        left -= trees.len() as u64;
+        let drawn: Vec<Run> = trees.iter().map(ValueTree::current).collect();
+        let failed = drawn.par_iter().enumerate().find_map_first(|(place, run)| Some((place, check(run).err()?)));
+        let Some((place, reason)) = failed else { continue };
+        let Some(tree) = trees.into_iter().nth(place) else { continue };
+        println!("{reason}\n{:?}It is being shrunk.", drawn[place]);
+        match runner.run_one(tree, |run| check(&run)) {
+            Err(TestError::Fail(reason, run)) => panic!("{reason}\n{run:?}"),
+            Err(TestError::Abort(reason)) => panic!("{reason}"),
+            Ok(_) => panic!("a run fails, and when it is gone again it does not:\n{:?}", drawn[place]),
+        }
+    }
+    let turns = turns.into_inner();
+    println!("{number_of_runs} runs, {turns} turns");
+    assert!(asked.is_some() || turns >= cases(extent.least_turns), "{turns} turns");
+}
+
+/// Whether tests are to try all that they can: where the environment has `WEEDER_THOROUGH`, as in the gate. Else somebody waits for them.
+pub fn is_thorough() -> bool {
+    env::var_os("WEEDER_THOROUGH").is_some()
+}
+
+/// How many of so many cases a test tries: all of them, or a fifth where somebody waits.
+pub fn cases(all: u64) -> u64 {
+    if is_thorough() { all } else { all.div_ceil(5) }
+}
+
+/// Runs that are drawn before they are gone.
+const BATCH: u64 = 64;
+
+pub use proptest::test_runner::TestCaseError as Failure;
+
+/// What an environment variable says, if it is there.
+fn number(name: &str) -> Option<u64> {
+    let text = env::var(name).ok()?;
+    Some(text.parse().unwrap_or_else(|_| panic!("{name}={text} is not a whole number")))
+}

@@ -1,0 +1,381 @@
+//! What the beam has shown of the ground, in the plainest form: whole numbers that never wrap, and a memory that never forgets.
+//!
+//! The ground is counted in the encoder's ticks. For each of them that the beam has come to, the model knows whether the
+//! beam was broken there when it first came, and two things only open such ground to the tool again: that it was taken for a
+//! weed while it was whole, and the operator's word. `start now` is that word. It counts for the ground of which `status` says
+//! that the machine does not know it, never seen or seen and forgotten, and for no other. An alarm opens nothing.
+//!
+//! With a stem's zone set, the tool may work under either end of what was seen in one: by what is beyond the zone, but by no more than
+//! a fifth of that, and by what a second beam may have that end elsewhere.
+//!
+//! What the machine says that it guards is as closed as a canopy from then on, whoever may stand there.
+//!
+//! Where the encoder's count goes wrong, the row is shifted under it by what was lost or made up: the model then still holds
+//! what the beam has shown at each count, which is all that the machine can know.
+
+/// Ground over which the beam was broken without a break.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Stretch {
+    /// The first place at which the beam was broken.
+    pub leading: i64,
+    /// The last.
+    pub trailing: i64,
+    /// How far off the machine may have it: by what its sensor's answer takes, as it is set.
+    blur: i64,
+    /// How far its margin goes at the most: the operator's word ends it.
+    margin_to: i64,
+    /// Whether the tool may work here: it was taken for a weed, or the operator has said so.
+    is_free: bool,
+}
+
+/// The ground as the beam has shown it.
+#[derive(Debug)]
+pub struct Model {
+    /// All behind this place is unknown.
+    known_from: i64,
+    /// The first place that was looked at.
+    begin: i64,
+    /// The farthest place that the beam has come to.
+    frontier: i64,
+    /// Whether the beam is broken where it is, and whether the last stretch goes on at the frontier.
+    broken: bool,
+    is_growing: bool,
+    /// In the order in which they lie.
+    stretches: Vec<Stretch>,
+    /// Ground where a plant was due and none was seen, in the order in which it was told.
+    guarded: Vec<Stretch>,
+    /// Gaps that belong to a canopy, each with the frontier from which on it was set.
+    merge_gaps: Vec<(i64, i64)>,
+    /// Zones round a stem, each with the frontier from which on it was set; and how far a second beam moves the end of one.
+    stem_zones: Vec<(i64, i64)>,
+    moved: i64,
+    /// A detection no longer than this may have been taken for a weed, and nobody has said so.
+    narrow: i64,
+    /// What every place may be off by: the steps in which the machine remembers the ground, and the turn of the loop.
+    slack: i64,
+    /// As much of it as the grain of that memory, and the turn, make.
+    grain_slack: i64,
+    /// Whether the encoder's count has gone wrong.
+    pub is_shifted: bool,
+    /// Whether the machine has been so near to the end of its memory that it may have begun anew, or not.
+    may_have_begun_anew: bool,
+}
+
+impl Model {
+    /// Nothing is known but the beam's level.
+    pub fn new(place: i64, broken: bool) -> Self {
+        let mut model = Self {
+            known_from: place,
+            begin: place,
+            frontier: place,
+            broken,
+            is_growing: false,
+            stretches: Vec::new(),
+            guarded: Vec::new(),
+            merge_gaps: Vec::new(),
+            stem_zones: Vec::new(),
+            moved: 0,
+            narrow: 0,
+            slack: 0,
+            grain_slack: 0,
+            is_shifted: false,
+            may_have_begun_anew: false,
+        };
+        model.touch(0);
+        model
+    }
+
+    /// The settings as of now, with the beam at a place: clear ground that belongs to a canopy, and a metre. Rolled back by more
+    /// than eight of them, the beam sees anew what it comes to; give or take five centimetres.
+    pub fn follow(&mut self, place: i64, merge_gap: i64, metre: i64) {
+        if self.frontier - place > 8 * metre - metre / 20 {
+            self.known_from = self.known_from.min(place);
+            self.may_have_begun_anew = true;
+        }
+        // The machine has done so by now, at eight metres as near as its turns let it.
+        if self.frontier - place > 8 * metre + metre / 64 {
+            self.begin_anew(self.frontier - 8 * metre);
+        }
+        let grain = 1 + metre / 2400;
+        let slack = 2 + 2 * grain;
+        self.slack += (slack - self.grain_slack).max(0);
+        self.grain_slack = self.grain_slack.max(slack);
+        if self.merge_gaps.last().is_none_or(|&(_, gap)| gap != merge_gap) {
+            self.merge_gaps.push((self.frontier, merge_gap));
+        }
+    }
+
+    /// The settings as of now: the zone round a stem, and how far a second beam stands behind the first.
+    pub fn keep_stems(&mut self, zone: i64, second_beam: i64) {
+        if self.stem_zones.last().map_or(0, |&(_, last)| last) != zone {
+            self.stem_zones.push((self.frontier, zone));
+        }
+        self.moved = self.moved.max(second_beam / 16);
+    }
+
+    /// Whether any zone has been set.
+    pub fn keeps_stems(&self) -> bool {
+        !self.stem_zones.is_empty()
+    }
+
+    /// Whether what the machine says of the ground may be of other ground than the model holds: nothing is to be held against it.
+    pub fn is_in_doubt(&self) -> bool {
+        self.is_shifted || self.may_have_begun_anew
+    }
+
+    /// The machine's places may be off by so many ticks more.
+    pub fn loosen(&mut self, ticks: i64) {
+        self.slack += ticks;
+    }
+
+    /// Of a detection no longer than this the machine may make a weed without anybody being told.
+    pub fn leave_narrow(&mut self, ticks: i64) {
+        self.narrow = self.narrow.max(ticks);
+    }
+
+    /// What lies ahead of a place is seen anew.
+    pub fn begin_anew(&mut self, place: i64) {
+        self.known_from = self.known_from.min(place);
+        self.begin = self.begin.min(place);
+        (self.frontier, self.is_growing, self.may_have_begun_anew) = (place, false, false);
+        self.stretches.retain(|stretch| stretch.leading < place);
+        self.stretches.iter_mut().for_each(|stretch| stretch.trailing = stretch.trailing.min(place - 1));
+        self.guarded.retain(|guarded| guarded.trailing < place);
+        self.merge_gaps.clear();
+        let zone = self.stem_zones.last().copied();
+        self.stem_zones = zone.map(|(_, zone)| (place, zone)).into_iter().collect();
+    }
+
+    /// The machine says that it guards the ground around a place, where a plant was due.
+    ///
+    /// # Errors
+    /// What the beam has shown, where it has not seen all of that ground, or nothing stands so far behind that the plant was due.
+    pub fn guard(&mut self, due: i64, spacing: i64, scatter: i64) -> Result<(), String> {
+        if due + scatter > self.frontier + self.slack {
+            return Err(format!("ground is guarded around {due}, and the beam has only come to {}", self.frontier));
+        }
+        // From the middle of a plant, which may have gaps, to that of the first, the second, or the third unseen behind it.
+        let is_from = |first: usize| {
+            self.stretches[first..].iter().any(|last| {
+                let middle = (self.stretches[first].leading + last.trailing) / 2;
+                let off = (1..=3).map(|unseen| (due - middle - unseen * spacing).abs()).min().unwrap_or(i64::MAX);
+                off <= 4 * self.slack + 2 * self.stretches[first].blur
+            })
+        };
+        if !(0..self.stretches.len()).any(is_from) {
+            return Err(format!("ground is guarded around {due}, {spacing} behind none of {:?}", self.stretches));
+        }
+        let (leading, trailing) = (due - scatter, due + scatter);
+        self.guarded.push(Stretch { leading, trailing, blur: 0, margin_to: i64::MAX, is_free: false });
+        Ok(())
+    }
+
+    /// The beam has come to a place, which the machine may have by `blur` elsewhere.
+    pub fn roll_to(&mut self, place: i64, blur: i64) {
+        if place > self.frontier {
+            self.touch(blur);
+            self.frontier = place;
+            self.touch(blur);
+        }
+    }
+
+    /// The beam breaks or clears at a place.
+    pub fn edge(&mut self, place: i64, broken: bool, blur: i64) {
+        self.roll_to(place, blur);
+        self.broken = broken;
+        if place == self.frontier {
+            self.touch(blur);
+        }
+    }
+
+    /// Something is in the beam at the frontier, or nothing is.
+    fn touch(&mut self, blur: i64) {
+        if !self.broken {
+            self.is_growing = false;
+            return;
+        }
+        let (here, goes_on) = (self.frontier, self.is_growing);
+        match self.stretches.last_mut() {
+            Some(stretch) if !stretch.is_free && (goes_on || stretch.trailing == here) => {
+                stretch.trailing = here;
+                stretch.blur = stretch.blur.max(blur);
+            }
+            _ => self.stretches.push(Stretch {
+                leading: here,
+                trailing: here,
+                blur,
+                margin_to: i64::MAX,
+                is_free: false,
+            }),
+        }
+        self.is_growing = true;
+    }
+
+    /// The operator says that the tool may work from one place up to another, of which the machine knows nothing.
+    pub fn trust(&mut self, from: i64, to: i64) {
+        self.known_from = self.known_from.min(from);
+        let parts = |stretch: &Stretch| {
+            let part = |leading: i64, trailing: i64, is_free| {
+                let (leading, trailing) = (leading.max(stretch.leading), trailing.min(stretch.trailing));
+                (leading <= trailing).then_some(Stretch { leading, trailing, is_free, ..*stretch })
+            };
+            [part(i64::MIN, from - 1, stretch.is_free), part(from, to, true), part(to + 1, i64::MAX, stretch.is_free)]
+        };
+        self.stretches = self.stretches.iter().flat_map(parts).flatten().collect();
+        self.guarded.retain(|guarded| guarded.trailing < from || guarded.leading > to);
+        for stretch in self.stretches.iter_mut().chain(&mut self.guarded).filter(|stretch| stretch.trailing < from) {
+            stretch.margin_to = stretch.margin_to.min(from - 1);
+        }
+        // What the beam is still to come to there counts as little.
+        if to > self.frontier {
+            (self.frontier, self.is_growing) = (to, false);
+        }
+    }
+
+    /// With the beam at a place, the machine has taken a detection for a weed of so many ticks, give or take `tolerance`.
+    ///
+    /// # Errors
+    /// What the beam has shown, where no whole detection of this width has come to its end here.
+    pub fn weed(&mut self, place: i64, width: i64, tolerance: i64) -> Result<(), String> {
+        let last = self.stretches.partition_point(|stretch| stretch.trailing <= place);
+        let nearest = |last: usize| &self.stretches[last.saturating_sub(4)..last];
+        // What still goes on at the frontier is not over.
+        let last = if self.is_growing && last == self.stretches.len() { last.saturating_sub(1) } else { last };
+        let shown = nearest(last).to_vec();
+        for first in (0..last).rev() {
+            let (leading, trailing) = (self.stretches[first].leading, self.stretches[last - 1].trailing);
+            let tolerance = tolerance
+                + self.slack
+                + 2 * self.stretches[first..last].iter().map(|stretch| stretch.blur).max().unwrap_or(0);
+            let shortest_since = |place| self.merge_gaps_since(place).min().unwrap_or(0);
+            let before = first.checked_sub(1).map(|before| self.stretches[before].trailing);
+            // What lies before it may have come to its end under another setting.
+            let begins = before.is_none_or(|end| leading - end >= shortest_since(end) - tolerance);
+            let is_whole = begins && place - trailing >= shortest_since(leading) - tolerance;
+            if is_whole && (trailing - leading).abs_diff(width) <= tolerance as u64 {
+                self.stretches[first..last].iter_mut().for_each(|stretch| stretch.is_free = true);
+                return Ok(());
+            }
+            let longest = self.merge_gaps_since(leading).max().unwrap_or(0);
+            if before.is_none_or(|end| leading - end > longest + tolerance) {
+                break;
+            }
+        }
+        if self.stretches[..last].is_empty() && place - width < self.begin {
+            return Ok(());
+        }
+        Err(format!("a weed of {width} ticks was told at {place}, where the beam has shown {shown:?}"))
+    }
+
+    /// The gaps that were set while the beam came from a place on.
+    fn merge_gaps_since(&self, place: i64) -> impl Iterator<Item = i64> {
+        let first = self.merge_gaps.partition_point(|&(from, _)| from <= place).saturating_sub(1);
+        self.merge_gaps[first..].iter().map(|&(_, gap)| gap)
+    }
+
+    /// Whether the tool is behind all that the beam has seen, with `near` the first place that it asks for.
+    pub fn is_unseen(&self, near: i64) -> bool {
+        near + self.slack < self.known_from
+    }
+
+    /// A canopy that the tool has to keep off, with its margin, somewhere from `near` to `far`.
+    pub fn canopy_between(&self, near: i64, far: i64, margin: i64) -> Option<Stretch> {
+        let first = self.stretches.partition_point(|stretch| stretch.trailing + margin < near);
+        let mut near_by = self.stretches[first..].iter().take_while(|stretch| stretch.leading - margin <= far);
+        let is_closed =
+            |stretch: &&Stretch| self.is_met(stretch, near, far, margin) && (self.narrow == 0 || self.is_wide(stretch));
+        let guarded = || self.guarded.iter().find(|stretch| self.is_met(stretch, near, far, margin));
+        near_by.find(is_closed).or_else(guarded).copied()
+    }
+
+    /// Whether the ground around a stretch is closed for sure somewhere from `near` to `far`.
+    fn is_met(&self, stretch: &Stretch, near: i64, far: i64, margin: i64) -> bool {
+        self.bounds(stretch, margin).is_some_and(|(from, to)| from <= far && to >= near)
+    }
+
+    /// As [`canopy_between`](Self::canopy_between), where all of the ground is closed by canopies and their margins.
+    pub fn canopies_all_over(&self, mut near: i64, far: i64, margin: i64) -> Option<Stretch> {
+        loop {
+            let stretch = self.canopy_between(near, near, margin)?;
+            let (_, to) = self.bounds(&stretch, margin)?;
+            if to >= far {
+                return Some(stretch);
+            }
+            near = to + 1;
+        }
+    }
+
+    /// Whether a stretch belongs to a detection that is too wide for a weed: with the stretches so near to it that they are of the same one.
+    fn is_wide(&self, stretch: &Stretch) -> bool {
+        let place = self.stretches.partition_point(|other| other.leading < stretch.leading);
+        let gap = |first: usize, next: usize| {
+            let shortest = self.merge_gaps_since(self.stretches[first].leading).min().unwrap_or(0);
+            let blur = self.stretches[first].blur.max(self.stretches[next].blur);
+            let is_same =
+                self.stretches[next].leading - self.stretches[first].trailing < shortest - self.slack - 2 * blur;
+            is_same && !self.stretches[first].is_free && !self.stretches[next].is_free
+        };
+        let first = (1..=place).rev().find(|&next| !gap(next - 1, next)).unwrap_or(0);
+        let last =
+            (place..self.stretches.len() - 1).find(|&first| !gap(first, first + 1)).unwrap_or(self.stretches.len() - 1);
+        let blur = self.stretches[first..=last].iter().map(|stretch| stretch.blur).max().unwrap_or(0);
+        self.stretches[last].trailing - self.stretches[first].leading > self.narrow + self.slack + 2 * blur
+    }
+
+    /// The ground around a stretch that is closed for sure; none where the tool may work, or the machine may have seen nothing.
+    fn bounds(&self, stretch: &Stretch, margin: i64) -> Option<(i64, i64)> {
+        let slack = self.slack + 2 * stretch.blur;
+        let is_canopy = !stretch.is_free && stretch.trailing - stretch.leading > slack;
+        let less = slack + self.given_up(stretch) - margin;
+        is_canopy.then_some((stretch.leading + less, (stretch.trailing - less).min(stretch.margin_to)))
+    }
+
+    /// How much at the end of a stretch may be taken for leaves alone, at the most.
+    fn given_up(&self, stretch: &Stretch) -> i64 {
+        let first = self.stem_zones.partition_point(|&(from, _)| from <= stretch.trailing).saturating_sub(1);
+        let zones = self.stem_zones[first..].iter().filter(|&&(_, zone)| zone > 0);
+        let beside = |zone: i64| ((self.widest(stretch) - zone) / 2).clamp(0, zone * 13 / 64);
+        let most = zones.map(|&(_, zone)| beside(zone)).max();
+        most.map_or(0, |most| if most > 0 { most + self.moved + 1 } else { 0 })
+    }
+
+    /// How wide the detection may be to which a stretch belongs, at the most.
+    fn widest(&self, stretch: &Stretch) -> i64 {
+        let is_one = |before: &Stretch, behind: &Stretch| {
+            let longest = self.merge_gaps_since(before.leading).max().unwrap_or(0);
+            behind.leading - before.trailing <= longest + self.slack + 2 * before.blur.max(behind.blur)
+        };
+        // Guarded ground is none of them, and is looked up as what stands near to it.
+        let Some(end) = self.stretches.len().checked_sub(1) else { return 0 };
+        let place = self.stretches.partition_point(|other| other.leading < stretch.leading).min(end);
+        let (mut first, mut last) = (place, place);
+        while first > 0 && is_one(&self.stretches[first - 1], &self.stretches[first]) {
+            first -= 1;
+        }
+        while last < end && is_one(&self.stretches[last], &self.stretches[last + 1]) {
+            last += 1;
+        }
+        let (first, last) = (&self.stretches[first], &self.stretches[last]);
+        last.trailing - first.leading + 1 + self.slack + 2 * first.blur.max(last.blur)
+    }
+
+    /// The window that a tool rolling on from a place comes to next: its canopy's first and last place.
+    pub fn next_window(&self, place: i64, forward: bool, margin: i64) -> Option<Stretch> {
+        if forward {
+            self.stretches
+                .iter()
+                .rev()
+                .take_while(|stretch| stretch.trailing + margin >= place)
+                .filter(|stretch| !stretch.is_free)
+                .last()
+                .copied()
+        } else {
+            self.stretches
+                .iter()
+                .take_while(|stretch| stretch.leading - margin <= place)
+                .filter(|stretch| !stretch.is_free)
+                .last()
+                .copied()
+        }
+    }
+}

@@ -1,0 +1,446 @@
+//! A log for the page: the row as the machine has told it, on the ground, and its replay.
+//!
+//! A log is read in pieces, as a day of it is 100 MB: [`begin`], [`take`] for each piece, and then a question about it. [`picture`]
+//! needs no line twice, so that none is held for it. Its tables are read where they lie (`exports`).
+//!
+//! Distances are millimetres that the tool has rolled since the log began, by the wheel. A reset, or another machine, begins again a metre
+//! farther on. What the log tells without a place has that of the line before.
+
+use control::say::command::{self, Command};
+use gps::job::{Job, Wanted};
+use gps::picture::{Words, draw_with};
+use link::log::{Entry, Kind, Pieces};
+use link::settings::{Setting, Settings, shown};
+use link::{Class, EventLine, Mode, Status, Values, replay};
+use serde_json::{Value, json};
+use std::cell::RefCell;
+use std::collections::VecDeque;
+use std::f64::consts::PI;
+use std::path::Path;
+
+/// Distance between two speeds that are kept, and the time for which a status is not read behind another.
+const SPEED_MM: f64 = 250.0;
+const SPEED_MS: u64 = 300;
+
+/// Ground between two stretches of a log.
+const APART_MM: f64 = 1000.0;
+
+/// How a machine's count becomes ground.
+struct Ground {
+    settings: Settings,
+    /// The tool's place where the encoder counts 0; none before the first place of a stretch is known.
+    zero_mm: Option<f64>,
+    /// The farthest place so far.
+    end_mm: f64,
+}
+
+impl Ground {
+    fn tick_mm(&self) -> f64 {
+        let value = |setting| f64::from(self.settings.get(setting));
+        let per_metre = value(Setting::TicksPerM);
+        if per_metre > 0.0 { 1000.0 / per_metre } else { PI * value(Setting::WheelMm) / value(Setting::TicksPerRev) }
+    }
+
+    /// Where the tool is at a count.
+    fn tool_mm(&mut self, position: i32) -> f64 {
+        let rolled_mm = f64::from(position) * self.tick_mm();
+        let zero_mm = *self.zero_mm.get_or_insert(self.end_mm - rolled_mm);
+        let tool_mm = zero_mm + rolled_mm;
+        self.end_mm = self.end_mm.max(tool_mm);
+        tool_mm
+    }
+
+    /// Where a count in the beam lies, as ground for the tool.
+    fn beam_mm(&mut self, position: i32) -> f64 {
+        self.tool_mm(position) + f64::from(self.settings.get(Setting::BeamToToolMm))
+    }
+}
+
+/// Something that happened on the ground, which the tool was told of.
+struct Change {
+    mm: f64,
+    out: bool,
+}
+
+/// What a log shows, as `page/src/record/picture.ts` has it.
+struct Picture {
+    ground: Ground,
+    /// Changes of settings that are not answered yet, and other commands.
+    unanswered: VecDeque<Option<(Setting, u16)>>,
+    here_mm: f64,
+    shown_mm: f64,
+    last_mode: Option<Mode>,
+    time_ms: u64,
+    swings: usize,
+    changes: Vec<Change>,
+    has_places: bool,
+    alarms: Vec<Value>,
+    tables: [Vec<f64>; TABLES],
+}
+
+/// The tables of a picture: for each detection its class (0 plant, 1 weed, 2 unknown), its canopy's ends and its zone's ends in mm; for
+/// each speed its place in mm, time in ms, and mm/s; the ends of each stretch with the tool in the row, in mm.
+const TABLES: usize = 3;
+const OBJECTS: usize = 0;
+const SPEEDS: usize = 1;
+const WORKED: usize = 2;
+
+impl Picture {
+    fn new() -> Self {
+        Self {
+            ground: Ground { settings: Settings::new(), zero_mm: None, end_mm: 0.0 },
+            unanswered: VecDeque::new(),
+            here_mm: 0.0,
+            shown_mm: f64::NEG_INFINITY,
+            last_mode: None,
+            time_ms: 0,
+            swings: 0,
+            changes: Vec::new(),
+            has_places: false,
+            alarms: Vec::new(),
+            tables: Default::default(),
+        }
+    }
+
+    fn take(&mut self, entry: &Entry) {
+        self.time_ms = entry.time_ms;
+        match entry.kind {
+            Kind::Connected => {
+                if self.ground.zero_mm.take().is_some() {
+                    self.ground.end_mm += APART_MM;
+                }
+                self.unanswered.clear();
+            }
+            Kind::Setting => {
+                if let Some((setting, value)) = shown(&entry.text) {
+                    // What this version does not take stays as it is.
+                    let _ = self.ground.settings.set(setting, value);
+                }
+            }
+            Kind::Status => {
+                let Some(status) = Status::parse(&entry.text) else { return };
+                self.here_mm = self.ground.tool_mm(status.position);
+                if (self.here_mm - self.shown_mm).abs() < SPEED_MM && self.last_mode == Some(status.mode) {
+                    return;
+                }
+                (self.shown_mm, self.last_mode) = (self.here_mm, Some(status.mode));
+                if self.tables[SPEEDS].is_empty() {
+                    self.changes.insert(0, Change { mm: self.here_mm, out: status.tool_out });
+                }
+                self.tables[SPEEDS].extend([self.here_mm, entry.time_ms as f64, f64::from(status.speed_mm_s)]);
+            }
+            Kind::Event => {
+                if let Some(event) = EventLine::parse(&entry.text) {
+                    self.take_event(&event, &entry.text, entry.time_ms);
+                }
+            }
+            Kind::Command => {
+                self.unanswered.push_back(match command::parse(entry.text.as_bytes()) {
+                    Ok(Command::Set(setting, value)) => Some((setting, value)),
+                    _ => None,
+                });
+            }
+            Kind::Answer if entry.text == "ok" || entry.text.starts_with("error") => {
+                if let Some(Some((setting, value))) = self.unanswered.pop_front()
+                    && entry.text == "ok"
+                {
+                    let _ = self.ground.settings.set(setting, value);
+                }
+            }
+            Kind::Gps => self.has_places = true,
+            _ => {}
+        }
+    }
+
+    fn take_event(&mut self, event: &EventLine, line: &str, time_ms: u64) {
+        let trouble = |name: &str, mm: f64, is_warning: bool| json!({ "name": name, "mm": mm, "timeMs": time_ms, "isWarning": is_warning });
+        let ground = &mut self.ground;
+        match *event {
+            EventLine::Detection { class, position, delay, hold, .. } => {
+                let tick_mm = ground.tick_mm();
+                // The tool comes there after so many counts.
+                let zone_mm = ground.tool_mm(position.wrapping_add(delay));
+                let zone_end_mm = zone_mm + f64::from(hold) * tick_mm;
+                let from_mm = ground.beam_mm(position);
+                let class = match class {
+                    Class::Plant => 0.0,
+                    Class::Weed => 1.0,
+                    Class::Unknown => 2.0,
+                };
+                // A zone lies about its canopy's middle.
+                let to_mm = zone_mm + zone_end_mm - from_mm;
+                self.tables[OBJECTS].extend([class, from_mm, to_mm, zone_mm, zone_end_mm]);
+            }
+            EventLine::Swing { out, position } => {
+                self.swings += 1;
+                self.changes.push(Change { mm: ground.tool_mm(position), out });
+            }
+            EventLine::Alarm { position, .. } => {
+                let (name, mm) = (Values(line).alarm().unwrap_or_default(), ground.tool_mm(position));
+                self.alarms.push(trouble(name, mm, false));
+                self.changes.push(Change { mm, out: true });
+            }
+            EventLine::Warning(_) => {
+                self.alarms.push(trouble(Values(line).text("name").unwrap_or_default(), self.here_mm, true));
+            }
+            // An alarm has the tool out, and a start may have it in: the swing says so.
+            EventLine::State(Mode::Hold | Mode::Work | Mode::Alarm)
+            | EventLine::Guarded { .. }
+            | EventLine::Slip { .. }
+            | EventLine::Calibrated { .. }
+            | EventLine::Plot => {}
+        }
+    }
+
+    /// The ground on which the tool was in the row: between a swing in and the next one out, or an alarm.
+    fn worked(&mut self) {
+        self.changes.sort_by(|one, other| one.mm.total_cmp(&other.mm));
+        let mut start_mm = None;
+        for &Change { mm, out } in &self.changes {
+            if let (true, Some(start_mm)) = (out, start_mm.take_if(|_| out)) {
+                self.tables[WORKED].extend([start_mm, mm]);
+            } else if !out {
+                start_mm.get_or_insert(mm);
+            }
+        }
+        if let Some(start_mm) = start_mm {
+            self.tables[WORKED].extend([start_mm, self.ground.end_mm]);
+        }
+        self.changes.clear();
+    }
+}
+
+/// The log that is read.
+struct Log {
+    pieces: Pieces,
+    /// Why it is none.
+    problem: Option<String>,
+    /// Whether all of its lines are held, for a replay, or else most of its statuses are left out.
+    is_whole: bool,
+    /// When the last status was that is not left out.
+    kept_ms: Option<u64>,
+    entries: Vec<Entry>,
+    picture: Picture,
+}
+
+thread_local! {
+    static LOG: RefCell<Log> = RefCell::new(Log::new(false));
+    static JOBS: RefCell<Vec<Job>> = const { RefCell::new(Vec::new()) };
+}
+
+impl Log {
+    fn new(is_whole: bool) -> Self {
+        let pieces = Pieces::new(Path::new("log"));
+        Self { pieces, problem: None, is_whole, kept_ms: None, entries: Vec::new(), picture: Picture::new() }
+    }
+
+    /// Takes the next bytes; all that are left where there are none.
+    fn take(&mut self, bytes: Option<&[u8]>) {
+        if self.problem.is_some() {
+            return;
+        }
+        let (is_whole, kept_ms) = (self.is_whole, &mut self.kept_ms);
+        let is_wanted = |line: &str| is_whole || !is_near_another(line, kept_ms);
+        let entries = match bytes {
+            Some(bytes) => self.pieces.take(bytes, is_wanted),
+            None => std::mem::replace(&mut self.pieces, Pieces::new(Path::new("log"))).end(is_wanted),
+        };
+        match entries {
+            Ok(entries) if is_whole => self.entries.extend(entries),
+            Ok(entries) => entries.iter().for_each(|entry| self.picture.take(entry)),
+            Err(error) => self.problem = Some(error.to_string()),
+        }
+    }
+}
+
+/// Whether a line is a status that comes soon behind another one. There are a million in a day.
+fn is_near_another(line: &str, kept_ms: &mut Option<u64>) -> bool {
+    let Some((time_ms, rest)) = line.split_once(',') else { return false };
+    if rest.starts_with("connected,") {
+        *kept_ms = None;
+    }
+    let Some(time_ms) = time_ms.parse::<u64>().ok().filter(|_| rest.starts_with("status,")) else { return false };
+    // Where a log is gone on with, time begins again at 0.
+    if kept_ms.is_some_and(|kept_ms| (kept_ms..kept_ms + SPEED_MS).contains(&time_ms)) {
+        return true;
+    }
+    *kept_ms = Some(time_ms);
+    false
+}
+
+/// Begins another log; a `whole` one can be replayed, and another one shown.
+pub fn begin(is_whole: bool) -> Value {
+    LOG.set(Log::new(is_whole));
+    Value::Null
+}
+
+/// Takes the next bytes of the log.
+pub fn take(bytes: &[u8]) {
+    LOG.with_borrow_mut(|log| log.take(Some(bytes)));
+}
+
+/// What the log shows besides its tables, or why it is none: `{"problem": "..."}`.
+pub fn picture() -> Value {
+    LOG.with_borrow_mut(|log| {
+        log.take(None);
+        if let Some(problem) = &log.problem {
+            return json!({ "problem": problem });
+        }
+        log.picture.worked();
+        let Picture { ground, time_ms, swings, has_places, alarms, .. } = &mut log.picture;
+        let alarms = std::mem::take(alarms);
+        json!({
+            "lengthMm": ground.end_mm, "timeMs": time_ms, "swings": swings, "alarms": alarms, "hasPlaces": has_places,
+        })
+    })
+}
+
+/// A table of the picture, as long as no other log begins; empty where it has none with this number.
+pub fn table<Read>(number: usize, read: impl FnOnce(&[f64]) -> Read) -> Read {
+    LOG.with_borrow(|log| read(log.picture.tables.get(number).map_or(&[], Vec::as_slice)))
+}
+
+/// What the decisions of these sources make of the log: on how much both agree, and the first thing on which they do not.
+pub fn replayed(progress: impl FnMut(f64)) -> Value {
+    let replayed = LOG.with_borrow_mut(|log| {
+        log.take(None);
+        match &log.problem {
+            Some(problem) => Err(problem.clone()),
+            None => replay::replay_with(&log.entries, progress).map_err(|error| error.to_string()),
+        }
+    });
+    match replayed {
+        Ok(replayed) => json!({
+            "objects": replayed.objects,
+            "swings": replayed.swings,
+            "alarms": replayed.alarms,
+            "difference": replayed.difference.as_ref().map(ToString::to_string),
+            "notes": replayed.notes,
+        }),
+        Err(problem) => json!({ "problem": problem }),
+    }
+}
+
+/// Puts the log on the map; why it cannot be: `{"problem": "..."}`.
+pub fn job() -> Value {
+    LOG.with_borrow_mut(|log| {
+        log.take(None);
+        if let Some(problem) = &log.problem {
+            return json!({ "problem": problem });
+        }
+        let job = Job::read(&std::mem::take(&mut log.entries), &Wanted::default());
+        JOBS.with_borrow_mut(|jobs| jobs.push(job));
+        json!({})
+    })
+}
+
+/// The map of all logs that were put on it, as SVG, and how many of their things stand there; no SVG where none has a place.
+pub fn map(words: &Words) -> Value {
+    let jobs = JOBS.take();
+    let drawn = draw_with(&jobs.iter().collect::<Vec<_>>(), words);
+    let placed = jobs.iter().flat_map(Job::things).filter(|thing| thing.found.is_ok()).count();
+    json!({ "svg": drawn.map(|drawn| drawn.to_string()), "placed": placed })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LOG: &str = "time_ms,kind,line
+0,connected,0.2.0
+0,setting,beam_to_tool_mm=400
+0,setting,margin_mm=50
+0,setting,ticks_per_m=2000
+10,status,state=work tool=in pos=1000 speed_mm_s=500 windows=0 unseen_mm=0
+20,command,set margin_mm 60
+30,answer,ok
+40,event,plant pos=2000 votes=3 spacing=1000 delay=680 hold=540 actuation=1220
+50,event,swing tool=out pos=2600
+460,status,state=work tool=out pos=2700 speed_mm_s=500 windows=1 unseen_mm=0
+470,event,alarm code=3-1 name=too_fast pos=3000
+480,event,warning name=no_plants
+490,lost,pulled
+495,connected,0.2.0
+496,status,state=hold tool=out pos=5 speed_mm_s=0 windows=0 unseen_mm=400
+";
+
+    /// What a log shows that is read in pieces of so many bytes.
+    fn shown(text: &str, length: usize) -> Value {
+        begin(false);
+        text.as_bytes().chunks(length).for_each(take);
+        picture()
+    }
+
+    fn rows<const COLUMNS: usize>(number: usize) -> Vec<[f64; COLUMNS]> {
+        table(number, |values| values.chunks(COLUMNS).map(|row| row.try_into().unwrap()).collect())
+    }
+
+    #[test]
+    fn a_log_is_a_row_on_the_ground_and_a_reset_goes_on_behind_it() {
+        for length in [1, 100, 10_000] {
+            let picture = shown(LOG, length);
+            // Half a millimetre a count; the log begins at 1000.
+            assert_eq!(rows(OBJECTS), [[0.0, 900.0, 1050.0, 840.0, 1110.0]]);
+            assert_eq!(picture["swings"], 1);
+            assert_eq!(rows(WORKED), [[0.0, 800.0]]);
+            assert_eq!(
+                picture["alarms"],
+                json!([
+                    { "name": "too_fast", "mm": 1000.0, "timeMs": 470, "isWarning": false },
+                    { "name": "no_plants", "mm": 850.0, "timeMs": 480, "isWarning": true },
+                ])
+            );
+            let speeds = rows::<3>(SPEEDS);
+            assert_eq!(speeds[..2], [[0.0, 10.0, 500.0], [850.0, 460.0, 500.0]]);
+            // The zone lay ahead of the tool, and a metre lies between.
+            assert!(speeds[2][0] >= 2000.0, "{speeds:?}");
+            assert_eq!(picture["timeMs"], 496);
+        }
+    }
+
+    #[test]
+    fn the_tool_is_in_the_row_from_a_swing_in_to_the_next_out_or_an_alarm() {
+        let swing = |tool: &str, pos: u32| format!("9,event,swing tool={tool} pos={pos}\n");
+        let status = "1,status,state=hold tool=out pos=0 speed_mm_s=500 windows=0 unseen_mm=0\n";
+        let alarm = "9,event,alarm code=3-1 name=too_fast pos=9000\n";
+        let setting = "0,setting,ticks_per_m=1000\n";
+        let swings =
+            [("in", 1000), ("out", 2000), ("in", 3000), ("in", 3500), ("out", 4000), ("in", 8000), ("in", 9500)];
+        let swings: String = swings.map(|(tool, pos)| swing(tool, pos)).concat();
+        shown(&format!("time_ms,kind,line\n0,connected,0.2.0\n{setting}{status}{swings}{alarm}"), 64);
+        assert_eq!(rows(WORKED), [[1000.0, 2000.0], [3000.0, 4000.0], [8000.0, 9000.0], [9500.0, 9500.0]]);
+    }
+
+    #[test]
+    fn statuses_close_together_are_left_out_and_lines_keep_their_numbers() {
+        let status = |time_ms: u64, position: u64| {
+            let figures = "speed_mm_s=500 windows=0 unseen_mm=0";
+            format!("{time_ms},status,state=work tool=in pos={position} {figures}\n")
+        };
+        let statuses: String = (0..10).map(|number| status(100 * number, 1000 * number)).collect();
+        let log = format!("time_ms,kind,line\n0,connected,0.2.0\n{statuses}0,connected,0.2.0\n{}", status(50, 0));
+        shown(&log, 100);
+        let times: Vec<f64> = rows::<3>(SPEEDS).iter().map(|speed| speed[1]).collect();
+        assert_eq!(times, [0.0, 300.0, 600.0, 900.0, 50.0]);
+        let wrong = shown(&format!("{log}1,gossip,hello\n"), 100);
+        assert!(wrong["problem"].as_str().is_some_and(|problem| problem.contains("line 15")), "{wrong}");
+    }
+
+    #[test]
+    fn what_is_no_log_is_told() {
+        let problem = shown("a,b\n1,2\n", 3)["problem"].as_str().map(str::to_owned);
+        assert!(problem.is_some_and(|problem| problem.contains("time_ms")));
+        begin(true);
+        take(b"time_ms,kind,line\n0,lost,gone\n");
+        assert!(replayed(|_| {})["problem"].is_string());
+    }
+
+    #[test]
+    fn a_replay_tells_how_far_it_is() {
+        begin(true);
+        take(LOG.as_bytes());
+        let mut shares = Vec::new();
+        assert!(replayed(|share| shares.push(share))["problem"].is_null());
+        assert!(shares.is_sorted() && shares.len() > 10 && shares.iter().all(|share| (0.0..=1.0).contains(share)));
+    }
+}

@@ -1,0 +1,84 @@
+//! Setting a machine up, for the page: the steps of the manual, what is to be measured next, and the margin.
+
+use crate::console::settings;
+use link::set_up::{SetUp, Step, Task, steps};
+use link::settings::{Settings, name, unit};
+use serde::Deserialize;
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+
+/// What was typed and said in a session, and the settings as they are, by their names.
+#[derive(Deserialize)]
+pub struct Heard {
+    lines: Vec<String>,
+    settings: BTreeMap<String, u16>,
+}
+
+impl Heard {
+    /// The steps, and what the session tells of them, as `page/src/panel/set_up.ts` has it.
+    pub fn advice(&self) -> Value {
+        let set_up = SetUp::of_lines(self.lines.iter().map(String::as_str));
+        let (settings, _) = settings(Settings::new(), &self.settings);
+        let manual = steps().into_iter().map(|step| {
+            let tasks: Vec<String> = step.tasks.iter().map(task).collect();
+            json!({ "title": step.title, "how": step.how, "tasks": tasks })
+        });
+        let margin = set_up.margin(&settings);
+        let missing = margin.as_ref().err().map_or(&[][..], Vec::as_slice);
+        json!({
+            "steps": manual.collect::<Vec<_>>(),
+            "next": set_up.next(&settings).map(|step| step.to_string()),
+            "missing": missing.iter().map(Step::to_string).collect::<Vec<_>>(),
+            "marginMm": margin.as_ref().ok().map(|margin| margin.least_mm()),
+            "warning": set_up.warning(&settings),
+        })
+    }
+}
+
+/// What a task has of the simulated machine; empty for a measurement.
+fn task(task: &Task) -> String {
+    match task {
+        Task::Fit(part, value) => format!("{part} = {value}"),
+        Task::Set(setting, value) => format!("{} = {value} {}", name(*setting), unit(*setting)),
+        Task::TimeServo => "calibrate servo".to_owned(),
+        Task::MeasureWheel(length_mm) => format!("calibrate {length_mm}"),
+        Task::SetMargin => "margin_mm".to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn advice(lines: &[&str], values: &[(&str, u16)]) -> Value {
+        Heard {
+            lines: lines.iter().map(|&line| line.to_owned()).collect(),
+            settings: values.iter().map(|&(name, value)| (name.to_owned(), value)).collect(),
+        }
+        .advice()
+    }
+
+    #[test]
+    fn the_page_has_the_manual_s_steps_and_what_is_missing() {
+        let nothing = advice(&[], &[]);
+        assert_eq!(nothing["steps"].as_array().map(Vec::len), Some(steps().len()));
+        assert_eq!(
+            (&nothing["next"], &nothing["marginMm"], &nothing["warning"]),
+            (&Value::Null, &Value::Null, &Value::Null)
+        );
+        assert_eq!(nothing["missing"].as_array().map(Vec::len), Some(2), "{nothing}");
+        let timed = "calibrated lead_out_ms=158 lead_in_ms=52 set=yes";
+        let begun = advice(&[timed, "> set margin_mm 13"], &[("margin_mm", 13)]);
+        assert_eq!(begun["next"], "time the servo: `calibrate servo` (1 of 2 done)");
+        assert!(begun["warning"].as_str().is_some_and(|warning| warning.ends_with("50 is safe")), "{begun}");
+    }
+
+    #[test]
+    fn the_page_is_told_the_margin_once_all_was_measured() {
+        let timed = "calibrated lead_out_ms=158 lead_in_ms=40 set=yes";
+        let stretch = ["> calibrate 10000", "ticks_per_m=2010"];
+        let all = [&[timed, timed][..], &stretch, &stretch, &stretch].concat();
+        // 3 % of 400 mm, 15 ms at 2.5 km/h and the firmware's 5 mm.
+        assert_eq!(advice(&all, &[("ticks_per_m", 2010)])["marginMm"], 28);
+    }
+}

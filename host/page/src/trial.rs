@@ -1,0 +1,407 @@
+//! The machine and the row of "Try it", beside the virtual Uno that the page runs: [`field::rolling`], and of what the tool has left
+//! behind what [`field::verdict`] makes of it.
+//!
+//! There is one of them, which [`Begun`] begins. [`roll`] and [`hear`] are called hundreds of times a second, so they are no
+//! questions: what the page needs of them stands in tables of numbers ([`table`]).
+
+use field::motion::mm_s;
+use field::planting::{Planting, Sowing};
+use field::rolling::{Faults, Rolling};
+use field::row::{Row, Thing};
+use field::servo::Servo;
+use field::verdict::{Timing, Verdict, judge};
+use field::{Kind, Machine};
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+use std::cell::RefCell;
+use uno::Pulse;
+
+/// Ground that lies sown ahead of the beam.
+const SOWN_AHEAD_MM: f64 = 2000.0;
+/// Ground behind a plant's margin at which it is judged: by then the tool could have begun to come back too early.
+const BEHIND_MM: f64 = 20.0;
+/// Before the next thing to be judged, this much ground is remembered: more than the tool needs to swing, at any speed.
+const BEFORE_MM: f64 = 500.0;
+/// An arm within this angle of fully out is fully out: half a millimetre at the tool's end, and 1 us of a pulse, whose edges avr8js
+/// does not place more exactly (docs/simulators.md).
+const CLEAR_WITHIN_DEGREES: f64 = 0.09;
+
+/// A machine in front of a row. What is not given is as on the machine straight from the box.
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub struct Begun {
+    /// The Uno's cycle at which it stands there, with the beam at 0 mm.
+    cycle: u64,
+    /// What stands in the row.
+    things: Vec<Standing>,
+    /// How the row goes on behind that; it ends there without.
+    sowing: Option<Sown>,
+    tool_width_mm: Option<f64>,
+    second_beam_mm: Option<f64>,
+    servo_in_us: Option<f64>,
+    servo_out_us: Option<f64>,
+}
+
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct Standing {
+    kind: Kind,
+    place_mm: f64,
+    width_mm: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct Sown {
+    seed: u64,
+    spacing_mm: f64,
+    /// Share of the gaps in which a tall weed stands.
+    weed_share: f64,
+    /// Where the first plant stands.
+    first_mm: f64,
+}
+
+/// What becomes different from now on.
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub enum Different {
+    /// The speed that the machine comes to, in km/h; negative backwards.
+    SpeedKmH(f64),
+    /// The share of the wheel's way that is lost, below 1.
+    Slip(f64),
+    /// Whether the first beam's wire is torn.
+    BeamWireTorn(bool),
+    /// Whether the encoder is dead.
+    EncoderDead(bool),
+    /// The spacing of what is yet to be sown.
+    SpacingMm(f64),
+    /// The share of its gaps in which a tall weed stands.
+    WeedShare(f64),
+}
+
+/// What the firmware is to keep free of a plant.
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub struct Kept {
+    /// Ground on both sides.
+    margin_mm: u32,
+    /// 0 for whole canopies.
+    stem_zone_mm: u32,
+}
+
+/// How a plant fared, or whether a weed was cut.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(untagged)]
+enum Fate {
+    Plant(Fared),
+    Weed(bool),
+}
+
+/// From good to bad.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+enum Fared {
+    #[serde(rename = "kept")]
+    Kept,
+    #[serde(rename = "margin cut")]
+    MarginCut,
+    #[serde(rename = "damaged")]
+    Damaged,
+}
+
+impl From<Verdict> for Fared {
+    fn from(verdict: Verdict) -> Self {
+        match verdict {
+            Verdict::Kept => Fared::Kept,
+            Verdict::MarginCut => Fared::MarginCut,
+            Verdict::Damaged => Fared::Damaged,
+        }
+    }
+}
+
+/// The machine with its row, and what of that is judged.
+struct Trial {
+    rolling: Rolling,
+    sowing: Option<Sowing>,
+    faults: Faults,
+    /// The first thing that is not judged, or is to be judged again.
+    next: usize,
+    /// What is known of things, by their numbers in the row. Of a plant that is passed again the worse stands, of a weed the better.
+    fates: Vec<Option<Fate>>,
+    /// When what was written down of the way begins.
+    from_s: f64,
+    tables: [Vec<f64>; 3],
+    /// Things of the row that the page knows.
+    told: usize,
+}
+
+/// The tables, by their numbers: how the machine is now, what has happened at the pins (cycle, pin, level), and what was sown
+/// (0 for a plant and 1 for a weed, place, width).
+const NOW: usize = 0;
+const CHANGES: usize = 1;
+const SOWN: usize = 2;
+
+thread_local! {
+    static TRIAL: RefCell<Option<Trial>> = const { RefCell::new(None) };
+}
+
+/// Does something with the trial, where one was begun.
+fn with<Answer>(act: impl FnOnce(&mut Trial) -> Answer) -> Option<Answer> {
+    TRIAL.with_borrow_mut(|trial| trial.as_mut().map(act))
+}
+
+impl Begun {
+    /// Begins, in the place of what was there before. Gives the machine's dimensions, and the levels of its pins.
+    pub fn begin(self) -> Result<Value, String> {
+        let servo = Servo::default();
+        let servo = Servo {
+            in_us: self.servo_in_us.unwrap_or(servo.in_us),
+            out_us: self.servo_out_us.unwrap_or(servo.out_us),
+            ..servo
+        };
+        let machine = Machine::default();
+        let machine = Machine {
+            tool_width_mm: self.tool_width_mm.unwrap_or(machine.tool_width_mm),
+            second_beam_mm: self.second_beam_mm.unwrap_or(machine.second_beam_mm),
+            clear_within_degrees: CLEAR_WITHIN_DEGREES,
+            servo,
+            ..machine
+        };
+        let mut row: Vec<Thing> =
+            self.things.iter().map(|thing| Thing::new(thing.place_mm, thing.width_mm, thing.kind)).collect();
+        if !row.is_empty() {
+            row = Row::new(row).map_err(|problem| problem.to_string())?.things().to_vec();
+        }
+        let mut sowing = self.sowing.map(|sown| {
+            let planting = Planting { spacing_mm: sown.spacing_mm, ..Planting::default() };
+            Sowing::new(planting, sown.weed_share, sown.first_mm, sown.seed)
+        });
+        if let Some(sowing) = &mut sowing {
+            sowing.sow(&mut row, SOWN_AHEAD_MM);
+        }
+        let mut trial = Trial {
+            rolling: Rolling::new(machine, row, 0.0, self.cycle),
+            sowing,
+            faults: Faults::default(),
+            next: 0,
+            fates: Vec::new(),
+            from_s: 0.0,
+            tables: Default::default(),
+            told: 0,
+        };
+        trial.tell_now();
+        trial.tell_sown();
+        let dimensions = json!({
+            "beamToToolMm": machine.beam_to_tool_mm, "armMm": machine.arm_mm, "toolWidthMm": machine.tool_width_mm,
+        });
+        let answer = json!({ "dimensions": dimensions, "levels": trial.levels() });
+        TRIAL.set(Some(trial));
+        Ok(answer)
+    }
+}
+
+impl Different {
+    /// Makes it so. Gives the levels of the machine's pins.
+    pub fn take(self) -> Result<Value, String> {
+        with(|trial| {
+            let Trial { rolling, sowing, faults, .. } = trial;
+            match (self, sowing) {
+                (Self::SpeedKmH(speed_km_h), _) => rolling.roll_at(mm_s(speed_km_h)),
+                (Self::Slip(share), _) => rolling.slip_by(share),
+                (Self::BeamWireTorn(is_torn), _) => faults.beam_wire_torn = is_torn,
+                (Self::EncoderDead(is_dead), _) => faults.encoder_dead = is_dead,
+                (Self::SpacingMm(spacing_mm), Some(sowing)) => sowing.planting.spacing_mm = spacing_mm,
+                (Self::WeedShare(share), Some(sowing)) => sowing.weed_share = share,
+                (Self::SpacingMm(_) | Self::WeedShare(_), None) => {}
+            }
+            rolling.have_faults(*faults);
+            trial.levels()
+        })
+        .ok_or_else(not_begun)
+    }
+}
+
+impl Kept {
+    /// Judges what lies behind the tool by now, and is not judged: a list of numbers in the row, each with what became of it.
+    pub fn judge(&self) -> Result<Value, String> {
+        with(|trial| json!(trial.judge(self))).ok_or_else(not_begun)
+    }
+}
+
+fn not_begun() -> String {
+    "no machine was put in front of a row".to_owned()
+}
+
+/// Rolls the machine on until a cycle of the Uno's clock, and sows ahead of it.
+pub fn roll(cycle: f64) {
+    with(|trial| {
+        let changes = trial.rolling.roll_until(cycle as u64);
+        let numbers = |change: &uno::PinChange| {
+            [change.cycle as f64, f64::from(change.pin.number()), f64::from(u8::from(change.high))]
+        };
+        trial.tables[CHANGES] = changes.iter().flat_map(numbers).collect();
+        if let Some(sowing) = &mut trial.sowing {
+            let until_mm = trial.rolling.place_mm() + SOWN_AHEAD_MM;
+            sowing.sow(&mut trial.rolling.row, until_mm);
+        }
+        trial.tell_now();
+        trial.tell_sown();
+    });
+}
+
+/// The Uno has sent its servo a pulse, by the cycles of its edges.
+pub fn hear(rise: f64, fall: f64) {
+    with(|trial| {
+        trial.rolling.hear(Pulse { rise: rise as u64, fall: fall as u64 });
+        trial.tell_now();
+    });
+}
+
+/// A table, by its number.
+pub fn table<Answer>(number: usize, use_it: impl FnOnce(&[f64]) -> Answer) -> Answer {
+    TRIAL.with_borrow(|trial| {
+        use_it(trial.as_ref().and_then(|trial| trial.tables.get(number)).map_or(&[], Vec::as_slice))
+    })
+}
+
+impl Trial {
+    /// Puts into its table how the machine is.
+    fn tell_now(&mut self) {
+        let Self { rolling, tables, .. } = self;
+        let machine = &rolling.machine;
+        let degrees = rolling.degrees();
+        let across_mm = machine.across_mm(degrees);
+        let is_clear = degrees >= machine.servo.stroke_degrees() - machine.clear_within_degrees;
+        tables[NOW] = vec![
+            rolling.place_mm(),
+            rolling.tool_mm(),
+            rolling.speed_mm_s(),
+            degrees,
+            across_mm,
+            f64::from(u8::from(is_clear)),
+            f64::from(u8::from(across_mm < machine.tool_width_mm / 2.0)),
+            f64::from(u8::from(rolling.is_beam_broken())),
+            rolling.ticks() as f64,
+            rolling.ground_mm_a_tick(),
+            rolling.commands as f64,
+        ];
+    }
+
+    /// Puts into its table what was sown since that was last told.
+    fn tell_sown(&mut self) {
+        let Self { rolling, tables, told, .. } = self;
+        let kind = |kind: Kind| if kind == Kind::Plant { 0.0 } else { 1.0 };
+        tables[SOWN] = rolling.row[*told..]
+            .iter()
+            .flat_map(|thing| [kind(thing.kind), thing.position_mm, thing.width_mm])
+            .collect();
+        *told = rolling.row.len();
+    }
+
+    fn levels(&self) -> Value {
+        let levels = self.rolling.levels().into_iter().map(|(pin, high)| json!([pin.number(), high]));
+        levels.collect()
+    }
+
+    fn judge(&mut self, kept: &Kept) -> Vec<(usize, Fate)> {
+        let is_behind =
+            |thing: &Thing| thing.span_mm().end + f64::from(kept.margin_mm) + BEHIND_MM < self.rolling.tool_mm();
+        let behind = self.rolling.row.partition_point(is_behind);
+        let first = std::mem::replace(&mut self.next, behind);
+        let (Some(things), true) = (self.rolling.row.get(first..behind), first < behind) else {
+            return Vec::new();
+        };
+        let Ok(row) = Row::new(things.to_vec()) else {
+            return Vec::new();
+        };
+        let timing = Timing { margin_mm: kept.margin_mm, stem_zone_mm: kept.stem_zone_mm, ..Timing::default() };
+        let (motion, pulses, start_cycle) = self.rolling.since(self.from_s);
+        let judgement = judge(&row, &self.rolling.machine, &motion, timing, pulses, start_cycle);
+        let mut plants = judgement.plants.iter().map(|plant| Fared::from(plant.verdict));
+        let mut weeds = judgement.weeds.iter().map(|weed| weed.cut);
+        self.fates.resize(self.fates.len().max(behind), None);
+        let mut judged = Vec::with_capacity(things.len());
+        for (number, thing) in (first..).zip(things) {
+            let now = match thing.kind {
+                Kind::Plant => plants.next().map(Fate::Plant),
+                Kind::Weed => weeds.next().map(Fate::Weed),
+            };
+            let fate = match (now, self.fates[number]) {
+                (Some(Fate::Plant(now)), Some(Fate::Plant(before))) => Some(Fate::Plant(now.max(before))),
+                (Some(Fate::Weed(now)), Some(Fate::Weed(before))) => Some(Fate::Weed(now || before)),
+                (now, before) => now.or(before),
+            };
+            self.fates[number] = fate;
+            judged.extend(fate.map(|fate| (number, fate)));
+        }
+        self.forget();
+        judged
+    }
+
+    /// Forgets what was before the tool came near the next thing to be judged.
+    fn forget(&mut self) {
+        let tool_mm = self.rolling.tool_mm();
+        let next_mm = self.rolling.row.get(self.next).map_or(tool_mm, |next| next.span_mm().start.min(tool_mm));
+        let near_mm = next_mm - BEFORE_MM + self.rolling.machine.beam_to_tool_mm;
+        if let Some(near_s) = self.rolling.passed_s(near_mm, self.from_s) {
+            self.from_s = near_s;
+            self.rolling.forget(near_s);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The verdicts where the tool goes in and out at these places of the beam, at half a metre a second, with a plant at 1000 and a
+    /// weed at 1400 mm.
+    fn judged(swings_mm: &[f64]) -> Value {
+        let begun = json!({
+            "cycle": 1_000_000,
+            "things": [
+                { "kind": "plant", "placeMm": 1000, "widthMm": 150 },
+                { "kind": "weed", "placeMm": 1400.5, "widthMm": 15 },
+            ],
+        });
+        serde_json::from_value::<Begun>(begun).unwrap().begin().unwrap();
+        Different::SpeedKmH(1.8).take().unwrap();
+        let mut swings = std::iter::once(0.0).chain(swings_mm.iter().copied()).enumerate().peekable();
+        let mut said = Vec::new();
+        for cycle in (1_000_000..90_000_000).step_by(32_000) {
+            roll(f64::from(cycle));
+            let place_mm = table(NOW, |now| now[0]);
+            if let Some((index, _)) = swings.next_if(|(_, swing_mm)| *swing_mm <= place_mm) {
+                let width_us = if index % 2 == 0 { 2000.0 } else { 1500.0 };
+                hear(f64::from(cycle) - 16.0 * width_us, cycle.into());
+            }
+            let kept = Kept { margin_mm: 50, stem_zone_mm: 0 };
+            said.extend(kept.judge().unwrap().as_array().unwrap().iter().cloned());
+        }
+        Value::from(said)
+    }
+
+    #[test]
+    fn a_plant_is_kept_cut_or_damaged_by_where_the_tool_went_out() {
+        for (out_mm, verdict) in [(1185.0, "kept"), (1215.0, "margin cut"), (1300.0, "damaged")] {
+            assert_eq!(judged(&[600.0, out_mm, 1520.0]), json!([[0, verdict], [1, true]]), "{out_mm}");
+        }
+        assert_eq!(judged(&[]), json!([[0, "kept"], [1, false]]));
+    }
+
+    #[test]
+    fn a_row_is_sown_ahead_as_it_is_asked_for() {
+        let sowing = json!({ "seed": 7, "spacingMm": 500, "weedShare": 1, "firstMm": 800 });
+        let begun = json!({ "cycle": 0, "things": [], "sowing": sowing });
+        serde_json::from_value::<Begun>(begun).unwrap().begin().unwrap();
+        let sown = || table(SOWN, <[f64]>::to_vec);
+        assert_eq!(sown()[..2], [0.0, 800.0]);
+        Different::SpeedKmH(2.5).take().unwrap();
+        Different::SpacingMm(300.0).take().unwrap();
+        Different::WeedShare(0.0).take().unwrap();
+        roll(16e6 * 5.0);
+        let places_mm: Vec<f64> = sown().chunks(3).map(|thing| thing[1]).collect();
+        assert!(places_mm.len() > 8 && places_mm.windows(2).all(|pair| (200.0..400.0).contains(&(pair[1] - pair[0]))));
+        roll(16e6 * 5.001);
+        assert_eq!(sown(), [0.0; 0]);
+    }
+}

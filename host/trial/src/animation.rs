@@ -1,0 +1,192 @@
+//! An animation of a row being weeded, from above, as an SVG that plays by itself: no script, and no other program makes it.
+//!
+//! The machine rolls at its speed along the row that was simulated. The tool's angle over each place is the recorded one. Weeded ground
+//! darkens behind the tool, and the weeds that it cut disappear. The beam turns dark while something breaks it.
+
+use drawing::{INK, LEFT_ALONE, MARK_SIZE, NOTE, PALE_INK, PLANT, WEED, WEEDED, WRONG};
+use drawing::{Legend, document, line, paper, rectangle, swatch, tenth, words};
+use field::machine::Machine;
+use field::row::Row;
+use field::verdict::{Judgement, Verdict};
+use svg::Document;
+use svg::node::element::{Animate, AnimateTransform, Circle, ClipPath, Definitions, Group};
+
+/// Length of a millimetre of ground, in pixels, and the picture's parts, downwards.
+const PIXELS_PER_MM: f64 = 0.36;
+const SIDE: f64 = 24.0;
+const LEGEND_Y: f64 = 14.0;
+const ROW_Y: f64 = 150.0;
+const HEIGHT: f64 = 256.0;
+
+/// How far the weeded strip, the beam and the frame reach from the row's line, in pixels.
+const STRIP: f64 = 18.0;
+const BEAM: f64 = 84.0;
+
+/// Draws the row while a machine weeds it at this speed. It begins again at its end.
+pub fn draw(row: &Row, machine: &Machine, judgement: &Judgement, speed_mm_s: f64) -> Document {
+    let ground = row.span_mm();
+    let length_mm = ground.end - ground.start;
+    let pixels = |length_mm: f64| tenth(length_mm * PIXELS_PER_MM);
+    let x = |position_mm: f64| pixels(position_mm - ground.start);
+    let share = |position_mm: f64| ((position_mm - ground.start) / length_mm).clamp(0.0, 1.0);
+    let animate = Run { seconds: length_mm / speed_mm_s };
+    let length = x(ground.end);
+
+    let behind_tool = rectangle(0.0, ROW_Y - STRIP, 0.0, 2.0 * STRIP, INK).add(animate.value(
+        "width",
+        &[(0.0, "0".to_owned()), (1.0, length.to_string())],
+        "linear",
+    ));
+    let clip = Definitions::new().add(ClipPath::new().set("id", "behind-tool").add(behind_tool));
+    let mut weeded = Group::new().set("clip-path", "url(#behind-tool)");
+    for stretch in &judgement.weeded_mm {
+        let (from, to) = (x(stretch.start.max(ground.start)), x(stretch.end.min(ground.end)));
+        weeded = weeded.add(rectangle(from, ROW_Y - STRIP, (to - from).max(0.0), 2.0 * STRIP, WEEDED));
+    }
+
+    let mut standing = Group::new();
+    for plant in &judgement.plants {
+        let colour = if plant.verdict == Verdict::Damaged { WRONG } else { PLANT };
+        let canopy = Circle::new().set("cx", x(plant.plant.position_mm)).set("cy", ROW_Y);
+        let stem = canopy.clone().set("r", 3).set("fill", INK);
+        let canopy = canopy.set("r", pixels(plant.plant.width_mm / 2.0)).set("fill", colour).set("fill-opacity", 0.75);
+        standing = standing.add(canopy).add(stem);
+    }
+    for weed in &judgement.weeds {
+        let at = x(weed.weed.position_mm);
+        let mut drawn = Circle::new().set("cx", at).set("cy", ROW_Y).set("r", 5).set("fill", WEED);
+        if weed.cut {
+            let gone = share(weed.weed.position_mm);
+            let shown = [(0.0, "1".to_owned()), (gone, "0".to_owned()), (1.0, "0".to_owned())];
+            drawn = drawn.add(animate.value("opacity", &shown, "discrete"));
+        }
+        standing = standing.add(drawn);
+    }
+
+    // The tool hangs on an arm whose pivot is ahead of it, on the row's line.
+    let pivot = pixels(machine.arm_mm);
+    let mut angles: Vec<(f64, String)> = Vec::new();
+    for &(position_mm, degrees) in &judgement.path {
+        let at = share(position_mm);
+        if angles.last().is_none_or(|(last, _)| *last < at) {
+            angles.push((at, format!("{:.1} {pivot} {ROW_Y}", degrees)));
+        }
+    }
+    if let (Some(first), Some(last)) = (angles.first().cloned(), angles.last().cloned()) {
+        angles.insert(0, (0.0, first.1));
+        angles.push((1.0, last.1));
+    }
+    let width = pixels(machine.tool_width_mm);
+    let tool = Group::new()
+        .add(line(0.0, ROW_Y, pivot, ROW_Y, INK).set("stroke-width", 3))
+        .add(rectangle(-5.0, ROW_Y - width / 2.0, 10.0, width, NOTE).set("rx", 2))
+        .add(animate.transform("rotate", &angles));
+
+    // What breaks the beam stands ahead of the tool by their distance.
+    let reach = pixels(machine.beam_to_tool_mm);
+    let mut colours = vec![(0.0, LEFT_ALONE.to_owned())];
+    for block in row.blocks_mm() {
+        let broken = [(block.start, NOTE), (block.end, LEFT_ALONE)];
+        colours.extend(broken.map(|(edge, colour)| (share(edge - machine.beam_to_tool_mm), colour.to_owned())));
+    }
+    colours.push((1.0, LEFT_ALONE.to_owned()));
+    let beam = line(reach, ROW_Y - BEAM, reach, ROW_Y + BEAM, LEFT_ALONE)
+        .set("stroke-width", 4)
+        .add(animate.value("stroke", &colours, "discrete"));
+    let frame = line(pivot, ROW_Y - BEAM, reach, ROW_Y - BEAM, PALE_INK).set("stroke-width", 6);
+    let post = line(pivot, ROW_Y - BEAM, pivot, ROW_Y, PALE_INK).set("stroke-width", 3);
+    let way = [(0.0, "0 0".to_owned()), (1.0, format!("{length} 0"))];
+    let rolling = Group::new().add(frame).add(post).add(beam).add(tool).add(animate.transform("translate", &way));
+
+    let full_width = length + reach + 2.0 * SIDE;
+    let row = Group::new()
+        .set("transform", format!("translate({SIDE} 0)"))
+        .add(clip)
+        .add(weeded)
+        .add(line(0.0, ROW_Y, length, ROW_Y, PALE_INK).set("stroke-dasharray", "4 6"))
+        .add(standing)
+        .add(rolling);
+    document(full_width, HEIGHT).add(paper(full_width, HEIGHT)).add(legend(speed_mm_s)).add(row)
+}
+
+/// One pass along the row.
+struct Run {
+    seconds: f64,
+}
+
+impl Run {
+    /// An attribute that takes these values at these shares of the row.
+    fn value(&self, attribute: &str, frames: &[(f64, String)], mode: &str) -> Animate {
+        let (times, values) = times_and_values(frames);
+        Animate::new()
+            .set("attributeName", attribute)
+            .set("calcMode", mode)
+            .set("keyTimes", times)
+            .set("values", values)
+            .set("dur", format!("{:.1}s", self.seconds))
+            .set("repeatCount", "indefinite")
+    }
+
+    /// The same for a part's place or turn.
+    fn transform(&self, kind: &str, frames: &[(f64, String)]) -> AnimateTransform {
+        let (times, values) = times_and_values(frames);
+        AnimateTransform::new()
+            .set("attributeName", "transform")
+            .set("type", kind)
+            .set("keyTimes", times)
+            .set("values", values)
+            .set("dur", format!("{:.1}s", self.seconds))
+            .set("repeatCount", "indefinite")
+    }
+}
+
+fn times_and_values(frames: &[(f64, String)]) -> (String, String) {
+    let times: Vec<String> = frames.iter().map(|(share, _)| format!("{share:.4}")).collect();
+    let values: Vec<&str> = frames.iter().map(|(_, value)| value.as_str()).collect();
+    (times.join(";"), values.join(";"))
+}
+
+fn legend(speed_mm_s: f64) -> Group {
+    let mut legend = Legend::new(SIDE, LEGEND_Y);
+    let marks =
+        [(PLANT, "plant, with its stem"), (WEED, "tall weed"), (WEEDED, "weeded ground"), (NOTE, "tool; broken beam")];
+    for (colour, meaning) in marks {
+        legend.explain(|x, y| swatch(x, y, colour), meaning);
+    }
+    let pace = format!("real time, {:.1} km/h", speed_mm_s * 3.6 / 1000.0);
+    let pace = words(SIDE, LEGEND_Y + 2.5 * MARK_SIZE, &pace, PALE_INK);
+    legend.drawn().add(pace)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::tests::ruined_row;
+
+    #[test]
+    fn the_tool_turns_along_the_row_as_it_did_and_a_damaged_plant_is_red() {
+        let (trial, outcome) = ruined_row();
+        let drawn = draw(&trial.row, &trial.machine, &outcome.judgement, 500.0).to_string();
+        assert_eq!(drawn.matches(WRONG).count(), 2);
+        let (_, turn) = drawn.split_once("type=\"rotate\"").unwrap();
+        let values = turn.split("values=\"").nth(1).unwrap().split('"').next().unwrap();
+        let angles: Vec<f64> =
+            values.split(';').map(|value| value.split(' ').next().unwrap().parse().unwrap()).collect();
+        // Out at first, and in the row from then on.
+        assert_eq!((angles.first(), angles.last()), (Some(&45.0), Some(&0.0)));
+    }
+
+    #[test]
+    fn every_animation_runs_over_the_whole_row_and_never_back() {
+        let (trial, outcome) = ruined_row();
+        let drawn = draw(&trial.row, &trial.machine, &outcome.judgement, 500.0).to_string();
+        let mut found = 0;
+        for times in drawn.split("keyTimes=\"").skip(1).map(|rest| rest.split('"').next().unwrap()) {
+            let times: Vec<f64> = times.split(';').map(|time| time.parse().unwrap()).collect();
+            assert_eq!((times.first(), times.last()), (Some(&0.0), Some(&1.0)));
+            assert!(times.is_sorted(), "{times:?}");
+            found += 1;
+        }
+        assert!(found >= 5, "{found}");
+    }
+}

@@ -1,0 +1,70 @@
+//! The ADC, where simavr differs from the chip: how long a conversion takes, and what it gives.
+//!
+//! simavr asks for the input in the middle of each conversion, when the chip takes its sample. [`set_right`] then hands it the
+//! voltage, and the time until the conversion ends. A conversion takes 13 clocks of the ADC, the first one 25 (data
+//! sheet, table 24-1); simavr multiplies these clocks by 2 or 14 and drops all but 8 bits of the product. The result is 1024 steps
+//! of the reference (data sheet, 24.7); simavr has 1023.
+//!
+//! AVCC and the pin AREF are at 5 V. The temperature sensor and noise are not there, and free running is the only trigger.
+
+use std::ffi::CStr;
+use std::ptr::NonNull;
+
+use simavr_ffi as simavr;
+
+/// Inputs that are pins of the board.
+pub(super) const ADC_CHANNELS: usize = 6;
+
+/// Voltage of AVCC, of AREF, and of a digital output that is high.
+pub(super) const SUPPLY_MILLIVOLTS: u16 = 5000;
+
+/// The internal reference in millivolts, and the bits of ADMUX that choose it (data sheet, table 24-3).
+const BANDGAP_MILLIVOLTS: u16 = 1100;
+const REFS: u8 = 0b1100_0000;
+
+/// Largest result of a conversion.
+const LARGEST: u32 = 1023;
+
+// Registers by their address in the data space (data sheet, register summary).
+const ADCSRA: u16 = 0x7A;
+const ADMUX: u16 = 0x7C;
+
+/// The ADC in the chip's list of peripherals.
+///
+/// # Safety
+///
+/// `avr` must be an initialised chip.
+pub(super) unsafe fn find(avr: *mut simavr::avr_t) -> NonNull<simavr::avr_adc_t> {
+    // SAFETY: as in `uart::find`; only the ADC is called so.
+    unsafe {
+        let mut peripheral = (*avr).io_port;
+        while !peripheral.is_null() && CStr::from_ptr((*peripheral).kind) != c"adc" {
+            peripheral = (*peripheral).next;
+        }
+        NonNull::new(peripheral.cast()).expect("the ATmega328P has an ADC")
+    }
+}
+
+/// Gives the running conversion its input and its end. simavr calls for it when the sample is taken.
+///
+/// # Safety
+///
+/// `avr` must be an initialised chip and `adc` its ADC.
+pub(super) unsafe fn set_right(avr: *mut simavr::avr_t, adc: *mut simavr::avr_adc_t, millivolts: &[u16; ADC_CHANNELS]) {
+    // SAFETY: the caller vouches for both; the registers are addresses inside `data`.
+    unsafe {
+        // 11 times this is what simavr waits from here on.
+        let prescaler = 1_u8 << (*(*avr).data.add(ADCSRA.into()) & 0b111).max(1);
+        (*adc).current_prescale = prescaler;
+        let reference = match *(*avr).data.add(ADMUX.into()) & REFS {
+            REFS => BANDGAP_MILLIVOLTS,
+            _ => SUPPLY_MILLIVOLTS,
+        };
+        for (value, &input) in (*adc).adc_values.iter_mut().zip(millivolts) {
+            let reference = u32::from(reference);
+            let result = (u32::from(input) * 1024 / reference).min(LARGEST);
+            // The smallest voltage of which simavr makes this result.
+            *value = (result * reference).div_ceil(LARGEST) as u16;
+        }
+    }
+}

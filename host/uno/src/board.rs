@@ -1,0 +1,439 @@
+//! The board: an Uno with a firmware in it, what is wired to its pins, and a terminal at its serial line.
+
+use std::collections::VecDeque;
+use std::path::Path;
+
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use crate::adc::SUPPLY_MILLIVOLTS;
+use crate::core::{self, Core, Stop};
+use crate::elf::{EEPROM_BYTES, Image, Size, Variable};
+use crate::error::UnoError;
+use crate::hex::Bootloader;
+use crate::interrupts::{InterruptStatistics, Place};
+use crate::pins::{CYCLES_PER_SECOND, Pin, PinChange, Pulse, Wire};
+use crate::recorder::{ReceivedByte, Reset};
+use crate::terminal::Terminal;
+use crate::turns::Turns;
+
+/// An Arduino Uno with a firmware in it.
+pub struct Uno {
+    core: Core,
+    image: Image,
+    /// Where a reset starts the chip, in bytes of flash.
+    reset_address: u16,
+    /// Levels to come, by cycle.
+    to_drive: VecDeque<PinChange>,
+    terminal: Terminal,
+}
+
+impl Uno {
+    /// Powers up an Uno with the firmware at `elf` and an erased EEPROM. Nothing is wired to its inputs yet ([`Uno::wired`]).
+    ///
+    /// # Errors
+    ///
+    /// Where the ELF cannot be read or does not fit the chip.
+    pub fn boot(elf: &Path) -> Result<Uno, UnoError> {
+        Uno::boot_with_eeprom(elf, &[])
+    }
+
+    /// As [`Uno::boot`], with `eeprom` from the EEPROM's address 0; the rest is erased.
+    ///
+    /// # Errors
+    ///
+    /// As [`Uno::boot`], and where `eeprom` is longer than 1024 bytes.
+    pub fn boot_with_eeprom(elf: &Path, eeprom: &[u8]) -> Result<Uno, UnoError> {
+        if eeprom.len() > EEPROM_BYTES {
+            return Err(UnoError::EepromTooLarge(eeprom.len()));
+        }
+        let image = Image::read(elf)?;
+        let mut content = image.eeprom.clone();
+        content.resize(content.len().max(eeprom.len()), 0xFF);
+        content[..eeprom.len()].copy_from_slice(eeprom);
+        Ok(Uno::power_up(image, &content, 0))
+    }
+
+    /// As [`Uno::boot_with_eeprom`], with a bootloader behind the firmware, or behind erased flash where `elf` is `None`. Every reset
+    /// starts the bootloader, as the fuses of a real Uno have it.
+    ///
+    /// # Errors
+    ///
+    /// As [`Uno::boot_with_eeprom`], and where the firmware reaches into the bootloader.
+    pub fn boot_with_bootloader(bootloader: &Bootloader, elf: Option<&Path>, eeprom: &[u8]) -> Result<Uno, UnoError> {
+        if eeprom.len() > EEPROM_BYTES {
+            return Err(UnoError::EepromTooLarge(eeprom.len()));
+        }
+        let mut image = elf.map(Image::read).transpose()?.unwrap_or_default();
+        image.flash = bootloader.behind(&image.flash)?;
+        Ok(Uno::power_up(image, eeprom, bootloader.start()))
+    }
+
+    fn power_up(image: Image, eeprom: &[u8], reset_address: u16) -> Uno {
+        Uno {
+            core: Core::new(&image.flash, eeprom, reset_address, 0),
+            image,
+            reset_address,
+            to_drive: VecDeque::new(),
+            terminal: Terminal::default(),
+        }
+    }
+
+    /// The Uno with this wired to its pins, each at its level at rest. Before the first instruction that is as if it
+    /// had been there when power came.
+    #[must_use]
+    pub fn wired(mut self, wires: &[Wire]) -> Uno {
+        for wire in wires {
+            self.set(wire.pin, wire.high_at_rest);
+        }
+        self
+    }
+
+    /// Pulls the reset pin. EEPROM, SRAM, inputs and the clock stay; the cause is in MCUSR.
+    pub fn reset(&mut self) {
+        self.core.reset();
+    }
+
+    /// Lets the supply sag for a moment: too low to run, high enough for SRAM, which keeps its content, as do EEPROM, inputs and
+    /// the clock. A byte that was being written to the EEPROM is torn.
+    pub fn brown_out(&mut self) {
+        self.core.brown_out();
+    }
+
+    /// Hangs the main program where it is, as an endless loop would, until the next reset. Interrupts are as they are there:
+    /// inside a critical section none comes any more. The clock runs on until no handler is running.
+    ///
+    /// # Errors
+    ///
+    /// As [`Uno::run_until`].
+    pub fn stall(&mut self) -> Result<(), UnoError> {
+        while self.core.is_in_handler() {
+            self.step(self.cycle() + 1)?;
+        }
+        self.core.stall();
+        Ok(())
+    }
+
+    /// As [`Uno::power_cycle`], with SRAM that comes up with random content, the same for the same seed. Then
+    /// [`Uno::deepest_stack`] can be told only of a firmware that paints its stack.
+    pub fn power_cycle_to_noise(&mut self, seed: u64) {
+        self.power_cycle();
+        let mut noise = [0; Core::SRAM_BYTES];
+        ChaCha8Rng::seed_from_u64(seed).fill_bytes(&mut noise);
+        self.core.set_sram(core::SRAM_START, &noise);
+    }
+
+    /// Takes the power away and gives it back. EEPROM, inputs and the clock stay; SRAM does not, and a byte that was being
+    /// written to the EEPROM is torn.
+    pub fn power_cycle(&mut self) {
+        self.core.lose_power();
+        let mut fresh = Core::new(self.core.flash(), &self.core.eeprom(), self.reset_address, self.core.cycle());
+        fresh.take_over(&mut self.core);
+        self.core = fresh;
+    }
+
+    /// Resets since the first power-up, oldest first.
+    pub fn resets(&self) -> &[Reset] {
+        &self.core.recorder().resets
+    }
+
+    /// The flash's 32 KiB, as the bootloader, if there is one, has written it.
+    pub fn flash(&self) -> &[u8] {
+        self.core.flash()
+    }
+
+    /// The EEPROM's 1024 bytes, as they would be found if power went now: a byte that is being written is torn.
+    pub fn eeprom(&self) -> Vec<u8> {
+        self.core.eeprom()
+    }
+
+    /// Cycles since the first power-up.
+    pub fn cycle(&self) -> u64 {
+        self.core.cycle()
+    }
+
+    /// Memory that the firmware takes.
+    pub fn size(&self) -> Size {
+        self.image.size
+    }
+
+    /// Puts a level on a pin, now. While the firmware drives the pin, the level waits until it is an input again.
+    pub fn set(&mut self, pin: Pin, high: bool) {
+        if let Some(channel) = pin.adc_channel() {
+            self.core.set_millivolts(channel, if high { SUPPLY_MILLIVOLTS } else { 0 });
+        }
+        self.core.set_input(pin, high);
+    }
+
+    /// Puts a voltage on an analogue pin, now. It is 0 at first, and stays over resets. The pin reads high from 3 V on and low up
+    /// to 1.5 V; in between it keeps its level (data sheet, DC characteristics).
+    ///
+    /// # Panics
+    ///
+    /// Where the pin is none of A0 to A5.
+    pub fn set_millivolts(&mut self, pin: Pin, millivolts: u16) {
+        let channel = pin.adc_channel().unwrap_or_else(|| panic!("{pin} is not an analogue pin: take A0 to A5"));
+        if millivolts >= SUPPLY_MILLIVOLTS / 10 * 6 {
+            self.core.set_input(pin, true);
+        } else if millivolts <= SUPPLY_MILLIVOLTS / 10 * 3 {
+            self.core.set_input(pin, false);
+        }
+        self.core.set_millivolts(channel, millivolts);
+    }
+
+    /// The level that the firmware drives a pin to; `None` while the pin is an input.
+    pub fn output(&self, pin: Pin) -> Option<bool> {
+        self.core.output(pin)
+    }
+
+    /// The level at a pin: what the firmware drives, or else what it reads there.
+    pub fn level(&self, pin: Pin) -> bool {
+        self.core.output(pin).unwrap_or_else(|| self.core.input(pin))
+    }
+
+    /// Queues levels for pins, as [`Uno::set`] puts them there. Each is there at the first instruction boundary at or after its cycle; what lies in the past
+    /// comes at once. Changes of the same cycle keep their order, and so do those of several calls.
+    pub fn drive(&mut self, changes: impl IntoIterator<Item = PinChange>) {
+        self.to_drive.extend(changes);
+        self.to_drive.make_contiguous().sort_by_key(|change| change.cycle);
+    }
+
+    /// Runs until the clock has reached `cycle`, or passed it by the last instruction's length.
+    ///
+    /// # Errors
+    ///
+    /// Where the firmware crashed or halted for good.
+    pub fn run_until(&mut self, cycle: u64) -> Result<(), UnoError> {
+        while self.cycle() < cycle {
+            self.step(cycle)?;
+        }
+        Ok(())
+    }
+
+    /// Runs for a time in milliseconds.
+    ///
+    /// # Errors
+    ///
+    /// As [`Uno::run_until`].
+    pub fn run_for_ms(&mut self, time_ms: u64) -> Result<(), UnoError> {
+        self.run_until(self.cycle() + time_ms * (CYCLES_PER_SECOND / 1000))
+    }
+
+    /// Runs until the firmware has sent `text`, and takes all that it sent up to the text's end.
+    ///
+    /// # Errors
+    ///
+    /// As [`Uno::run_until`], and where the text has not come after `timeout_cycles`.
+    pub fn run_until_serial(&mut self, text: &str, timeout_cycles: u64) -> Result<String, UnoError> {
+        let deadline = self.cycle() + timeout_cycles;
+        loop {
+            let bytes = to_bytes(&self.core.recorder().received);
+            if let Some(start) = find(&bytes, text.as_bytes()) {
+                let end = start + text.len();
+                self.core.recorder_mut().received.drain(..end);
+                return Ok(String::from_utf8_lossy(&bytes[..end]).into_owned());
+            }
+            if self.cycle() >= deadline {
+                return Err(UnoError::NoAnswer {
+                    text: text.to_owned(),
+                    timeout_cycles,
+                    received: String::from_utf8_lossy(&bytes).into_owned(),
+                });
+            }
+            while self.core.recorder().received.len() == bytes.len() && self.cycle() < deadline {
+                self.step(deadline)?;
+            }
+        }
+    }
+
+    /// Runs until the next instruction is the first of a function, by its path from the crate on: `main` is where the start-up
+    /// code has filled SRAM and no line of the firmware's own has run.
+    ///
+    /// # Errors
+    ///
+    /// As [`Uno::run_until`], where the ELF has no such function, and where it is not reached within `timeout_cycles`.
+    pub fn run_until_symbol(&mut self, symbol: &str, timeout_cycles: u64) -> Result<(), UnoError> {
+        let address = self.image.functions.get(symbol).copied();
+        let address = address.ok_or_else(|| UnoError::NoFunction(symbol.to_owned()))?;
+        let deadline = self.cycle() + timeout_cycles;
+        while self.core.program_counter() != address {
+            if self.cycle() >= deadline {
+                return Err(UnoError::NotReached { symbol: symbol.to_owned(), timeout_cycles });
+            }
+            self.run_instruction()?;
+        }
+        Ok(())
+    }
+
+    /// Runs one instruction. Where an interrupt is due, that is the first one of its handler, behind the response.
+    ///
+    /// # Errors
+    ///
+    /// As [`Uno::run_until`].
+    pub fn run_instruction(&mut self) -> Result<(), UnoError> {
+        // A cycle is less than any instruction has.
+        self.step(self.cycle() + 1)
+    }
+
+    /// Where the program stands.
+    pub fn place(&self) -> Place {
+        self.core.place()
+    }
+
+    /// Gives the receiver a byte whose stop bit ends now, beside those that [`Uno::send`] has on their way. Returns whether it had
+    /// room.
+    pub fn receive(&mut self, byte: u8) -> bool {
+        self.core.receive(byte)
+    }
+
+    /// Runs a step, and what falls due before it.
+    fn step(&mut self, until: u64) -> Result<(), UnoError> {
+        while let Some(change) = self.to_drive.pop_front_if(|change| change.cycle <= self.core.cycle()) {
+            self.set(change.pin, change.high);
+        }
+        self.terminal.send_what_is_due(&mut self.core);
+        let next_level = self.to_drive.front().map(|change| change.cycle);
+        let until = [next_level, self.terminal.next_byte_ends()].into_iter().flatten().fold(until, u64::min);
+        self.core.step(until).map_err(|stop| {
+            let (cycle, program_counter) = (self.core.cycle(), self.core.program_counter());
+            match stop {
+                Stop::Crashed => UnoError::Crashed { cycle, program_counter },
+                Stop::Halted => UnoError::Halted { cycle, program_counter },
+            }
+        })
+    }
+
+    /// Types bytes into the serial line, at the pace of the line and behind those that are still on their way.
+    pub fn send(&mut self, bytes: &[u8]) {
+        self.terminal.send(bytes, &self.core);
+    }
+
+    /// From now on sent bytes come at the rate that the chip's UART is set to, whichever that is, and not at 115,200 baud: a
+    /// bootloader has a rate of its own.
+    pub fn follow_baud(&mut self) {
+        self.terminal.follow_baud();
+    }
+
+    /// Sent bytes that are still on their way to the receiver.
+    pub fn bytes_on_their_way(&self) -> usize {
+        self.terminal.bytes_on_their_way()
+    }
+
+    /// Pushes up to 63 bytes into the receiver at once, faster than any line could: simavr keeps them and hands them out one
+    /// by one.
+    pub fn send_at_once(&mut self, bytes: &[u8]) {
+        for &byte in bytes {
+            self.core.flood(byte);
+        }
+    }
+
+    /// Sent bytes that the receiver had no room for, because the firmware did not read in time.
+    pub fn lost_bytes(&self) -> u64 {
+        self.terminal.lost_bytes()
+    }
+
+    /// Takes the bytes that have come from the firmware, with their cycles.
+    pub fn received_bytes(&mut self) -> Vec<ReceivedByte> {
+        std::mem::take(&mut self.core.recorder_mut().received)
+    }
+
+    /// Takes the text that has come from the firmware; what is not UTF-8 is replaced.
+    pub fn received(&mut self) -> String {
+        let bytes = to_bytes(&self.received_bytes());
+        String::from_utf8_lossy(&bytes).into_owned()
+    }
+
+    /// Takes the edges of the output pins: from now on [`Uno::changes`] begins with the next one. An Uno that runs for days
+    /// would pile them up.
+    pub fn take_changes(&mut self) -> Vec<PinChange> {
+        std::mem::take(&mut self.core.recorder_mut().changes)
+    }
+
+    /// Every edge of the output pins since the first power-up, oldest first.
+    pub fn changes(&self) -> &[PinChange] {
+        &self.core.recorder().changes
+    }
+
+    /// The complete pulses on an output pin since the first power-up, oldest first.
+    pub fn pulses(&self, pin: Pin) -> Vec<Pulse> {
+        let edges: Vec<_> = self.changes().iter().filter(|change| change.pin == pin).collect();
+        edges
+            .windows(2)
+            .filter(|edges| edges[0].high && !edges[1].high)
+            .map(|edges| Pulse { rise: edges[0].cycle, fall: edges[1].cycle })
+            .collect()
+    }
+
+    /// Counts and times interrupts from now on; a second call starts afresh. The simulation is slower for it.
+    pub fn measure_interrupts(&mut self) {
+        self.core.measure_interrupts();
+    }
+
+    /// What the interrupts have cost since [`Uno::measure_interrupts`]; `None` before it.
+    pub fn interrupt_statistics(&self) -> Option<&InterruptStatistics> {
+        self.core.interrupt_statistics()
+    }
+
+    /// Times the main loop's turns from now on; a second call starts afresh. The simulation is slower for it.
+    pub fn measure_turns(&mut self) {
+        self.core.measure_turns();
+    }
+
+    /// The main loop's turns since [`Uno::measure_turns`]; `None` before it.
+    pub fn turns(&self) -> Option<&Turns> {
+        self.core.turns()
+    }
+
+    /// A variable's bytes in SRAM, by its symbol: in Rust the path from the crate on. `None` where there is no such symbol.
+    pub fn read(&self, symbol: &str) -> Option<&[u8]> {
+        let variable = self.image.variables.get(symbol)?;
+        Some(self.core.sram(variable.address, variable.size))
+    }
+
+    /// Puts bytes into a variable from its first byte on, as bits that fall over would. It is named as in [`Uno::read`].
+    ///
+    /// # Errors
+    ///
+    /// Where there is no such symbol, or more bytes than it has.
+    pub fn write(&mut self, symbol: &str, bytes: &[u8]) -> Result<(), UnoError> {
+        let length = bytes.len();
+        match self.image.variables.get(symbol) {
+            Some(&Variable { address, size }) if length <= size.into() => self.write_sram(address, bytes),
+            _ => Err(UnoError::NoVariable { symbol: symbol.to_owned(), length }),
+        }
+    }
+
+    /// Puts bytes into SRAM from an address of the data space on.
+    ///
+    /// # Errors
+    ///
+    /// Where they do not fit into SRAM, which is from 0x0100 to 0x08FF.
+    pub fn write_sram(&mut self, address: u16, bytes: &[u8]) -> Result<(), UnoError> {
+        let length = bytes.len();
+        let fits = u16::try_from(length).is_ok_and(|count| self.core.sram(address, count).len() == length);
+        if !fits {
+            return Err(UnoError::NotInSram { address, length });
+        }
+        self.core.set_sram(address, bytes);
+        Ok(())
+    }
+
+    /// Address of the first byte behind the static data, down to which the stack may grow.
+    pub fn first_stack_address(&self) -> u16 {
+        core::SRAM_START + self.image.size.sram as u16
+    }
+
+    /// The most bytes that the stack has taken since power-up, or since the firmware painted it, as far as they were written.
+    pub fn deepest_stack(&self) -> usize {
+        self.core.deepest_stack(self.image.size.sram as u16)
+    }
+}
+
+fn to_bytes(received: &[ReceivedByte]) -> Vec<u8> {
+    received.iter().map(|received| received.byte).collect()
+}
+
+/// Where `text` begins in `bytes`.
+fn find(bytes: &[u8], text: &[u8]) -> Option<usize> {
+    (0..=bytes.len()).find(|&start| bytes[start..].starts_with(text))
+}

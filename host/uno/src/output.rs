@@ -1,0 +1,98 @@
+//! What the firmware drives at the pins: the registers of the ports, and the timers' outputs that take their place.
+//!
+//! A pin is an output while its bit in DDRx is set. Its level is its bit in PORTx, or that of a timer's output which is connected
+//! to it (data sheet, section 14.3). simavr copies a timer's level into PORTx. A firmware that reads PORTx before an edge
+//! and writes it back behind the edge would take the edge back. So the level of a connected output is kept here.
+
+use simavr_ffi as simavr;
+
+use crate::pins::Pin;
+
+/// An output of a timer.
+pub(super) struct TimerOutput {
+    pub(super) pin: Pin,
+    /// The timer's name for simavr, and the output's number there.
+    pub(super) timer: [u8; 4],
+    pub(super) output: u32,
+    /// The register that connects it, and the bits in it.
+    control: u16,
+    connected: u8,
+}
+
+const A: u8 = 0b1100_0000;
+const B: u8 = 0b0011_0000;
+
+/// The timers' outputs (data sheet, tables 14-3, 14-6 and 14-9; TCCRnA in the register summary).
+pub(super) const TIMER_OUTPUTS: [TimerOutput; 6] = [
+    TimerOutput { pin: Pin::D6, timer: *b"tmr0", output: 0, control: 0x44, connected: A },
+    TimerOutput { pin: Pin::D5, timer: *b"tmr0", output: 1, control: 0x44, connected: B },
+    TimerOutput { pin: Pin::D9, timer: *b"tmr1", output: 0, control: 0x80, connected: A },
+    TimerOutput { pin: Pin::D10, timer: *b"tmr1", output: 1, control: 0x80, connected: B },
+    TimerOutput { pin: Pin::D11, timer: *b"tmr2", output: 0, control: 0xB0, connected: A },
+    TimerOutput { pin: Pin::D3, timer: *b"tmr2", output: 1, control: 0xB0, connected: B },
+];
+
+/// The level of the timer's output that is connected to a pin; `None` if none is.
+///
+/// # Safety
+///
+/// `avr` must be an initialised chip.
+pub(super) unsafe fn timer_level(
+    avr: *mut simavr::avr_t,
+    pin: Pin,
+    levels: &[bool; TIMER_OUTPUTS.len()],
+) -> Option<bool> {
+    let index = TIMER_OUTPUTS.iter().position(|output| output.pin == pin)?;
+    let TimerOutput { control, connected, .. } = TIMER_OUTPUTS[index];
+    // SAFETY: the caller vouches for `avr`; the register is an address inside `data`.
+    let is_connected = unsafe { *(*avr).data.add(control.into()) } & connected != 0;
+    is_connected.then_some(levels[index])
+}
+
+/// A port's registers, by the address of the first one, PINx, in the data space (data sheet, register summary).
+#[derive(Clone, Copy)]
+pub(super) struct Port(u16);
+
+impl Port {
+    /// The ports' letters.
+    pub(super) const NAMES: [char; 3] = ['B', 'C', 'D'];
+
+    /// The port with this letter.
+    pub(super) const fn named(name: char) -> Port {
+        Port(match name {
+            'B' => 0x23,
+            'C' => 0x26,
+            _ => 0x29,
+        })
+    }
+
+    /// PINx: the levels at the pins.
+    ///
+    /// # Safety
+    ///
+    /// `avr` must be an initialised chip.
+    pub(super) unsafe fn pins(self, avr: *mut simavr::avr_t) -> u8 {
+        // SAFETY: the caller vouches for `avr`; the register is an address inside `data`.
+        unsafe { *(*avr).data.add(self.0.into()) }
+    }
+
+    /// DDRx: the bits of outputs are set.
+    ///
+    /// # Safety
+    ///
+    /// As [`Port::pins`].
+    pub(super) unsafe fn direction(self, avr: *mut simavr::avr_t) -> u8 {
+        // SAFETY: as in `pins`.
+        unsafe { *(*avr).data.add((self.0 + 1).into()) }
+    }
+
+    /// PORTx: the levels of outputs, and the pull-ups of inputs.
+    ///
+    /// # Safety
+    ///
+    /// As [`Port::pins`].
+    pub(super) unsafe fn port(self, avr: *mut simavr::avr_t) -> u8 {
+        // SAFETY: as in `pins`.
+        unsafe { *(*avr).data.add((self.0 + 2).into()) }
+    }
+}

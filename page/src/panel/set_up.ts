@@ -1,0 +1,96 @@
+// Setting the machine up: the steps of the manual, what is to be measured next, and how small the margin may be. The project's own
+// Rust has the steps and does the sum (host/page/src/set_up.rs); here the lines of the session are kept for it.
+
+import { ask as askRust } from "../core.ts";
+import { make, type Parts } from "../dom.ts";
+import { read } from "../link/grammar.ts";
+import type { Ask, Happening } from "../link/session.ts";
+import { quantity, say, step, told } from "../words/words.ts";
+import type { Machine } from "./machine.ts";
+
+/** What the session tells of the steps. */
+interface Advice {
+    readonly steps: readonly { readonly title: string; readonly how: string; readonly tasks: readonly string[] }[];
+    /** What is to be done next; nothing before the first thing was measured. */
+    readonly next: string | null;
+    /** What is to be measured until the margin is known. */
+    readonly missing: readonly string[];
+    readonly marginMm: number | null;
+    readonly warning: string | null;
+}
+
+/** Lines that are kept, and those of plants among them: the oldest go first. */
+const LINES = 200;
+const PLANTS = 12;
+
+export class SetUp {
+    readonly #parts: Parts;
+    readonly #machine: Machine;
+    #lines: string[] = [];
+
+    constructor(parts: Parts, machine: Machine, ask: Ask) {
+        [this.#parts, this.#machine] = [parts, machine];
+        parts.button("margin-set", async () => {
+            const { marginMm } = this.#advice();
+            if (marginMm === null) return;
+            try {
+                await ask(`set margin_mm ${marginMm}`);
+                await ask("save");
+            } catch (error) {
+                parts.say("margin-said", () => told(error instanceof Error ? error.message : String(error)));
+            }
+        });
+    }
+
+    /** Keeps what tells of a measurement. */
+    take(happening: Happening): void {
+        const { is } = happening;
+        if (is === "connected" || is === "settings")
+            for (const name of ["servo_in_us", "servo_out_us"]) this.#keep(`${name}=${this.#machine.setting(name)}`);
+        else if (is === "command" && /^(calibrate|set margin_mm) /.test(happening.line))
+            this.#keep(`> ${happening.line}`);
+        else if (is === "answer" && read(happening.line).is === "setting") this.#keep(happening.line);
+        else if (is === "told" && (happening.said.is === "calibrated" || happening.said.is === "slip"))
+            this.#keep(happening.line);
+        else return;
+        this.show();
+    }
+
+    /** Shows the steps and what is known of them. */
+    show(): void {
+        const advice = this.#advice();
+        const list = this.#parts.html("set-up-steps");
+        list.replaceChildren(
+            ...advice.steps.map((manual) => {
+                const [title, how] = step(manual.title, manual.how);
+                const codes = manual.tasks.flatMap((task) => [" ", make("code", "", task)]);
+                return make("li", "", make("b", "", title), ". ", how, ...codes);
+            }),
+        );
+        const steps = advice.missing.map((step) => `${told(step)}.`).join(" ");
+        const { next, warning } = advice;
+        this.#parts.write(
+            "margin-said",
+            next === null ? say("beforeMargin", { steps }) : say("next", { step: told(next) }),
+        );
+        this.#parts.write("margin-warning", warning === null ? "" : say("warningOf", { what: told(warning) }));
+        const button = this.#parts.get("margin-set", HTMLButtonElement);
+        button.hidden = advice.marginMm === null || advice.marginMm === this.#machine.setting("margin_mm");
+        if (advice.marginMm !== null)
+            button.textContent = say("setMargin", { margin: quantity(advice.marginMm, "millimeter") });
+    }
+
+    #keep(line: string): void {
+        if (this.#lines.at(-1) === line && !line.startsWith("calibrated") && !line.startsWith("slip")) return;
+        const plants = this.#lines.filter((kept) => kept.startsWith("slip"));
+        if (line.startsWith("slip") && plants.length >= PLANTS)
+            this.#lines.splice(this.#lines.indexOf(plants[0] ?? ""), 1);
+        this.#lines.push(line);
+        if (this.#lines.length > LINES) this.#lines.shift();
+    }
+
+    #advice(): Advice {
+        const settings = Object.fromEntries(this.#machine.settings.map(({ name, value }) => [name, value]));
+        return askRust<Advice>({ setUp: { lines: this.#lines, settings } });
+    }
+}

@@ -1,0 +1,116 @@
+// Whether the Uno that is connected has another firmware than this page, and the way to this page's: its settings go to a file, the
+// page flashes it, and what the new firmware has lost of them is put back by a button.
+
+import { ask as askRust } from "../core.ts";
+import { download, type Parts } from "../dom.ts";
+import type { Happening } from "../link/session.ts";
+import { write } from "../link/settings_file.ts";
+import { chosen, keep } from "../preferences.ts";
+import { say, told } from "../words/words.ts";
+import type { Panel } from "./panel.ts";
+
+/** The firmware of this page. */
+interface Firmware {
+    readonly version: string;
+    readonly settings: readonly string[];
+}
+
+/** Where the settings are kept until the new firmware has them. */
+const KEPT = "settings";
+
+export class Update {
+    readonly #parts: Parts;
+    readonly #panel: Panel;
+    readonly #own = askRust<Firmware>("firmware");
+
+    /** `flash` leads to where the Uno is flashed. */
+    constructor(parts: Parts, panel: Panel, flash: () => Promise<void>) {
+        [this.#parts, this.#panel] = [parts, panel];
+        parts.button("update-go", () => {
+            const { settings, help } = panel.machine;
+            download("machine.toml", write(settings, help), "application/toml");
+            keep(KEPT, JSON.stringify(settings.map(({ name, value }) => [name, value])));
+            void flash();
+        });
+        parts.button("restore-go", () => void this.#putBack());
+        parts.button("restore-drop", () => {
+            keep(KEPT, "");
+            this.#show();
+        });
+    }
+
+    /** Takes what happened to the machine. */
+    take({ is }: Happening): void {
+        if (is === "connected" && this.#isOwn && !this.#isLost()) keep(KEPT, "");
+        if (is === "connected") this.#parts.write("restore-said", "");
+        if (["connected", "lost", "settings", "told"].includes(is)) this.#show();
+    }
+
+    /** Settings that the machine has and this page's firmware has not, and the other way round. */
+    #changes(): { gone: string[]; added: string[] } {
+        const names = this.#panel.machine.settings.map(({ name }) => name);
+        const { settings } = this.#own;
+        return {
+            gone: names.filter((name) => !settings.includes(name)),
+            added: settings.filter((name) => !names.includes(name)),
+        };
+    }
+
+    get #isOwn(): boolean {
+        const { gone, added } = this.#changes();
+        return this.#panel.machine.version === this.#own.version && gone.length + added.length === 0;
+    }
+
+    /** Whether the machine has nothing saved: its firmware has another table, or none was ever there. */
+    #isLost(): boolean {
+        return this.#panel.machine.settings.every(({ saved }) => saved === undefined);
+    }
+
+    /** What was kept of the settings, where that is not in the machine. */
+    #kept(): [string, number][] {
+        return JSON.parse(chosen(KEPT) || "[]");
+    }
+
+    #show(): void {
+        const { version } = this.#panel.machine;
+        const isOther = version !== undefined && !this.#isOwn;
+        this.#parts.html("update").hidden = !isOther;
+        if (isOther) {
+            const { gone, added } = this.#changes();
+            const tables = () => [
+                ...(gone.length > 0 ? [say("settingsGone", { names: gone.join(", ") })] : []),
+                ...(added.length > 0 ? [say("settingsAdded", { names: added.join(", ") })] : []),
+                ...(gone.length + added.length > 0 ? [say("settingsLost")] : []),
+            ];
+            const versions = { theirs: version, ours: this.#own.version };
+            this.#parts.say("update-said", () =>
+                [say("otherFirmware", versions), ...tables(), say("settingsToFile")].join(" "),
+            );
+        }
+        const kept = this.#kept();
+        this.#parts.html("restore").hidden = version === undefined || isOther || kept.length === 0;
+    }
+
+    async #putBack(): Promise<void> {
+        const values = new Map(this.#kept());
+        const unknown = [...values.keys()].filter((name) => !this.#own.settings.includes(name));
+        for (const name of unknown) values.delete(name);
+        try {
+            const isSaved = await this.#panel.putBack(values);
+            if (!isSaved) {
+                this.#say(() => say("notAllPutBack"));
+                return;
+            }
+            keep(KEPT, "");
+            const names = unknown.join(", ");
+            this.#say(() => `${say("areBack")}${names === "" ? "" : ` ${say("hasNoSuch", { names })}`}`);
+            this.#show();
+        } catch (error) {
+            this.#say(() => told(error instanceof Error ? error.message : String(error)));
+        }
+    }
+
+    #say(text: () => string): void {
+        this.#parts.say("restore-said", text);
+    }
+}

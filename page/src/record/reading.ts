@@ -1,0 +1,37 @@
+// A question about logs, answered by a worker. The worker's code is inside of the page, as a page from the disk has no other.
+
+import code from "log-worker.js";
+import { module } from "../core.ts";
+import type { Asked, Told } from "./worker.ts";
+
+export interface Answer<Said> {
+    readonly said: Said;
+    readonly tables: readonly Float64Array[];
+}
+
+/** Why there is no answer: it was cancelled. */
+export class Cancelled extends Error {}
+
+let address: string | undefined;
+
+/** Asks; `progress` takes how far the answer is, from 0 to 1. The worker ends with its answer, or when `cancel` does. */
+export function read<Said>(
+    logs: readonly File[],
+    wants: Asked["wants"],
+    progress: (share: number) => void,
+    cancel: AbortSignal,
+): Promise<Answer<Said>> {
+    address ??= URL.createObjectURL(new Blob([code], { type: "text/javascript" }));
+    const worker = new Worker(address);
+    const answer = new Promise<Answer<Said>>((resolve, reject) => {
+        cancel.addEventListener("abort", () => reject(new Cancelled()), { once: true });
+        worker.addEventListener("error", ({ message }) => reject(new Error(message)));
+        worker.addEventListener("message", ({ data }: MessageEvent<Told>) => {
+            if ("share" in data) progress(data.share);
+            else if ("why" in data) reject(new Error(data.why));
+            else resolve({ said: data.answer as Said, tables: data.tables });
+        });
+    });
+    worker.postMessage({ module, logs, wants } satisfies Asked);
+    return answer.finally(() => worker.terminate());
+}

@@ -1,0 +1,371 @@
+// Logs that were written before, as rows one below the other: what was seen and kept free, where the tool was in the row, how fast the
+// machine rolled, and its alarms. The buttons, the slider and the wheel move and zoom all of them at once. Each can be replayed.
+//
+// Only what is in the window is drawn, however long a log is. It is read and replayed beside the page, which can be used meanwhile.
+
+import { make as element, Parts } from "../dom.ts";
+import { fault, sentence } from "../panel/machine.ts";
+import { onLanguage, quantity, say } from "../words/words.ts";
+import { map, type Picture, picture, type Replayed, replay, type Speed } from "./picture.ts";
+import { Cancelled } from "./reading.ts";
+
+const SVG = "http://www.w3.org/2000/svg";
+/** Ground in the window: at first, the least and the most. */
+const WINDOW_MM = { first: 8000, least: 1000, most: 200_000 };
+/** How much a press zooms, and how much of the window it moves. */
+const ZOOM = 2;
+const STEP = 0.5;
+/** The picture's height, and what stands in it from above: alarms, canopies, the tool's track, and the speed. */
+const HEIGHT = 200;
+const AT = { alarm: 0, row: 24, rowEnd: 84, track: 100, speed: 120, speedEnd: 180, note: 196 };
+/** The distance between two marks is the first of these with at most so many marks in the window. */
+const MARKS_MM = [200, 500, 1000, 2000, 5000, 10_000, 20_000, 50_000];
+const MARKS = 8;
+/** From here on a duration is told in minutes, and in hours. */
+const MINUTE_S = 120;
+const HOUR_S = 7200;
+
+/** A log that is shown. */
+interface Row {
+    readonly file: File;
+    readonly picture: Picture;
+    readonly drawing: SVGSVGElement;
+    /** What is told of the window's middle. */
+    readonly at: HTMLElement;
+}
+
+export class RecordView {
+    readonly #parts: Parts;
+    readonly #place: HTMLInputElement;
+    readonly #resized = new ResizeObserver(() => this.#draw());
+    #rows: readonly Row[] = [];
+    #windowMm = WINDOW_MM.first;
+    /** The middle of the window. */
+    #middleMm = 0;
+    #isToBeDrawn = false;
+    #work = new AbortController();
+
+    constructor(root: HTMLElement) {
+        const parts = new Parts(root);
+        this.#parts = parts;
+        this.#place = parts.get("log-place", HTMLInputElement);
+        const file = parts.get("log-file", HTMLInputElement);
+        parts.button("log-open", () => file.click());
+        file.addEventListener("change", () => void this.#open(file));
+        for (const [name, by] of [
+            ["log-back", -STEP],
+            ["log-on", STEP],
+        ] as const)
+            parts.button(name, () => this.#go(this.#middleMm + by * this.#windowMm));
+        parts.button("log-closer", () => this.#zoom(1 / ZOOM));
+        parts.button("log-farther", () => this.#zoom(ZOOM));
+        parts.button("alarm-before", () => this.#toAlarm(-1));
+        parts.button("alarm-next", () => this.#toAlarm(1));
+        parts.button("log-replay", () => void this.#replay());
+        parts.button("log-map", () => void this.#map());
+        parts.button("log-cancel", () => this.#work.abort());
+        this.#place.addEventListener("input", () => this.#go(this.#place.valueAsNumber));
+        const rows = parts.html("log-rows");
+        rows.addEventListener(
+            "wheel",
+            (event) => {
+                event.preventDefault();
+                if (event.ctrlKey) this.#zoom(event.deltaY > 0 ? ZOOM : 1 / ZOOM);
+                else this.#go(this.#middleMm + ((event.deltaX + event.deltaY) / 1000) * this.#windowMm);
+            },
+            { passive: false },
+        );
+        rows.addEventListener("pointermove", (event) => {
+            if (event.buttons !== 1) return;
+            this.#go(this.#middleMm - (event.movementX / Math.max(rows.clientWidth, 1)) * this.#windowMm);
+        });
+        onLanguage(() => this.#draw());
+    }
+
+    async #open(input: HTMLInputElement): Promise<void> {
+        const files = [...(input.files ?? [])];
+        input.value = "";
+        if (files.length === 0) return;
+        this.#show([]);
+        for (const name of ["log-replayed", "log-alarm", "log-mapped"]) this.#parts.write(name, "");
+        const texts: (() => string)[] = [];
+        const rows: Row[] = [];
+        const isWhole = await this.#eachOf(files, "log-said", async (file, progress, cancel) => {
+            const found = await picture(file, progress, cancel);
+            if ("problem" in found) texts.push(() => say("noLog", { file: file.name, why: found.problem }));
+            else if (found.speeds.length === 0) texts.push(() => say("emptyLog", { file: file.name }));
+            else {
+                rows.push(row(file, found));
+                texts.push(() => inWords(file, found));
+            }
+        });
+        if (!isWhole) return;
+        this.#parts.say("log-said", () => texts.map((text) => text()).join(" "));
+        this.#show(rows);
+    }
+
+    /**
+     * Does something about each file, and shows how far all are. Another such work, or the operator, cancels it: false then. Why it
+     * failed is told in this part.
+     */
+    async #eachOf(
+        files: readonly File[],
+        said: string,
+        use: (file: File, progress: (share: number) => void, cancel: AbortSignal) => Promise<void>,
+    ): Promise<boolean> {
+        this.#work.abort();
+        const work = new AbortController();
+        this.#work = work;
+        const bar = this.#parts.get("log-progress", HTMLProgressElement);
+        const busy = this.#parts.html("log-busy");
+        bar.value = 0;
+        busy.hidden = false;
+        this.#parts.write(said, "");
+        let at = "";
+        try {
+            for (const [done, file] of files.entries()) {
+                at = file.name;
+                await use(
+                    file,
+                    (share) => {
+                        bar.value = (done + share) / files.length;
+                    },
+                    work.signal,
+                );
+            }
+            return true;
+        } catch (error) {
+            if (this.#work !== work) return false;
+            const why = error instanceof Error ? error.message : String(error);
+            this.#parts.say(said, () =>
+                error instanceof Cancelled ? say("cancelled") : say("notRead", { file: at, why }),
+            );
+            return false;
+        } finally {
+            if (this.#work === work) busy.hidden = true;
+        }
+    }
+
+    #show(rows: readonly Row[]): void {
+        this.#rows = rows;
+        this.#resized.disconnect();
+        this.#parts.html("log-body").hidden = rows.length === 0;
+        this.#parts.html("log-places").hidden = !rows.some(({ picture }) => picture.hasPlaces);
+        this.#showMap(null);
+        this.#parts.html("log-rows").replaceChildren(...rows.map(({ drawing, at }) => element("div", "", drawing, at)));
+        for (const { drawing } of rows) this.#resized.observe(drawing);
+        this.#place.max = String(Math.ceil(this.#endMm));
+        this.#windowMm = WINDOW_MM.first;
+        this.#go(this.#windowMm / 2);
+    }
+
+    get #endMm(): number {
+        return this.#rows.reduce((most, { picture }) => Math.max(most, picture.lengthMm), 0);
+    }
+
+    #zoom(by: number): void {
+        this.#windowMm = Math.min(Math.max(this.#windowMm * by, WINDOW_MM.least), WINDOW_MM.most);
+        this.#draw();
+    }
+
+    #go(middleMm: number): void {
+        this.#middleMm = Math.min(Math.max(middleMm, 0), this.#endMm);
+        this.#place.value = String(Math.round(this.#middleMm));
+        this.#draw();
+    }
+
+    /** Goes to the next alarm on, or back, of any row. */
+    #toAlarm(way: 1 | -1): void {
+        const alarms = this.#rows.flatMap(({ file, picture }) => picture.alarms.map((alarm) => ({ ...alarm, file })));
+        // Rolled back, the machine may have come to an alarm's place again.
+        const ahead = alarms.filter(({ mm }) => way * (mm - this.#middleMm) > 0.5);
+        const next = ahead.sort((one, other) => way * (one.mm - other.mm))[0];
+        if (next) this.#go(next.mm);
+        this.#parts.say("log-alarm", () => {
+            if (!next) return say(way > 0 ? "noAlarmNext" : "noAlarmBefore");
+            const { title, advice } = fault(next.name);
+            return this.#of(next.file, `${say(next.isWarning ? "warning" : "alarm", { title })}: ${sentence(advice)}`);
+        });
+    }
+
+    /** What is told of a file, with its name where there are others. */
+    #of(file: File, text: string): string {
+        return this.#rows.length > 1 ? `${file.name}: ${text}` : text;
+    }
+
+    async #replay(): Promise<void> {
+        const files = this.#rows.map(({ file }) => file);
+        const results: (() => string)[] = [];
+        const isWhole = await this.#eachOf(files, "log-replayed", async (file, progress, cancel) => {
+            const result = await replay(file, progress, cancel);
+            results.push(() => this.#of(file, "problem" in result ? sentence(result.problem) : agreement(result)));
+        });
+        if (isWhole) this.#parts.say("log-replayed", () => results.map((result) => result()).join(" "));
+    }
+
+    /** Draws the map of all logs. */
+    async #map(): Promise<void> {
+        const files = this.#rows.map(({ file }) => file);
+        const words = {
+            legend: [
+                say("mapWeeded"),
+                say("mapLeft"),
+                say("plant"),
+                say("mapKept"),
+                say("legendWeed"),
+                say("mapLabel"),
+                say("stateAlarm"),
+            ],
+            withoutPlace: say("mapMissing"),
+            north: say("north"),
+        };
+        await this.#eachOf(files.slice(0, 1), "log-mapped", async (_, progress, cancel) => {
+            const { svg, placed } = await map(files, words, progress, cancel);
+            this.#parts.say("log-mapped", () => (svg ? say("mapped", { count: placed }) : say("noMap")));
+            this.#showMap(svg);
+        });
+    }
+
+    #showMap(svg: string | null): void {
+        const drawn = this.#parts.get("log-map-drawn", HTMLImageElement);
+        URL.revokeObjectURL(drawn.src);
+        drawn.hidden = svg === null;
+        if (svg) drawn.src = URL.createObjectURL(new Blob([svg], { type: "image/svg+xml" }));
+    }
+
+    /** Draws the rows in the browser's next picture, once, however often they are moved until then. */
+    #draw(): void {
+        if (this.#isToBeDrawn) return;
+        this.#isToBeDrawn = true;
+        requestAnimationFrame(() => {
+            this.#isToBeDrawn = false;
+            for (const row of this.#rows) this.#drawRow(row);
+        });
+    }
+
+    #drawRow({ file, picture: shown, drawing, at }: Row): void {
+        const { clientWidth } = drawing;
+        if (clientWidth === 0) return;
+        const fromMm = this.#middleMm - this.#windowMm / 2;
+        const toMm = fromMm + this.#windowMm;
+        const x = (mm: number) => ((mm - fromMm) / this.#windowMm) * clientWidth;
+        const isSeen = (one: number, other: number) => Math.max(one, other) >= fromMm && Math.min(one, other) <= toMm;
+        const bar = (className: string, one: number, other: number, top: number, height: number) =>
+            make("rect", { class: className, x: x(one), width: Math.max(x(other) - x(one), 1), y: top, height });
+        const objects = shown.objects
+            .near(fromMm, toMm)
+            .filter(({ zoneMm, zoneEndMm, toMm }) => isSeen(zoneMm, Math.max(zoneEndMm, toMm)));
+        const row = AT.rowEnd - AT.row;
+        drawing.ariaLabel = `${file.name}: ${say("logDrawing")}`;
+        drawing.setAttribute("viewBox", `0 0 ${clientWidth} ${HEIGHT}`);
+        drawing.replaceChildren(
+            ...objects
+                .filter((object) => object.class !== "weed")
+                .map(({ zoneMm, zoneEndMm }) => bar("strip-margin", zoneMm, zoneEndMm, AT.row, row)),
+            ...objects.map((object) =>
+                bar(
+                    object.class === "weed" ? "strip-weed" : `strip-canopy ${object.class}`,
+                    object.fromMm,
+                    object.toMm,
+                    AT.row + row / 4,
+                    row / 2,
+                ),
+            ),
+            ...shown.worked
+                .near(fromMm, toMm)
+                .filter(({ startMm, endMm }) => isSeen(startMm, endMm))
+                .map(({ startMm, endMm }) => bar("log-worked", startMm, endMm, AT.track, 10)),
+            make("path", {
+                class: "log-speed",
+                d: this.#speedLine(shown.speeds.near(fromMm, toMm), shown.fastestMmS, x, isSeen),
+            }),
+            make("line", { class: "log-middle", x1: x(this.#middleMm), x2: x(this.#middleMm), y1: 0, y2: AT.speedEnd }),
+            ...shown.alarms
+                .filter(({ mm }) => isSeen(mm, mm))
+                .map(({ mm, isWarning }) =>
+                    make("path", {
+                        class: isWarning ? "log-warning" : "log-alarm",
+                        d: `M${x(mm)} ${AT.alarm}l14 9l-14 9V${AT.speedEnd}`,
+                    }),
+                ),
+            ...this.#marks(fromMm, toMm, x),
+        );
+        const here = nearest(shown.speeds.nearest(this.#middleMm), this.#middleMm);
+        if (here)
+            at.textContent = say("atPlace", {
+                distance: metres(this.#middleMm),
+                time: duration(here.timeMs),
+                speed: quantity(here.mmS * 0.0036, "kilometer-per-hour", 1),
+            });
+    }
+
+    #speedLine(
+        speeds: readonly Speed[],
+        fastestMmS: number,
+        x: (mm: number) => number,
+        isSeen: (one: number, other: number) => boolean,
+    ): string {
+        const y = (mmS: number) => AT.speedEnd - (Math.abs(mmS) / fastestMmS) * (AT.speedEnd - AT.speed);
+        const seen = speeds.filter(({ mm }, at) => isSeen(speeds[at - 1]?.mm ?? mm, speeds[at + 1]?.mm ?? mm));
+        const points = seen.map(({ mm, mmS }) => `${x(mm).toFixed(1)} ${y(mmS).toFixed(1)}`);
+        return points.length > 0 ? `M${points.join("L")}` : "";
+    }
+
+    #marks(fromMm: number, toMm: number, x: (mm: number) => number): SVGElement[] {
+        const apart = MARKS_MM.find((apart) => (toMm - fromMm) / apart <= MARKS) ?? (toMm - fromMm) / MARKS;
+        const marks: SVGElement[] = [];
+        for (let mm = Math.ceil(Math.max(fromMm, 0) / apart) * apart; mm <= toMm; mm += apart) {
+            const note = make("text", { class: "strip-note", x: x(mm), y: AT.note, "text-anchor": "middle" });
+            note.textContent = quantity(mm / 1000, "meter", apart < 1000 ? 1 : 0);
+            marks.push(note);
+        }
+        return marks;
+    }
+}
+
+/** A log as a row. */
+function row(file: File, picture: Picture): Row {
+    const drawing = make("svg", { class: "log-row", role: "img", "data-part": "log-drawing" }) as SVGSVGElement;
+    const at = element("p", "log-at");
+    return { file, picture, drawing, at };
+}
+
+const inWords = (file: File, { lengthMm, timeMs, objects, swings, alarms }: Picture) =>
+    say("logHas", {
+        file: file.name,
+        distance: metres(lengthMm),
+        time: duration(timeMs),
+        objects: objects.length,
+        swings,
+        count: alarms.length,
+    });
+
+function agreement({ objects, alarms, swings, difference, notes }: Replayed): string {
+    return [
+        say("replaySame", { objects, alarms, swings }),
+        difference === null ? say("replayWhole") : say("replayDiffers", { difference }),
+        ...notes.map(sentence),
+    ].join(" ");
+}
+
+/** What was told nearest to a place. */
+function nearest(speeds: readonly Speed[], placeMm: number): Speed | undefined {
+    return speeds.reduce<Speed | undefined>(
+        (best, speed) => (best && Math.abs(best.mm - placeMm) <= Math.abs(speed.mm - placeMm) ? best : speed),
+        undefined,
+    );
+}
+
+const metres = (mm: number) => quantity(mm / 1000, "meter", mm < 100_000 ? 1 : 0);
+
+function duration(ms: number): string {
+    const seconds = ms / 1000;
+    if (seconds < MINUTE_S) return quantity(seconds, "second", 1);
+    return seconds < HOUR_S ? quantity(seconds / 60, "minute", 1) : quantity(seconds / 3600, "hour", 1);
+}
+
+function make(name: string, attributes: Readonly<{ [name: string]: string | number }>): SVGElement {
+    const element = document.createElementNS(SVG, name);
+    for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, String(value));
+    return element;
+}

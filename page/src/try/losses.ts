@@ -1,0 +1,126 @@
+// Why ground of a trial was not weeded, tall weeds were left and plants were not kept, as the tool passes them.
+//
+// Each stretch that the tool rolls over for the first time goes to one part of the loss budget, whose parts are those of
+// host/field/src/budget.rs without guarded ground. Its parts add up to all that was rolled over. What the firmware says decides: its
+// state, the reason that it gives, and its keep-out zones.
+
+import type { Machine } from "../row/machine.ts";
+import { span, type Thing } from "../row/row.ts";
+import { quantity, say, type Word } from "../words/words.ts";
+import type { Zone } from "./zone.ts";
+
+/** Where the ground goes, with the text for each part. */
+const PARTS = {
+    weeded: "groundWeeded",
+    plants: "groundPlants",
+    margins: "groundMargins",
+    weeds: "groundWeeds",
+    swings: "groundSwings",
+    closed: "groundClosed",
+} as const satisfies Record<string, Word>;
+export type Part = keyof typeof PARTS;
+
+/** Why a tall weed was left, by the part to which its place went, and why a plant was not kept. */
+const LEFT = {
+    weeded: "leftSwings",
+    swings: "leftSwings",
+    plants: "leftPlants",
+    margins: "leftPlants",
+    weeds: "leftWeeds",
+    closed: "leftClosed",
+} as const satisfies Record<Part, Word>;
+const NOT_KEPT = { unseen: "notKeptUnseen", off: "notKeptOff", late: "notKeptLate" } as const satisfies Record<
+    string,
+    Word
+>;
+export type NotKept = keyof typeof NOT_KEPT;
+
+/** How far off a zone may lie that is where it should be: the encoder's count, and the beam's. */
+const OFF_MM = 5;
+/** Reasons of the firmware for which the tool is out on ground of no plant. */
+const CLOSED = ["unseen_ground", "too_fast", "encoder_doubtful"];
+
+/** Why a plant was not kept that is to have ground of this width free on both sides. */
+export function whyNotKept(plant: Thing, widthMm: number, zones: readonly Zone[], marginMm: number): NotKept {
+    const { placeMm } = plant;
+    const [fromMm, toMm] = [placeMm - widthMm / 2 - marginMm, placeMm + widthMm / 2 + marginMm];
+    const over = zones.filter(({ startMm, endMm }) => startMm < toMm && endMm > fromMm);
+    if (over.length === 0) return "unseen";
+    const isOff = !over.some(({ startMm, endMm }) => startMm <= fromMm + OFF_MM && endMm >= toMm - OFF_MM);
+    return isOff ? "off" : "late";
+}
+
+export class Losses {
+    /** Ground of each part, in mm. */
+    readonly groundMm: Record<Part, number> = { weeded: 0, plants: 0, margins: 0, weeds: 0, swings: 0, closed: 0 };
+    /** The part of the ground below each tall weed, by its number in the row. */
+    readonly below = new Map<number, Part>();
+    /** How the machine is, and why its tool is out, as it has said last. */
+    isAtWork = false;
+    reason: string | undefined;
+    #passedMm: number;
+    #next = 0;
+
+    constructor(toolMm: number) {
+        this.#passedMm = toolMm;
+    }
+
+    /** Takes the ground over which the tool has come since the last time, where the firmware keeps these zones. */
+    pass(machine: Machine, zones: readonly Zone[], marginMm: number): void {
+        const { toolMm, things } = machine;
+        if (toolMm <= this.#passedMm) return;
+        const part = this.#part(machine, zones, marginMm);
+        this.groundMm[part] += toolMm - this.#passedMm;
+        this.#passedMm = toolMm;
+        for (let thing = things[this.#next]; thing && thing.placeMm <= toolMm; thing = things[this.#next]) {
+            if (thing.kind === "weed") this.below.set(this.#next, part);
+            this.#next += 1;
+        }
+    }
+
+    #part({ toolMm, things, isWeeding }: Machine, zones: readonly Zone[], marginMm: number): Part {
+        if (isWeeding) return "weeded";
+        if (!this.isAtWork || CLOSED.includes(this.reason ?? "")) return "closed";
+        const around = zones.filter(({ startMm, endMm }) => startMm <= toolMm && endMm >= toolMm);
+        if (around.length === 0) return "swings";
+        const kept = around.filter(({ startMm, endMm }) => nearest(things, (startMm + endMm) / 2) !== "weed");
+        if (kept.length === 0) return "weeds";
+        const isInside = kept.some(({ startMm, endMm }) => startMm + marginMm <= toolMm && endMm - marginMm >= toolMm);
+        return isInside ? "plants" : "margins";
+    }
+}
+
+/** What kind of thing stands nearest to a place, and not beyond it by more than its own width. */
+function nearest(things: readonly Thing[], placeMm: number): Thing["kind"] | undefined {
+    const away = (thing: Thing) => Math.abs(thing.placeMm - placeMm);
+    const first = things.findIndex((thing) => span(thing).endMm >= placeMm);
+    const [one, other] = first < 0 ? [things.at(-1), undefined] : [things[first - 1], things[first]];
+    if (!one || !other) return (one ?? other)?.kind;
+    return away(one) < away(other) ? one.kind : other.kind;
+}
+
+/** Where the ground went, in words; nothing before there was any. */
+export function groundInWords(groundMm: Readonly<Record<Part, number>>): string {
+    const parts = Object.keys(PARTS) as Part[];
+    const allMm = parts.reduce((sum, part) => sum + groundMm[part], 0);
+    if (allMm < 1) return "";
+    const share = (part: Part) => quantity((100 * groundMm[part]) / allMm, "percent");
+    return say("ground", { parts: parts.map((part) => say(PARTS[part], { share: share(part) })).join(", ") });
+}
+
+/** How often each text stands in a list, the most frequent first. */
+function counted(words: readonly ((typeof LEFT)[Part] | (typeof NOT_KEPT)[NotKept])[]): string {
+    const counts = new Map<(typeof words)[number], number>();
+    for (const word of words) counts.set(word, (counts.get(word) ?? 0) + 1);
+    return [...counts]
+        .sort(([, one], [, other]) => other - one)
+        .map(([word, count]) => say(word, { count }))
+        .join(", ");
+}
+
+/** Why weeds were left and plants not kept, in words. */
+export function whyInWords(left: readonly (Part | undefined)[], notKept: readonly NotKept[]): string {
+    const weeds = left.length > 0 ? [say("left", { parts: counted(left.map((part) => LEFT[part ?? "closed"])) })] : [];
+    const plants = notKept.length > 0 ? [say("notKept", { parts: counted(notKept.map((why) => NOT_KEPT[why])) })] : [];
+    return [...plants, ...weeds].join(" ");
+}

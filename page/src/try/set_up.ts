@@ -1,0 +1,33 @@
+// The machine that is set up, as the manual has it: what the page's own machine is like, and what its firmware is told.
+//
+// The values are those of the manual's steps, which the project's own Rust has (host/page/src/set_up.rs).
+
+import { ask } from "../core.ts";
+import type { MachineKind } from "../row/machine.ts";
+
+/** What the measurements of the simulated machine ask for. */
+const MARGIN_MM = 11;
+
+/** The values of the steps, by their names. */
+function values(): Map<string, number> {
+    const { steps } = ask<{ steps: { tasks: string[] }[] }>({ setUp: { lines: [], settings: {} } });
+    const tasks = steps.flatMap(({ tasks }) => tasks).map((task) => /^([\w.]+) = ([\d.]+)/.exec(task));
+    return new Map(tasks.flatMap((found) => (found?.[1] ? [[found[1], Number(found[2])] as const] : [])));
+}
+
+/** The machine. */
+export function machineSetUp(): MachineKind {
+    const of = values();
+    const taken = [
+        ["toolWidthMm", of.get("machine.tool_width_mm")],
+        ["servoInUs", of.get("servo_in_us")],
+        ["servoOutUs", of.get("servo_out_us")],
+    ] as const;
+    return Object.fromEntries(taken.filter(([, value]) => value !== undefined));
+}
+
+/** What its firmware is told: all that is set, but of the second beam, which this machine has not. */
+export function commandsSetUp(): string[] {
+    const set = [...values()].filter(([name]) => !name.includes(".") && name !== "second_beam_mm");
+    return [...set, ["margin_mm", MARGIN_MM] as const].map(([name, value]) => `set ${name} ${value}`);
+}

@@ -1,0 +1,197 @@
+// The page in the operator's language: its texts, its numbers and its units.
+//
+// The texts stand in a table for each language. en.ts is the source. The page's HTML has them in English; `translate` finds
+// them there. What is shown by `show` or `translate` changes with the language; all else is written again by who wrote it.
+
+import { chosen, keep } from "../preferences.ts";
+import { en } from "./en.ts";
+import { es } from "./es.ts";
+import { fr } from "./fr.ts";
+import { hi } from "./hi.ts";
+import type { HeardWord, Holes, Language, Word } from "./language.ts";
+
+export type { Language, Plain, Word } from "./language.ts";
+
+/** The languages, each with its own name for itself. */
+export const LANGUAGES = {
+    en: { name: "English", table: { ...en, advice: {}, settings: {}, steps: {} } },
+    hi: { name: "हिन्दी", table: hi },
+    es: { name: "Español", table: es },
+    fr: { name: "Français", table: fr },
+} as const satisfies Readonly<Record<string, { name: string; table: Language }>>;
+export type Code = keyof typeof LANGUAGES;
+
+/** What fills the holes of a text; nothing where it has none. Numbers are written as the language has them. */
+type Filling<Text extends string> = [Holes<Text>] extends [never]
+    ? []
+    : [Readonly<Record<Holes<Text>, string | number>>];
+
+const isCode = (code: string): code is Code => code in LANGUAGES;
+const base = (locale: string) => locale.split("-")[0] ?? "";
+
+/** The language that was chosen, or the first of the browser's that there is. */
+function preferred(): Code {
+    const kept = chosen("language") ?? "";
+    if (isCode(kept)) return kept;
+    const { languages = [] } = globalThis.navigator ?? {};
+    return languages.map(base).find(isCode) ?? "en";
+}
+
+let code: Code = preferred();
+let table: Language = LANGUAGES[code].table;
+const changes: (() => void)[] = [];
+const formats = new Map<string, Intl.NumberFormat>();
+
+/** The language of the page. */
+export const language = (): Code => code;
+
+/** Chooses a language, and has all write again what is not shown over and over. */
+export function speak(chosen: Code): void {
+    keep("language", chosen);
+    [code, table] = [chosen, LANGUAGES[chosen].table];
+    formats.clear();
+    for (const change of changes) change();
+}
+
+/** Calls back when the language is another one. */
+export function onLanguage(change: () => void): void {
+    changes.push(change);
+}
+
+/** Numbers of this kind. As this country writes them, where the browser names one with this language. */
+function format(options: Intl.NumberFormatOptions): Intl.NumberFormat {
+    const key = JSON.stringify(options);
+    let found = formats.get(key);
+    if (!found) {
+        const { languages = [] } = globalThis.navigator ?? {};
+        const locale = languages.find((locale) => base(locale) === code) ?? code;
+        found = new Intl.NumberFormat(locale, options);
+        formats.set(key, found);
+    }
+    return found;
+}
+
+/** A number with so many digits behind the point. */
+export function number(value: number, digits = 0): string {
+    // Rounded to it, a small negative number is no negative 0.
+    return format({ minimumFractionDigits: digits, maximumFractionDigits: digits, signDisplay: "negative" }).format(
+        value,
+    );
+}
+
+export type Unit =
+    | "kilometer-per-hour"
+    | "meter"
+    | "millimeter"
+    | "millisecond"
+    | "second"
+    | "minute"
+    | "hour"
+    | "percent";
+
+/** A number with its unit. */
+export function quantity(value: number, unit: Unit, digits = 0): string {
+    return format({
+        style: "unit",
+        unit,
+        minimumFractionDigits: digits,
+        maximumFractionDigits: digits,
+        signDisplay: "negative",
+    }).format(value);
+}
+
+/** A text with its holes filled, in the form for `count`. */
+function fill(text: string, holes: Readonly<Record<string, string | number>> = {}): string {
+    const forms = text.split("|");
+    const isOne = forms.length > 1 && new Intl.PluralRules(code).select(Number(holes.count)) === "one";
+    const form = (isOne ? forms[0] : forms.at(-1)) ?? text;
+    return form.replaceAll(/\{(\w+)\}/g, (_, hole: string) => {
+        const value = holes[hole] ?? "";
+        return typeof value === "number" ? format({}).format(value) : value;
+    });
+}
+
+/** A text of the page. */
+export function say<Key extends Word>(word: Key, ...[holes]: Filling<(typeof en.words)[Key]>): string {
+    return fill(table.words[word], holes);
+}
+
+/** A text that is to be English until it is shown. */
+export function english<Key extends HeardWord>(word: Key, ...[holes]: Filling<(typeof en.heard)[Key]>): string {
+    const texts = Object.entries(holes ?? {}).map(([hole, value]) => [hole, String(value)]);
+    return fill(en.heard[word], Object.fromEntries(texts));
+}
+
+/** What is English until it is shown, as patterns, those with the longest texts first. */
+const heard = Object.entries(en.heard)
+    .sort(([, one], [, other]) => other.length - one.length)
+    .map(([word, text]) => {
+        const holes = [...text.matchAll(/\{(\w+)\}/g)].map(([, hole = ""]) => hole);
+        const parts = text.split(/\{\w+\}/).map((part) => part.replaceAll(/[\\^$.*+?()[\]{}|]/g, "\\$&"));
+        return { word: word as HeardWord, holes, pattern: new RegExp(`^${parts.join("(.*)")}$`, "s") };
+    });
+
+/** A text that was English until now, and what fills its holes. What no table has stays: the machine itself speaks English. */
+export function told(text: string): string {
+    if (code === "en") return text;
+    // The same, whether it was a sentence or stood in one.
+    const bare = `${text.charAt(0).toLowerCase()}${text.slice(1).replace(/\.$/, "")}`;
+    for (const { word, holes, pattern } of heard) {
+        const found = pattern.exec(text) ?? pattern.exec(bare);
+        if (found)
+            return fill(
+                table.heard[word],
+                Object.fromEntries(holes.map((hole, at) => [hole, told(found[at + 1] ?? "")])),
+            );
+    }
+    return text;
+}
+
+/** What to do about an alarm or a warning, where the language has words of its own for that. */
+export const advice = (name: string): string | undefined => table.advice[name];
+
+/** What a setting is, where the language has words of its own for that. */
+export const settingHelp = (name: string): string | undefined => table.settings[name];
+
+/** A step of setting a machine up, from its title and its text in the manual. */
+export const step = (title: string, how: string): readonly [string, string] => table.steps[title] ?? [title, how];
+
+const shown = new Map<Element, () => string>();
+onLanguage(() => {
+    for (const [element, text] of shown) if (element.isConnected) element.textContent = text();
+});
+
+/** Shows a text in an element, in another language too; without one, the element is written by others from now on. */
+export function show(element: Element, text?: () => string): void {
+    shown.delete(element);
+    if (!text) return;
+    shown.set(element, text);
+    element.textContent = text();
+}
+
+const words = new Map(Object.entries(en.words).map(([word, text]) => [text as string, word as Word]));
+
+/** Puts the page's texts and the names of its elements into the language, now and whenever it is another one. */
+export function translate(root: Element | DocumentFragment): void {
+    const nodes: (() => void)[] = [];
+    const take = (text: string, write: (text: string) => void) => {
+        const bare = text.trim();
+        const word = words.get(bare);
+        if (bare !== "" && word) nodes.push(() => write(text.replace(bare, () => table.words[word])));
+    };
+    const texts = document.createTreeWalker(root, NodeFilter.SHOW_TEXT);
+    for (let node = texts.nextNode(); node; node = texts.nextNode()) {
+        const text = node as Text;
+        take(text.data, (data) => {
+            text.data = data;
+        });
+    }
+    for (const name of ["aria-label", "title", "label", "alt"])
+        for (const element of root.querySelectorAll(`[${name}]`))
+            take(element.getAttribute(name) ?? "", (value) => element.setAttribute(name, value));
+    const write = () => {
+        for (const node of nodes) node();
+    };
+    onLanguage(write);
+    if (code !== "en") write();
+}

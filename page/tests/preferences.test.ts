@@ -1,0 +1,135 @@
+// What the operator has chosen, and what his system asks for: kept, honoured, and what he hears by it.
+
+import assert from "node:assert/strict";
+import test, { after, before } from "node:test";
+import type { Browser, Page } from "playwright-core";
+import { close, launch, open } from "./browser.ts";
+import { part, pass, tryIt } from "./trying.ts";
+
+let browser: Browser;
+
+before(async () => {
+    browser = await launch();
+});
+
+after(() => browser?.close());
+
+/** What the page has let the operator hear and feel since this was last asked: tones in Hz, and vibrations. */
+const heard = (page: Page) => page.evaluate(() => globalThis.signals.splice(0).join(" "));
+
+declare global {
+    var signals: string[];
+}
+
+test("theme, sound and board are kept from one visit to the next", async () => {
+    const opened = await open(browser, "flash");
+    const { page } = opened;
+    const [light, sound] = [page.getByRole("button", { name: "Light" }), page.getByRole("button", { name: "Sound" })];
+    const board = page.locator("[data-part=board]");
+    const shown = async () => [
+        await light.getAttribute("aria-pressed"),
+        await page.evaluate(() => getComputedStyle(document.documentElement).colorScheme),
+        await sound.getAttribute("aria-pressed"),
+        await board.inputValue(),
+    ];
+    const options = await board
+        .locator("option")
+        .evaluateAll((options) => options.map((option) => (option as HTMLOptionElement).value));
+    assert.deepEqual(await shown(), ["false", "light dark", "true", options[0]]);
+    await light.click();
+    await sound.click();
+    await board.selectOption(options[1] ?? "");
+    const chosen = ["true", "light", "false", options[1]];
+    assert.deepEqual(await shown(), chosen);
+    await page.reload();
+    assert.deepEqual(await shown(), chosen);
+    await close(opened);
+});
+
+test("where little motion is asked for, the machine stands until it is driven, and the row does not glide", async () => {
+    const opened = await open(browser, "work");
+    const { page } = opened;
+    await page.emulateMedia({ reducedMotion: "reduce" });
+    await page.reload();
+    await page.getByRole("link", { name: "Try" }).click();
+    assert.equal(await page.locator("#speed-is").textContent(), "0.0 km/h");
+    await pass(page, 1);
+    assert.equal(await page.evaluate(() => globalThis.trial.machine.placeMm), 0);
+    await page.locator("#speed").fill("2");
+    const pictures = await page.evaluate(async () => {
+        let pictures = 0;
+        const drawing = document.getElementById("drawing");
+        if (!drawing) throw new Error("there is no drawing");
+        new MutationObserver(() => {
+            pictures += 1;
+        }).observe(drawing, { attributes: true, subtree: true, childList: true });
+        await new Promise((done) => setTimeout(done, 2500));
+        return pictures;
+    });
+    assert(pictures >= 1 && pictures <= 3, `${pictures} pictures in 2.5 s`);
+    await close(opened);
+});
+
+test("an alarm, a lost machine and an obeyed HOLD are each heard and felt as another one, and one button turns that off", async () => {
+    const opened = await tryIt(browser);
+    const { page } = opened;
+    await page.evaluate(() => {
+        globalThis.signals = [];
+        const { start } = OscillatorNode.prototype;
+        OscillatorNode.prototype.start = function (at) {
+            globalThis.signals.push(String(this.frequency.value));
+            start.call(this, at);
+        };
+        navigator.vibrate = (pattern) => {
+            globalThis.signals.push(`vibrates ${pattern}`);
+            return true;
+        };
+    });
+    const sound = page.getByRole("button", { name: "Sound" });
+    await sound.click();
+    assert.equal(await sound.getAttribute("aria-pressed"), "false");
+    await heard(page);
+    await part(page, "hold").click();
+    await pass(page, 0.5);
+    await part(page, "said").getByText("> hold").first().waitFor();
+    assert.equal(await heard(page), "");
+
+    const held = "vibrates 80,60,80 660 990";
+    await sound.click();
+    assert.equal(await heard(page), held, "turned on, it is heard at once");
+    await page.waitForFunction(() => !document.querySelector("#sound.waiting"));
+    await part(page, "start").click();
+    await part(page, "state").filter({ hasText: "work" }).waitFor();
+    // The answer to HOLD and the state that it brings, as far from each other as on a slow line.
+    await page.evaluate(() => {
+        const { now } = performance;
+        let lateMs = 0;
+        performance.now = () => {
+            lateMs += 1000;
+            return now.call(performance) + lateMs;
+        };
+    });
+    await part(page, "hold").click();
+    await page.evaluate(async () => {
+        for (let turn = 0; turn < 2000; turn++) {
+            globalThis.trial.advance(1e-4, Number.POSITIVE_INFINITY);
+            await Promise.resolve();
+        }
+    });
+    await part(page, "state").filter({ hasText: "hold" }).waitFor();
+    assert.equal(await heard(page), held, "an obeyed HOLD is heard once");
+    await page.evaluate(() => delete (performance as Partial<Performance>).now);
+
+    await part(page, "start").click();
+    await part(page, "state").filter({ hasText: "work" }).waitFor();
+    await page.getByLabel("Kill the encoder").check();
+    await pass(page, 5);
+    await part(page, "alarm").waitFor();
+    assert.equal(await heard(page), "vibrates 300,100,300,100,300 1760 1760 1760 1760");
+    await page.getByRole("button", { name: "Press reset" }).click();
+    await part(page, "said")
+        .getByText(/reset by reset_pin/)
+        .waitFor();
+    assert.equal(await heard(page), "vibrates 1000 660 440 330");
+    await close(opened);
+});

@@ -1,0 +1,14 @@
+// How large the page is: it is opened on phones in the field, and stands in a release and in `weeder`.
+
+import assert from "node:assert/strict";
+import { readdirSync, statSync } from "node:fs";
+import test from "node:test";
+
+/** All of it: the firmware and the Rust inside, and four languages. Raise it with what is measured, and a reason. */
+const MOST_KIB = 640;
+
+test("the page is not larger than it is meant to be", (test) => {
+    const bytes = readdirSync("dist").reduce((sum, name) => sum + statSync(`dist/${name}`).size, 0);
+    test.diagnostic(`${(bytes / 1024).toFixed(0)} KiB`);
+    assert(bytes <= MOST_KIB * 1024, `${bytes} bytes are more than ${MOST_KIB} KiB`);
+});

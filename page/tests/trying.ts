@@ -1,0 +1,38 @@
+// What the tests of "Try it" share: the page when its machine is set up, and time that passes on its chip.
+
+import type { Browser, Locator, Page } from "playwright-core";
+import { DESK, type Opened, open } from "./browser.ts";
+
+export const part = (page: Page, name: string): Locator => page.locator(`#try-panel [data-part="${name}"]`);
+
+/** Opens "Try it", and waits until its settings are saved and it holds: a switch that is thrown before that does nothing. */
+export async function tryIt(browser: Browser, viewport = DESK): Promise<Opened> {
+    const opened = await open(browser, "try", viewport);
+    await pass(opened.page, 0.5);
+    await part(opened.page, "said")
+        .locator("div", { hasText: /clear$/ })
+        .waitFor();
+    await pass(opened.page, 0.3);
+    await part(opened.page, "state").filter({ hasText: "hold" }).waitFor();
+    return opened;
+}
+
+/** Lets time pass in the page until the tool has come to a place along the row, as fast as this machine can. */
+export async function rollTo(page: Page, toolMm: number): Promise<void> {
+    while (await page.evaluate((mm) => globalThis.trial.machine.toolMm < mm, toolMm)) await pass(page, 0.5);
+}
+
+/** Lets so much time pass on the chip. */
+export async function pass(page: Page, seconds: number): Promise<void> {
+    await page.evaluate((seconds) => globalThis.trial.advance(seconds, Number.POSITIVE_INFINITY), seconds);
+}
+
+/** Types a command and waits for what the machine says to it: an answer like this behind the command itself, which is shown anew. */
+export async function type(page: Page, command: string, answer: RegExp): Promise<void> {
+    const typed = part(page, "said").locator("div", { hasText: new RegExp(`^> ${command}$`) });
+    const before = await typed.count();
+    await part(page, "typed").fill(command);
+    await page.locator("#try-panel").getByRole("button", { name: "Send" }).click();
+    await pass(page, 0.2);
+    await typed.nth(before).locator("xpath=following-sibling::div").filter({ hasText: answer }).first().waitFor();
+}

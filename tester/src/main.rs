@@ -1,0 +1,145 @@
+//! The tester's firmware: a second Uno that drives the weeder's inputs, and measures its outputs.
+//!
+//! The crate `tester-core` decides, and each file beside this one knows one peripheral. The loop passes bytes between the serial line and
+//! the station, and what was measured to the station. Interrupts play the plan and stamp pulses.
+
+#![no_std]
+#![no_main]
+#![feature(asm_experimental_arch)]
+#![feature(abi_avr_interrupt)]
+#![allow(missing_docs, reason = "the interrupt attribute leaves no place for a handler's doc comment")]
+
+mod burst;
+mod lines;
+mod serial;
+mod timeline;
+
+use avr_device::{atmega328p::Peripherals, interrupt};
+use core::panic::PanicInfo;
+use lines::Lines;
+use serial::Serial;
+use tester_core::frame::Frame;
+use tester_core::message::{Record, Step};
+use tester_core::piece::Piece;
+use tester_core::station::{Board, Station};
+use timeline::Timeline;
+
+struct Tester {
+    lines: Lines,
+    timeline: Timeline,
+}
+
+#[avr_device::entry]
+fn main() -> ! {
+    let station = &raw mut STATION;
+    // SAFETY: nothing else names this static, and the entry point runs once.
+    run(unsafe { &mut *station })
+}
+
+static mut STATION: Station = Station::new();
+
+#[inline(never)]
+fn run(station: &mut Station) -> ! {
+    // SAFETY: the entry point is the first code to run and runs once, as this does, so nothing else holds the peripherals.
+    let peripherals = unsafe { Peripherals::steal() };
+    let lines = Lines::new(peripherals.PORTB, peripherals.PORTC, peripherals.PORTD);
+    let mut serial = Serial::new(peripherals.USART0);
+    let mut tester = Tester { lines, timeline: Timeline::new(peripherals.TC1) };
+    // SAFETY: every interrupt's peripheral is set up, and no critical section is open.
+    unsafe { interrupt::enable() };
+
+    let mut sending = Frame::new();
+    let mut sent = 0;
+    let mut lit = tester.lines.lamp_is_lit();
+    loop {
+        if let Some(byte) = serial.read() {
+            station.take(byte, &mut tester);
+        }
+        let now_lit = tester.lines.lamp_is_lit();
+        if now_lit != lit {
+            lit = now_lit;
+            station.record(Record::Led { time: tester.now(), lit });
+        }
+        // One at a time: a queue that fills loses the youngest, and its number is missed.
+        if let Some(record) = tester.timeline.measured() {
+            station.record(record);
+        }
+        if sent == sending.len() {
+            match station.next_frame() {
+                Some(frame) => (sending, sent) = (frame, 0),
+                None => continue,
+            }
+        }
+        if let Some(&byte) = sending.get(sent)
+            && serial.write(byte)
+        {
+            sent += 1;
+        }
+    }
+}
+
+impl Board for Tester {
+    fn now(&mut self) -> u32 {
+        self.timeline.now()
+    }
+
+    fn position(&mut self) -> i32 {
+        self.timeline.position()
+    }
+
+    fn room(&mut self) -> u8 {
+        self.timeline.room()
+    }
+
+    fn push(&mut self, piece: Piece) {
+        self.timeline.push(piece);
+    }
+
+    fn is_playing(&mut self) -> bool {
+        self.timeline.is_playing()
+    }
+
+    fn start(&mut self) -> u32 {
+        self.timeline.start()
+    }
+
+    fn stop(&mut self) {
+        self.timeline.stop();
+    }
+
+    fn set(&mut self, mask: u8, levels: u8) {
+        self.timeline.set(mask, levels);
+    }
+
+    fn reset(&mut self, pulled: bool) {
+        self.lines.pull_reset(pulled);
+    }
+
+    fn levels(&mut self) -> u8 {
+        lines::shown()
+    }
+
+    fn burst(&mut self, steps: &[Step], run_up: u16, repeats: u16, slower: u8) {
+        let levels = interrupt::free(|_| {
+            let levels = burst::play(steps, run_up, slower, lines::shown());
+            burst::play(steps, repeats, 0, levels)
+        });
+        self.timeline.restart(levels);
+    }
+
+    fn check_capture(&mut self, width: u16) {
+        self.lines.drive_capture(true);
+        let begin = self.timeline.now();
+        while self.timeline.now().wrapping_sub(begin) < width.into() {}
+        self.lines.drive_capture(false);
+    }
+}
+
+/// A tester that has panicked says nothing more, which the computer tells.
+#[panic_handler]
+fn panic(_: &PanicInfo) -> ! {
+    interrupt::disable();
+    loop {
+        core::hint::spin_loop();
+    }
+}

@@ -1,0 +1,270 @@
+//! Timer1: the clock in cycles, the plan's events, and the servo's pulses on ICP1 (D8).
+//!
+//! The timer counts cycles and runs over every 4.096 ms; an interrupt counts on. Its compare interrupt fires the plan's events, each by the
+//! time at which it was due, so a late one does not delay the next. Its capture unit stamps the servo's edges (data sheet, 16.6), so other
+//! interrupts do not change what is measured.
+
+use crate::lines;
+use avr_device::{
+    atmega328p::TC1,
+    interrupt::{self, Mutex},
+};
+use core::cell::RefCell;
+use heapless::Deque;
+use tester_core::message::{QUEUE_PIECES, Record};
+use tester_core::piece::Piece;
+use tester_core::player::{Next, Player};
+
+/// The longest wait that the compare unit is set to at once, in cycles. Half the timer's range tells before from behind.
+const STRIDE: u16 = 0x4000;
+
+/// From the command to the plan's start, in cycles: 200 us.
+const LEAD: u16 = 3200;
+
+/// An event that is later than this is told of, in cycles: 10 us.
+const LATE: u16 = 160;
+
+// TIMSK1 and TIFR1.
+const CAPTURE: u8 = 1 << 5;
+const COMPARE: u8 = 1 << 1;
+const OVERFLOW: u8 = 1;
+
+// TCCR1B.
+const RISING: u8 = 1 << 6;
+const NO_PRESCALER: u8 = 1;
+
+struct Inner {
+    player: Player,
+    queue: Deque<Piece, QUEUE_PIECES>,
+    /// Where the compare unit is set to, and cycles from there to the event.
+    armed: u16,
+    left: u32,
+    overflows: u16,
+    late: u16,
+    /// The time and position at the pulse's beginning.
+    rise: Option<(u32, i32)>,
+    measured: Deque<Record, 4>,
+    lost: u16,
+    is_lost_told: bool,
+}
+
+static INNER: Mutex<RefCell<Inner>> = Mutex::new(RefCell::new(Inner {
+    player: Player::new(),
+    queue: Deque::new(),
+    armed: 0,
+    left: 0,
+    overflows: 0,
+    late: 0,
+    rise: None,
+    measured: Deque::new(),
+    lost: 0,
+    is_lost_told: true,
+}));
+
+/// The timer, as the loop sees it.
+pub struct Timeline(TC1);
+
+impl Timeline {
+    /// Starts the clock.
+    pub fn new(timer: TC1) -> Self {
+        // SAFETY: normal mode, the next edge rises.
+        timer.tccr1b().write(|w| unsafe { w.bits(RISING | NO_PRESCALER) });
+        let timeline = Self(timer);
+        timeline.enable(CAPTURE | OVERFLOW);
+        timeline
+    }
+
+    fn enable(&self, interrupts: u8) {
+        // SAFETY: the handlers of all three are below.
+        self.0.timsk1().write(|w| unsafe { w.bits(interrupts) });
+    }
+
+    fn with<R>(&self, change: impl FnOnce(&mut Inner, &TC1) -> R) -> R {
+        interrupt::free(|cs| change(&mut INNER.borrow(cs).borrow_mut(), &self.0))
+    }
+
+    /// The time in cycles, modulo 2^32.
+    pub fn now(&self) -> u32 {
+        self.with(|inner, timer| inner.time(timer, timer.tcnt1().read().bits()))
+    }
+
+    /// The position.
+    pub fn position(&self) -> i32 {
+        self.with(|inner, _| inner.player.position())
+    }
+
+    /// Pieces that have room.
+    pub fn room(&self) -> u8 {
+        self.with(|inner, _| (QUEUE_PIECES - inner.queue.len()) as u8)
+    }
+
+    /// Queues a piece.
+    pub fn push(&self, piece: Piece) {
+        self.with(|inner, _| {
+            let _ = inner.queue.push_back(piece);
+        });
+    }
+
+    /// Whether a plan is being played.
+    pub fn is_playing(&self) -> bool {
+        self.with(|inner, _| inner.player.is_playing())
+    }
+
+    /// Starts the plan. Returns when.
+    pub fn start(&self) -> u32 {
+        self.enable(CAPTURE | COMPARE | OVERFLOW);
+        self.with(|inner, timer| {
+            let begin = timer.tcnt1().read().bits().wrapping_add(LEAD);
+            let time = inner.time(timer, timer.tcnt1().read().bits());
+            let time = time.wrapping_add(begin.wrapping_sub(time as u16).into());
+            inner.late = 0;
+            inner.armed = begin;
+            let Inner { player, queue, .. } = inner;
+            let next = player.start(|| queue.pop_front());
+            inner.follow(next, timer);
+            time
+        })
+    }
+
+    /// Gives up the plan, and drops its pieces.
+    pub fn stop(&self) {
+        self.enable(CAPTURE | OVERFLOW);
+        self.with(|inner, _| {
+            inner.player.stop();
+            inner.queue.clear();
+        });
+    }
+
+    /// Sets lines.
+    pub fn set(&self, mask: u8, levels: u8) {
+        self.with(|inner, _| {
+            inner.player.set(mask, levels);
+            lines::show(inner.player.levels());
+        });
+    }
+
+    /// Goes on behind a burst that has left these levels: the clock has lost time, and a pulse that has begun is void.
+    pub fn restart(&self, levels: u8) {
+        self.set(u8::MAX, levels);
+        self.with(|inner, timer| {
+            inner.rise = None;
+            // SAFETY: the next edge rises, and what was captured is dropped.
+            timer.tccr1b().write(|w| unsafe { w.bits(RISING | NO_PRESCALER) });
+            // SAFETY: a flag is cleared by writing it.
+            timer.tifr1().write(|w| unsafe { w.bits(CAPTURE) });
+        });
+    }
+
+    /// The oldest thing that was measured.
+    pub fn measured(&self) -> Option<Record> {
+        self.with(|inner, _| {
+            inner.measured.pop_front().or_else(|| {
+                let is_told = core::mem::replace(&mut inner.is_lost_told, true);
+                (!is_told).then_some(Record::Lost { pulses: inner.lost })
+            })
+        })
+    }
+}
+
+impl Inner {
+    /// The time at which the counter's lower half was `low`, which is at most half its range ago.
+    fn time(&self, timer: &TC1, low: u16) -> u32 {
+        // An overflow that waits for its interrupt belongs to a small number, and not to a large one.
+        let is_pending = timer.tifr1().read().bits() & OVERFLOW != 0 && low < 1 << 15;
+        let high = self.overflows.wrapping_add(is_pending.into());
+        u32::from(high) << 16 | u32::from(low)
+    }
+
+    /// Waits for the next event, or tells that there is none.
+    fn follow(&mut self, next: Next, timer: &TC1) {
+        let position = self.player.position();
+        match next {
+            Next::After(wait) => self.wait(wait, timer),
+            Next::Ended => {
+                let time = self.time(timer, self.armed);
+                self.measure(Record::Ended { time, position, late: self.late });
+            }
+            Next::Dry => {
+                self.player.stop();
+                let time = self.time(timer, timer.tcnt1().read().bits());
+                self.measure(Record::Dry { time, position });
+            }
+        }
+    }
+
+    fn wait(&mut self, wait: u32, timer: &TC1) {
+        let now = if wait > STRIDE.into() { STRIDE } else { wait as u16 };
+        self.left = wait - u32::from(now);
+        self.armed = self.armed.wrapping_add(now);
+        timer.ocr1a().write(|w| w.set(self.armed));
+    }
+
+    /// Fires every event that is due.
+    fn fire(&mut self, timer: &TC1) {
+        while self.player.is_playing() {
+            let since = timer.tcnt1().read().bits().wrapping_sub(self.armed);
+            if (since as i16) < 0 {
+                return;
+            }
+            if self.left > 0 {
+                self.wait(self.left, timer);
+                continue;
+            }
+            let Self { player, queue, .. } = self;
+            let next = player.fire(|| queue.pop_front());
+            lines::show(self.player.levels());
+            self.late = self.late.saturating_add((since > LATE).into());
+            self.follow(next, timer);
+        }
+    }
+
+    /// Takes an edge on the servo's line.
+    fn capture(&mut self, timer: &TC1) {
+        let time = self.time(timer, timer.icr1().read().bits());
+        let rise = self.rise.take();
+        if rise.is_none() {
+            self.rise = Some((time, self.player.position()));
+        }
+        let edge = if self.rise.is_none() { RISING } else { 0 };
+        // SAFETY: the other edge comes next.
+        timer.tccr1b().write(|w| unsafe { w.bits(edge | NO_PRESCALER) });
+        // A change of the edge may set the flag (data sheet, 16.6.3).
+        // SAFETY: a flag is cleared by writing it.
+        timer.tifr1().write(|w| unsafe { w.bits(CAPTURE) });
+        if let Some((start, position)) = rise {
+            self.measure(Record::Pulse { start, width: time.wrapping_sub(start), position });
+        }
+    }
+
+    fn measure(&mut self, record: Record) {
+        if self.measured.push_back(record).is_err() {
+            self.lost = self.lost.saturating_add(1);
+            self.is_lost_told = false;
+        }
+    }
+}
+
+/// From a handler of this file.
+fn interrupted(change: impl FnOnce(&mut Inner, &TC1)) {
+    // SAFETY: the loop uses the timer in critical sections alone, or for writes of one byte that no handler makes.
+    let timer = unsafe { TC1::steal() };
+    interrupt::free(|cs| change(&mut INNER.borrow(cs).borrow_mut(), &timer));
+}
+
+// An edge on the servo's line.
+#[avr_device::interrupt(atmega328p)]
+fn TIMER1_CAPT() {
+    interrupted(Inner::capture);
+}
+
+// An event is due.
+#[avr_device::interrupt(atmega328p)]
+fn TIMER1_COMPA() {
+    interrupted(Inner::fire);
+}
+
+// The counter ran over.
+#[avr_device::interrupt(atmega328p)]
+fn TIMER1_OVF() {
+    interrupted(|inner, _| inner.overflows = inner.overflows.wrapping_add(1));
+}

@@ -1,0 +1,69 @@
+//! The native run and the firmware on the virtual Uno swing at the same places.
+//!
+//! The rows have everything that the presets have but stops: a machine that brakes may come to stand at the very edge of a
+//! window, where the last reading of the speed decides whether the tool swings once more, and both read it at different moments.
+
+use field::conditions::{Conditions, presets};
+use field::driving::drive;
+use field::native::{self, Sensors};
+use field::stand::Stand;
+use field::trial::{Start, Trial};
+use model_test::cases;
+use rand::seq::IndexedRandom;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use trial::firmware;
+use uno::Pulse;
+
+/// A servo's frame: what a swing may differ by.
+const FRAME_S: f64 = 0.020;
+
+/// A short row under the conditions of some preset, with a speed and a spacing of its own.
+fn random_row(seed: u64) -> Trial {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let presets: Vec<&str> = presets().collect();
+    let mut conditions = Conditions::preset(presets.choose(&mut rng).unwrap()).unwrap().unwrap();
+    conditions.set("plot.row_m", 3.0).unwrap();
+    conditions.set("driving.stops_per_100_m", 0.0).unwrap();
+    let stand = Stand::grow(&conditions, rng.random_range(400.0..700.0), &mut rng).unwrap();
+    let drive = drive(&conditions, &stand.span_mm, rng.random_range(0.8..3.0), &mut rng);
+    Trial {
+        row: stand.row,
+        machine: conditions.machine(rng.random()),
+        motion: drive.motion,
+        timing: conditions.timing(),
+        start: Start::Command,
+        settings: conditions.firmware_settings(),
+        examples: Vec::new(),
+    }
+}
+
+#[test]
+fn the_native_run_swings_as_the_firmware_does_on_random_rows() {
+    let elf = firmware::build().unwrap();
+    let rows = cases(50);
+    let swings: usize = (0..rows)
+        .into_par_iter()
+        .map(|seed| {
+            let trial = random_row(seed);
+            let servo = trial.machine.servo;
+            let on_the_uno = trial::run(&trial, &elf, |_| ()).unwrap();
+            let by_the_native_run = native::weed(&trial, &Sensors::new(&trial, native::TURN_S)).unwrap();
+            // The tool is out from the beginning, and on the Uno before it is told how far that is.
+            let swings = |pulses: &[Pulse]| {
+                servo.commands(pulses).into_iter().skip_while(|command| command.is_out()).collect::<Vec<_>>()
+            };
+            let (real, native) = (swings(&on_the_uno.pulses), swings(&by_the_native_run.pulses));
+            assert_eq!(real.len(), native.len(), "row {seed}: {real:?} {native:?}");
+            for (real, native) in real.iter().zip(&native) {
+                assert_eq!(real.degrees, native.degrees, "row {seed}");
+                let real_s = (real.rise_cycle - on_the_uno.start_cycle) as f64 / 16e6;
+                let native_s = native.rise_cycle as f64 / 16e6;
+                assert!((real_s - native_s).abs() <= FRAME_S, "row {seed}: {real_s} s, not {native_s} s");
+            }
+            real.len()
+        })
+        .sum();
+    assert!(swings > 8 * rows as usize, "{swings}");
+}
