@@ -204,22 +204,17 @@ fn in_words(bounds: &Bounds, held: &[Held], all: bool) -> String {
             )),
         }
     }
+    // Addresses stand behind `--loops` alone: the rest of the report is the same for programs that are laid out differently.
+    let named_or_where = if all { ":" } else { ", which --loops names." };
     let loops = &bounds.loops_without_bound;
     if !loops.is_empty() {
-        let shown = if all { loops.len() } else { loops.len().min(5) };
-        line(format!("{} loops that end have no bound:", loops.len()));
-        loops[..shown].iter().for_each(|place| line(format!("  {place}")));
-        if shown < loops.len() {
-            line(format!("  and {} more, which --loops names", loops.len() - shown));
-        }
+        line(format!("{} loops that end have no bound{named_or_where}", loops.len()));
+        loops.iter().filter(|_| all).for_each(|place| line(format!("  {place}")));
     }
     if !bounds.indirect.is_empty() {
         let targets: usize = bounds.indirect.iter().map(|indirect| indirect.targets.len()).sum();
         let calls = bounds.indirect.len();
-        line(format!(
-            "{calls} calls or jumps by an address lead to {targets} places{}",
-            if all { ":" } else { ", which --loops names." }
-        ));
+        line(format!("{calls} calls or jumps by an address lead to {targets} places{named_or_where}"));
         for indirect in bounds.indirect.iter().filter(|_| all) {
             let found = json!(indirect.found);
             line(format!("  {} ({})", indirect.place, found.as_str().unwrap_or_default()));
