@@ -4,6 +4,7 @@
 #     ./release.sh FOLDER
 #
 # weeder.hex          the firmware, for the page or avrdude to write
+# weeder-tester.hex   the firmware of a second Uno, which checks the first
 # firmware.txt        its size, and what it can need at most of stack and time
 # page/               the page: open its index.html, or serve it to a phone with `weeder serve`
 # weeder              the host tools, for computers like this one, with the page inside
@@ -51,6 +52,9 @@ elf=$target/avr-none/firmware/weeder-firmware.elf
     "$folder/weeder" bounds --elf "$elf"
 } >"$folder/firmware.txt"
 
+# The tester's.
+"$folder/weeder" hex --tester "$folder/weeder-tester.hex"
+
 # The page.
 [ -d page/node_modules ] || npm --prefix page ci --no-audit --no-fund
 WEEDER="$folder/weeder" npm --prefix page run build
@@ -74,7 +78,7 @@ each licence's text where its author gives one.
 
 - weeder has simavr in it (https://github.com/buserror/simavr, by simavr-ffi), which is under GPL-3.0: so is `weeder` as a whole, and
   distributors have to offer all sources with it. libelf (LGPL-3.0 or GPL-2.0) is in it too.
-- weeder.hex has code of avr-libc (modified BSD) and libgcc (GPL-3.0 with the GCC Runtime Library Exception) in it.
+- weeder.hex and weeder-tester.hex have code of avr-libc (modified BSD) and libgcc (GPL-3.0 with the GCC Runtime Library Exception) in them.
 - The page has avr8js in it (MIT), and this project's firmware and Rust.
 - book/ has mdBook's theme in it (MPL-2.0), with highlight.js (BSD-3-Clause) and fonts (OFL-1.1).
 
@@ -86,6 +90,7 @@ crates() {
 }
 sources=(
     "weeder.hex|--package weeder-firmware --features avr --target avr-none"
+    "weeder-tester.hex|--package tester-firmware --features avr --target avr-none"
     "page|--package page --target wasm32-unknown-unknown"
     "weeder|--package weeder-cli"
 )
@@ -132,6 +137,7 @@ sbom() {
     find . -name target -prune -o -name node_modules -prune -o -name sbom.json -exec rm {} +
 }
 sbom firmware . "$c_avr_libc" "$c_libgcc" -- --features avr --target avr-none
+sbom tester tester "$c_avr_libc" "$c_libgcc" -- --features avr --target avr-none
 sbom weeder host/cli "$c_simavr" "$c_libelf" -- --target "$(rustc --print host-tuple)"
 sbom page host/page -- --target wasm32-unknown-unknown
 (cd page && npx --yes npm@10.9.4 sbom --sbom-format cyclonedx --omit dev) >"$target/npm-sbom.json"

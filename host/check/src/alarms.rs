@@ -227,6 +227,40 @@ pub fn switch_to_out_ms(weeder: &mut Weeder, tester: &mut Tester, clock_ratio: f
     Ok(first_out(&servo::pulses(&played.records, played.start), ORIGIN + opened, clock_ratio))
 }
 
+/// The machine that is tried by [`beam_to_window_ms`]: beam and tool 100 mm apart, a margin of 50 mm, and no lead.
+const NEAR_MACHINE: [&str; 4] = ["top_speed_mm_s 200", "lead_out_ms 0", "margin_mm 50", "beam_to_tool_mm 100"];
+
+/// From the beam's edge to the window: 50 mm in counts of the factory settings' wheel, 400 mm and 2400 counts around.
+const WINDOW_COUNTS: f64 = 50.0 * 2400.0 / (std::f64::consts::PI * 400.0);
+
+/// Counts a second there: 0.1 m/s.
+const SLOW_COUNTS_PER_S: f64 = 191.0;
+
+/// From the moment that a window is due at the tool to the first pulse for out, in ms; below 0 if the pulse comes first. The window follows
+/// from the beam's edge, half a second before.
+///
+/// # Errors
+/// If a board does not answer.
+pub fn beam_to_window_ms(weeder: &mut Weeder, tester: &mut Tester, clock_ratio: f64) -> Result<f64, CheckError> {
+    weeder.to_hold()?;
+    for setting in NEAR_MACHINE {
+        weeder.ask(&format!("set {setting}"))?;
+    }
+    weeder.ask("start now")?;
+    tester.record_for_ms(2 * STILL_MS)?;
+    let beam = Line::Beam.bit();
+    let mut plan = Plan::new();
+    plan.roll(100, SLOW_COUNTS_PER_S);
+    plan.at(plan.end(), Action::Levels { mask: beam, levels: 0 });
+    let edge = plan.end();
+    plan.roll(150, SLOW_COUNTS_PER_S);
+    plan.at(plan.end(), Action::Levels { mask: beam, levels: beam });
+    let played = tester.play(&plan.finish(), || weeder.drain())?;
+    weeder.to_hold()?;
+    let out_ms = first_out(&servo::pulses(&played.records, played.start), ORIGIN + edge, clock_ratio);
+    Ok(out_ms - WINDOW_COUNTS * 1000.0 / SLOW_COUNTS_PER_S * clock_ratio)
+}
+
 /// From before `hold` is typed to the first pulse for out, in ms: what the computer and the lines take is in it.
 ///
 /// # Errors

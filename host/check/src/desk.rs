@@ -93,6 +93,8 @@ impl Drop for Desk {
 /// Moves bytes between a board and its terminal.
 fn take_turn(pair: &mut Pair, side: Side, pty: &mut Pty) -> Result<(), DeskError> {
     if pty.was_opened()? {
+        // A port that nobody reads keeps nothing.
+        pair.received(side).clear();
         pair.reset(side);
     }
     let room = MOST_BYTES_ON_THEIR_WAY.saturating_sub(pair.board(side).bytes_on_their_way());

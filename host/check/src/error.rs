@@ -1,6 +1,7 @@
 //! Why a check could not go on.
 
 use link::LinkError;
+use link::examples::ExamplesError;
 use std::io;
 use tester_core::message::{PROTOCOL, Refusal};
 use thiserror::Error;
@@ -14,6 +15,20 @@ pub enum CheckError {
     /// The weeder's answer lacks something.
     #[error("the weeder's answer to `{0}` is not understood: flash the firmware that belongs to this command")]
     Answer(&'static str),
+    /// The weeder's examples cannot be read or taught.
+    #[error("the weeder's examples")]
+    Examples(#[from] ExamplesError),
+    /// The user has interrupted the check.
+    #[error("interrupted: the weeder has its saved settings and examples again")]
+    Interrupted,
+    /// The tester's port cannot be opened.
+    #[error("the tester")]
+    TesterPort(#[source] LinkError),
+    /// No Uno is the board that is looked for.
+    #[error(
+        "no {0} answers at an Uno's port (looked at: {1}): connect and flash both boards, or name them by --port and --tester"
+    )]
+    NotFound(&'static str, String),
     /// The tester does not answer.
     #[error(
         "the tester does not answer: flash it with the tester's firmware, and check that --port and --tester are not swapped"

@@ -88,6 +88,7 @@ pub struct Pair {
     shared: (u64, u64),
     steps: u64,
     is_reset_pulled: bool,
+    resets: u32,
     from_tester: VecDeque<u8>,
     from_weeder: VecDeque<u8>,
 }
@@ -111,6 +112,7 @@ impl Pair {
             shared,
             steps: 0,
             is_reset_pulled: false,
+            resets: 0,
             from_tester,
             from_weeder,
         })
@@ -167,6 +169,7 @@ impl Pair {
         }
         let pulled = self.wiring.has_reset && self.tester.output(TESTER_RESET) == Some(false);
         if pulled && !self.is_reset_pulled {
+            self.resets += 1;
             if let Some(spoil) = &mut self.wiring.eeprom_at_reset {
                 let mut eeprom = self.weeder.eeprom();
                 spoil(&mut eeprom);
@@ -184,7 +187,13 @@ impl Pair {
 
     /// Resets a board, as opening its port does by the modem line DTR.
     pub fn reset(&mut self, side: Side) {
+        self.resets += 1;
         self.board(side).reset();
+    }
+
+    /// How long the check would have taken two real boards so far, in seconds: each of their resets has a bootloader wait for `bootloader_s`.
+    pub fn duration_s(&self, bootloader_s: f64) -> f64 {
+        self.tester.cycle() as f64 / CYCLES_PER_SECOND as f64 + f64::from(self.resets) * bootloader_s
     }
 
     /// One of the boards.

@@ -1,4 +1,4 @@
-//! Rates: bursts of the encoder, up to the rate that is proved, and whether the weeder has lost a count.
+//! Rates: bursts of the encoder, beyond the rate that is proved, and whether the weeder has lost a count; and glitches of a channel.
 //!
 //! The tester counts cycles between two edges, so a rate is exact by its clock. The weeder is in hold. Busy means that it prints all its
 //! settings meanwhile, and that the beam changes once in 128 counts.
@@ -7,17 +7,23 @@ use crate::error::CheckError;
 use crate::tester::Tester;
 use crate::wiring::Weeder;
 use link::ConsoleLine;
-use tester_core::message::{Command, PATTERN_STEPS, REPEAT_CYCLES, Step, step_cycles};
+use tester_core::message::{Command, PATTERN_STEPS, REPEAT_CYCLES, STEP_CYCLES, Step, step_cycles};
 use tester_core::pins::Line;
 use uno::CYCLES_PER_SECOND;
 
 /// Counts of a burst behind its run-up: 0.1 s at the highest rate, less than the time after which the weeder takes its loop for dead.
 const COUNTS: u32 = 29_000;
 
-/// Counts of the run-up, and how much longer its steps are, in units of 3 cycles: 40,000 counts a second. The weeder takes the jumps of a
+/// Counts of the run-up, and how much longer its steps are, in units of [`STEP_CYCLES`]: 40,000 counts a second. The weeder takes the jumps of a
 /// wheel that is fast from one moment to the next for noise.
 const RUN_UP_COUNTS: u32 = 1280;
 const SLOWER: u8 = 115;
+
+/// Cycles between two counts at the rate that `weeder bounds` proves: 290,909 a second.
+pub const PROVED_CYCLES: u32 = 55;
+
+/// The most by which [`highest`] shortens them: every handler takes longer than what is left.
+const SHORTER_CYCLES: u32 = 42;
 
 /// The share of the time between two edges by which each comes early or late, with jitter: a disc that is worn or off its centre.
 const JITTER: f64 = 0.3;
@@ -64,7 +70,7 @@ impl Turning {
             let shift = if self.jittered { JITTER * share * f64::from(self.cycles) } else { 0.0 };
             let repeated = if number == 0 { f64::from(REPEAT_CYCLES) } else { 0.0 };
             let wait = due + shift - done - repeated - f64::from(step_cycles(0));
-            let delay = (wait / 3.0).round().clamp(1.0, f64::from(u8::MAX - SLOWER));
+            let delay = (wait / f64::from(STEP_CYCLES)).round().clamp(1.0, f64::from(u8::MAX - SLOWER));
             done += f64::from(step_cycles(delay as u8)) + repeated;
             Step { delay: delay as u8, toggle: line.bit() | beam }
         };
@@ -104,6 +110,60 @@ pub fn lost(turning: Turning, weeder: &mut Weeder, tester: &mut Tester) -> Resul
     let made = i64::from((run_up + repeats) * PATTERN_STEPS as u32) * if turning.forward { 1 } else { -1 };
     let counted = i64::from(weeder.status()?.position.wrapping_sub(before));
     Ok(Some((made - counted).abs()))
+}
+
+/// The highest rate at which no count is lost, in counts a second; `None` if counts are lost at the proved rate.
+///
+/// It is looked for from the proved rate on, in the steps that the tester can make.
+///
+/// # Errors
+/// If a board does not answer.
+pub fn highest(forward: bool, busy: bool, weeder: &mut Weeder, tester: &mut Tester) -> Result<Option<f64>, CheckError> {
+    let mut highest = None;
+    for shorter in (0..=SHORTER_CYCLES).step_by(STEP_CYCLES as usize) {
+        let turning = Turning { cycles: PROVED_CYCLES - shorter, forward, jittered: false, busy };
+        match lost(turning, weeder, tester)? {
+            Some(0) => highest = Some(turning.per_s()),
+            Some(_) => break,
+            None => {
+                weeder.drain()?;
+                break;
+            }
+        }
+    }
+    Ok(highest)
+}
+
+/// Lengths of glitches in cycles, from 0.8 us to longer than both handlers of the encoder take one after the other.
+const GLITCH_CYCLES: [u32; 8] = [13, 16, 22, 31, 43, 55, 79, 121];
+
+/// How often the pattern of 64 glitches is played for each length.
+const GLITCH_REPEATS: u16 = 4;
+
+/// Counts that glitches of a channel leave behind: the level changes and changes back, for each length. The sum over all lengths.
+///
+/// # Errors
+/// If a board does not answer.
+pub fn left_by_glitches(channel: Line, weeder: &mut Weeder, tester: &mut Tester) -> Result<f64, CheckError> {
+    weeder.to_hold()?;
+    let mut left = 0;
+    for cycles in GLITCH_CYCLES {
+        let toggle = channel.bit();
+        let short = Step { delay: ((cycles - step_cycles(0)) / STEP_CYCLES) as u8, toggle };
+        let pattern = [Step { delay: u8::MAX, toggle }, short].repeat(PATTERN_STEPS / 2);
+        tester.load(&pattern)?;
+        let before = weeder.status()?.position;
+        weeder.drain()?;
+        tester.command(&Command::Burst {
+            steps: PATTERN_STEPS as u8,
+            run_up: 0,
+            slower: 0,
+            repeats: GLITCH_REPEATS,
+        })?;
+        tester.record_for_ms(SETTLE_MS)?;
+        left += i64::from(weeder.status()?.position.wrapping_sub(before)).abs();
+    }
+    Ok(left as f64)
 }
 
 #[cfg(test)]

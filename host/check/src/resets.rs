@@ -4,13 +4,20 @@
 //! ones. Only `max_width_mm` is changed for this, and put back at the end.
 
 use crate::error::CheckError;
-use crate::servo::{self, ORIGIN};
+use crate::plan::Plan;
+use crate::servo::{self, Measured, ORIGIN};
 use crate::tester::{Tester, ms};
 use crate::wiring::{Weeder, reset};
 use control::alarm::Alarm;
+use control::ground::examples::EXAMPLES;
+use link::examples::{self, Taught};
 use link::{ConsoleLine, Mode};
 use tester_core::message::Command;
 use uno::CYCLES_PER_SECOND;
+
+/// How the weeder rolls when it is reset at work: 1.9 km/h with the factory settings' wheel, for as many counts as the tester has room for.
+const ROLL_COUNTS_PER_S: f64 = 1000.0;
+const ROLL_COUNTS: i32 = 8000;
 
 /// Time for which the reset is pulled, in ms.
 const PULLED_MS: u32 = 20;
@@ -30,20 +37,30 @@ const SAVED_MS: u32 = 1000;
 /// The setting that is changed.
 const SETTING: &str = "max_width_mm";
 
+/// How the weeder is reset.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Way {
+    /// The tester pulls the reset.
+    Pin,
+    /// The computer opens the port, which pulls it by the modem line DTR.
+    Port,
+}
+
 /// What came of a reset at work.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AtWork {
-    /// From the last pulse's end to the first one's beginning behind the release, in ms by the weeder's clock; infinite if none came.
+    /// From the last pulse's end to the first one's beginning behind the reset, in ms by the weeder's clock; infinite if none came.
     pub without_pulse_ms: f64,
-    /// Whether the first pulse is for out, and the weeder is not at work.
+    /// Whether all pulses behind it are for out, and the weeder is not at work.
     pub is_out: bool,
 }
 
-/// Pulls the reset at work with the tool in.
+/// Resets the weeder at work, while it rolls with the tool in.
 ///
 /// # Errors
 /// If a board does not answer.
 pub fn at_work(
+    way: Way,
     weeder: &mut Weeder,
     tester: &mut Tester,
     clock_ratio: f64,
@@ -51,24 +68,92 @@ pub fn at_work(
 ) -> Result<AtWork, CheckError> {
     weeder.to_hold()?;
     weeder.ask("start now")?;
-    tester.record_for_ms(300)?;
-    let pulled = tester.command(&Command::Reset { pulled: true })?.time;
-    let mut records = tester.record_for_ms(PULLED_MS)?;
-    let released = tester.command(&Command::Reset { pulled: false })?.time;
+    let mut plan = Plan::new();
+    plan.roll(ROLL_COUNTS, ROLL_COUNTS_PER_S);
+    tester.begin(&plan.finish())?;
+    let mut records = tester.record_for_ms(300)?;
+    let reset = tester.command(&Command::Clock)?.time;
+    match way {
+        Way::Pin => {
+            tester.command(&Command::Reset { pulled: true })?;
+            records.extend(tester.record_for_ms(PULLED_MS)?);
+            tester.command(&Command::Reset { pulled: false })?;
+        }
+        Way::Port => weeder.open_again()?,
+    }
     records.extend(tester.record_for_ms(if is_simulated { SIMULATED_START_MS } else { START_MS })?);
-    weeder.greeting()?;
+    if way == Way::Pin {
+        weeder.greeting()?;
+    }
+    tester.command(&Command::Stop)?;
     let status = weeder.status()?;
-    let pulses = servo::pulses(&records, pulled);
-    let release = ORIGIN + u64::from(released.wrapping_sub(pulled));
-    let last = pulses.iter().rev().find(|measured| measured.pulse.rise < release);
-    let first = pulses.iter().find(|measured| measured.pulse.rise >= release);
-    let cycles = first.map(|first| first.pulse.rise - last.map_or(ORIGIN, |last| last.pulse.fall));
-    let ms = |cycles: u64| cycles as f64 * 1000.0 / CYCLES_PER_SECOND as f64 * clock_ratio;
-    let is_wide = first.is_some_and(|first| first.pulse.width_us() * clock_ratio > 1750.0);
+    let pulses = servo::pulses(&records, reset);
+    // While it is reset, pulses are missing; a machine that works has one every 20 ms.
+    let gap = |number: &usize| pulses[number + 1].pulse.rise - pulses[*number].pulse.fall;
+    let longest = (0..pulses.len().saturating_sub(1)).max_by_key(gap);
+    let came_back = pulses.last().is_some_and(|last| last.pulse.rise > ORIGIN + u64::from(ms(SIMULATED_START_MS / 2)));
+    let longest = longest.filter(|_| came_back);
+    let in_ms = |cycles: u64| cycles as f64 * 1000.0 / CYCLES_PER_SECOND as f64 * clock_ratio;
+    let is_wide = |measured: &Measured| measured.pulse.width_us() * clock_ratio > 1750.0;
+    let stays_out = longest.is_some_and(|number| pulses[number + 1..].iter().all(is_wide));
     Ok(AtWork {
-        without_pulse_ms: cycles.map_or(f64::INFINITY, ms),
-        is_out: is_wide && status.mode != Mode::Work && status.tool_out,
+        without_pulse_ms: longest.map_or(f64::INFINITY, |number| in_ms(gap(&number))),
+        is_out: stays_out && status.mode != Mode::Work && status.tool_out,
     })
+}
+
+/// What a reset must not change: the saved settings and the taught examples, as the console shows them.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Kept {
+    settings: Vec<(String, u16)>,
+    examples: Vec<(u16, Taught)>,
+}
+
+impl Kept {
+    /// What the weeder has behind a reset.
+    ///
+    /// # Errors
+    /// If a board does not answer, or the weeder was built with other examples than this program.
+    pub fn read(weeder: &mut Weeder, tester: &mut Tester) -> Result<Self, CheckError> {
+        reset(weeder, tester)?;
+        let setting = |line: &String| match ConsoleLine::parse(line) {
+            ConsoleLine::Setting(setting) => Some((setting.name, setting.value)),
+            _ => None,
+        };
+        Ok(Self {
+            settings: weeder.ask("get")?.iter().filter_map(setting).collect(),
+            examples: examples::read(weeder.link()?)?,
+        })
+    }
+
+    /// How many of them another one lacks, or has with another value.
+    pub fn lost(&self, later: &Self) -> usize {
+        let settings = self.settings.iter().filter(|setting| !later.settings.contains(setting));
+        let examples = self.examples.iter().filter(|example| !later.examples.contains(example));
+        settings.count() + examples.count()
+    }
+}
+
+/// Has the weeder know an example while something is tried, if it knows none, so that one can be lost.
+///
+/// # Errors
+/// What the trial says, or if the weeder does not take the example or does not forget it.
+pub fn with_an_example<T>(
+    weeder: &mut Weeder,
+    tester: &mut Tester,
+    try_it: impl FnOnce(&mut Weeder, &mut Tester) -> Result<T, CheckError>,
+) -> Result<T, CheckError> {
+    weeder.to_hold()?;
+    let is_taught = examples::read(weeder.link()?)?.is_empty();
+    if is_taught {
+        examples::push(weeder.link()?, &EXAMPLES[..1], false)?;
+    }
+    let tried = try_it(weeder, tester);
+    if is_taught {
+        weeder.to_hold()?;
+        weeder.ask("forget all")?;
+    }
+    tried
 }
 
 /// What came of resets while settings were saved.
@@ -90,6 +175,13 @@ pub fn while_saving(moments: u32, weeder: &mut Weeder, tester: &mut Tester) -> R
     reset(weeder, tester)?;
     let kept = value(weeder)?;
     save(weeder, tester, kept)?;
+    // Whatever ends it, the old value is put back.
+    let saves = saves(moments, kept, weeder, tester);
+    save(weeder, tester, kept)?;
+    saves
+}
+
+fn saves(moments: u32, kept: u32, weeder: &mut Weeder, tester: &mut Tester) -> Result<Saves, CheckError> {
     let (mut saved, mut saves) = (kept, Saves { resets: moments, ..Saves::default() });
     for moment in 0..moments {
         let wanted = if saved == 300 + moment { 299 } else { 300 + moment };
@@ -105,7 +197,6 @@ pub fn while_saving(moments: u32, weeder: &mut Weeder, tester: &mut Tester) -> R
         saves.new += u32::from(found == wanted);
         saved = found;
     }
-    save(weeder, tester, kept)?;
     Ok(saves)
 }
 

@@ -4,11 +4,12 @@ use crate::alarms::{self, Scene};
 use crate::error::CheckError;
 use crate::rates::{self, Turning};
 use crate::report::{Figure, Report};
-use crate::resets;
+use crate::resets::{self, Kept, Way};
 use crate::row;
 use crate::servo::{self, Steady};
 use crate::tester::Tester;
 use crate::wiring::{self, Weeder};
+use tester_core::pins::Line;
 
 /// What to check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,11 +32,25 @@ impl Extent {
     }
 }
 
-/// Checks a board. `progress` is told what comes next, and the share done from 0 to 1.
+/// Checks a board. `progress` is told what comes next, and the share done from 0 to 1. The weeder has its saved settings again at the end,
+/// also where that is an error.
 ///
 /// # Errors
-/// If a board does not answer. Wrong wires are no error: the report has them, and nothing else then.
+/// If a board does not answer, or the check is interrupted. Wrong wires are no error: the report has them, and nothing else then.
 pub fn run(
+    weeder: &mut Weeder,
+    tester: &mut Tester,
+    extent: Extent,
+    progress: impl FnMut(&'static str, f64),
+) -> Result<Report, CheckError> {
+    let report = check(weeder, tester, extent, progress);
+    let reset = wiring::reset(weeder, tester);
+    let report = report?;
+    reset?;
+    Ok(report)
+}
+
+fn check(
     weeder: &mut Weeder,
     tester: &mut Tester,
     extent: Extent,
@@ -43,12 +58,11 @@ pub fn run(
 ) -> Result<Report, CheckError> {
     progress("wires", 0.0);
     let checked = if extent.simulated { "simulated" } else { "boards" };
-    let report = |figures| Report::new(weeder.version(), checked, extent.brief, figures);
-    let mut empty = report(vec![]);
+    let version = weeder.version().to_owned();
+    let report = |figures| Report::new(&version, checked, extent.brief, figures);
     let wires = wiring::look(weeder, tester)?;
     if !wires.is_empty() {
-        empty.wires = wires;
-        return Ok(empty);
+        return Ok(Report { wires, ..report(vec![]) });
     }
     let mut figures = Vec::new();
     progress("pulses", 0.1);
@@ -56,7 +70,7 @@ pub fn run(
     figures.extend(of_pulses(&steady));
     progress("rates", 0.15);
     figures.extend(rates(weeder, tester, extent)?);
-    progress("alarms", 0.2);
+    progress("alarms", 0.25);
     figures.extend(alarms(weeder, tester, extent, steady.clock_ratio)?);
     progress("resets", 0.4);
     figures.extend(resets(weeder, tester, extent, steady.clock_ratio)?);
@@ -67,9 +81,8 @@ pub fn run(
         let outcome = row::weed(&trial, weeder, tester, steady.clock_ratio)?;
         figures.extend(of_row(&outcome, plants, weeds, speed));
     }
-    wiring::reset(weeder, tester)?;
     progress("done", 1.0);
-    Ok(Report::new(weeder.version(), checked, extent.brief, figures))
+    Ok(report(figures))
 }
 
 /// The pulses in hold: the clocks' ratio, width and spread.
@@ -90,32 +103,43 @@ fn of_pulses(steady: &Steady) -> Vec<Figure> {
     ]
 }
 
+/// The rate that `weeder bounds` proves, in counts a second.
+const PROVED_PER_S: f64 = 290_909.0;
+
+/// With jitter of 30 %, two counts come in 1.4 times the mean at least: so many cycles keep to the proof.
+const JITTERED_CYCLES: u32 = 79;
+
 /// The bursts' figures.
 fn rates(weeder: &mut Weeder, tester: &mut Tester, extent: Extent) -> Result<Vec<Figure>, CheckError> {
     let mut figures = Vec::new();
-    // 55 cycles are the proved rate. With jitter of 30 %, two counts come in 1.4 times the mean at least: 79 cycles keep to the proof.
-    let turnings: &[(u32, bool)] =
-        if extent.brief { &[(106, false), (55, false)] } else { &[(106, false), (55, false), (79, true)] };
-    let (ways, loads): (&[bool], &[bool]) =
-        if extent.brief { (&[true], &[true]) } else { (&[true, false], &[false, true]) };
-    for &(cycles, jittered) in turnings {
-        for &forward in ways {
-            for &busy in loads {
-                let turning = Turning { cycles, forward, jittered, busy };
-                let rate = turning.per_s().round();
-                let way = if forward { "forward" } else { "backward" };
-                let load = if busy { "busy" } else { "idle" };
-                let id = format!("lost_{cycles}_{way}_{load}");
-                let jitter = if jittered { ", 30 % jitter" } else { "" };
-                let what = format!("counts lost at {rate}/s {way}, {load}{jitter}");
-                // A weeder that has started afresh has lost all.
-                let lost = rates::lost(turning, weeder, tester)?.map_or(f64::INFINITY, |lost| lost as f64);
-                figures.push(Figure::new(&id, &what, "", lost, 0.0).at_most(0.0).proved(0.0));
-            }
-        }
+    let all = [(true, true), (true, false), (false, true), (false, false)];
+    for &(forward, busy) in if extent.brief { &all[..1] } else { &all[..] } {
+        let way = if forward { "forward" } else { "backward" };
+        let load = if busy { "busy" } else { "idle" };
+        // Counts are lost below the proved rate if there is none.
+        let highest = rates::highest(forward, busy, weeder, tester)?.unwrap_or(f64::INFINITY);
+        let what = format!("highest rate without a lost count, {way}, {load}");
+        figures.push(
+            Figure::new(&format!("highest_{way}_{load}"), &what, "counts/s", highest.round(), RATE_TOLERANCE)
+                .at_least(PROVED_PER_S)
+                .proved(PROVED_PER_S),
+        );
+        let turning = Turning { cycles: JITTERED_CYCLES, forward, jittered: true, busy };
+        let what = format!("counts lost at {}/s {way}, {load}, 30 % jitter", turning.per_s().round());
+        // A weeder that has started afresh has lost all.
+        let lost = rates::lost(turning, weeder, tester)?.map_or(f64::INFINITY, |lost| lost as f64);
+        figures.push(Figure::new(&format!("lost_jitter_{way}_{load}"), &what, "", lost, 0.0).at_most(0.0).proved(0.0));
+    }
+    for (channel, name) in [(Line::EncoderA, "A"), (Line::EncoderB, "B")] {
+        let left = rates::left_by_glitches(channel, weeder, tester)?;
+        let what = format!("counts left by glitches of channel {name}");
+        figures.push(Figure::new(&format!("glitches_{name}"), &what, "", left, 0.0).at_most(0.0));
     }
     Ok(figures)
 }
+
+/// How far the highest rate may be from the simulation's, in counts a second: a step of the search.
+const RATE_TOLERANCE: f64 = 40_000.0;
 
 /// The time within which the tool has to be out behind a fault, in ms: what the manual says of each, and a frame and a half of the servo.
 const fn limit_ms(scene: Scene) -> f64 {
@@ -158,9 +182,11 @@ fn alarms(weeder: &mut Weeder, tester: &mut Tester, extent: Extent, ratio: f64) 
     }
     let switch = alarms::switch_to_out_ms(weeder, tester, ratio)?;
     let hold = alarms::hold_to_out_ms(weeder, tester, ratio)?;
+    let beam = alarms::beam_to_window_ms(weeder, tester, ratio)?;
     let time = |id: &str, what: &str, value| Figure::new(id, what, "ms", value, TIME_TOLERANCE_MS);
     figures.extend([
         time("switch_out", "work switch opened, until the tool is out", switch).at_most(100.0),
+        time("beam_out", "from a beam's edge to the window: out later than due", beam).at_least(-5.0).at_most(30.0),
         time("hold_out", "`hold` typed, until the tool is out, computer included", hold).at_most(300.0),
     ]);
     Ok(figures)
@@ -168,31 +194,45 @@ fn alarms(weeder: &mut Weeder, tester: &mut Tester, extent: Extent, ratio: f64) 
 
 /// The resets' figures.
 fn resets(weeder: &mut Weeder, tester: &mut Tester, extent: Extent, ratio: f64) -> Result<Vec<Figure>, CheckError> {
-    let at_work = resets::at_work(weeder, tester, ratio, extent.simulated)?;
-    let moments = if extent.brief { 6 } else { 50 };
-    let saves = resets::while_saving(moments, weeder, tester)?;
-    // A bootloader takes 2 s at most, and a virtual Uno has none: only the whole is limited.
-    Ok(vec![
-        Figure::new("reset_pulse", "reset at work: without a pulse", "ms", at_work.without_pulse_ms, 2500.0)
-            .at_most(2500.0),
-        Figure::new(
-            "reset_out",
-            "reset at work: the tool is out behind it",
-            "",
-            f64::from(u8::from(at_work.is_out)),
-            0.0,
-        )
-        .at_least(1.0),
-        Figure::new(
-            "save_torn",
-            &format!("settings torn by {moments} resets while saving"),
-            "",
-            saves.torn.into(),
-            0.0,
-        )
-        .at_most(0.0),
-        Figure::new("save_new", "of these, new settings kept", "", saves.new.into(), moments.into()),
-    ])
+    resets::with_an_example(weeder, tester, |weeder, tester| {
+        let before = Kept::read(weeder, tester)?;
+        let mut figures = Vec::new();
+        for (way, id, words) in
+            [(Way::Pin, "pin", "reset by its pin"), (Way::Port, "port", "reset by opening the port")]
+        {
+            let at_work = resets::at_work(way, weeder, tester, ratio, extent.simulated)?;
+            let what = |what: &str| format!("{words}, at work and rolling: {what}");
+            // A bootloader takes 2 s at most, and a virtual Uno has none: only the whole is limited.
+            figures.extend([
+                Figure::new(
+                    &format!("reset_{id}_pulse"),
+                    &what("without a pulse"),
+                    "ms",
+                    at_work.without_pulse_ms,
+                    2500.0,
+                )
+                .at_most(2500.0),
+                Figure::new(
+                    &format!("reset_{id}_out"),
+                    &what("the tool is out behind it"),
+                    "",
+                    f64::from(u8::from(at_work.is_out)),
+                    0.0,
+                )
+                .at_least(1.0),
+            ]);
+        }
+        let moments = if extent.brief { 6 } else { 50 };
+        let saves = resets::while_saving(moments, weeder, tester)?;
+        let count = |id: &str, what: &str, value: f64| Figure::new(id, what, "", value, 0.0).at_most(0.0);
+        let lost = before.lost(&Kept::read(weeder, tester)?) as f64;
+        figures.extend([
+            count("save_torn", &format!("settings torn by {moments} resets while saving"), saves.torn.into()),
+            Figure::new("save_new", "of these, new settings kept", "", saves.new.into(), moments.into()),
+            count("kept", "settings and taught examples lost by all resets", lost),
+        ]);
+        Ok(figures)
+    })
 }
 
 /// How far the mean error of a swing may be from the simulation's, in counts. Where two zones nearly touch, a run merges them or does not,

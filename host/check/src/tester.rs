@@ -7,6 +7,8 @@ use crate::error::CheckError;
 use link::Port;
 use std::collections::VecDeque;
 use std::io;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use tester_core::frame::{self, Receiver};
 use tester_core::message::{Command, PIECES, PROTOCOL, Record, STEPS, Step};
 use tester_core::piece::Piece;
@@ -55,6 +57,7 @@ pub struct Tester {
     expected: Option<u8>,
     missing: u32,
     records: VecDeque<Record>,
+    interrupt: Arc<AtomicBool>,
 }
 
 impl Tester {
@@ -70,6 +73,7 @@ impl Tester {
             expected: None,
             missing: 0,
             records: VecDeque::new(),
+            interrupt: Arc::default(),
         };
         tester.command(&Command::Hello)?;
         tester.records.clear();
@@ -77,11 +81,19 @@ impl Tester {
         Ok(tester)
     }
 
+    /// Once this is set, the next command fails, and those behind it do not: they put things back.
+    pub fn interrupted_by(&mut self, interrupt: Arc<AtomicBool>) {
+        self.interrupt = interrupt;
+    }
+
     /// Has the tester obey a command.
     ///
     /// # Errors
-    /// If it does not answer, refuses, or records are missing.
+    /// If it does not answer, refuses, or records are missing; and [`CheckError::Interrupted`].
     pub fn command(&mut self, command: &Command) -> Result<Done, CheckError> {
+        if self.interrupt.swap(false, Ordering::Relaxed) {
+            return Err(CheckError::Interrupted);
+        }
         self.number = self.number.wrapping_add(1);
         let frame = frame::encode(self.number, command).expect("the longest command fits a frame");
         for _ in 0..TRIES {
@@ -101,7 +113,10 @@ impl Tester {
                     return match refusal {
                         _ if protocol != PROTOCOL => Err(CheckError::Protocol(protocol)),
                         Some(refusal) => Err(CheckError::Refused(refusal)),
-                        None if self.missing > 0 => Err(CheckError::Missing(self.missing)),
+                        // What was recorded before the greeting is no loss.
+                        None if self.missing > 0 && *command != Command::Hello => {
+                            Err(CheckError::Missing(self.missing))
+                        }
                         None => Ok(Done { room, time, position, levels }),
                     };
                 }
@@ -158,6 +173,19 @@ impl Tester {
             self.hear()?;
         }
         Ok(self.take_records())
+    }
+
+    /// Starts a plan that has room in the tester as a whole, and returns at once.
+    ///
+    /// # Errors
+    /// As [`Tester::command`].
+    pub fn begin(&mut self, plan: &[Piece]) -> Result<(), CheckError> {
+        self.command(&Command::Stop)?;
+        self.take_records();
+        for pieces in plan.chunks(PIECES) {
+            self.command(&Command::Pieces(pieces.iter().copied().collect()))?;
+        }
+        self.command(&Command::Start).map(drop)
     }
 
     /// Plays a plan to its end. `meanwhile` is called some times a second.

@@ -4,7 +4,8 @@ use crate::error::CheckError;
 use crate::plan::Plan;
 use crate::servo;
 use crate::tester::Tester;
-use link::{Link, LinkError, Mode, Port, Status, is_greeting};
+use link::{Link, LinkError, Mode, Status, is_greeting};
+use std::io;
 use tester_core::message::{Command, Record};
 use tester_core::piece::Action;
 use tester_core::pins::{AT_REST, Line};
@@ -25,15 +26,19 @@ const OWN_PULSE: u16 = 16_000;
 const OWN_PULSE_ERROR: u32 = 800;
 
 /// The weeder's console.
-pub struct Weeder(Link);
+pub struct Weeder {
+    /// `None` while the port is opened again, and where that failed.
+    link: Option<Link>,
+    open: Box<dyn FnMut() -> Result<Link, LinkError>>,
+}
 
 impl Weeder {
-    /// The weeder at this port. `resets` says whether opening it has reset the board.
+    /// The weeder at the port that this opens, which resets the board.
     ///
     /// # Errors
-    /// If something else is at the port.
-    pub fn over(port: impl Port + 'static, resets: bool) -> Result<Self, CheckError> {
-        Ok(Self(Link::over(port, resets)?))
+    /// If the port cannot be opened, or something else is there.
+    pub fn over(mut open: impl FnMut() -> Result<Link, LinkError> + 'static) -> Result<Self, CheckError> {
+        Ok(Self { link: Some(open()?), open: Box::new(open) })
     }
 
     /// The weeder at the port of this name.
@@ -41,12 +46,32 @@ impl Weeder {
     /// # Errors
     /// If the port cannot be opened, or something else is there.
     pub fn open(port: &str) -> Result<Self, CheckError> {
-        Ok(Self(Link::open(Some(port))?))
+        let port = port.to_owned();
+        Self::over(move || Link::open(Some(&port)))
     }
 
-    /// The firmware's version.
+    /// Closes the port and opens it again, which resets the board by the modem line DTR.
+    ///
+    /// # Errors
+    /// As [`Weeder::open`].
+    pub fn open_again(&mut self) -> Result<(), CheckError> {
+        // A port that is open is locked.
+        self.link = None;
+        self.link = Some((self.open)()?);
+        Ok(())
+    }
+
+    /// The link to the console.
+    ///
+    /// # Errors
+    /// If the port could not be opened again.
+    pub fn link(&mut self) -> Result<&mut Link, CheckError> {
+        self.link.as_mut().ok_or_else(|| LinkError::Gone(io::ErrorKind::NotConnected.into()).into())
+    }
+
+    /// The firmware's version; empty if the port could not be opened again.
     pub fn version(&self) -> &str {
-        self.0.version()
+        self.link.as_ref().map_or("", Link::version)
     }
 
     /// The lines that a command is answered by.
@@ -54,7 +79,7 @@ impl Weeder {
     /// # Errors
     /// If it is refused, or not answered.
     pub fn ask(&mut self, command: &str) -> Result<Vec<String>, CheckError> {
-        Ok(self.0.ask(command)?)
+        Ok(self.link()?.ask(command)?)
     }
 
     /// The status.
@@ -92,7 +117,7 @@ impl Weeder {
     /// # Errors
     /// If the port is gone.
     pub fn next_line(&mut self) -> Result<Option<String>, CheckError> {
-        Ok(self.0.next_line()?)
+        Ok(self.link()?.next_line()?)
     }
 
     /// Types a command, and does not wait for its answer.
@@ -100,7 +125,7 @@ impl Weeder {
     /// # Errors
     /// If the port is gone.
     pub fn send(&mut self, command: &str) -> Result<(), CheckError> {
-        Ok(self.0.send(command)?)
+        Ok(self.link()?.send(command)?)
     }
 
     /// Waits for the greeting of a firmware that starts; `None` if none came.

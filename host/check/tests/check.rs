@@ -2,27 +2,41 @@
 
 mod common;
 
+use check::CheckError;
 use check::desk::Desk;
 use check::pair::{Side, Wiring};
+use check::ports;
 use check::report::{Report, Verdict};
+use check::resets::{self, Kept};
 use check::run::{Extent, run};
 use check::tester::Tester;
 use check::wiring::{self, Weeder};
 use common::{boards, boards_and_pair};
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use trial::firmware;
 
 /// The most SRAM that the tester may need, static and stack, of 2048 bytes.
 const SRAM_USED: usize = 1750;
 
+/// The longest time of a whole check, and of a bootloader's wait, in seconds.
+const LONGEST_S: f64 = 600.0;
+const BOOTLOADER_S: f64 = 2.0;
+
 fn checked(weeder: &mut Weeder, tester: &mut Tester, brief: bool) -> Report {
     run(weeder, tester, Extent { brief, simulated: true }, |_, _| {}).expect("the check ends")
 }
 
-fn check(wiring: Wiring, brief: bool) -> Report {
-    let (mut weeder, mut tester) = boards(wiring);
-    checked(&mut weeder, &mut tester, brief)
+/// The whole check, which takes two real boards ten minutes at most.
+fn whole_check() -> Report {
+    let (pair, mut weeder, mut tester) = boards_and_pair(Wiring::right());
+    let report = checked(&mut weeder, &mut tester, false);
+    let duration_s = pair.borrow().duration_s(BOOTLOADER_S);
+    println!("The whole check takes two boards {duration_s:.0} s.");
+    assert!(duration_s <= LONGEST_S, "{duration_s} s");
+    report
 }
 
 /// The figures by their ids.
@@ -46,14 +60,14 @@ fn the_shipped_firmware_passes_and_is_as_recorded() {
     assert!(used <= SRAM_USED, "the tester needs {used} bytes of SRAM");
     let recorded = concat!(env!("CARGO_MANIFEST_DIR"), "/src/simulated.json");
     if is_set("UPDATE_EXPECT") {
-        let whole = check(Wiring::right(), false);
+        let whole = whole_check();
         let both = BTreeMap::from([("brief", figures(&brief)), ("whole", figures(&whole))]);
         std::fs::write(recorded, serde_json::to_string_pretty(&both).unwrap() + "\n").unwrap();
         return;
     }
     let mut reports = vec![brief];
     if is_set("WEEDER_THOROUGH") {
-        reports.push(check(Wiring::right(), false));
+        reports.push(whole_check());
     }
     for report in reports {
         assert!(report.lines.iter().all(|line| line.verdict == Verdict::Pass), "{}", report.text());
@@ -80,14 +94,30 @@ fn a_row_is_measured_as_the_simulation_judges_it() {
 }
 
 #[test]
-fn the_boards_are_reached_through_two_terminals() {
+fn the_boards_are_found_at_two_terminals() {
     let (tester, weeder) = (firmware::build_tester().expect("it is built"), firmware::build().expect("it is built"));
     let desk = Desk::start(&tester, &weeder).expect("it starts");
-    let name = |path: &Path| path.to_str().expect("it is text").to_owned();
-    let port = link::open_other(&name(desk.tester())).expect("it opens");
-    let mut tester = Tester::over(port).expect("the tester answers");
-    let mut weeder = Weeder::open(&name(desk.weeder())).expect("the weeder answers");
+    // The weeder's stands first, and no port is named.
+    let unos = [desk.weeder(), desk.tester()].map(|path: &Path| path.to_str().expect("it is text").to_owned());
+    let (mut weeder, mut tester) = ports::open(None, None, &unos).expect("both are found");
     assert_eq!(wiring::look(&mut weeder, &mut tester).expect("both answer"), Vec::<String>::new());
     drop((weeder, tester));
+    let error = ports::open(Some(&unos[0]), None, &unos[..1]).map(drop).expect_err("there is no tester");
+    assert!(error.to_string().starts_with("no tester answers at an Uno's port"), "{error}");
     desk.stop().expect("neither has stopped");
+}
+
+#[test]
+fn an_interrupted_check_leaves_what_was_saved() {
+    let (mut weeder, mut tester) = boards(Wiring::right());
+    let before = Kept::read(&mut weeder, &mut tester).expect("both answer");
+    let interrupt = Arc::new(AtomicBool::new(false));
+    tester.interrupted_by(Arc::clone(&interrupt));
+    let tried = resets::with_an_example(&mut weeder, &mut tester, |weeder, tester| {
+        interrupt.store(true, Ordering::Relaxed);
+        resets::while_saving(3, weeder, tester)
+    });
+    assert!(matches!(tried, Err(CheckError::Interrupted)), "{tried:?}");
+    let after = Kept::read(&mut weeder, &mut tester).expect("both answer");
+    assert_eq!(before, after);
 }

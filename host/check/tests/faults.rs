@@ -8,8 +8,9 @@ use check::rates::{self, Turning};
 use check::{resets, row, servo, wiring};
 use common::boards;
 use field::wiring as pins;
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::rc::Rc;
+use tester_core::pins::Line;
 use uno::{Pin, PinChange};
 
 /// What the check says of these wires.
@@ -51,6 +52,15 @@ fn swapped_channels_are_named() {
 #[test]
 fn an_open_wire_of_the_encoder_is_named() {
     assert_named(|wires| wires.inputs.retain(|wire| wire.1 != pins::ENCODER_B), &["encoder B", "D3"]);
+}
+
+#[test]
+fn a_floating_channel_that_follows_the_other_one_is_named() {
+    let float = |wires: &mut Wiring| {
+        wires.inputs.retain(|wire| wire.1 != pins::ENCODER_B);
+        wires.inputs.push((Line::EncoderA, pins::ENCODER_B, false));
+    };
+    assert_named(float, &["encoder", "D3"]);
 }
 
 #[test]
@@ -149,6 +159,23 @@ fn counts_that_are_lost_above_150_000_a_second_are_counted() {
     };
     assert_eq!(lost(106), 0);
     assert!(lost(55) > 10_000);
+    assert_eq!(rates::highest(true, true, &mut weeder, &mut tester).expect("both answer"), None);
+}
+
+#[test]
+fn a_channel_that_hides_the_end_of_a_glitch_is_counted() {
+    // What comes within 5 us of an edge is lost, as behind a filter of 1 k and 4.7 nF that only one channel has.
+    let mut last = 0;
+    let filter = move |change: PinChange| {
+        let is_short = change.pin == Pin::A0 && change.cycle - last < 80;
+        last = change.cycle;
+        (!is_short).then_some(change)
+    };
+    let wires = Wiring { to_weeder: Some(Box::new(filter)), ..Wiring::right() };
+    let (mut weeder, mut tester) = boards(wires);
+    let mut left = |channel| rates::left_by_glitches(channel, &mut weeder, &mut tester).expect("both answer");
+    assert!(left(Line::EncoderA) > 0.0);
+    assert!(left(Line::EncoderB) < 0.5);
 }
 
 #[test]
@@ -186,10 +213,9 @@ fn a_swing_that_is_late_by_10_ms_is_measured() {
         outcome.judgement.swing_errors_ticks()
     };
     let (right, wrong) = (swings(0), swings(160_000));
-    // 10 ms at 2.5 km/h are 13.3 counts.
-    for (right, wrong) in right.iter().zip(&wrong) {
-        assert!((wrong - right - 13.3).abs() < 6.0, "{right} {wrong}");
-    }
+    // 10 ms at 2.5 km/h are 13.3 counts. One swing may come a servo's frame earlier or later from run to run, by 26 counts.
+    let later = right.iter().zip(&wrong).map(|(right, wrong)| wrong - right).sum::<f64>() / right.len() as f64;
+    assert!(right.len() == wrong.len() && (later - 13.3).abs() < 8.0, "{right:?} {wrong:?}");
 }
 
 #[test]
@@ -218,4 +244,25 @@ fn a_save_that_tears_is_counted() {
     weeder.to_hold().expect("it holds");
     let saves = resets::while_saving(3, &mut weeder, &mut tester).expect("both answer");
     assert_eq!(saves.torn, 3);
+}
+
+#[test]
+fn settings_that_a_reset_loses_are_counted() {
+    let spoils = Rc::new(Cell::new(false));
+    let is_to_spoil = Rc::clone(&spoils);
+    let lose = move |eeprom: &mut [u8]| {
+        if is_to_spoil.get() {
+            eeprom.fill(0xFF);
+        }
+    };
+    let wires = Wiring { eeprom_at_reset: Some(Box::new(lose)), ..Wiring::right() };
+    let (mut weeder, mut tester) = boards(wires);
+    weeder.to_hold().expect("it holds");
+    weeder.ask("set margin_mm 60").expect("it obeys");
+    weeder.ask("save").expect("it saves");
+    tester.record_for_ms(1000).expect("the tester answers");
+    let saved = resets::Kept::read(&mut weeder, &mut tester).expect("both answer");
+    spoils.set(true);
+    let after = resets::Kept::read(&mut weeder, &mut tester).expect("both answer");
+    assert_eq!((saved.lost(&saved), saved.lost(&after)), (0, 1));
 }

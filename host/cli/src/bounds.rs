@@ -48,16 +48,27 @@ fn repository_budgets() -> PathBuf {
     firmware::workspace_root().join("budgets.toml")
 }
 
+/// The same for the tester's firmware.
+fn tester_budgets() -> PathBuf {
+    firmware::workspace_root().join("tester/budgets.toml")
+}
+
 /// The bounds of a firmware, each beside its budget.
-fn prove(elf: &Path) -> Result<Vec<Held>> {
-    let budgets = Budgets::read(&repository_budgets())?;
+fn prove(elf: &Path, budgets: &Path) -> Result<Vec<Held>> {
+    let budgets = Budgets::read(budgets)?;
     let program = Program::read(elf, budgets.chip.as_deref())?;
     Ok(budgets.hold(&avr_bounds::prove(&program, &budgets)?)?)
 }
 
-/// Whether a firmware goes onto an Uno whose bounds are not proved.
+/// Which firmware is written for an Uno, and whether it may be one without proved bounds.
 #[derive(Args)]
-pub struct Unproved {
+pub struct Firmware {
+    /// Take this ELF instead of building the firmware of this repository.
+    #[arg(long, value_name = "FILE.elf")]
+    elf: Option<PathBuf>,
+    /// Take the firmware of the tester, the second Uno of `weeder check-board`.
+    #[arg(long, conflicts_with = "elf")]
+    tester: bool,
     /// Write the firmware even if its bounds are not proved. Its stack may overwrite its data. It may miss plants
     /// without an alarm.
     #[arg(long)]
@@ -67,13 +78,26 @@ pub struct Unproved {
 /// What an unproved firmware may do.
 const RISK: &str = "its stack may overwrite its data, and plants may be missed, without an alarm";
 
-impl Unproved {
-    /// Proves a firmware's bounds, and says where that fails but is insisted on.
+impl Firmware {
+    /// The firmware's ELF, built if none was named.
+    ///
+    /// # Errors
+    /// If it cannot be built.
+    pub fn elf(&self) -> Result<PathBuf> {
+        Ok(match &self.elf {
+            Some(elf) => elf.clone(),
+            None if self.tester => firmware::build_tester()?,
+            None => firmware::build()?,
+        })
+    }
+
+    /// Proves this ELF's bounds, and says where that fails but is insisted on.
     ///
     /// # Errors
     /// Where it fails, or a bound is over its budget, without `--unproved`.
     pub fn check(&self, elf: &Path) -> Result<()> {
-        let why = match prove(elf) {
+        let budgets = if self.tester { tester_budgets() } else { repository_budgets() };
+        let why = match prove(elf, &budgets) {
             Ok(held) => match held.into_iter().find(|held| !held.keeps) {
                 Some(Held { name, proved, budget, .. }) => format!("{name} is {proved}, and its budget is {budget}"),
                 None => return Ok(()),

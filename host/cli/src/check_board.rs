@@ -4,34 +4,36 @@ use crate::destination::{FileName, Replace};
 use crate::finding::Finding;
 use crate::output::{print, say, tell};
 use crate::progress::Progress;
-use anyhow::Result;
+use anyhow::{Context, Result};
 use check::desk::Desk;
+use check::ports;
 use check::run::{Extent, run as check_run};
-use check::tester::Tester;
-use check::wiring::Weeder;
 use clap::Args;
 use std::cell::Cell;
 use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use trial::firmware;
 
 /// What the user asks of the check.
 #[derive(Args)]
 #[command(after_help = "\
 The tester is an Uno with the tester's firmware, wired to the weeder's Uno: docs/check-board.md has the wires.
-Remove the machine's own wires from the weeder's Uno before. Settings are not changed for good.
+Remove the machine's own wires from the weeder's Uno before. Settings are not changed for good,
+also where Ctrl-C ends the check.
 
-  cargo tester-firmware
-  weeder flash --port /dev/ttyACM1 --elf target/avr-none/firmware/tester-firmware.elf
+  weeder flash --tester --port /dev/ttyACM1
+  weeder check-board --page check.html
   weeder check-board --port /dev/ttyACM0 --tester /dev/ttyACM1 --json --board 'Uno R3' > uno-r3.json
   weeder check-board --simulated --brief
 
 Status 1: a wire is wrong, or a figure is outside its limits.")]
 pub struct Arguments {
-    /// The weeder's port.
-    #[arg(long, required_unless_present = "simulated")]
+    /// The weeder's port. Default: the Uno that answers as a weeder.
+    #[arg(long)]
     port: Option<String>,
-    /// The tester's port.
-    #[arg(long, required_unless_present = "simulated")]
+    /// The tester's port. Default: the Uno that answers as a tester.
+    #[arg(long)]
     tester: Option<String>,
     /// The board's name, for the report.
     #[arg(long, value_name = "NAME", default_value = "", hide_default_value = true)]
@@ -62,13 +64,16 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
         true => Some(Desk::start(&firmware::build_tester()?, &firmware::build()?)?),
         false => None,
     };
-    let name = |path: &Path| path.to_string_lossy().into_owned();
+    let name = |path: &Path| Some(path.to_string_lossy().into_owned());
     let (port, tester) = match &desk {
         Some(desk) => (name(desk.weeder()), name(desk.tester())),
-        None => (arguments.port.clone().unwrap_or_default(), arguments.tester.clone().unwrap_or_default()),
+        None => (arguments.port.clone(), arguments.tester.clone()),
     };
-    let mut tester = Tester::over(link::open_other(&tester)?)?;
-    let mut weeder = Weeder::open(&port)?;
+    let unos = if port.is_some() && tester.is_some() { vec![] } else { link::find_unos()? };
+    let (mut weeder, mut tester) = ports::open(port.as_deref(), tester.as_deref(), &unos)?;
+    let interrupt = Arc::new(AtomicBool::new(false));
+    tester.interrupted_by(Arc::clone(&interrupt));
+    ctrlc::set_handler(move || interrupt.store(true, Ordering::Relaxed)).context("Ctrl-C cannot be caught")?;
     let bar = Progress::new("checking");
     let extent = Extent { brief: arguments.brief, simulated: arguments.simulated };
     let last = Cell::new("");

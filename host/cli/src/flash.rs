@@ -1,13 +1,13 @@
 //! `weeder flash`: builds the firmware, proves its bounds, and has avrdude put it on the Uno.
 
-use crate::bounds::Unproved;
+use crate::bounds::Firmware;
 use crate::output::say;
 use crate::ports::Port;
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use std::collections::HashSet;
 use std::io::{self, Read, Write};
-use std::path::{self, Path, PathBuf};
+use std::path::{self, Path};
 use std::process::{Command, Stdio};
 use trial::firmware;
 use uno::elf::Image;
@@ -30,11 +30,8 @@ pub struct Arguments {
     /// Use ravedude (Ravedude.toml) if it is installed and the bootloader is not the old one.
     #[arg(long)]
     ravedude: bool,
-    /// Flash this ELF instead of building the firmware of this repository.
-    #[arg(long, value_name = "FILE.elf")]
-    elf: Option<PathBuf>,
     #[command(flatten)]
-    unproved: Unproved,
+    firmware: Firmware,
 }
 
 /// Baud rates of the bootloader, Optiboot's and its predecessor's.
@@ -55,13 +52,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let port = arguments.port.board()?.port()?;
     // For an error that says more than avrdude's, and before anything is built.
     link::try_port(&port)?;
-    let elf = match &arguments.elf {
-        Some(elf) => elf.clone(),
-        None => firmware::build()?,
-    };
+    let elf = arguments.firmware.elf()?;
     let flash = Image::read(&elf)?.flash;
     hex::check_room(flash.len(), available)?;
-    arguments.unproved.check(&elf)?;
+    arguments.firmware.check(&elf)?;
     if arguments.ravedude && !arguments.old_bootloader && run_ravedude(&elf, &port)? {
         return Ok(());
     }

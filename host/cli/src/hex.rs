@@ -1,13 +1,11 @@
 //! `weeder hex`: the firmware as an Intel HEX file, which a computer without Rust can put on an Uno. The page and the release
 //! take theirs from here, so that they carry what is proved.
 
-use crate::bounds::Unproved;
+use crate::bounds::Firmware;
 use crate::destination::{FileName, Replace};
 use crate::output::say;
 use anyhow::Result;
 use clap::Args;
-use std::path::PathBuf;
-use trial::firmware;
 use uno::elf::Image;
 use uno::hex;
 
@@ -26,11 +24,8 @@ pub struct Arguments {
     out: FileName,
     #[command(flatten)]
     replace: Replace,
-    /// Write this ELF instead of building the firmware of this repository.
-    #[arg(long, value_name = "FILE.elf")]
-    elf: Option<PathBuf>,
     #[command(flatten)]
-    unproved: Unproved,
+    firmware: Firmware,
 }
 
 /// Writes it.
@@ -39,12 +34,9 @@ pub struct Arguments {
 /// Where the firmware cannot be built, read or proved, or the file cannot be written.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let out = arguments.out.check(arguments.replace)?;
-    let elf = match &arguments.elf {
-        Some(elf) => elf.clone(),
-        None => firmware::build()?,
-    };
+    let elf = arguments.firmware.elf()?;
     let flash = Image::read(&elf)?.flash;
-    arguments.unproved.check(&elf)?;
+    arguments.firmware.check(&elf)?;
     out.write(|to| to.write_all(hex::text(&flash).as_bytes()))?;
     say!("Written     {}, {} bytes of flash", out.path().display(), flash.len())
 }

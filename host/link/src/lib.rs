@@ -37,7 +37,7 @@ pub use self::error::LinkError;
 pub use self::event_line::{EventLine, Mode, Status, Timed, Values};
 pub use self::lines::LineReader;
 #[cfg(not(target_arch = "wasm32"))]
-pub use self::port::{find_uno, listen, open_other, try_port};
+pub use self::port::{find_uno, find_unos, listen, open_other, try_port};
 pub use control::ground::class::Class;
 
 use std::collections::VecDeque;

@@ -38,12 +38,25 @@ pub fn find_uno() -> Result<String, LinkError> {
     only_uno(&serialport::available_ports().map_err(LinkError::NoList)?)
 }
 
-/// The only Uno's port among these, known by its USB vendor and product.
+/// The ports of all Unos.
+///
+/// # Errors
+/// Where the ports cannot be listed.
+pub fn find_unos() -> Result<Vec<String>, LinkError> {
+    Ok(unos(&serialport::available_ports().map_err(LinkError::NoList)?))
+}
+
+/// The Unos' ports among these, known by their USB vendor and product.
+fn unos(ports: &[SerialPortInfo]) -> Vec<String> {
+    ports.iter().filter(|port| is_uno(port)).map(|port| port.port_name.clone()).collect()
+}
+
+/// The only Uno's port among these.
 ///
 /// # Errors
 /// Where there is none, or several.
 fn only_uno(ports: &[SerialPortInfo]) -> Result<String, LinkError> {
-    let unos: Vec<String> = ports.iter().filter(|port| is_uno(port)).map(|port| port.port_name.clone()).collect();
+    let unos = unos(ports);
     match unos.as_slice() {
         [only] => Ok(only.clone()),
         [] => Err(LinkError::NoUno(ports.iter().map(|port| port.port_name.clone()).collect())),

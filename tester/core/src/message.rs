@@ -31,9 +31,12 @@ pub struct Step {
     pub toggle: u8,
 }
 
+/// Cycles by which a step is longer for each 1 of its `delay`.
+pub const STEP_CYCLES: u32 = 3;
+
 /// Cycles of a step, for `delay` from 1.
 pub const fn step_cycles(delay: u8) -> u32 {
-    10 + 3 * delay as u32
+    10 + STEP_CYCLES * delay as u32
 }
 
 /// Cycles that the last step of a pattern takes longer, if the pattern is repeated.

@@ -3,6 +3,7 @@
 use check::pair::{Pair, PairPort, Side, Wiring};
 use check::tester::Tester;
 use check::wiring::Weeder;
+use link::Link;
 use std::cell::RefCell;
 use std::rc::Rc;
 use trial::firmware;
@@ -18,8 +19,12 @@ pub fn boards_and_pair(wiring: Wiring) -> (Rc<RefCell<Pair>>, Weeder, Tester) {
     let tester = firmware::build_tester().expect("the tester's firmware is built");
     let weeder = firmware::build().expect("the weeder's firmware is built");
     let pair = Rc::new(RefCell::new(Pair::power_up(&tester, &weeder, &[], wiring).expect("both start")));
-    let port = |side| PairPort { pair: Rc::clone(&pair), side };
-    let tester = Tester::over(port(Side::Tester)).expect("the tester answers");
-    let weeder = Weeder::over(port(Side::Weeder), true).expect("the weeder answers");
+    let tester = Tester::over(PairPort { pair: Rc::clone(&pair), side: Side::Tester }).expect("the tester answers");
+    let opened = Rc::clone(&pair);
+    let open = move || {
+        opened.borrow_mut().reset(Side::Weeder);
+        Link::over(PairPort { pair: Rc::clone(&opened), side: Side::Weeder }, true)
+    };
+    let weeder = Weeder::over(open).expect("the weeder answers");
     (pair, weeder, tester)
 }

@@ -1,0 +1,34 @@
+//! The two boards' ports: what is not named is looked for among those of all Unos.
+
+use crate::error::CheckError;
+use crate::tester::Tester;
+use crate::wiring::Weeder;
+
+/// Opens both boards. A port that is not named is one of `unos` at which such a board answers: the tester by its protocol, the weeder by its
+/// console.
+///
+/// # Errors
+/// If a port that is named cannot be opened or does not answer, or no other port has such a board.
+pub fn open(weeder: Option<&str>, tester: Option<&str>, unos: &[String]) -> Result<(Weeder, Tester), CheckError> {
+    let (tester_port, tester) = opened("tester", tester, weeder, unos, |port| {
+        Tester::over(link::open_other(port).map_err(CheckError::TesterPort)?)
+    })?;
+    let (_, weeder) = opened("weeder", weeder, Some(&tester_port), unos, Weeder::open)?;
+    Ok((weeder, tester))
+}
+
+/// The board at the port that is named, or at the first of the others where it answers; none of them is the one that is `taken`.
+fn opened<T>(
+    board: &'static str,
+    named: Option<&str>,
+    taken: Option<&str>,
+    unos: &[String],
+    open: impl Fn(&str) -> Result<T, CheckError>,
+) -> Result<(String, T), CheckError> {
+    if let Some(port) = named {
+        return Ok((port.to_owned(), open(port)?));
+    }
+    let mut others = unos.iter().filter(|uno| Some(uno.as_str()) != taken);
+    let found = others.find_map(|port| open(port).ok().map(|board| (port.clone(), board)));
+    found.ok_or_else(|| CheckError::NotFound(board, unos.join(", ")))
+}
