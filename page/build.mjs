@@ -1,4 +1,5 @@
-// Makes what runs out of what is written: `node build.mjs page` makes dist/, `node build.mjs tests` makes build/tests/.
+// Makes what runs out of what is written: `node build.mjs page` makes dist/, `node build.mjs tests` makes build/tests/. Both
+// make build/lockstep.mjs, the page's virtual Uno for another program.
 //
 // The page is three files that a browser opens from anywhere, the disk included, and three more by which it can be installed where it
 // comes from a server. The firmware is inside, and so is the project's own Rust, as a browser gives no page a file of the disk. Both are
@@ -110,6 +111,15 @@ const common = {
     },
     loader: { ".hex": "text", ".txt": "text", ".deflated": "binary" },
 };
+
+await build({
+    bundle: true,
+    mainFields: common.mainFields,
+    entryPoints: ["src/uno/lockstep.ts"],
+    outfile: "build/lockstep.mjs",
+    platform: "node",
+    format: "esm",
+});
 
 const what = process.argv[2];
 if (what === "page") {

@@ -7,10 +7,11 @@
 import { type ChildProcess, spawn } from "node:child_process";
 import { closeSync, constants, existsSync, mkdtempSync, openSync, readSync, rmSync, writeSync } from "node:fs";
 import { tmpdir } from "node:os";
-import { join, resolve } from "node:path";
+import { join } from "node:path";
 import type { TestContext } from "node:test";
 import { setTimeout as wait } from "node:timers/promises";
 import type { Page } from "playwright-core";
+import { WEEDER } from "./weeder.ts";
 
 /** What is at the other end of a port. */
 export interface Device {
@@ -49,11 +50,8 @@ export class VirtualUno implements Device {
 
     /** Starts one for a test, at whose end it stops, with further options. */
     static async start(test: TestContext, ...options: string[]): Promise<VirtualUno> {
-        const weeder = process.env.WEEDER ?? resolve("../target/debug/weeder");
-        if (!existsSync(weeder))
-            throw new Error(`${weeder} is not there: \`cargo build -p weeder-cli\` makes it, or name it in WEEDER`);
         const folder = mkdtempSync(join(tmpdir(), "weeder-page-"));
-        const child = spawn(weeder, ["virtual-uno", "--link", join(folder, "uno"), ...options], {
+        const child = spawn(WEEDER, ["virtual-uno", "--link", join(folder, "uno"), ...options], {
             stdio: ["ignore", "ignore", "pipe"],
         });
         let said = "";

@@ -3,14 +3,13 @@
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import { mkdirSync, readFileSync, writeFileSync } from "node:fs";
-import { join, resolve } from "node:path";
+import { join } from "node:path";
 import test, { after, before } from "node:test";
 import type { Browser, Page } from "playwright-core";
 import { close, inspect, launch, type Opened, open, openAt } from "./browser.ts";
 import { folder, plugIn, serve } from "./serving.ts";
 import { part, tryIt } from "./trying.ts";
-
-const WEEDER = process.env.WEEDER ?? resolve("../target/debug/weeder");
+import { WEEDER } from "./weeder.ts";
 
 let browser: Browser;
 

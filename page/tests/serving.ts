@@ -10,9 +10,9 @@ import { createInterface } from "node:readline";
 import type { TestContext } from "node:test";
 import { setTimeout as wait } from "node:timers/promises";
 import type { Locator, Page } from "playwright-core";
+import { WEEDER } from "./weeder.ts";
 
 const FIRMWARE = resolve("../target/avr-none/firmware/weeder-firmware.elf");
-const WEEDER = process.env.WEEDER ?? resolve("../target/debug/weeder");
 
 /** A part of a machine's panel, by the machine's name. */
 export const part = (page: Page, machine: string, name: string): Locator =>

@@ -8,9 +8,9 @@ import test, { after, before, type TestContext } from "node:test";
 import type { Browser, Page } from "playwright-core";
 import { close, DESK, inspect, launch, type Opened, open, PHONE } from "./browser.ts";
 import { type Device, Foreign, VirtualUno } from "./ports.ts";
+import { WEEDER } from "./weeder.ts";
 
 const FIRMWARE = resolve("../target/avr-none/firmware/weeder-firmware.elf");
-const WEEDER = process.env.WEEDER ?? resolve("../target/debug/weeder");
 
 let browser: Browser;
 

@@ -2,15 +2,15 @@
 //!
 //! They run as fast as the computer can. Opening a port resets its board, as the modem line DTR does on a real one.
 
-use crate::pair::{Pair, Side, Wiring};
+use crate::pair::{Pair, PairError, Side, Wiring};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
 use thiserror::Error;
+use uno::CYCLES_PER_SECOND;
 use uno::pty::{Pty, PtyError};
-use uno::{CYCLES_PER_SECOND, UnoError};
 
 /// Bytes that may be on their way to a board. More are left to the terminal.
 const MOST_BYTES_ON_THEIR_WAY: usize = 64;
@@ -20,7 +20,7 @@ const MOST_BYTES_ON_THEIR_WAY: usize = 64;
 pub enum DeskError {
     /// A virtual Uno stopped.
     #[error(transparent)]
-    Uno(#[from] UnoError),
+    Pair(#[from] PairError),
     /// A pseudo terminal failed.
     #[error(transparent)]
     Pty(#[from] PtyError),
@@ -38,18 +38,22 @@ pub struct Desk {
 }
 
 impl Desk {
-    /// Powers both up.
+    /// Powers both up. `second` is the program of another simulator for the weeder's, if one is to take its place.
     ///
     /// # Errors
     /// If an ELF cannot be run, or no pseudo terminal is to be had.
-    pub fn start(tester_elf: &Path, weeder_elf: &Path) -> Result<Self, DeskError> {
+    pub fn start(tester_elf: &Path, weeder_elf: &Path, second: Option<&Path>) -> Result<Self, DeskError> {
         let (tester_pty, weeder_pty) = (Pty::open()?, Pty::open()?);
         let (tester, weeder) = (tester_pty.path().to_owned(), weeder_pty.path().to_owned());
         let stop = Arc::new(AtomicBool::new(false));
         let is_to_stop = Arc::clone(&stop);
         let elves = (tester_elf.to_owned(), weeder_elf.to_owned());
+        let second = second.map(Path::to_owned);
         let run = move || {
-            let mut pair = Pair::power_up(&elves.0, &elves.1, &[], Wiring::right())?;
+            let mut pair = match second {
+                Some(program) => Pair::with_second_simulator(&elves.0, &elves.1, &program)?,
+                None => Pair::power_up(&elves.0, &elves.1, &[], Wiring::right()).map_err(PairError::from)?,
+            };
             let mut ptys = [(Side::Tester, tester_pty), (Side::Weeder, weeder_pty)];
             while !is_to_stop.load(Ordering::Relaxed) {
                 for (side, pty) in &mut ptys {
@@ -95,9 +99,9 @@ fn take_turn(pair: &mut Pair, side: Side, pty: &mut Pty) -> Result<(), DeskError
     if pty.was_opened()? {
         // A port that nobody reads keeps nothing.
         pair.received(side).clear();
-        pair.reset(side);
+        pair.reset(side)?;
     }
-    let room = MOST_BYTES_ON_THEIR_WAY.saturating_sub(pair.board(side).bytes_on_their_way());
+    let room = MOST_BYTES_ON_THEIR_WAY.saturating_sub(pair.bytes_on_their_way(side));
     let mut bytes = [0; MOST_BYTES_ON_THEIR_WAY];
     let count = pty.read(&mut bytes[..room])?;
     if count > 0 {

@@ -5,7 +5,8 @@
 //! [`report`] sets measured, simulated and proved side by side.
 //!
 //! [`ports`] finds both boards. [`tester`] talks to the tester, and `link` to the weeder. [`plan`] turns levels at cycles into a plan.
-//! [`pair`] has two virtual Unos in the place of the boards, wire to wire, [`desk`] puts them at ports, and [`drawing`] shows the wires.
+//! [`pair`] has two virtual Unos in the place of the boards, wire to wire, [`second`] has another simulator's for one of them, [`desk`] puts
+//! them at ports, and [`drawing`] shows the wires.
 
 pub mod alarms;
 pub mod desk;
@@ -19,6 +20,7 @@ pub mod report;
 pub mod resets;
 pub mod row;
 pub mod run;
+pub mod second;
 pub mod servo;
 pub mod tester;
 pub mod wiring;

@@ -4,12 +4,14 @@
 //! An edge from the tester reaches the weeder at its cycle. One from the weeder reaches the tester [`STEP`] cycles late, always, so widths
 //! and distances are right. [`Wiring`] can be wrong on purpose, for tests of the check.
 
+use crate::second::SecondUno;
 use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use tester_core::pins::Line;
+use thiserror::Error;
 use uno::{CYCLES_PER_SECOND, Pin, PinChange, Uno, UnoError};
 
 /// Cycles between two looks at the wires: 1 us.
@@ -78,10 +80,73 @@ impl Wiring {
     }
 }
 
+/// Why the boards stopped.
+#[derive(Debug, Error)]
+pub enum PairError {
+    /// A virtual Uno stopped.
+    #[error(transparent)]
+    Uno(#[from] UnoError),
+    /// The second simulator did.
+    #[error("the second simulator")]
+    Second(#[from] io::Error),
+}
+
+/// The weeder's virtual Uno: of this project's simulator, or of another one.
+enum WeederUno {
+    Own(Uno),
+    Second(SecondUno),
+}
+
+impl WeederUno {
+    fn cycle(&self) -> u64 {
+        match self {
+            Self::Own(uno) => uno.cycle(),
+            Self::Second(uno) => uno.cycle(),
+        }
+    }
+
+    fn run_until(&mut self, cycle: u64) -> Result<(), PairError> {
+        match self {
+            Self::Own(uno) => uno.run_until(cycle)?,
+            Self::Second(uno) => uno.run_until(cycle)?,
+        }
+        Ok(())
+    }
+
+    fn drive(&mut self, change: PinChange) {
+        match self {
+            Self::Own(uno) => uno.drive([change]),
+            Self::Second(uno) => uno.drive(change),
+        }
+    }
+
+    fn take_changes(&mut self) -> Vec<PinChange> {
+        match self {
+            Self::Own(uno) => uno.take_changes(),
+            Self::Second(uno) => uno.take_changes(),
+        }
+    }
+
+    fn received(&mut self) -> Vec<u8> {
+        match self {
+            Self::Own(uno) => uno.received_bytes().into_iter().map(|received| received.byte).collect(),
+            Self::Second(uno) => uno.received(),
+        }
+    }
+
+    fn reset(&mut self) -> Result<(), PairError> {
+        match self {
+            Self::Own(uno) => uno.reset(),
+            Self::Second(uno) => uno.reset()?,
+        }
+        Ok(())
+    }
+}
+
 /// The two boards.
 pub struct Pair {
     tester: Uno,
-    weeder: Uno,
+    weeder: WeederUno,
     weeder_elf: PathBuf,
     wiring: Wiring,
     /// The tester's and the weeder's cycle at the last moment that both share.
@@ -99,15 +164,26 @@ impl Pair {
     /// # Errors
     /// If an ELF cannot be run.
     pub fn power_up(tester: &Path, weeder: &Path, eeprom: &[u8], wiring: Wiring) -> Result<Self, UnoError> {
-        let weeder_elf = weeder.to_owned();
-        let (tester, weeder) = (Uno::boot(tester)?, Uno::boot_with_eeprom(weeder, eeprom)?);
-        let weeder = weeder.wired(&field::wiring::WIRES);
+        let weeder_uno = Uno::boot_with_eeprom(weeder, eeprom)?.wired(&field::wiring::WIRES);
+        Ok(Self::of(Uno::boot(tester)?, WeederUno::Own(weeder_uno), weeder, wiring))
+    }
+
+    /// The same with another simulator's Uno as the weeder, which `program` runs.
+    ///
+    /// # Errors
+    /// If an ELF cannot be run, or the other simulator.
+    pub fn with_second_simulator(tester: &Path, weeder: &Path, program: &Path) -> Result<Self, PairError> {
+        let second = SecondUno::power_up(program, weeder)?;
+        Ok(Self::of(Uno::boot(tester)?, WeederUno::Second(second), weeder, Wiring::right()))
+    }
+
+    fn of(tester: Uno, weeder: WeederUno, weeder_elf: &Path, wiring: Wiring) -> Self {
         let shared = (tester.cycle(), weeder.cycle());
         let (from_tester, from_weeder) = (VecDeque::new(), VecDeque::new());
-        Ok(Self {
+        Self {
             tester,
             weeder,
-            weeder_elf,
+            weeder_elf: weeder_elf.to_owned(),
             wiring,
             shared,
             steps: 0,
@@ -115,7 +191,7 @@ impl Pair {
             resets: 0,
             from_tester,
             from_weeder,
-        })
+        }
     }
 
     fn weeder_cycle(&self, tester_cycle: u64) -> u64 {
@@ -132,17 +208,17 @@ impl Pair {
     ///
     /// # Errors
     /// If one of them stops.
-    pub fn run_for(&mut self, cycles: u64) -> Result<(), UnoError> {
+    pub fn run_for(&mut self, cycles: u64) -> Result<(), PairError> {
         let end = self.tester.cycle() + cycles;
         while self.tester.cycle() < end {
             self.step()?;
         }
         self.from_tester.extend(self.tester.received_bytes().into_iter().map(|received| received.byte));
-        self.from_weeder.extend(self.weeder.received_bytes().into_iter().map(|received| received.byte));
+        self.from_weeder.extend(self.weeder.received());
         Ok(())
     }
 
-    fn step(&mut self) -> Result<(), UnoError> {
+    fn step(&mut self) -> Result<(), PairError> {
         let until = self.tester.cycle() + STEP;
         self.tester.run_until(until)?;
         for change in self.tester.take_changes() {
@@ -163,20 +239,20 @@ impl Pair {
     }
 
     /// While the reset is pulled, the weeder's clock stands still, and both are counted from there on.
-    fn look_at_reset(&mut self) -> Result<(), UnoError> {
+    fn look_at_reset(&mut self) -> Result<(), PairError> {
         if self.is_reset_pulled {
             self.shared = (self.tester.cycle(), self.weeder.cycle());
         }
         let pulled = self.wiring.has_reset && self.tester.output(TESTER_RESET) == Some(false);
         if pulled && !self.is_reset_pulled {
             self.resets += 1;
-            if let Some(spoil) = &mut self.wiring.eeprom_at_reset {
-                let mut eeprom = self.weeder.eeprom();
+            if let (Some(spoil), WeederUno::Own(weeder)) = (&mut self.wiring.eeprom_at_reset, &mut self.weeder) {
+                let mut eeprom = weeder.eeprom();
                 spoil(&mut eeprom);
-                self.weeder = Uno::boot_with_eeprom(&self.weeder_elf, &eeprom)?.wired(&field::wiring::WIRES);
+                *weeder = Uno::boot_with_eeprom(&self.weeder_elf, &eeprom)?.wired(&field::wiring::WIRES);
             }
             self.shared = (self.tester.cycle(), self.weeder.cycle());
-            self.weeder.reset();
+            self.weeder.reset()?;
             for change in self.weeder.take_changes() {
                 self.carry_to_tester(change);
             }
@@ -186,9 +262,16 @@ impl Pair {
     }
 
     /// Resets a board, as opening its port does by the modem line DTR.
-    pub fn reset(&mut self, side: Side) {
+    ///
+    /// # Errors
+    /// If the second simulator has ended.
+    pub fn reset(&mut self, side: Side) -> Result<(), PairError> {
         self.resets += 1;
-        self.board(side).reset();
+        match side {
+            Side::Tester => self.tester.reset(),
+            Side::Weeder => self.weeder.reset()?,
+        }
+        Ok(())
     }
 
     /// How long the check would have taken two real boards so far, in seconds: each of their resets has a bootloader wait for `bootloader_s`.
@@ -196,11 +279,17 @@ impl Pair {
         self.tester.cycle() as f64 / CYCLES_PER_SECOND as f64 + f64::from(self.resets) * bootloader_s
     }
 
-    /// One of the boards.
-    pub fn board(&mut self, side: Side) -> &mut Uno {
-        match side {
-            Side::Tester => &mut self.tester,
-            Side::Weeder => &mut self.weeder,
+    /// The tester.
+    pub fn tester(&self) -> &Uno {
+        &self.tester
+    }
+
+    /// Bytes that were typed into a board's port and have not reached it.
+    pub fn bytes_on_their_way(&self, side: Side) -> usize {
+        match (side, &self.weeder) {
+            (Side::Tester, _) => self.tester.bytes_on_their_way(),
+            (Side::Weeder, WeederUno::Own(weeder)) => weeder.bytes_on_their_way(),
+            (Side::Weeder, WeederUno::Second(weeder)) => weeder.bytes_on_their_way(),
         }
     }
 
@@ -213,9 +302,8 @@ impl Pair {
         let Some(change) = change else { return };
         let cycle = self.weeder_cycle(change.cycle);
         let wires = self.wiring.inputs.iter().filter(|&&(wired, ..)| wired == line);
-        let changes: Vec<_> =
-            wires.map(|&(_, pin, inverted)| PinChange { cycle, pin, high: change.high != inverted }).collect();
-        self.weeder.drive(changes);
+        let changes = wires.map(|&(_, pin, inverted)| PinChange { cycle, pin, high: change.high != inverted });
+        changes.for_each(|change| self.weeder.drive(change));
     }
 
     fn carry_to_tester(&mut self, change: PinChange) {
@@ -255,7 +343,11 @@ const READ_MS: u64 = 20;
 impl Pair {
     /// Types bytes into a board's port.
     pub fn send(&mut self, side: Side, bytes: &[u8]) {
-        self.board(side).send(bytes);
+        match (side, &mut self.weeder) {
+            (Side::Tester, _) => self.tester.send(bytes),
+            (Side::Weeder, WeederUno::Own(weeder)) => weeder.send(bytes),
+            (Side::Weeder, WeederUno::Second(weeder)) => weeder.send(bytes),
+        }
     }
 
     /// What has come from a board and was not read yet.

@@ -4,7 +4,7 @@ mod common;
 
 use check::CheckError;
 use check::desk::Desk;
-use check::pair::{Side, Wiring};
+use check::pair::Wiring;
 use check::ports;
 use check::report::{Report, Verdict};
 use check::resets::{self, Kept};
@@ -54,8 +54,8 @@ fn the_shipped_firmware_passes_and_is_as_recorded() {
     let (pair, mut weeder, mut tester) = boards_and_pair(Wiring::right());
     let brief = checked(&mut weeder, &mut tester, true);
     assert!(brief.is_good(), "{}", brief.text());
-    let mut pair = pair.borrow_mut();
-    let tester = pair.board(Side::Tester);
+    let pair = pair.borrow();
+    let tester = pair.tester();
     let used = tester.size().sram as usize + tester.deepest_stack();
     assert!(used <= SRAM_USED, "the tester needs {used} bytes of SRAM");
     let recorded = concat!(env!("CARGO_MANIFEST_DIR"), "/src/simulated.json");
@@ -96,7 +96,7 @@ fn a_row_is_measured_as_the_simulation_judges_it() {
 #[test]
 fn the_boards_are_found_at_two_terminals() {
     let (tester, weeder) = (firmware::build_tester().expect("it is built"), firmware::build().expect("it is built"));
-    let desk = Desk::start(&tester, &weeder).expect("it starts");
+    let desk = Desk::start(&tester, &weeder, None).expect("it starts");
     // The weeder's stands first, and no port is named.
     let unos = [desk.weeder(), desk.tester()].map(|path: &Path| path.to_str().expect("it is text").to_owned());
     let (mut weeder, mut tester) = ports::open(None, None, &unos).expect("both are found");

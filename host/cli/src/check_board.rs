@@ -10,7 +10,7 @@ use check::ports;
 use check::run::{Extent, run as check_run};
 use clap::Args;
 use std::cell::Cell;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use trial::firmware;
@@ -41,6 +41,10 @@ pub struct Arguments {
     /// Check two virtual Unos, wire to wire, each at a pseudo terminal. Their clocks differ by 0.3 %.
     #[arg(long, conflicts_with_all = ["port", "tester"])]
     simulated: bool,
+    /// With --simulated: run the weeder on the page's simulator. `./setup.sh page` makes its program,
+    /// page/build/lockstep.mjs.
+    #[arg(long, value_name = "FILE.mjs", requires = "simulated")]
+    second_simulator: Option<PathBuf>,
     /// Check less of everything, in a tenth of the time.
     #[arg(long)]
     brief: bool,
@@ -61,7 +65,10 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let page = arguments.page.as_ref().map(|page| page.check(arguments.replace)).transpose()?;
     let desk = match arguments.simulated {
-        true => Some(Desk::start(&firmware::build_tester()?, &firmware::build()?)?),
+        true => {
+            let second = arguments.second_simulator.as_deref();
+            Some(Desk::start(&firmware::build_tester()?, &firmware::build()?, second)?)
+        }
         false => None,
     };
     let name = |path: &Path| Some(path.to_string_lossy().into_owned());

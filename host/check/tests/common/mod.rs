@@ -22,7 +22,7 @@ pub fn boards_and_pair(wiring: Wiring) -> (Rc<RefCell<Pair>>, Weeder, Tester) {
     let tester = Tester::over(PairPort { pair: Rc::clone(&pair), side: Side::Tester }).expect("the tester answers");
     let opened = Rc::clone(&pair);
     let open = move || {
-        opened.borrow_mut().reset(Side::Weeder);
+        opened.borrow_mut().reset(Side::Weeder).expect("it is reset");
         Link::over(PairPort { pair: Rc::clone(&opened), side: Side::Weeder }, true)
     };
     let weeder = Weeder::over(open).expect("the weeder answers");

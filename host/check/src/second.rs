@@ -1,0 +1,158 @@
+//! Another simulator's virtual Uno in the weeder's place: a process that answers turn by turn.
+//!
+//! A turn has [`TURN`] cycles, so that there are not too many of them. What happens on its inputs comes at its cycle. What it does is known
+//! when its turn is over, and counts as done one turn later, always: widths and distances are right, and delays are longer by 0.1 ms.
+
+use serde::{Deserialize, Serialize};
+use std::io::{self, BufRead, BufReader, Write};
+use std::path::Path;
+use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use uno::elf::Image;
+use uno::{Pin, PinChange, hex};
+
+/// Cycles of a turn: 0.1 ms.
+const TURN: u64 = 1600;
+
+/// The edges of a turn: cycle, number of the board's pin, level.
+type Edges = Vec<(u64, usize, bool)>;
+
+/// What happens in a turn. `page/src/uno/lockstep.ts` has the other end.
+#[derive(Serialize)]
+struct Turn {
+    until: u64,
+    edges: Edges,
+    typed: Vec<u8>,
+    reset: bool,
+}
+
+/// The first line.
+#[derive(Serialize)]
+struct PowerUp {
+    hex: String,
+}
+
+/// What came of a turn.
+#[derive(Deserialize)]
+struct Done {
+    edges: Edges,
+    said: Vec<u8>,
+}
+
+/// The virtual Uno. Dropped, its process ends.
+pub struct SecondUno {
+    process: Child,
+    to: ChildStdin,
+    from: BufReader<ChildStdout>,
+    /// The cycle until which it was asked to run, and the one until which it has run.
+    asked: u64,
+    run: u64,
+    edges: Edges,
+    typed: Vec<u8>,
+    changes: Vec<PinChange>,
+    said: Vec<u8>,
+}
+
+impl SecondUno {
+    /// Powers it up with the firmware of an ELF. `program` is `page/build/lockstep.mjs`, which `./setup.sh page` makes.
+    ///
+    /// # Errors
+    /// If node cannot be started, or the ELF not be read.
+    pub fn power_up(program: &Path, elf: &Path) -> io::Result<Self> {
+        let flash = Image::read(elf).map_err(io::Error::other)?.flash;
+        let mut process = Command::new("node")
+            .arg(program)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .map_err(|error| {
+                io::Error::new(error.kind(), format!("node cannot be started ({error}): ./setup.sh page installs it"))
+            })?;
+        let missing = || io::Error::from(io::ErrorKind::BrokenPipe);
+        let to = process.stdin.take().ok_or_else(missing)?;
+        let from = BufReader::new(process.stdout.take().ok_or_else(missing)?);
+        let mut uno =
+            Self { process, to, from, asked: 0, run: 0, edges: vec![], typed: vec![], changes: vec![], said: vec![] };
+        uno.exchange(&PowerUp { hex: hex::text(&flash) })?;
+        Ok(uno)
+    }
+
+    /// The cycle until which it was asked to run.
+    pub fn cycle(&self) -> u64 {
+        self.asked
+    }
+
+    /// Lets its clock run. It does so once there is a whole turn.
+    ///
+    /// # Errors
+    /// If the process has ended.
+    pub fn run_until(&mut self, cycle: u64) -> io::Result<()> {
+        self.asked = self.asked.max(cycle);
+        if self.asked < self.run + TURN { Ok(()) } else { self.turn(false) }
+    }
+
+    /// Changes an input pin.
+    pub fn drive(&mut self, change: PinChange) {
+        let pin = Pin::ALL.iter().position(|&pin| pin == change.pin).unwrap_or_default();
+        self.edges.push((change.cycle, pin, change.high));
+    }
+
+    /// What it did, and did not say yet.
+    pub fn take_changes(&mut self) -> Vec<PinChange> {
+        std::mem::take(&mut self.changes)
+    }
+
+    /// Types bytes into it.
+    pub fn send(&mut self, bytes: &[u8]) {
+        self.typed.extend(bytes);
+    }
+
+    /// Bytes that are typed and have not reached it.
+    pub fn bytes_on_their_way(&self) -> usize {
+        self.typed.len()
+    }
+
+    /// What it has said since it was asked.
+    pub fn received(&mut self) -> Vec<u8> {
+        std::mem::take(&mut self.said)
+    }
+
+    /// Pulls its reset.
+    ///
+    /// # Errors
+    /// If the process has ended.
+    pub fn reset(&mut self) -> io::Result<()> {
+        self.turn(false)?;
+        self.turn(true)
+    }
+
+    fn turn(&mut self, reset: bool) -> io::Result<()> {
+        let until = self.asked;
+        let (edges, typed) = (std::mem::take(&mut self.edges), std::mem::take(&mut self.typed));
+        let done = self.exchange(&Turn { until, edges, typed, reset })?;
+        self.run = until;
+        let change = |(cycle, pin, high): (u64, usize, bool)| {
+            Pin::ALL.get(pin).map(|&pin| PinChange { cycle: cycle + TURN, pin, high })
+        };
+        self.changes.extend(done.edges.into_iter().filter_map(change));
+        self.said.extend(done.said);
+        Ok(())
+    }
+
+    fn exchange(&mut self, said: &impl Serialize) -> io::Result<Done> {
+        serde_json::to_writer(&mut self.to, said)?;
+        self.to.write_all(b"\n")?;
+        let mut line = String::new();
+        if self.from.read_line(&mut line)? == 0 {
+            return Err(io::Error::new(io::ErrorKind::UnexpectedEof, "the second simulator has ended"));
+        }
+        Ok(serde_json::from_str(&line)?)
+    }
+}
+
+impl Drop for SecondUno {
+    fn drop(&mut self) {
+        // It ends by itself when its input is closed; this does not wait for it.
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}

@@ -1,0 +1,53 @@
+// The virtual Uno for another program, in lock step: a command for node, not a part of the page.
+//
+// Each line of standard input is a turn: until which cycle the clock runs, and what happens on the way. Each line of standard output
+// says what the Uno did in it. The first line has the firmware. `weeder check-board --second-simulator` puts this in the weeder's place
+// (host/check/src/second.rs has the other end).
+
+import { createInterface } from "node:readline";
+import { Uno } from "./uno.ts";
+
+/** What happens in a turn. Cycles are the Uno's own. */
+interface Turn {
+    readonly until: number;
+    /** Changes of input pins, in the order of their cycles. */
+    readonly edges: readonly (readonly [cycle: number, pin: number, high: boolean])[];
+    /** Bytes that are typed at the turn's beginning. */
+    readonly typed: readonly number[];
+    /** Whether the reset is pulled at the turn's beginning. */
+    readonly reset: boolean;
+}
+
+/** What came of it. */
+interface Done {
+    readonly edges: [cycle: number, pin: number, high: boolean][];
+    readonly said: number[];
+}
+
+let uno: Uno | undefined;
+let done: Done = { edges: [], said: [] };
+
+function powerUp(hex: string): Uno {
+    const uno = new Uno(hex);
+    uno.onLevel = (pin, high, cycle) => done.edges.push([cycle, pin, high]);
+    uno.onByte = (byte) => done.said.push(byte);
+    return uno;
+}
+
+function take(uno: Uno, { until, edges, typed, reset }: Turn): void {
+    if (reset) uno.reset("external");
+    uno.send(String.fromCharCode(...typed));
+    for (const [cycle, pin, high] of edges) {
+        uno.runUntil(cycle);
+        uno.set(pin, high);
+    }
+    uno.runUntil(until);
+}
+
+createInterface({ input: process.stdin }).on("line", (line) => {
+    const said: { hex: string } | Turn = JSON.parse(line);
+    if ("hex" in said) uno = powerUp(said.hex);
+    else if (uno) take(uno, said);
+    process.stdout.write(`${JSON.stringify(done)}\n`);
+    done = { edges: [], said: [] };
+});

@@ -1,0 +1,28 @@
+// The check of a board, with avr8js in the weeder's place: a third program compares the two simulators at the pins.
+
+import assert from "node:assert/strict";
+import { spawnSync } from "node:child_process";
+import test from "node:test";
+import { WEEDER } from "./weeder.ts";
+
+/** A line of the report. */
+interface Line {
+    readonly id: string;
+    readonly measured: number | null;
+    readonly simulated: number | null;
+    readonly verdict: "pass" | "differs" | "fail";
+}
+
+test("the board check passes the firmware on avr8js too", () => {
+    const words = ["check-board", "--simulated", "--brief", "--second-simulator", "build/lockstep.mjs", "--json"];
+    const { status, stdout, stderr } = spawnSync(WEEDER, words, { encoding: "utf8" });
+    assert.equal(status, 0, `${stdout}${stderr}`);
+    const { wires, lines }: { wires: string[]; lines: Line[] } = JSON.parse(stdout);
+    for (const { id, measured, simulated } of lines.filter(({ verdict }) => verdict === "differs"))
+        console.log(`${id} is ${measured} on avr8js, and ${simulated} on simavr`);
+    assert.deepEqual([wires, lines.filter(({ verdict }) => verdict === "fail")], [[], []]);
+    // The range of each of these is so narrow that a simulator that does nothing is outside of it.
+    const ids = lines.map(({ id }) => id);
+    for (const id of ["pulse_out_us", "highest_forward_busy", "beam_flickers_code", "row_2.5_damaged"])
+        assert(ids.includes(id), `${id} is not in the report`);
+});
