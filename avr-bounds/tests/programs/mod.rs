@@ -1,4 +1,5 @@
-//! Programs that others wrote, built from what Debian and simavr bring: arduino-core-avr, avr-libc's manual, simavr's tests.
+//! Programs that others wrote, built from what Debian and simavr bring: arduino-core-avr with its bootloaders, avr-libc's manual, simavr's
+//! tests.
 //!
 //! They are linked with `--emit-relocs`, which changes no byte of the program. A built program is kept in the target folder.
 
@@ -14,6 +15,8 @@ const MANUAL: &str = "/usr/share/doc/avr-libc/examples";
 pub struct Sample {
     pub name: String,
     pub elf: PathBuf,
+    /// The chip, where the ELF does not name it.
+    pub chip: Option<&'static str>,
     pub facts: String,
 }
 
@@ -37,14 +40,17 @@ pub fn samples() -> Vec<Sample> {
         let mut built = of_arduino();
         built.extend(of_simavr());
         built.extend(of_manual());
+        built.extend(of_bootloaders());
         built.sort();
         built
     });
     let sample = |(name, elf): &(String, PathBuf)| {
-        let program = avr_bounds::Program::read(elf, None).unwrap_or_else(|error| panic!("{name}: {error}"));
+        // Without the C library's start-up code nothing in the ELF names the chip.
+        let chip = ["atmega328p", "atmega168", "atmega8"].into_iter().find(|chip| name.ends_with(&format!(" {chip}")));
+        let program = avr_bounds::Program::read(elf, chip).unwrap_or_else(|error| panic!("{name}: {error}"));
         let has = |function: &str| program.functions.values().any(|symbol| symbol.name == function);
         let facts = FACTS.iter().filter(|(function, _)| has(function)).map(|(_, facts)| *facts);
-        Sample { name: name.clone(), elf: elf.clone(), facts: facts.collect() }
+        Sample { name: name.clone(), elf: elf.clone(), chip, facts: facts.collect() }
     };
     built.iter().map(sample).collect()
 }
@@ -207,6 +213,44 @@ fn of_manual() -> Vec<(String, PathBuf)> {
                 built.push((format!("manual/{name}{suffix}"), elf));
             }
         }
+    }
+    built
+}
+
+/// The bootloaders of the Arduino core that need nothing else, built as their Makefiles say, each at the flash's end.
+fn of_bootloaders() -> Vec<(String, PathBuf)> {
+    // Without the LED: with it, Debian's compiler needs more than the 512 bytes.
+    let optiboot = ["-fno-split-wide-types", "-mrelax", "-nostartfiles", "-nostdlib", "-DLED_START_FLASHES=0"];
+    let optiboot = |begin: &str, version: &str| {
+        let sections =
+            [format!("-Wl,--section-start=.text={begin}"), format!("-Wl,--section-start=.version={version}")];
+        [&optiboot.map(str::to_owned)[..], &sections, &["-DBAUD_RATE=115200".to_owned()]].concat()
+    };
+    let boot = |begin: &str| {
+        let options = ["-DMAX_TIME_COUNT=F_CPU>>4", "-DNUM_LED_FLASHES=1", "-DBAUD_RATE=19200"];
+        [&options.map(str::to_owned)[..], &[format!("-Wl,--section-start=.text={begin}")]].concat()
+    };
+    let stk500 = ["-D_MEGA_BOARD_", "-DBAUDRATE=115200", "-funsigned-char", "-Wl,--section-start=.text=0x3e000"];
+    let bootloaders = [
+        ("optiboot/optiboot.c", "atmega328p", optiboot("0x7e00", "0x7ffe")),
+        ("optiboot/optiboot.c", "atmega168", optiboot("0x3e00", "0x3ffe")),
+        ("optiboot/optiboot.c", "atmega8", optiboot("0x1e00", "0x1ffe")),
+        ("atmega/ATmegaBOOT_168.c", "atmega328p", boot("0x7800")),
+        ("atmega/ATmegaBOOT_168.c", "atmega168", boot("0x3800")),
+        ("atmega8/ATmegaBOOT.c", "atmega8", boot("0x1c00")),
+        ("stk500v2/stk500boot.c", "atmega2560", stk500.map(str::to_owned).to_vec()),
+    ];
+    let to = folder("bootloaders");
+    let mut built = Vec::new();
+    for (source, chip, options) in bootloaders {
+        let source = Path::new(ARDUINO).join("bootloaders").join(source);
+        let name = source.file_stem().expect("a file has a name").to_string_lossy().into_owned();
+        let elf = to.join(format!("{name}-{chip}.elf"));
+        let mut gcc = Command::new("avr-gcc");
+        // Without relocations, which cost optiboot the short calls that it needs for its 512 bytes.
+        gcc.args(["-g", "-Os", "-w", "-DF_CPU=16000000L", &format!("-mmcu={chip}")]).args(options);
+        assert!(elf.exists() || run(gcc.arg(&source).arg("-o").arg(&elf)), "{} was not built", source.display());
+        built.push((format!("bootloader/{name} {chip}"), elf));
     }
     built
 }

@@ -1,6 +1,6 @@
 //! Another simulator's virtual Uno in the weeder's place: a process that answers turn by turn.
 //!
-//! A turn has [`TURN`] cycles, so that there are not too many of them. What happens on its inputs comes at its cycle. What it does is known
+//! A turn has 1600 cycles, so that there are not too many of them. What happens on its inputs comes at its cycle. What it does is known
 //! when its turn is over, and counts as done one turn later, always: widths and distances are right, and delays are longer by 0.1 ms.
 
 use serde::{Deserialize, Serialize};
