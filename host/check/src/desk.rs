@@ -97,7 +97,7 @@ impl Drop for Desk {
 /// Moves bytes between a board and its terminal.
 fn take_turn(pair: &mut Pair, side: Side, pty: &mut Pty) -> Result<(), DeskError> {
     if pty.was_opened()? {
-        // A port that nobody reads keeps nothing.
+        // A port that is not open keeps nothing.
         pair.received(side).clear();
         pair.reset(side)?;
     }

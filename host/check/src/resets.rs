@@ -175,7 +175,7 @@ pub fn while_saving(moments: u32, weeder: &mut Weeder, tester: &mut Tester) -> R
     reset(weeder, tester)?;
     let kept = value(weeder)?;
     save(weeder, tester, kept)?;
-    // Whatever ends it, the old value is put back.
+    // The old value is put back, also after an error.
     let saves = saves(moments, kept, weeder, tester);
     save(weeder, tester, kept)?;
     saves
