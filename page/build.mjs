@@ -114,7 +114,7 @@ const common = {
 
 await build({
     bundle: true,
-    mainFields: common.mainFields,
+    mainFields: ["module", "main"],
     entryPoints: ["src/uno/lockstep.ts"],
     outfile: "build/lockstep.mjs",
     platform: "node",

@@ -144,21 +144,32 @@ pub fn order(elf: &Program) -> (String, usize, usize) {
     (lines, before, best.0)
 }
 
-/// A mangled name with a wildcard for each crate's number, `Cs` with letters and digits up to `_`.
+/// A mangled name (Rust's v0) with wildcards for what another machine may have otherwise: each crate's number, `Cs` with letters and digits up
+/// to `_`, and so each reference back into the name, `B` likewise, since it counts the characters in front.
 fn without_numbers(name: &str) -> String {
-    let mut parts = name.split("Cs");
-    let mut pattern = parts.next().unwrap_or_default().to_owned();
-    for part in parts {
-        match part.split_once('_') {
-            Some((number, rest)) if number.bytes().all(|byte| byte.is_ascii_alphanumeric()) => {
-                pattern += "Cs*_";
-                pattern += rest;
+    let Some(mut rest) = name.strip_prefix("_R") else { return name.to_owned() };
+    let mut pattern = "_R".to_owned();
+    while let Some(first) = rest.chars().next() {
+        let to_underscore = rest.find('_').map_or(rest.len(), |at| at + 1);
+        let digits = rest.bytes().take_while(u8::is_ascii_digit).count();
+        let length = match first {
+            'B' | 's' => to_underscore,
+            // A constant: its type, and its value.
+            'K' => to_underscore,
+            // An identifier behind its length.
+            _ if digits > 0 => {
+                let separator = usize::from(rest[digits..].starts_with('_'));
+                (digits + separator + rest[..digits].parse().unwrap_or(0)).min(rest.len())
             }
-            _ => {
-                pattern += "Cs";
-                pattern += part;
-            }
-        }
+            _ => first.len_utf8(),
+        };
+        let (part, behind) = rest.split_at(length);
+        pattern += match first {
+            'B' => "B*_",
+            's' if pattern.ends_with('C') => "s*_",
+            _ => part,
+        };
+        rest = behind;
     }
     pattern
 }
@@ -168,9 +179,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_crate_s_number_is_left_out_of_a_name() {
+    fn what_other_machines_number_otherwise_is_left_out_of_a_name() {
         assert_eq!(without_numbers("_RNvMs_NtCsfdqj_7control6ground4look"), "_RNvMs_NtCs*_7control6ground4look");
         assert_eq!(without_numbers("_RNvCs1_1aCs2_1b"), "_RNvCs*_1aCs*_1b");
+        let long = "_RINvXs_NtCs1a_3abc8examplesNtB5_7BuiltInINtNtCs2_3knn4Kj5_8ExamplesKj5_E4keepKtc8_EB1f_";
+        let short = "_RINvXs_NtCs*_3abc8examplesNtB*_7BuiltInINtNtCs*_3knn4Kj5_8ExamplesKj5_E4keepKtc8_EB*_";
+        assert_eq!(without_numbers(long), short);
         assert_eq!(without_numbers("_ZN4testCs"), "_ZN4testCs");
     }
 
