@@ -1,7 +1,8 @@
 //! Another simulator's virtual Uno in the weeder's place: a process that answers turn by turn.
 //!
 //! A turn has 1600 cycles, so that there are not too many of them. What happens on its inputs comes at its cycle. What it does is known
-//! when its turn is over, and counts as done one turn later, always: widths and distances are right, and delays are longer by 0.1 ms.
+//! when its turn is over, and counts as done a little more than a turn later, always: widths and distances are right, and delays are longer
+//! by 0.1 ms.
 
 use serde::{Deserialize, Serialize};
 use std::io::{self, BufRead, BufReader, Write};
@@ -12,6 +13,10 @@ use uno::{Pin, PinChange, hex};
 
 /// Cycles of a turn: 0.1 ms.
 const TURN: u64 = 1600;
+
+/// By how much later its edges count as done: a turn, and by how much one can be longer, since both programs go on to the end of an
+/// instruction.
+const DELAY: u64 = TURN + 64;
 
 /// The edges of a turn: cycle, number of the board's pin, level.
 type Edges = Vec<(u64, usize, bool)>;
@@ -131,7 +136,7 @@ impl SecondUno {
         let done = self.exchange(&Turn { until, edges, typed, reset })?;
         self.run = until;
         let change = |(cycle, pin, high): (u64, usize, bool)| {
-            Pin::ALL.get(pin).map(|&pin| PinChange { cycle: cycle + TURN, pin, high })
+            Pin::ALL.get(pin).map(|&pin| PinChange { cycle: cycle + DELAY, pin, high })
         };
         self.changes.extend(done.edges.into_iter().filter_map(change));
         self.said.extend(done.said);
