@@ -21,12 +21,14 @@ const BENCH: Program = Program { package: "knn-bench", alias: "bench-firmware" }
 const TESTER: Program = Program { package: "tester-firmware", alias: "tester-firmware" };
 
 /// What an outer cargo, or a shell, may have set that would change how the firmware is compiled.
-const FOREIGN_SETTINGS: [&str; 8] = [
+const FOREIGN_SETTINGS: [&str; 9] = [
     // Either of the flags replaces the target-cpu of .cargo/config.toml.
     "RUSTFLAGS",
     "CARGO_ENCODED_RUSTFLAGS",
     "CARGO_BUILD_RUSTFLAGS",
     "CARGO_BUILD_TARGET",
+    // Compiled in parts, the handlers' assembly is not accepted.
+    "CARGO_INCREMENTAL",
     // `cargo clippy` sets it, and would check the firmware instead of compiling it.
     "RUSTC_WORKSPACE_WRAPPER",
     "RUSTC",
