@@ -249,10 +249,10 @@ mod tests {
     }
 
     /// Arguments of files that are only read.
-    const READ: &str = "bounds:elf bounds:budgets bounds:diff classify:file design:machine evaluate:file examples.diff:file \
-        examples.push:file flash:elf hex:elf map:logs merge:parts replay:log serve:page settings.diff:file settings.push:file \
-        sim:capture sim:elf sim:field sim:row soak:elf sweep:field train:files trial:elf trial:examples trial:field virtual-uno:bootloader \
-        virtual-uno:elf virtual-uno:field virtual-uno:row";
+    const READ: &str = "bounds:budgets bounds:diff bounds:elf check-board:second_simulator classify:file design:machine \
+        evaluate:file examples.diff:file examples.push:file flash:elf hex:elf map:logs merge:parts replay:log serve:page \
+        settings.diff:file settings.push:file sim:capture sim:elf sim:field sim:row soak:elf sweep:field train:files trial:elf \
+        trial:examples trial:field virtual-uno:bootloader virtual-uno:elf virtual-uno:field virtual-uno:row";
 
     /// Of files that are gone on with, where they are of the command's own kind, and else refused: logs, an EEPROM, and what was set up.
     const CONTINUED: &str = "monitor:log record:out set-up:state virtual-uno:eeprom";
