@@ -14,6 +14,7 @@ use trial::console::ask;
 use trial::firmware;
 use trial::live::rows::{LiveRows, Mishap};
 use trial::live::{Background, Course, Live, Setup};
+use uno::Uno;
 
 /// Walking pace.
 const SPEED_MM_S: f64 = 700.0;
@@ -195,15 +196,23 @@ fn all_rows_count_the_same_ticks_of_the_wheel_that_they_share_and_each_sees_its_
     let ran = ran.map_err(|(row, error)| format!("row {row}: {error}")).expect("they run");
     assert_eq!(ran.simulated, Duration::from_secs(8));
     let mut unos = machine.into_unos();
-    // Each answers in a turn of its own, so that a machine that rolls may be a tick farther: to the row's end, where it stands.
-    unos.iter_mut().for_each(|uno| uno.run_for_ms(8_000).expect("it runs"));
-    let mut told = |command: &str| -> Vec<Vec<String>> {
+    let told = |unos: &mut [Uno], command: &str| -> Vec<Vec<String>> {
         unos.iter_mut().map(|uno| ask(uno, command).expect("it answers")).collect()
     };
-    let position = |status: &Vec<String>| status[0].split(' ').find(|word| word.starts_with("pos=")).map(str::to_owned);
-    let positions: Vec<Option<String>> = told("status").iter().map(position).collect();
-    assert!(positions[0].is_some() && positions.iter().all(|position| *position == positions[0]), "{positions:?}");
-    assert_ne!(positions[0].as_deref(), Some("pos=0"));
-    let objects = told("dump");
+    let position = |status: &Vec<String>| -> i64 {
+        let word = status[0].split(' ').find_map(|word| word.strip_prefix("pos="));
+        word.expect("a status has a position").parse().expect("it is a number")
+    };
+    // Each answers in a turn of its own, so that a machine that rolls may be a tick farther: asked until all of them stand.
+    let mut positions: Vec<i64> = Vec::new();
+    let stand = (0..60).any(|_| {
+        unos.iter_mut().for_each(|uno| uno.run_for_ms(250).expect("it runs"));
+        let before = std::mem::take(&mut positions);
+        positions = told(&mut unos, "status").iter().map(position).collect();
+        positions == before
+    });
+    assert!(stand, "{positions:?}");
+    assert!(positions[0] != 0 && positions.iter().all(|position| *position == positions[0]), "{positions:?}");
+    let objects = told(&mut unos, "dump");
     assert!(objects[0] != objects[1] && objects[1] != objects[2], "{objects:?}");
 }
