@@ -13,10 +13,11 @@
 mod answer;
 pub mod command;
 mod errors;
+mod event_table;
 mod events;
 mod execute;
 pub mod line;
-mod names;
+pub mod names;
 pub mod packed;
 mod status;
 mod texts;

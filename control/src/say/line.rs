@@ -3,7 +3,10 @@
 //! A line is put together at once, so that what it tells belongs together, and goes out a character at a time, as the main
 //! loop has time for no more: a text is unpacked and a number divided into its digits only as far as the next character.
 
-use crate::say::{packed::Characters, texts::Text};
+use crate::{
+    alarm::Alarm,
+    say::{packed::Characters, texts::Text},
+};
 use ufmt::{Formatter, uDisplay, uWrite};
 
 /// Texts that a line may have; one that shows a setting has ten. A power of two, for short arithmetic.
@@ -65,6 +68,14 @@ impl Line {
         debug_assert!(usize::from(self.numbers) < NUMBERS, "a line has {NUMBERS} numbers at most");
         self.number[usize::from(self.numbers) % NUMBERS] = number;
         self.numbers += 1;
+    }
+
+    /// An alarm's code, for two `#`.
+    #[inline(never)]
+    pub(crate) fn led(&mut self, alarm: Alarm) {
+        let (first, second) = alarm.code();
+        self.counted(first.into());
+        self.counted(second.into());
     }
 }
 

@@ -46,7 +46,8 @@ impl Setting {
     }
 }
 
-pub(super) fn state_name(state: State) -> Text {
+/// What the machine does.
+pub fn state(state: State) -> Text {
     match state {
         State::Hold => Word::Hold.text(),
         State::Work => texts::WORK,
@@ -54,15 +55,33 @@ pub(super) fn state_name(state: State) -> Text {
     }
 }
 
-pub(super) fn place_name(tool_out: bool) -> Text {
+/// An alarm's name.
+pub fn alarm(alarm: Alarm) -> Text {
+    alarm.text()
+}
+
+/// A warning's name.
+pub fn warning(warning: Warning) -> Text {
+    warning.text()
+}
+
+/// Where the tool is, or is to be.
+pub fn place(tool_out: bool) -> Text {
     if tool_out { Argument::Out.text() } else { Argument::In.text() }
 }
 
-pub(super) fn label_name(label: u8) -> Text {
+/// Yes or no.
+pub fn answer(yes: bool) -> Text {
+    if yes { texts::YES } else { texts::NO }
+}
+
+/// What a [`label`] stands for.
+pub fn label(label: u8) -> Text {
     if label == label::PLANT { Argument::Plant.text() } else { Argument::Weed.text() }
 }
 
-pub(super) fn class_name(class: Class) -> Text {
+/// What a detection was taken for.
+pub fn class(class: Class) -> Text {
     match class {
         Class::Plant => Argument::Plant.text(),
         Class::Weed => Argument::Weed.text(),

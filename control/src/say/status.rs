@@ -1,6 +1,6 @@
 //! Lines that show the machine: its status, its curves, its settings, examples and detections.
 
-use super::names::{class_name, label_name, place_name, state_name};
+use super::names;
 use crate::{
     alarm::{Alarm, Warning},
     ground::class::{Classifier, Listed},
@@ -17,7 +17,7 @@ use crate::{
 
 /// The state, and which alarm, its code in a text between them.
 pub(super) fn write_state(state: State, between: Text, line: &mut Line) {
-    line.say(state_name(state));
+    line.say(names::state(state));
     if let State::Alarm(alarm) = state {
         write_alarm(alarm, between, line);
     }
@@ -26,10 +26,8 @@ pub(super) fn write_state(state: State, between: Text, line: &mut Line) {
 /// An alarm's code and name: a text with room for the code's digits, and the name.
 #[inline(never)]
 pub(super) fn write_alarm(alarm: Alarm, code: Text, line: &mut Line) {
-    let (first, second) = alarm.code();
     line.say(code);
-    line.counted(first.into());
-    line.counted(second.into());
+    line.led(alarm);
     line.say(alarm.text());
 }
 
@@ -37,7 +35,7 @@ pub(super) fn write_status<C: Classifier, M: Memory>(controller: &Controller<C, 
     line.say(texts::STATE_IS);
     write_state(controller.state(), texts::CODE, line);
     line.say(texts::TOOL_IS);
-    line.say(place_name(controller.tool_out()));
+    line.say(names::place(controller.tool_out()));
     if let Some(reason) = controller.reason() {
         line.say(texts::FOR);
         line.say(reason.text());
@@ -134,7 +132,7 @@ pub(super) fn write_example(listed: &Listed, line: &mut Line) {
     line.say(if listed.from_field { texts::FIELD } else { texts::BUILT_IN });
     line.say(texts::EXAMPLE);
     line.counted(listed.number.into());
-    line.say(label_name(listed.example.label));
+    line.say(names::label(listed.example.label));
     line.say(texts::FEATURES);
     listed.example.features.iter().for_each(|&feature| line.counted(feature.into()));
 }
@@ -142,10 +140,10 @@ pub(super) fn write_example(listed: &Listed, line: &mut Line) {
 pub(super) fn write_detection(detection: &Classified, line: &mut Line) {
     line.say(texts::DUMPED);
     detection.features().values().iter().for_each(|&value| line.number(value));
-    line.say(class_name(detection.vote.class));
+    line.say(names::class(detection.vote.class));
     line.say(texts::VOTES);
     line.counted(detection.vote.votes.into());
     if let Some(label) = detection.label {
-        line.say(label_name(label));
+        line.say(names::label(label));
     }
 }

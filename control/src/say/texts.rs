@@ -5,9 +5,11 @@
 
 use crate::{
     alarm::{Alarm, Warning},
+    event_table,
     measure::reset::Cause,
     operate::{command_error::CommandError, tool::Reason},
     say::{
+        event_table::event_line,
         version,
         words::{Argument, Word},
     },
@@ -17,6 +19,7 @@ use crate::{
 /// All texts of the machine, from which the table in flash is made.
 pub(crate) const GROUPS: &[&[&str]] = &[
     SAID,
+    EVENTS,
     REFUSALS,
     TAKES_WORDS,
     HELPS,
@@ -60,6 +63,13 @@ impl Text {
         Self(first)
     }
 
+    /// A text in the line of an event.
+    pub(crate) const fn of_event(text: &str) -> Self {
+        let place = place_of(text, EVENTS);
+        assert!(place < EVENTS.len(), "the table of events has it");
+        Self::first_of(EVENTS).plus(place as u8)
+    }
+
     /// The text that stands so many places behind this one.
     pub(crate) const fn plus(self, places: u8) -> Self {
         Self(self.0 + places)
@@ -85,6 +95,43 @@ const fn is_same_text(one: &[u8], other: &[u8]) -> bool {
         same += 1;
     }
     same == one.len() && same == other.len()
+}
+
+macro_rules! texts_of_events {
+    ($($Event:ident $meaning:literal, $pattern:pat => $beginning:literal { $($values:tt)* } $($tail:literal)?)*) => {
+        /// The texts in the lines of events, line by line.
+        const OF_EVENTS: &[&[&str]] = &[$(event_line!(texts(line) $beginning $($values)* $($tail)?)),*];
+    };
+}
+
+event_table!(texts_of_events);
+
+/// The same, each once, and how many.
+const DISTINCT: ([&str; 32], usize) = {
+    let (mut texts, mut count, mut line) = ([""; 32], 0, 0);
+    while line < OF_EVENTS.len() {
+        let mut place = 0;
+        while place < OF_EVENTS[line].len() {
+            let text = OF_EVENTS[line][place];
+            if place_of(text, &texts) == texts.len() {
+                (texts[count], count) = (text, count + 1);
+            }
+            place += 1;
+        }
+        line += 1;
+    }
+    (texts, count)
+};
+
+const EVENTS: &[&str] = DISTINCT.0.split_at(DISTINCT.1).0;
+
+/// Where a text stands; behind the last where it does not.
+const fn place_of(text: &str, texts: &[&str]) -> usize {
+    let mut place = 0;
+    while place < texts.len() && !is_same_text(texts[place].as_bytes(), text.as_bytes()) {
+        place += 1;
+    }
+    place
 }
 
 /// Names for texts.
@@ -129,18 +176,8 @@ said! {
     WARNING_IS = " warning=";
     SLIP_IS = " slip_permille=";
     NONE = "none";
-    SLIP = "slip permille=#";
-    OBJECT = " pos=# votes=# spacing=# delay=# hold=# actuation=#";
-    GUARDED = "guarded";
-    SWING = "swing tool=";
-    POS = " pos=#";
-    STATE_EVENT = "state is=";
-    WARNING = "warning name=";
-    CALIBRATED = "calibrated lead_out_ms=# lead_in_ms=#";
-    SET = " set=yes";
-    NOT_SET = " set=no";
-    CALIBRATED_BY_EYE = "calibrated by=eye, set lead_out_ms and lead_in_ms to what you saw";
-    NOT_CALIBRATED = "calibrated by=none, the end switch did not follow";
+    YES = "yes";
+    NO = "no";
     CODE = " code=#-# name=";
     SERIAL_PLOTTER = "speed_mm_s:#,tool_deg:#,beam_broken:#,windows:#";
     TELEPLOT = ">speed_mm_s:#\r\n>tool_deg:#\r\n>beam_broken:#\r\n>windows:#";

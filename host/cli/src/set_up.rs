@@ -12,7 +12,7 @@ use clap::Args;
 use files::whole_file;
 use link::set_up::{ManualStep, SetUp, Step, Task, steps};
 use link::settings::{self, Setting, name, range, unit};
-use link::{ConsoleLine, EventLine, Link, LinkError, Mode, Status, Timed};
+use link::{ConsoleLine, EventLine, Link, LinkError, Mode, Status};
 use std::collections::BTreeSet;
 use std::fs;
 use std::io::{self, BufRead, ErrorKind, Write};
@@ -303,16 +303,18 @@ impl Guide {
             if self.ask("calibrate servo")?.is_none() {
                 continue;
             }
-            let calibrated = |event: &EventLine| match *event {
-                EventLine::Calibrated { by, is_set } => Some((by, is_set)),
-                _ => None,
+            let calibrated = |event: &EventLine| {
+                use EventLine::{CalibratedByEye, CalibratedBySwitch, NotCalibrated};
+                matches!(event, CalibratedBySwitch { .. } | CalibratedByEye {} | NotCalibrated {}).then_some(*event)
             };
-            let Some(((by, is_set), line)) = self.wait_for(SWINGS, calibrated)? else {
+            let Some((event, line)) = self.wait_for(SWINGS, calibrated)? else {
                 bail!("the machine does not say how the swings ended: is it in hold?");
             };
-            match by {
-                Timed::None => tell!("  error: the end switch did not follow: see to it, or type `set end_switch off`"),
-                Timed::EndSwitch { out_ms, in_ms } => {
+            match event {
+                EventLine::NotCalibrated {} => {
+                    tell!("  error: the end switch did not follow: see to it, or type `set end_switch off`")
+                }
+                EventLine::CalibratedBySwitch { out_ms, in_ms, is_set } => {
                     say!("  The tool was out after {out_ms} ms, and began to come back after {in_ms} ms.")?;
                     if !is_set {
                         bail!(
@@ -321,7 +323,7 @@ impl Guide {
                     }
                     self.state.measured.take_line(&line);
                 }
-                Timed::Eye => {
+                _ => {
                     self.state.measured.take_line(&line);
                     let mut leads = Vec::new();
                     for lead in [Setting::LeadOutMs, Setting::LeadInMs] {

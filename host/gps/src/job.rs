@@ -447,7 +447,7 @@ impl Reading {
                 (if out { What::SwingOut } else { What::SwingIn }, position, 0.0, 0.0)
             }
             EventLine::Alarm { position, .. } => (What::Alarm, position, 0.0, 0.0),
-            EventLine::State(mode) => {
+            EventLine::State { mode } => {
                 if let Some(status) = &mut self.last_status {
                     status.mode = mode;
                 }
@@ -458,7 +458,7 @@ impl Reading {
                 }
                 return;
             }
-            EventLine::Slip { .. } | EventLine::Warning(_) | EventLine::Calibrated { .. } | EventLine::Plot => return,
+            _ => return,
         };
         let Some(ticks) = self.ticks(position) else { return };
         self.things.push(Thing {

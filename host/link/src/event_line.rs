@@ -5,80 +5,139 @@
 
 use control::alarm::{Alarm, Warning};
 use control::ground::class::Class;
+use control::operate::calibration::{Outcome, SwingTimes};
+use control::operate::event::Event;
+use control::operate::state::State;
+use control::say::names;
 
-/// Something that the machine told by itself, as [`control::operate::event::Event`] was written.
+/// An event, as the [table of events](control::event_table) describes it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum EventLine {
-    /// An object was seen in full and classified.
-    Detection {
-        /// What it was taken for.
-        class: Class,
-        /// Where the beam broke, in ticks.
-        position: i32,
-        /// Votes for the class.
-        votes: u8,
-        /// Distance since the last plant's leading edge, in ticks.
-        spacing: i32,
-        /// The paper's Y, in ticks.
-        delay: i32,
-        /// The paper's Z, in ticks: canopy and both margins.
-        hold: i32,
-        /// The paper's R, in ticks.
-        actuation: i32,
-    },
-    /// The tool was told to swing.
-    Swing {
-        /// Out of the row, or back into it.
-        out: bool,
-        /// The machine's position at the command, in ticks.
-        position: i32,
-    },
-    /// Ground is kept free on which a plant was due and none was seen.
-    Guarded {
-        /// The middle of it, in ticks.
-        position: i32,
-    },
-    /// A plant has passed both beams.
-    Slip {
-        /// The slip by the last of them in thousandths, above 0 where the wheel turns farther than the machine rolls.
-        permille: i32,
-    },
-    /// The machine went from one state to another.
-    State(Mode),
-    /// A fault was latched.
-    Alarm {
-        /// Which.
-        alarm: Alarm,
-        /// The machine's position, in ticks.
-        position: i32,
-    },
-    /// Something that the operator should know of.
-    Warning(Warning),
-    /// What came of timing the servo.
-    Calibrated {
-        /// By what it was timed.
-        by: Timed,
-        /// Whether the leads that follow from it are in use.
-        is_set: bool,
-    },
-    /// Points of a plotter's curves.
-    Plot,
+pub struct EventDescription {
+    /// Its name.
+    pub name: &'static str,
+    /// What happened.
+    pub meaning: &'static str,
+    /// What its line begins with; nothing where a value stands first.
+    pub beginning: &'static str,
+    /// The values in its line, in their order.
+    pub values: &'static [ValueDescription],
 }
 
-/// By what the servo was timed.
+/// A value in the line of an event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Timed {
-    /// By the end switch.
-    EndSwitch {
-        /// The longest that the tool took to be out, in milliseconds.
-        out_ms: u16,
-        /// The shortest until it began to come back.
-        in_ms: u16,
-    },
-    /// By the operator, who has seen it swing.
-    Eye,
-    /// In vain: the end switch did not follow.
-    None,
+pub struct ValueDescription {
+    /// What stands before `=`; nothing for the line's first word.
+    pub key: &'static str,
+    /// How it is written, as the table of events calls it.
+    pub kind: &'static str,
+    /// The field of [`EventLine`] that it is read into, and that one's type; none where another value says the same.
+    pub field: Option<(&'static str, &'static str)>,
+    /// What it tells.
+    pub meaning: &'static str,
+}
+
+macro_rules! event_lines {
+    ($($Event:ident $meaning:literal, $pattern:pat => $beginning:literal {
+        $($key:literal = $kind:ident($value:expr) $(=> $field:ident: $Type:ty)?, $about:literal;)*
+    } $($tail:literal)?)*) => {
+        /// Something that the machine told by itself, as [`Event`] was written.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub enum EventLine {
+            $(
+                #[doc = $meaning]
+                $Event {
+                    $($(
+                        #[doc = $about]
+                        $field: $Type,
+                    )?)*
+                },
+            )*
+            /// Points of a plotter's curves.
+            Plot,
+        }
+
+        /// All events, in the order of the table.
+        pub const EVENTS: &[EventDescription] = &[$(EventDescription {
+            name: stringify!($Event),
+            meaning: $meaning,
+            beginning: $beginning,
+            values: &[$(ValueDescription {
+                key: $key,
+                kind: stringify!($kind),
+                field: [$(Some((stringify!($field), stringify!($Type))),)? None][0],
+                meaning: $about,
+            }),*],
+        }),*];
+
+        impl EventLine {
+            /// Reads a line of the table of events; none where it is not one.
+            fn of_table(line: &str) -> Option<Self> {
+                $(
+                    let read = |values: Values<'_>| {
+                        let _ = &values;
+                        Some(Self::$Event { $($($field: kind::$kind(values.text($key)?)?,)?)* })
+                    };
+                    if let Some(event) = behind(line, $beginning).and_then(read) {
+                        return Some(event);
+                    }
+                )*
+                None
+            }
+
+            /// The name of the event in [`EVENTS`], and the fields as JSON would have them, by their names; none for a plotter's points.
+            pub fn fields(&self) -> Option<(&'static str, Vec<(&'static str, Field)>)> {
+                match *self {
+                    $(Self::$Event { $($($field,)?)* } => {
+                        Some((stringify!($Event), vec![$($((stringify!($field), $field.into()),)?)*]))
+                    })*
+                    Self::Plot => None,
+                }
+            }
+        }
+
+        impl From<&Event> for EventLine {
+            fn from(event: &Event) -> Self {
+                match *event {
+                    $($pattern => Self::$Event { $($($field: $value.into(),)?)* },)*
+                }
+            }
+        }
+    };
+}
+
+control::event_table!(event_lines);
+
+/// A field of an event.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Field {
+    /// A number.
+    Number(i32),
+    /// Yes or no.
+    Flag(bool),
+    /// A word.
+    Word(String),
+}
+
+/// Which kind of field a type is.
+macro_rules! fields {
+    ($($Type:ty: $value:ident => $field:expr;)*) => {$(
+        impl From<$Type> for Field {
+            fn from($value: $Type) -> Self {
+                $field
+            }
+        }
+    )*};
+}
+
+fields! {
+    i32: number => Self::Number(number);
+    u16: number => Self::Number(number.into());
+    u8: number => Self::Number(number.into());
+    bool: flag => Self::Flag(flag);
+    Class: class => Self::Word(names::class(class).to_string());
+    Mode: mode => Self::Word(mode.name().to_owned());
+    Alarm: alarm => Self::Word(alarm.text().to_string());
+    Warning: warning => Self::Word(warning.text().to_string());
 }
 
 /// What the machine is doing, without the reason for an alarm.
@@ -91,6 +150,16 @@ pub enum Mode {
     Work,
     /// A fault is latched.
     Alarm,
+}
+
+impl From<State> for Mode {
+    fn from(state: State) -> Self {
+        match state {
+            State::Hold => Self::Hold,
+            State::Work => Self::Work,
+            State::Alarm(_) => Self::Alarm,
+        }
+    }
 }
 
 impl Mode {
@@ -135,8 +204,11 @@ pub struct Status {
 pub struct Values<'a>(pub &'a str);
 
 impl<'a> Values<'a> {
-    /// The text of a key; none where the line does not have it.
+    /// The text of a key; none where the line does not have it. Without a key it is the first word.
     pub fn text(&self, key: &str) -> Option<&'a str> {
+        if key.is_empty() {
+            return self.0.split(' ').next();
+        }
         self.0.split(' ').find_map(|word| word.strip_prefix(key)?.strip_prefix('='))
     }
 
@@ -149,61 +221,63 @@ impl<'a> Values<'a> {
     pub fn alarm(&self) -> Option<&'a str> {
         self.text("name").or_else(|| self.text("alarm"))
     }
-
-    fn out(&self) -> Option<bool> {
-        match self.text("tool")? {
-            "out" => Some(true),
-            "in" => Some(false),
-            _ => None,
-        }
-    }
 }
 
 impl EventLine {
     /// Reads an event's line; none where it is not one.
     pub fn parse(line: &str) -> Option<Self> {
-        if is_plot(line) {
-            return Some(Self::Plot);
-        }
-        let (name, rest) = line.split_once(' ')?;
-        let values = Values(rest);
-        let object = |class| {
-            Some(Self::Detection {
-                class,
-                position: values.number("pos")?,
-                votes: values.number("votes")?,
-                spacing: values.number("spacing")?,
-                delay: values.number("delay")?,
-                hold: values.number("hold")?,
-                actuation: values.number("actuation")?,
-            })
-        };
-        match name {
-            "plant" => object(Class::Plant),
-            "weed" => object(Class::Weed),
-            "unknown" => object(Class::Unknown),
-            "swing" => Some(Self::Swing { out: values.out()?, position: values.number("pos")? }),
-            "guarded" => Some(Self::Guarded { position: values.number("pos")? }),
-            "slip" => Some(Self::Slip { permille: values.number("permille")? }),
-            "state" => Some(Self::State(Mode::find(values.text("is")?)?)),
-            "alarm" => Some(Self::Alarm {
-                alarm: Alarm::find(values.text("name")?.as_bytes())?,
-                position: values.number("pos")?,
-            }),
-            "warning" => Warning::find(values.text("name")?.as_bytes()).map(Self::Warning),
-            "calibrated" => {
-                let by = match values.text("by") {
-                    None => {
-                        Timed::EndSwitch { out_ms: values.number("lead_out_ms")?, in_ms: values.number("lead_in_ms")? }
-                    }
-                    Some("eye,") => Timed::Eye,
-                    Some("none,") => Timed::None,
-                    Some(_) => return None,
-                };
-                Some(Self::Calibrated { by, is_set: values.text("set") == Some("yes") })
-            }
-            _ => None,
-        }
+        if is_plot(line) { Some(Self::Plot) } else { Self::of_table(line) }
+    }
+}
+
+/// What stands behind the beginning of an event's line; none where the line begins otherwise.
+fn behind<'a>(line: &'a str, beginning: &str) -> Option<Values<'a>> {
+    let rest = line.strip_prefix(beginning)?;
+    let is_whole = beginning.is_empty() || rest.is_empty() || rest.starts_with([' ', ',']);
+    is_whole.then_some(Values(rest))
+}
+
+/// How each kind of value of the table of events is read.
+mod kind {
+    use super::{Alarm, Class, Mode, Warning, names};
+    use control::say::Text;
+    use std::str::FromStr;
+
+    pub(super) fn number<T: FromStr>(word: &str) -> Option<T> {
+        word.parse().ok()
+    }
+
+    pub(super) fn count<T: FromStr>(word: &str) -> Option<T> {
+        word.parse().ok()
+    }
+
+    pub(super) fn class(word: &str) -> Option<Class> {
+        named(word, [Class::Plant, Class::Weed, Class::Unknown], names::class)
+    }
+
+    pub(super) fn place(word: &str) -> Option<bool> {
+        named(word, [false, true], names::place)
+    }
+
+    pub(super) fn answer(word: &str) -> Option<bool> {
+        named(word, [false, true], names::answer)
+    }
+
+    pub(super) fn state(word: &str) -> Option<Mode> {
+        Mode::find(word)
+    }
+
+    pub(super) fn alarm(word: &str) -> Option<Alarm> {
+        Alarm::find(word.as_bytes())
+    }
+
+    pub(super) fn warning(word: &str) -> Option<Warning> {
+        Warning::find(word.as_bytes())
+    }
+
+    /// The one that is called so.
+    fn named<T: Copy, const N: usize>(word: &str, all: [T; N], name: fn(T) -> Text) -> Option<T> {
+        all.into_iter().find(|&one| name(one).to_string() == word)
     }
 }
 
@@ -222,7 +296,7 @@ impl Status {
         Some(Self {
             mode: Mode::find(values.text("state")?)?,
             alarm: values.alarm().and_then(|name| Alarm::find(name.as_bytes())),
-            tool_out: values.out()?,
+            tool_out: kind::place(values.text("tool")?)?,
             reason: values.text("for").map(str::to_owned),
             position: values.number("pos")?,
             speed_mm_s: values.number("speed_mm_s")?,
@@ -238,12 +312,12 @@ mod tests {
     use super::*;
     use control::ground::class::Vote;
     use control::ground::keep_out::Plan;
-    use control::operate::calibration::{Outcome, SwingTimes};
-    use control::operate::event::Event;
-    use control::operate::state::State;
     use control::say::line::Line;
     use control::say::write_event;
     use control::units::{Position, Ticks};
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use std::collections::BTreeMap;
 
     /// The event as the firmware writes it.
     fn line(event: Event) -> String {
@@ -252,53 +326,86 @@ mod tests {
         line.map(char::from).collect::<String>().trim_end().to_owned()
     }
 
+    /// Any event.
+    fn any(chance: &mut ChaCha8Rng) -> Event {
+        let position = Position::new(chance.random());
+        let alarms: Vec<Alarm> = (0..).map_while(Alarm::from_index).collect();
+        let alarm = alarms[chance.random_range(0..alarms.len())];
+        match chance.random_range(0..9) {
+            0 | 1 => {
+                let class = [Class::Plant, Class::Weed, Class::Unknown][chance.random_range(0..3)];
+                let [delay, hold, spacing] = [0; 3].map(|_| Ticks(chance.random_range(-(1 << 29)..1 << 29)));
+                let vote = Vote { class, votes: chance.random() };
+                Event::Detection { vote, leading: position, spacing, plan: Plan { delay, hold } }
+            }
+            2 => Event::Guarded(position),
+            3 => Event::Slip { permille: chance.random() },
+            4 => Event::Swing { out: chance.random(), position },
+            5 => Event::State([State::Hold, State::Work, State::Alarm(alarm)][chance.random_range(0..3)]),
+            6 => Event::Alarm { alarm, position },
+            7 => {
+                let warnings: Vec<Warning> = (0..).map_while(Warning::from_index).collect();
+                Event::Warning(warnings[chance.random_range(0..warnings.len())])
+            }
+            _ => {
+                let times = SwingTimes { out_ms: chance.random(), in_ms: chance.random() };
+                let outcomes = [Outcome::Measured(times), Outcome::Shown, Outcome::Failed];
+                Event::Calibrated { outcome: outcomes[chance.random_range(0..3)], fits: chance.random() }
+            }
+        }
+    }
+
     #[test]
     fn every_event_is_read_as_the_firmware_writes_it() {
-        let plan = Plan { delay: Ticks(668), hold: Ticks(477) };
-        for (class, votes) in [(Class::Plant, 3), (Class::Weed, 2), (Class::Unknown, 0)] {
-            let vote = Vote { class, votes };
-            let event = Event::Detection { vote, leading: Position::new(-70_000), spacing: Ticks(1146), plan };
-            let expected = EventLine::Detection {
-                class,
-                position: -70_000,
-                votes,
-                spacing: 1146,
-                delay: 668,
-                hold: 477,
-                actuation: 1145,
-            };
-            assert_eq!(EventLine::parse(&line(event)), Some(expected));
+        let mut chance = ChaCha8Rng::seed_from_u64(27);
+        let mut met = BTreeMap::new();
+        for _ in 0..20_000 {
+            let event = any(&mut chance);
+            let line = line(event);
+            let read = EventLine::parse(&line);
+            assert_eq!(read, Some(EventLine::from(&event)), "{line}");
+            let (name, fields) = read.and_then(|read| read.fields()).expect("it has a name");
+            // The description says what the line is.
+            let described = EVENTS.iter().find(|described| described.name == name).expect("it is described");
+            let keys: Vec<&str> =
+                line.split([' ', ',']).filter_map(|word| word.split_once('=')).map(|(key, _)| key).collect();
+            let wanted = described.beginning.split(' ').filter_map(|word| Some(word.split_once('=')?.0));
+            let wanted = wanted.chain(described.values.iter().map(|value| value.key).filter(|key| !key.is_empty()));
+            assert_eq!(keys, wanted.collect::<Vec<_>>(), "{line}");
+            let of_fields: Vec<&str> = described.values.iter().filter_map(|value| Some(value.field?.0)).collect();
+            assert_eq!(fields.iter().map(|&(field, _)| field).collect::<Vec<_>>(), of_fields);
+            met.entry(name).or_insert(line);
         }
-        let guarded = Event::Guarded(Position::new(-3));
-        assert_eq!(EventLine::parse(&line(guarded)), Some(EventLine::Guarded { position: -3 }));
-        let slip = Event::Slip { permille: -52 };
-        assert_eq!(EventLine::parse(&line(slip)), Some(EventLine::Slip { permille: -52 }));
-        let swing = Event::Swing { out: true, position: Position::new(12) };
-        assert_eq!(EventLine::parse(&line(swing)), Some(EventLine::Swing { out: true, position: 12 }));
-        assert_eq!(EventLine::parse(&line(Event::State(State::Work))), Some(EventLine::State(Mode::Work)));
-        for alarm in (0..).map_while(Alarm::from_index) {
-            let event = Event::Alarm { alarm, position: Position::new(1) };
-            let (first, second) = alarm.code();
-            let told = line(event);
-            let named = format!("alarm code={first}-{second} name={} pos=1", alarm.text());
-            assert_eq!((EventLine::parse(&told), &told), (Some(EventLine::Alarm { alarm, position: 1 }), &named));
-            let old = format!("alarm name={} code={first}{second} pos=1", alarm.text());
-            assert_eq!(EventLine::parse(&old), Some(EventLine::Alarm { alarm, position: 1 }), "a log of 0.1");
-            assert_eq!(EventLine::parse(&line(Event::State(State::Alarm(alarm)))), Some(EventLine::State(Mode::Alarm)));
-        }
-        let measured = Outcome::Measured(SwingTimes { out_ms: 150, in_ms: 40 });
-        let by_the_switch = Timed::EndSwitch { out_ms: 150, in_ms: 40 };
-        for (outcome, fits, by) in [
-            (measured, true, by_the_switch),
-            (measured, false, by_the_switch),
-            (Outcome::Shown, false, Timed::Eye),
-            (Outcome::Failed, false, Timed::None),
+        assert_eq!(met.len(), EVENTS.len(), "{met:#?}");
+    }
+
+    #[test]
+    fn a_line_means_what_it_says() {
+        for (line, meant) in [
+            (
+                "weed pos=-70000 votes=2 spacing=1146 delay=668 hold=477 actuation=1145",
+                EventLine::Detection {
+                    class: Class::Weed,
+                    position: -70_000,
+                    votes: 2,
+                    spacing: 1146,
+                    delay: 668,
+                    hold: 477,
+                    actuation: 1145,
+                },
+            ),
+            ("swing tool=out pos=12", EventLine::Swing { out: true, position: 12 }),
+            ("state is=alarm", EventLine::State { mode: Mode::Alarm }),
+            ("alarm code=3-1 name=too_fast pos=1", EventLine::Alarm { alarm: Alarm::TooFast, position: 1 }),
+            // As a log of 0.1 has it.
+            ("alarm name=too_fast code=31 pos=1", EventLine::Alarm { alarm: Alarm::TooFast, position: 1 }),
+            ("calibrated by=eye, as seen", EventLine::CalibratedByEye {}),
+            ("calibrated by=none, the end switch did not follow", EventLine::NotCalibrated {}),
+            // A newer firmware may say more.
+            ("guarded pos=3 for=plant", EventLine::Guarded { position: 3 }),
         ] {
-            let calibrated = Event::Calibrated { outcome, fits };
-            assert_eq!(EventLine::parse(&line(calibrated)), Some(EventLine::Calibrated { by, is_set: fits }));
+            assert_eq!(EventLine::parse(line), Some(meant), "{line}");
         }
-        let warning = Event::Warning(Warning::NoPlants);
-        assert_eq!(EventLine::parse(&line(warning)), Some(EventLine::Warning(Warning::NoPlants)));
     }
 
     #[test]
@@ -323,6 +430,9 @@ mod tests {
             "state=work tool=in pos=1",
             "alarm code=1-1 name=boredom pos=1",
             "warning name=",
+            "calibrated by=hand",
+            "calibrated lead_out_ms=150 set=yes",
+            "guardedpos=1",
             "pos=1 swing tool=out",
             "plant pos=1 votes=300 spacing=1 delay=1 hold=1 actuation=1",
         ] {

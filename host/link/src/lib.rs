@@ -34,11 +34,11 @@ pub mod settings_file;
 
 pub use self::console_line::{ConsoleLine, SettingValue};
 pub use self::error::LinkError;
-pub use self::event_line::{EventLine, Mode, Status, Timed, Values};
+pub use self::event_line::{EVENTS, EventDescription, EventLine, Field, Mode, Status, ValueDescription, Values};
 pub use self::lines::LineReader;
 #[cfg(not(target_arch = "wasm32"))]
 pub use self::port::{find_uno, find_unos, listen, open_other, try_port};
-pub use control::ground::class::Class;
+pub use control::{ground::class::Class, say::names};
 
 use std::collections::VecDeque;
 use std::io::{self, Read, Write};

@@ -156,7 +156,7 @@ fn play(stretch: &Stretch, pace: Pace, progress: &mut Progress<impl FnMut(f64)>)
                     last.0.speed_mm_s = player.speed_mm_s;
                 }
                 match event {
-                    EventLine::State(mode) => player.enter(*mode, std::mem::take(&mut starts_now)),
+                    EventLine::State { mode } => player.enter(*mode, std::mem::take(&mut starts_now)),
                     EventLine::Alarm { .. } => is_given = player.raise(),
                     EventLine::Swing { .. } => is_given = stretch.follows_change(place),
                     _ => {}

@@ -248,7 +248,7 @@ impl Session {
     fn take(&mut self, line: String) {
         let said = ConsoleLine::parse(&line);
         if let ConsoleLine::Event(event) = said {
-            self.settings_changed |= matches!(event, EventLine::Calibrated { .. });
+            self.settings_changed |= matches!(event, EventLine::CalibratedBySwitch { is_set: true, .. });
             self.happened.push_back(Happening::Event(event, line));
             return;
         }

@@ -14,9 +14,9 @@ mod steps;
 
 pub use steps::{ManualStep, Task, steps};
 
+use super::EventLine;
 use super::session::Happening;
 use super::settings::shown;
-use super::{EventLine, Timed};
 use control::settings::{Setting, Settings};
 use std::{collections::VecDeque, fmt};
 
@@ -238,10 +238,10 @@ impl SetUp {
     fn take_event(&mut self, event: &EventLine) {
         let pulses = self.pulses;
         match *event {
-            EventLine::Calibrated { by: Timed::EndSwitch { out_ms, in_ms }, .. } => {
+            EventLine::CalibratedBySwitch { out_ms, in_ms, .. } => {
                 self.timings.push(Timing { leads: Some((out_ms, in_ms)), pulses });
             }
-            EventLine::Calibrated { by: Timed::Eye, .. } => self.timings.push(Timing { leads: None, pulses }),
+            EventLine::CalibratedByEye {} => self.timings.push(Timing { leads: None, pulses }),
             EventLine::Slip { permille } => {
                 self.slip_permille.push_back(permille);
                 if self.slip_permille.len() > PLANTS {

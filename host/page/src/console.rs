@@ -1,8 +1,8 @@
 //! The console for the page: what a line says, and in which order settings can be sent.
 
-use control::ground::class::Class;
+use control::say::names;
 use link::settings::{Setting, Settings, explain, name, steps};
-use link::{ConsoleLine, EventLine, SettingValue, Status, Timed, Values};
+use link::{ConsoleLine, EventLine, Field, SettingValue, Status, Values};
 use serde::Deserialize;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -18,42 +18,40 @@ pub fn read(line: &str) -> Value {
         ConsoleLine::Setting(setting) => json!({ "is": "setting", "setting": shown_setting(&setting) }),
         ConsoleLine::Help { name, help } => json!({ "is": "help", "name": name, "help": help }),
         ConsoleLine::Example { from_field, number, label, .. } => {
-            json!({ "is": "example", "fromField": from_field, "number": number, "label": class(label) })
+            json!({ "is": "example", "fromField": from_field, "number": number, "label": names::class(label).to_string() })
         }
-        ConsoleLine::Event(event) => read_event(&event, line),
+        ConsoleLine::Event(event) => read_event(&event),
         ConsoleLine::Other => json!({ "is": "other" }),
     }
 }
 
-fn read_event(event: &EventLine, line: &str) -> Value {
-    match *event {
-        EventLine::Detection { class: taken_for, position, votes, spacing, delay, hold, .. } => json!({
-            "is": "object",
-            "seen": {
-                "class": class(taken_for),
-                "position": position,
-                "votes": votes,
-                "spacing": spacing,
-                "delay": delay,
-                "hold": hold,
-            },
-        }),
-        EventLine::Swing { out, .. } => json!({ "is": "swing", "out": out }),
-        EventLine::Slip { permille } => json!({ "is": "slip", "permille": permille }),
-        EventLine::Guarded { .. } => json!({ "is": "guarded" }),
-        EventLine::State(mode) => json!({ "is": "state", "mode": mode.name() }),
-        EventLine::Alarm { .. } => json!({ "is": "alarm", "name": Values(line).alarm() }),
-        EventLine::Warning(_) => json!({ "is": "warning", "name": Values(line).text("name") }),
-        EventLine::Calibrated { by, is_set } => {
-            let by = match by {
-                Timed::EndSwitch { .. } => "end switch",
-                Timed::Eye => "eye",
-                Timed::None => "none",
-            };
-            json!({ "is": "calibrated", "by": by, "isSet": is_set })
+/// An event: what it is, and its fields.
+fn read_event(event: &EventLine) -> Value {
+    let Some((name, fields)) = event.fields() else { return json!({ "is": "plot" }) };
+    let fields = fields.into_iter().map(|(field, value)| {
+        let value = match value {
+            Field::Number(number) => number.into(),
+            Field::Flag(flag) => flag.into(),
+            Field::Word(word) => word.into(),
+        };
+        (camel_case(field), value)
+    });
+    Value::Object([("is".to_owned(), camel_case(name).into())].into_iter().chain(fields).collect())
+}
+
+/// A name in Rust, of a field or an enum's variant, as TypeScript has it.
+fn camel_case(name: &str) -> String {
+    let mut camel = String::new();
+    let mut begins = false;
+    for character in name.chars() {
+        match character {
+            '_' => begins = true,
+            _ if camel.is_empty() => camel.push(character.to_ascii_lowercase()),
+            _ if std::mem::take(&mut begins) => camel.push(character.to_ascii_uppercase()),
+            _ => camel.push(character),
         }
-        EventLine::Plot => json!({ "is": "plot" }),
     }
+    camel
 }
 
 /// The status; the alarm's name from the line, so that one which is new has it too.
@@ -102,14 +100,6 @@ pub fn firmware() -> Value {
     json!({ "version": version, "settings": Setting::all().map(name).collect::<Vec<_>>() })
 }
 
-fn class(class: Class) -> &'static str {
-    match class {
-        Class::Plant => "plant",
-        Class::Weed => "weed",
-        Class::Unknown => "unknown",
-    }
-}
-
 /// All settings as they are, and some as they are to be, by their names.
 #[derive(Deserialize)]
 pub struct Change {
@@ -152,13 +142,63 @@ pub fn settings(mut settings: Settings, values: &BTreeMap<String, u16>) -> (Sett
 #[cfg(test)]
 mod tests {
     use super::*;
+    use expect_test::expect_file;
+    use link::{EVENTS, ValueDescription};
+
+    /// A comment, if there is something to say.
+    fn comment(indent: &str, meaning: &str) -> String {
+        let mut letters = meaning.chars();
+        let first = letters.next().map_or(String::new(), |first| first.to_uppercase().to_string());
+        format!("{indent}/** {first}{}. */\n", letters.as_str())
+    }
+
+    /// The type in TypeScript of what [`read`] makes of a field.
+    fn type_of(rust: &str) -> &str {
+        match rust {
+            "i32" | "u16" | "u8" => "number",
+            "bool" => "boolean",
+            "Mode" => "Mode",
+            "Class" => "\"plant\" | \"weed\" | \"unknown\"",
+            "Alarm" | "Warning" => "string",
+            _ => panic!("say what {rust} is in TypeScript"),
+        }
+    }
+
+    #[test]
+    fn the_page_s_types_of_events_are_the_table_of_events() {
+        let field = |value: &ValueDescription| {
+            let (name, rust) = value.field?;
+            let about = comment("    ", value.meaning);
+            Some(format!("{about}    readonly {}: {};\n", camel_case(name), type_of(rust)))
+        };
+        let shapes = EVENTS.iter().map(|event| {
+            let fields: String = event.values.iter().filter_map(field).collect();
+            let (about, is) = (comment("", event.meaning), camel_case(event.name));
+            format!("{about}export interface {} {{\n    readonly is: \"{is}\";\n{fields}}}\n\n", event.name)
+        });
+        let shapes: String = shapes.collect();
+        let list = |line: fn(&str) -> String| EVENTS.iter().map(|event| line(event.name)).collect::<String>();
+        let [types, names] =
+            [list(|name| format!("\n    | {name}")), list(|name| format!("    \"{}\",\n", camel_case(name)))];
+        expect_file!["../../../page/src/link/events.ts"].assert_eq(&format!(
+            "// What the machine tells by itself: the table of events in control/src/say/event_table.rs, as types.\n\
+             // `UPDATE_EXPECT=1 cargo test -p page events` writes this file.\n\n\
+             import type {{ Mode }} from \"./grammar.ts\";\n\n\
+             {shapes}/** Points of a plotter's curves. */\n\
+             export interface Plot {{\n    readonly is: \"plot\";\n}}\n\n\
+             /** What the machine tells by itself. */\n\
+             export type Told ={types}\n    | Plot;\n\n\
+             /** What each of them is. */\n\
+             export const TOLD: readonly Told[\"is\"][] = [\n{names}    \"plot\",\n];\n"
+        ));
+    }
 
     #[test]
     fn a_line_is_told_to_the_page_with_all_that_is_in_it() {
         for (line, said) in [
             ("ok", json!({ "is": "end" })),
             ("error: no", json!({ "is": "end", "error": "no" })),
-            ("alarm code=3-1 name=too_fast pos=7", json!({ "is": "alarm", "name": "too_fast" })),
+            ("alarm code=3-1 name=too_fast pos=7", json!({ "is": "alarm", "alarm": "too_fast", "position": 7 })),
             (
                 "state=alarm code=9-9 name=boredom tool=out pos=1 speed_mm_s=-2 windows=3 unseen_mm=4",
                 json!({ "is": "status", "status": {
@@ -168,9 +208,10 @@ mod tests {
             ),
             (
                 "plant pos=-7 votes=3 spacing=1 delay=2 hold=3 actuation=5",
-                json!({ "is": "object", "seen": {
-                    "class": "plant", "position": -7, "votes": 3, "spacing": 1, "delay": 2, "hold": 3,
-                } }),
+                json!({
+                    "is": "detection", "class": "plant", "position": -7, "votes": 3, "spacing": 1, "delay": 2, "hold": 3,
+                    "actuation": 5,
+                }),
             ),
             (
                 "end_switch=off on or off, default off, not saved",
@@ -178,7 +219,11 @@ mod tests {
                     "name": "end_switch", "value": 0, "unit": "", "least": 0, "greatest": 1, "isSwitched": true, "default": 0,
                 } }),
             ),
-            ("calibrated by=eye, set them", json!({ "is": "calibrated", "by": "eye", "isSet": false })),
+            ("calibrated by=eye, set them", json!({ "is": "calibratedByEye" })),
+            (
+                "calibrated lead_out_ms=150 lead_in_ms=40 set=yes",
+                json!({ "is": "calibratedBySwitch", "outMs": 150, "inMs": 40, "isSet": true }),
+            ),
         ] {
             assert_eq!(read(line), said, "{line}");
         }

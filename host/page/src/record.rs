@@ -180,15 +180,11 @@ impl Picture {
                 self.alarms.push(trouble(name, mm, false));
                 self.changes.push(Change { mm, out: true });
             }
-            EventLine::Warning(_) => {
+            EventLine::Warning { .. } => {
                 self.alarms.push(trouble(Values(line).text("name").unwrap_or_default(), self.here_mm, true));
             }
             // An alarm has the tool out, and a start may have it in: the swing says so.
-            EventLine::State(Mode::Hold | Mode::Work | Mode::Alarm)
-            | EventLine::Guarded { .. }
-            | EventLine::Slip { .. }
-            | EventLine::Calibrated { .. }
-            | EventLine::Plot => {}
+            _ => {}
         }
     }
 

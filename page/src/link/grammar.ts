@@ -5,6 +5,7 @@
 // Commands are put together where they are typed; their words stand in the firmware's help.
 
 import { ask } from "../core.ts";
+import { TOLD, type Told } from "./events.ts";
 
 /** What the machine is doing. */
 export type Mode = "hold" | "work" | "alarm";
@@ -24,19 +25,6 @@ export interface Status {
     readonly windows: number;
     /** How far the machine has to roll until ground that the beam has seen reaches the tool. */
     readonly unseenMm: number;
-}
-
-/** An object that the beam saw, in the encoder's counts. */
-export interface Seen {
-    readonly class: "plant" | "weed" | "unknown";
-    /** Its leading edge, when that was in the beam. */
-    readonly position: number;
-    readonly votes: number;
-    /** Distance since the last plant. */
-    readonly spacing: number;
-    /** From the leading edge to the beginning of its window, and the window's length: canopy and both margins. */
-    readonly delay: number;
-    readonly hold: number;
 }
 
 /** A setting as `get` shows it. A switched one is 0 or 1. */
@@ -65,25 +53,12 @@ export type Said =
     /** What a setting or a command is. */
     | { is: "help"; name: string; help: string }
     | { is: "example"; fromField: boolean; number: number; label: string }
-    | { is: "object"; seen: Seen }
-    | { is: "state"; mode: Mode }
-    | { is: "swing"; out: boolean }
-    /** Ground is kept free on which a plant was due and none was seen. */
-    | { is: "guarded" }
-    /** The wheel's slip in thousandths, by the last plant that passed both beams. */
-    | { is: "slip"; permille: number }
-    /** A fault was latched. */
-    | { is: "alarm"; name: string }
-    | { is: "warning"; name: string }
-    /** The servo was timed: by the end switch, by the operator's eye, or in vain. */
-    | { is: "calibrated"; by: "end switch" | "eye" | "none"; isSet: boolean }
-    /** Points of a plotter's curves. */
-    | { is: "plot" }
+    | Told
     | { is: "other" };
 
 /** Whether the machine says it by itself, and not as a part of an answer. */
-export function isTold({ is }: Said): boolean {
-    return ["object", "state", "swing", "guarded", "slip", "alarm", "warning", "calibrated", "plot"].includes(is);
+export function isTold(said: Said): said is Told {
+    return TOLD.some((is) => is === said.is);
 }
 
 /** Reads a line. */

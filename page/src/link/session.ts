@@ -5,7 +5,8 @@
 // chip's. After every start of the Uno it asks who is there, for settings and examples, and turns the events on. `hold` waits
 // for nobody. A wire that ended ends its session.
 
-import { isTold, read, type Said, type Setting, type Status } from "./grammar.ts";
+import type { Told } from "./events.ts";
+import { isTold, read, type Setting, type Status } from "./grammar.ts";
 import { LineReader } from "./lines.ts";
 
 /** Types a command, and gives back its answer without the `ok`. Throws what the machine refuses by. */
@@ -48,7 +49,7 @@ export type Happening =
     | { is: "lost"; why: string; forGood: boolean; isWanted: boolean }
     | { is: "status"; status: Status; line: string }
     /** The machine told something by itself. */
-    | { is: "told"; said: Said; line: string }
+    | { is: "told"; said: Told; line: string }
     | { is: "command"; line: string }
     | { is: "answer"; line: string }
     | { is: "settings"; settings: Setting[] }
@@ -280,7 +281,7 @@ export class Session {
         }
         if (isTold(said)) {
             this.onHappening({ is: "told", said, line });
-            if (said.is === "calibrated" && said.isSet) void this.#readSettings();
+            if (said.is === "calibratedBySwitch" && said.isSet) void this.#readSettings();
             return;
         }
         const [question] = this.#asked;

@@ -1,7 +1,8 @@
 // Calibration, step by step: the wheel over a measured stretch, then the servo's pulses and times.
 
 import type { Parts } from "../dom.ts";
-import { read, type Said } from "../link/grammar.ts";
+import type { Told } from "../link/events.ts";
+import { read } from "../link/grammar.ts";
 import { type Ask, Refused } from "../link/session.ts";
 import { type Plain, quantity, say, told } from "../words/words.ts";
 import type { Machine } from "./machine.ts";
@@ -65,13 +66,13 @@ export class Calibration {
         }
     }
 
-    /** What came of timing the servo. */
-    take(said: Extract<Said, { is: "calibrated" }>): void {
-        const text: Plain = {
-            "end switch": said.isSet ? ("timedSet" as const) : ("timedNotSet" as const),
-            eye: "timedByEye" as const,
-            none: "notTimed" as const,
-        }[said.by];
+    /** Shows what came of timing the servo, if that is what the machine tells. */
+    take(said: Told): void {
+        let text: Plain;
+        if (said.is === "calibratedBySwitch") text = said.isSet ? "timedSet" : "timedNotSet";
+        else if (said.is === "calibratedByEye") text = "timedByEye";
+        else if (said.is === "notCalibrated") text = "notTimed";
+        else return;
         this.#parts.say("servo-said", () => say(text));
     }
 

@@ -2,7 +2,8 @@
 // operator.
 
 import faults from "faults.json";
-import type { Mode, Seen, Setting, Status } from "../link/grammar.ts";
+import type { Detection, Told } from "../link/events.ts";
+import type { Mode, Setting, Status } from "../link/grammar.ts";
 import type { Happening } from "../link/session.ts";
 import { advice, english, type Plain, quantity, say, told } from "../words/words.ts";
 
@@ -56,8 +57,8 @@ export class Machine {
     help: ReadonlyMap<string, string> = new Map();
     examples: readonly string[] = [];
     /** The last objects, the newest first, and those of them whose windows the machine still knows of. */
-    objects: Seen[] = [];
-    windows: Seen[] = [];
+    objects: Detection[] = [];
+    windows: Detection[] = [];
 
     /** Takes what happened, at a time. */
     take(happening: Happening, nowMs: number): void {
@@ -100,12 +101,12 @@ export class Machine {
         }
     }
 
-    #take(said: Extract<Happening, { is: "told" }>["said"]): void {
+    #take(said: Told): void {
         switch (said.is) {
-            case "object":
-                this.objects = [said.seen, ...this.objects].slice(0, OBJECTS);
-                this.windows = [said.seen, ...this.windows].slice(0, OBJECTS);
-                if (said.seen.class === "plant" && this.warning === "no_plants") this.warning = undefined;
+            case "detection":
+                this.objects = [said, ...this.objects].slice(0, OBJECTS);
+                this.windows = [said, ...this.windows].slice(0, OBJECTS);
+                if (said.class === "plant" && this.warning === "no_plants") this.warning = undefined;
                 break;
             case "state":
                 this.mode = said.mode;
@@ -116,10 +117,10 @@ export class Machine {
                 this.toolOut = said.out;
                 break;
             case "alarm":
-                [this.mode, this.toolOut, this.alarm, this.windows] = ["alarm", true, said.name, []];
+                [this.mode, this.toolOut, this.alarm, this.windows] = ["alarm", true, said.alarm, []];
                 break;
             case "warning":
-                this.warning = said.name;
+                this.warning = said.warning;
                 break;
             default:
         }
@@ -142,7 +143,7 @@ export class Machine {
     }
 
     /** How wide an object was. */
-    widthMm({ hold }: Seen): number {
+    widthMm({ hold }: Detection): number {
         return hold * this.tickMm - 2 * this.setting("margin_mm");
     }
 

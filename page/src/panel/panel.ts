@@ -202,7 +202,7 @@ export class Panel {
                 break;
             case "told":
                 if (happening.said.is === "plot") break;
-                if (happening.said.is === "calibrated") this.#calibration.take(happening.said);
+                this.#calibration.take(happening.said);
                 if (happening.said.is === "state") this.#parts.write("drive-said", "");
                 this.#console.add(happening.line, happening.said.is === "alarm" ? "error" : "");
                 break;

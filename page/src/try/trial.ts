@@ -3,7 +3,7 @@
 // `advance` lets time pass. What the operator does, to the machine or to the row, he may do between two calls. `outcome`
 // knows what became of each plant that the tool has left behind.
 
-import type { Seen } from "../link/grammar.ts";
+import type { Detection } from "../link/events.ts";
 import type { Happening } from "../link/session.ts";
 import { Machine, type MachineKind, PIN } from "../row/machine.ts";
 import { CYCLES_PER_SECOND, Uno } from "../uno/uno.ts";
@@ -105,14 +105,14 @@ export class Trial {
         if (said.is === "state" || said.is === "alarm")
             this.losses.isAtWork = said.is === "state" && said.mode === "work";
         if (said.is === "alarm") this.zones = [];
-        if (said.is === "object" && said.seen.class !== "weed") this.zones.push(this.#zone(said.seen));
+        if (said.is === "detection" && said.class !== "weed") this.zones.push(this.#zone(said));
     }
 
     /**
      * The ground of a zone. The paper's delay and hold are counted from the moment at which the leading edge is in the
      * beam, when the tool is beamToToolMm behind it. Counts become ground as the machine rolls now.
      */
-    #zone({ position, delay, hold }: Seen): Zone {
+    #zone({ position, delay, hold }: Detection): Zone {
         const { placeMm, ticks, groundMmATick, dimensions } = this.machine;
         const startMm = placeMm + (position + delay + this.#zero - ticks) * groundMmATick - dimensions.beamToToolMm;
         return { startMm, endMm: startMm + hold * groundMmATick };

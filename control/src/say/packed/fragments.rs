@@ -3,22 +3,22 @@
 
 #[rustfmt::skip]
 pub(super) const FRAGMENTS: &[&str] = &[
-    "\r\n", " [", " exampl", " f", " mm", " ms", " o", " ob", " obj", " obje", " p", " s",
-    " t", " tak", " th", " the", " the ", " the tool ", " ti", " to", " to ", " to the ", " tool", "# ",
-    "#,", "#,#,", ", ", ", or ", "0 ", "00", "100", ":#", "; ", "; 0 ", "; 0 n", "=#",
-    "=# ", "_f", "_mm", "_mm,", "_mm_s", "_ms", "_p", "_s", "a ", "ac", "ack", "ak",
-    "al", "alar", "alarm ", "ali", "alibr", "alibrat", "all", "am", "ampl", "an", "and", "and ",
-    "ar", "are ", "ast", "at", "at ", "back", "bea", "beam", "beam_", "bel", "br", "by",
-    "calibrat", "ce", "ch", "ch ", "chan", "ck", "co", "cod", "comm", "con", "ct", "d ",
-    "d_", "de", "di", "e ", "e the ", "e=", "ea", "ed", "ed ", "eed", "eed ", "eed_mm_s",
-    "eel", "el", "en", "en ", "encod", "ep", "er", "er_", "ervo", "es", "es ", "est",
-    "et", "ex", "exampl", "fi", "fir", "first", "for", "ga", "he ", "hol", "il", "in",
-    "ind", "ing", "is", "is ", "it", "lea", "lead_", "li", "list", "lists", "lo", "m ",
-    "ma", "mm", "ms", "nam", "no", "not ", "now", "of", "off", "ol", "oll", "on",
-    "one", "op", "or", "or ", "ou", "oun", "out", "ow", "pl", "plan", "plant", "re",
-    "ro", "roll", "row", "s ", "sa", "sav", "se", "servo", "servo_", "set", "sett", "setting",
-    "sp", "speed_mm_s", "st", "star", "start", "stat", "sw", "t ", "ter", "th", "the ", "to",
-    "tool", "tool ", "tu", "ul", "um", "un", "unse", "us", "ver", "vo", "wh", "wheel",
+    "\r\n", " [", " a ", " m", " mm", " ms", " o", " ob", " obj", " obje", " on", " p",
+    " s", " t", " ta", " take", " th", " the ", " the tool ", " ti", " to", " to ", " to the ", " tool",
+    "# ", "#,", "#,#,", ", ", ", or ", "0 ", "00", "100", ":#", "; ", "; 0 ", "; 0 n",
+    "=#", "=# ", "_m", "_mm", "_mm,", "_ms", "_s", "a ", "ac", "ach", "ack", "al",
+    "alar", "alarm ", "ali", "alibr", "all", "am", "an", "an ", "and", "and ", "ar", "ar ",
+    "are ", "at", "at ", "ate", "back", "be", "beam", "beam_", "bel", "br", "calibr", "calibrate",
+    "ce", "ch", "chan", "ck", "co", "coder", "comm", "con", "ct", "d ", "d_", "de",
+    "der", "di", "du", "e ", "e the ", "ee", "eed", "eed_mm", "el", "en", "en ", "encoder",
+    "er", "ervo", "ex", "exam", "examp", "example", "fa", "fi", "fir", "first", "for", "fr",
+    "fro", "ga", "ge", "he ", "hol", "il", "in", "ind", "ing", "is", "is ", "it",
+    "ke", "l ", "la", "le", "lea", "lead_", "li", "list", "lo", "m ", "mm", "nam",
+    "name", "no", "not ", "now", "of", "off", "ol", "on", "one", "op", "or", "or ",
+    "ou", "oun", "out", "ow", "pl", "plan", "plant", "re", "rol", "row", "s ", "s a ",
+    "s th", "s=# ", "s_", "sa", "save", "se", "servo", "servo_", "set", "sett", "setting", "sp",
+    "speed_mm", "st", "star", "start", "stat", "sw", "t ", "te", "ter", "th", "the ", "to",
+    "tool", "tool ", "ul", "un", "unse", "us", "ve", "ver", "vo", "wh", "whee", "y ",
 ];
 
 #[cfg(test)]

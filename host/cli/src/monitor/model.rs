@@ -199,7 +199,7 @@ impl Model {
             Happening::Connected { version, .. } => Some(format!("-- connected to weeder {version}")),
             Happening::Lost(why) => Some(format!("-- {why}")),
             Happening::Event(EventLine::Plot, _) => None,
-            Happening::Event(EventLine::Alarm { .. } | EventLine::Warning(_) | EventLine::State(_), line) => {
+            Happening::Event(EventLine::Alarm { .. } | EventLine::Warning { .. } | EventLine::State { .. }, line) => {
                 Some(line.clone())
             }
             Happening::Event(_, line) => (!self.are_several()).then(|| line.clone()),
@@ -343,16 +343,11 @@ impl RowModel {
                 self.windows.truncate(OBJECTS);
             }
             EventLine::Alarm { .. } => self.windows.clear(),
-            EventLine::Warning(warning) => {
+            EventLine::Warning { warning } => {
                 self.advice =
                     Some(format!("warning {}: {}", name_of(warning.text().bytes()), advice::warning(warning)));
             }
-            EventLine::Plot
-            | EventLine::Swing { .. }
-            | EventLine::Guarded { .. }
-            | EventLine::Slip { .. }
-            | EventLine::State(_)
-            | EventLine::Calibrated { .. } => {}
+            _ => {}
         }
     }
 }

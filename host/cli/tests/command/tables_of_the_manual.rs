@@ -8,8 +8,8 @@ use control::settings::{Description, Setting};
 use expect_test::{ExpectFile, expect_file};
 use field::conditions::{Conditions, Parameter};
 use field::wiring::{self, Contact, PullUp};
-use link::advice;
 use link::settings::{help, name, unit};
+use link::{EVENTS, EventDescription, advice};
 use std::fmt::Write;
 use svg::node::element::tag::Type;
 use svg::parser::Event;
@@ -22,6 +22,26 @@ fn with_part(page: &ExpectFile, name: &str, part: &str) -> String {
     let (before, rest) = text.split_once(&begin).unwrap_or_else(|| panic!("no {begin:?}"));
     let (_, after) = rest.split_once(&end).unwrap_or_else(|| panic!("no {end:?}"));
     [before, &begin, "\n", part, "\n", &end, after].concat()
+}
+
+/// All events, and what their lines tell.
+fn events() -> String {
+    let mut table = "| event | value | meaning |\n| --- | --- | --- |\n".to_owned();
+    for EventDescription { meaning, beginning, values, .. } in EVENTS {
+        let names =
+            if beginning.is_empty() { "`plant`, `weed`, `unknown`".to_owned() } else { format!("`{beginning}`") };
+        writeln!(table, "| {names} | | {meaning} |").expect("a string takes all");
+        for value in values.iter().filter(|value| !value.key.is_empty()) {
+            let words = match value.kind {
+                "place" => "out\\|in",
+                "answer" => "yes\\|no",
+                "state" => "hold\\|work\\|alarm",
+                _ => "",
+            };
+            writeln!(table, "| | `{}={words}` | {} |", value.key, value.meaning).expect("a string takes all");
+        }
+    }
+    table
 }
 
 /// The texts of a drawing, each with its x and y.
@@ -69,6 +89,12 @@ fn the_wiring_table_is_the_pin_table() {
 fn the_settings_page_is_the_settings_table() {
     let page = expect_file!["../../../../docs/settings.md"];
     page.assert_eq(&with_part(&page, "settings", &settings()));
+}
+
+#[test]
+fn the_events_page_is_the_table_of_events() {
+    let page = expect_file!["../../../../docs/events.md"];
+    page.assert_eq(&with_part(&page, "events", &events()));
 }
 
 #[test]

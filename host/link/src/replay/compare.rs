@@ -1,7 +1,8 @@
 //! What a log tells beside what its replay tells.
 
 use super::replayed::{DETECTION_TICKS, Difference, Replayed, SWING_MS, SWING_TICKS};
-use crate::{Class, EventLine, advice};
+use crate::{EventLine, advice};
+use control::say::names;
 
 /// Farther than any detection's hold goes, 5 m at the default wheel.
 const FAR_TICKS: i32 = 10_000;
@@ -176,22 +177,12 @@ fn describe(heard: Option<&Heard>) -> String {
     let Some(heard) = heard else { return "none".to_owned() };
     match heard.event {
         EventLine::Detection { class, position, votes, hold, .. } => {
-            let class = match class {
-                Class::Plant => "plant",
-                Class::Weed => "weed",
-                Class::Unknown => "unknown",
-            };
-            format!("`{class} pos={position} votes={votes} hold={hold}`")
+            format!("`{} pos={position} votes={votes} hold={hold}`", names::class(class))
         }
         EventLine::Swing { out, position } => format!("`swing tool={} pos={position}`", if out { "out" } else { "in" }),
         EventLine::Alarm { alarm, position } => {
             format!("`alarm {} pos={position}`", advice::name(alarm))
         }
-        EventLine::Guarded { .. }
-        | EventLine::Slip { .. }
-        | EventLine::State(_)
-        | EventLine::Warning(_)
-        | EventLine::Calibrated { .. }
-        | EventLine::Plot => "something else".to_owned(),
+        _ => "something else".to_owned(),
     }
 }

@@ -263,27 +263,15 @@ impl<'a> Player<'a> {
     fn listen(&mut self) {
         let speed = self.speed().0;
         while let Some(event) = self.controller.next_event() {
-            let event = match event {
-                Event::Detection { vote, leading, spacing, plan } => EventLine::Detection {
-                    class: vote.class,
-                    position: leading.count(),
-                    votes: vote.votes,
-                    spacing: spacing.0,
-                    delay: plan.delay.0,
-                    hold: plan.hold.0,
-                    actuation: plan.actuation().0,
-                },
-                Event::Swing { out, position } => EventLine::Swing { out, position: position.count() },
-                Event::Alarm { .. } if std::mem::take(&mut self.swallows_alarm) => continue,
-                Event::Alarm { alarm, position } => EventLine::Alarm { alarm, position: position.count() },
+            match event {
+                Event::Alarm { .. } if std::mem::take(&mut self.swallows_alarm) => {}
+                Event::Detection { .. } | Event::Swing { .. } | Event::Alarm { .. } => {
+                    let event = EventLine::from(&event);
+                    self.heard.push(Heard { line: 0, steps: self.steps, event, speed, is_given: false });
+                }
                 // They rest on time, which the log has only roughly; or follow from the others.
-                Event::State(_)
-                | Event::Warning(_)
-                | Event::Calibrated { .. }
-                | Event::Guarded(_)
-                | Event::Slip { .. } => continue,
-            };
-            self.heard.push(Heard { line: 0, steps: self.steps, event, speed, is_given: false });
+                _ => {}
+            }
         }
     }
 

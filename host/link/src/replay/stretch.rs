@@ -146,10 +146,10 @@ impl<'a> Stretch<'a> {
     pub(super) fn place_of_change(&self, place: usize) -> Option<i32> {
         let mode = match &self.happened[place].1 {
             Happened::Event(EventLine::Alarm { position, .. }) => return Some(*position),
-            Happened::Event(EventLine::State(mode)) => mode,
+            Happened::Event(EventLine::State { mode }) => mode,
             _ => return None,
         };
-        let is_state = |(_, happened): &&(_, _)| matches!(happened, Happened::Event(EventLine::State(_)));
+        let is_state = |(_, happened): &&(_, _)| matches!(happened, Happened::Event(EventLine::State { .. }));
         // Behind the next change of state, a swing is that one's.
         let mut until_next = self.happened[place + 1..].iter().take_while(|happened| !is_state(happened));
         match (until_next.find_map(swing_or_status), mode) {
@@ -173,7 +173,7 @@ impl<'a> Stretch<'a> {
             statuses < 2
         });
         let told = soon.into_iter().find_map(|(_, happened)| match happened {
-            Happened::Event(EventLine::State(mode)) => Some(*mode),
+            Happened::Event(EventLine::State { mode }) => Some(*mode),
             _ => None,
         });
         told == Some(brings)
@@ -184,7 +184,7 @@ impl<'a> Stretch<'a> {
         let before = self.happened[..place].iter().rev().map(|(_, happened)| happened);
         before
             .take_while(|happened| !matches!(happened, Happened::Status(_) | Happened::Event(EventLine::Swing { .. })))
-            .any(|happened| matches!(happened, Happened::Event(EventLine::State(_))))
+            .any(|happened| matches!(happened, Happened::Event(EventLine::State { .. })))
     }
 
     /// The status that comes behind a place.

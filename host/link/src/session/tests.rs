@@ -134,7 +134,7 @@ fn settings_are_asked_for_again_whatever_has_changed_them() {
         let Some(Happening::Settings(settings)) = happened.last() else { panic!("{command}: {happened:?}") };
         assert_eq!(settings.get(settings::Setting::WheelMm), wheel_mm, "{command}");
     }
-    says.borrow_mut().extend(b"calibrated lead_out_ms=150 lead_in_ms=40\r\n");
+    says.borrow_mut().extend(b"calibrated lead_out_ms=150 lead_in_ms=40 set=yes\r\n");
     let happened = second(&mut session, now + Duration::from_secs(1));
     assert!(matches!(happened.as_slice(), [Happening::Event(..), Happening::Settings(_)]), "{happened:?}");
     assert!(session.command("set wheel_mm 9"));

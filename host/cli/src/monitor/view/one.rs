@@ -3,7 +3,7 @@
 
 use super::parts::{HOLD_KEY, colour, draw_line, draw_said, draw_top, ground, hold_style, tool_column};
 use crate::monitor::model::{Connection, Model, RowModel, Seen};
-use link::Class;
+use link::names;
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::{Color, Style, Stylize};
@@ -156,13 +156,8 @@ fn draw_ground(row: &RowModel, frame: &mut Frame, area: Rect) {
 
 fn draw_objects(machine: &RowModel, frame: &mut Frame, area: Rect) {
     let row = |seen: &Seen| {
-        let class = match seen.class {
-            Class::Plant => "plant",
-            Class::Weed => "weed",
-            Class::Unknown => "unknown",
-        };
         Row::new([
-            class.to_owned(),
+            names::class(seen.class).to_string(),
             seen.votes.to_string(),
             format!("{:.0} mm", machine.millimetres(seen.width)),
             format!("{:.0} mm", machine.millimetres(seen.spacing)),
