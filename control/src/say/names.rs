@@ -1,4 +1,4 @@
-//! What things are called: the text of each of the machine's [words](crate::say::words), and which of them was typed.
+//! What things are called: the text of each of the machine's words (`words`), and which of them was typed.
 
 use crate::{
     alarm::{Alarm, Warning},
@@ -75,7 +75,7 @@ pub fn answer(yes: bool) -> Text {
     if yes { texts::YES } else { texts::NO }
 }
 
-/// What a [`label`] stands for.
+/// What a [label](mod@crate::ground::class::label) stands for.
 pub fn label(label: u8) -> Text {
     if label == label::PLANT { Argument::Plant.text() } else { Argument::Weed.text() }
 }
