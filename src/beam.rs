@@ -20,8 +20,9 @@ use crate::{
 use avr_device::atmega328p::{EXINT, PORTB};
 use control::{measure::readings::Edge, units::Position};
 
-/// Edges that can wait for the loop, which a sensor with a response of 1 ms cannot make in less than 16 ms.
-const SLOTS: usize = 16;
+/// Edges that can wait for the loop, which a sensor with a response of 1 ms cannot make in less than 8 ms. No turn of the loop takes a
+/// tenth of that (tests/end_to_end/turns_of_the_loop.rs); the longest that can be proved has as many edges in it as can wait.
+const SLOTS: usize = 8;
 
 /// Edges that wait for the loop: 14 bits of the count between the beams' levels, the first's below and the second's above them.
 static EDGES: Ring<SLOTS> = Ring::new();

@@ -21,11 +21,12 @@ use field::verdict::Timing;
 use knn::MAX_K;
 use model_test::{cases, is_thorough};
 use rayon::prelude::*;
+use std::fs;
 use std::path::Path;
 use std::process::Command;
 use trial::firmware::workspace_root;
-use uno::Uno;
 use uno::elf::Image;
+use uno::{CYCLES_PER_SECOND, Uno};
 
 /// Counts in a second beside which the loop still gets time to answer.
 const BUSY_PER_S: u64 = 150_000;
@@ -150,6 +151,17 @@ fn no_count_is_lost_at_the_rate_that_is_never_lost() {
     println!("{} counts a second, {} cycles of wait", edges.never_lost_per_s, edges.wait_cycles);
     // A rate whose counts go up in quarters.
     roll(&mut woken_up(), edges.never_lost_per_s / 100 * 100);
+}
+
+#[test]
+fn no_turn_lasts_until_the_heartbeat_takes_the_loop_for_stalled() {
+    let source = fs::read_to_string(workspace_root().join("src/heartbeat.rs")).expect("it is there");
+    let periods = source.split("const PERIODS: u8 = ").nth(1).and_then(|rest| rest.split(';').next());
+    let periods: u64 = periods.and_then(|periods| periods.parse().ok()).expect("it says when");
+    // A period of the clock's interrupt is 1.024 ms.
+    let heartbeat = periods * 1024 * CYCLES_PER_SECOND / 1_000_000;
+    let turn = proved().turn.and_then(|turn| turn.cycles).expect("every loop in it has a bound");
+    assert!(turn < heartbeat, "{turn} of {heartbeat} cycles");
 }
 
 #[test]
