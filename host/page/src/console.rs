@@ -143,7 +143,7 @@ pub fn settings(mut settings: Settings, values: &BTreeMap<String, u16>) -> (Sett
 mod tests {
     use super::*;
     use expect_test::expect_file;
-    use link::{EVENTS, ValueDescription};
+    use link::{EVENTS, Mode, ValueDescription};
 
     /// A comment, if there is something to say.
     fn comment(indent: &str, meaning: &str) -> String {
@@ -177,13 +177,15 @@ mod tests {
             format!("{about}export interface {} {{\n    readonly is: \"{is}\";\n{fields}}}\n\n", event.name)
         });
         let shapes: String = shapes.collect();
+        let modes = [Mode::Hold, Mode::Work, Mode::Alarm].map(|mode| format!("\"{}\"", mode.name())).join(" | ");
         let list = |line: fn(&str) -> String| EVENTS.iter().map(|event| line(event.name)).collect::<String>();
         let [types, names] =
             [list(|name| format!("\n    | {name}")), list(|name| format!("    \"{}\",\n", camel_case(name)))];
         expect_file!["../../../page/src/link/events.ts"].assert_eq(&format!(
             "// What the machine tells by itself: the table of events in control/src/say/event_table.rs, as types.\n\
              // `UPDATE_EXPECT=1 cargo test -p page events` writes this file.\n\n\
-             import type {{ Mode }} from \"./grammar.ts\";\n\n\
+             /** What the machine is doing. */\n\
+             export type Mode = {modes};\n\n\
              {shapes}/** Points of a plotter's curves. */\n\
              export interface Plot {{\n    readonly is: \"plot\";\n}}\n\n\
              /** What the machine tells by itself. */\n\

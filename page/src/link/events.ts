@@ -1,7 +1,8 @@
 // What the machine tells by itself: the table of events in control/src/say/event_table.rs, as types.
 // `UPDATE_EXPECT=1 cargo test -p page events` writes this file.
 
-import type { Mode } from "./grammar.ts";
+/** What the machine is doing. */
+export type Mode = "hold" | "work" | "alarm";
 
 /** A detection was seen in full and classified. */
 export interface Detection {

@@ -1,14 +1,10 @@
-// What a line of the machine means. This is the page's one door to the console's grammar: whoever wants to know what was
-// said asks `read`, and nobody else takes a line apart. Behind it is the project's own Rust (host/link/src/said.rs), of which
-// these are the types.
+// What a line of the machine means. This is the page's one door to the console's grammar: `read` tells what was said, and nothing
+// else takes a line apart. Behind it is the project's own Rust (host/link/src/console_line.rs), of which these are the types.
 //
 // Commands are put together where they are typed; their words stand in the firmware's help.
 
 import { ask } from "../core.ts";
-import { TOLD, type Told } from "./events.ts";
-
-/** What the machine is doing. */
-export type Mode = "hold" | "work" | "alarm";
+import { type Mode, TOLD, type Told } from "./events.ts";
 
 /** The first line of the answer to `status`. Positions are the encoder's counts. */
 export interface Status {

@@ -2,8 +2,8 @@
 // operator.
 
 import faults from "faults.json";
-import type { Detection, Told } from "../link/events.ts";
-import type { Mode, Setting, Status } from "../link/grammar.ts";
+import type { Detection, Mode, Told } from "../link/events.ts";
+import type { Setting, Status } from "../link/grammar.ts";
 import type { Happening } from "../link/session.ts";
 import { advice, english, type Plain, quantity, say, told } from "../words/words.ts";
 
