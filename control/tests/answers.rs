@@ -362,9 +362,17 @@ fn what_is_tried_on_the_bench_is_refused_at_work_with_what_would_be_right() {
     assert_eq!(ask(&mut machine, "servo 499"), ["error: servo takes a whole number from 500 to 2500"]);
     assert_eq!(ask(&mut machine, "revert"), ["error: no settings are saved, save does it"]);
     ask(&mut machine, "start");
-    for line in
-        ["servo in", "servo out", "calibrate start", "calibrate servo", "test row", "defaults", "revert", "save"]
-    {
+    for line in [
+        "servo in",
+        "servo out",
+        "calibrate start",
+        "calibrate servo",
+        "test row",
+        "test watchdog",
+        "defaults",
+        "revert",
+        "save",
+    ] {
         assert_eq!(ask(&mut machine, line), ["error: the machine is at work, hold first"], "{line}");
     }
 }

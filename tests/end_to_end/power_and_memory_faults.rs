@@ -95,6 +95,24 @@ fn a_loop_that_stalls_has_the_tool_put_out_and_the_machine_reset_and_the_cause_t
 }
 
 #[test]
+fn the_operator_has_the_watchdog_restart_a_machine_that_stands_in_hold() {
+    let mut run = at_work();
+    ask(&mut run.uno, "test watchdog");
+    ask(&mut run.uno, "hold");
+    // It still rolls, as far as it knows.
+    let rolls = refusal(&mut run.uno, "test watchdog");
+    assert!(rolls.contains("stand"), "{rolls}");
+    run_for_ms(&mut run.uno, 2000);
+    ask(&mut run.uno, "servo in");
+    run_for_ms(&mut run.uno, 100);
+    let typed = run.uno.cycle();
+    run.uno.send(b"test watchdog\n");
+    let greeting = greeting_with_the_tool_out_since(&mut run.uno, typed + CYCLES_PER_SECOND / 25);
+    assert!(greeting.contains("reset by loop_stalled, state hold,"), "{greeting:?}");
+    assert_eq!(run.uno.resets().len(), 1);
+}
+
+#[test]
 fn a_stack_that_nearly_reaches_the_variables_is_an_alarm() {
     let mut run = at_work();
     let free = number(&status(&mut run.uno), "stack_free");

@@ -58,6 +58,8 @@ pub enum Command {
         /// The speed of the machine that is played, in mm/s.
         speed_mm_s: u16,
     },
+    /// `test watchdog`.
+    TestWatchdog,
     /// `start`, or `start now`.
     Start {
         /// At once, over unseen ground.
@@ -207,6 +209,7 @@ commands! {
     Calibrate Start => Command::CalibrateStart;
     Calibrate Servo => Command::CalibrateServo;
     Test Row => Command::TestRow { speed_mm_s: TEST_SPEED_MM_S };
+    Test Watchdog => Command::TestWatchdog;
     Help => Command::Help;
     Status => Command::Status;
     Get => Command::GetAll;
@@ -352,6 +355,7 @@ mod tests {
             (b"servo 1750", Command::Servo(1750)),
             (b"test row", Command::TestRow { speed_mm_s: 500 }),
             (b"test row 700", Command::TestRow { speed_mm_s: 700 }),
+            (b"test watchdog", Command::TestWatchdog),
             (b"plot on", Command::Plot(Plot::Arduino)),
             (b"plot off", Command::Plot(Plot::Off)),
             (b"plot teleplot", Command::Plot(Plot::Teleplot)),
@@ -409,6 +413,7 @@ mod tests {
             (b"servo in now", ParseError::Usage(Word::Servo)),
             (b"test", ParseError::Usage(Word::Test)),
             (b"test plants", ParseError::Usage(Word::Test)),
+            (b"test watchdog now", ParseError::Usage(Word::Test)),
             (b"test row fast", ParseError::Usage(Word::Test)),
             (b"plot", ParseError::Usage(Word::Plot)),
             (b"plot start", ParseError::Usage(Word::Plot)),

@@ -46,6 +46,7 @@ where
         Command::ServoOut => done(controller.servo_out(), None),
         Command::Servo(pulse_us) => done(controller.servo_by_hand(pulse_us), None),
         Command::TestRow { speed_mm_s } => done(controller.test_row(speed_mm_s), None),
+        Command::TestWatchdog => done(controller.test_watchdog(), None),
         Command::Plot(plot) => {
             controller.set_plot(plot);
             Answer::Ok

@@ -286,15 +286,15 @@ commands! {
     Save "",
         "keep the settings";
     Revert "",
-        "back to the saved settings";
+        "restore saved settings";
     Defaults "",
-        "back to the settings of a new machine";
+        "restore factory settings";
     Calibrate " start|servo|MM [force]",
-        "start, roll, give the distance; or time the servo";
+        "measure a distance, or time the servo";
     Servo " in|out|US",
         "move the tool";
-    Test " row [MM_S]",
-        "swing as for a row of plants";
+    Test " row [MM_S]|watchdog",
+        "swing as for plants, or reset";
     Start " [now]",
         "weed; now, over unseen ground";
     Hold "",
@@ -302,19 +302,19 @@ commands! {
     Clear "",
         "clear an alarm";
     Events " on|off",
-        "tell of plants, swings and alarms";
+        "plants, swings and alarms";
     Plot " on|off|teleplot",
         "curves for Arduino, or Teleplot";
     Label " plant|weed [force]",
-        "teach what the last object was";
+        "label the last detection";
     Teach " N|plant|weed",
-        "teach an example, feature by feature";
+        "teach an example";
     Examples "",
         "all examples";
     Forget " N|all",
         "forget field examples";
     Dump "",
-        "the last 16 objects";
+        "the last 16 detections";
     Version "",
-        "name the firmware";
+        "the firmware";
 }

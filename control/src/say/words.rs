@@ -81,6 +81,8 @@ pub enum Argument {
     Out,
     /// Of `test`.
     Row,
+    /// Of `test`.
+    Watchdog,
     /// Of `plot`.
     Teleplot,
     /// Of `label`.
@@ -200,6 +202,7 @@ words! {
         In = "in",
         Out = "out",
         Row = "row",
+        Watchdog = "watchdog",
         Teleplot = "teleplot",
         Plant = "plant",
         Weed = "weed",

@@ -98,6 +98,21 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         Ok(())
     }
 
+    /// Stops the loop behind the next turn, so that the heartbeat and the watchdog show that they work.
+    ///
+    /// # Errors
+    /// [`CommandError::NotInHold`], [`CommandError::AlarmLatched`] and [`CommandError::Rolls`].
+    pub fn test_watchdog(&mut self) -> Result<(), CommandError> {
+        self.expect_rest()?;
+        (self.bench, self.stops) = (Bench::Idle, true);
+        Ok(())
+    }
+
+    /// Whether the loop is to stop, see [`test_watchdog`](Self::test_watchdog).
+    pub const fn stops_the_loop(&self) -> bool {
+        self.stops
+    }
+
     /// Carries on with what is being tried; whether it has the tool out, if it says.
     pub(super) fn try_out(&mut self) -> Option<bool> {
         let Readings { now, end_switch_on, .. } = self.sensors.readings;

@@ -191,6 +191,9 @@ impl Machine for Decisions {
         let (inside, outside) = (pulse_of(Setting::ServoInUs), pulse_of(Setting::ServoOutUs));
         let Orders { pulse, pulse_out, .. } = self.orders;
         prop_assert_eq!(pulse_out, outside);
+        if self.weeder.stops_the_loop() {
+            prop_assert!(pulse == outside && self.weeder.state() == State::Hold, "the loop stops with a pulse of {pulse}");
+        }
         let (state, out) = (self.weeder.state(), self.weeder.tool_out());
         if state == State::Work {
             prop_assert_eq!(pulse, if out { outside } else { inside });
@@ -214,6 +217,10 @@ impl Machine for Decisions {
 
     fn state(&self) -> State {
         self.weeder.state()
+    }
+
+    fn stops_the_loop(&self) -> bool {
+        self.weeder.stops_the_loop()
     }
 
     fn reason(&self) -> Option<Reason> {

@@ -7,7 +7,7 @@ use crate::error::CheckError;
 use crate::plan::Plan;
 use crate::servo::{self, Measured, ORIGIN};
 use crate::tester::{Tester, ms};
-use crate::wiring::{Weeder, reset};
+use crate::wiring::{self, Weeder, reset};
 use control::alarm::Alarm;
 use control::ground::examples::EXAMPLES;
 use link::examples::{self, Taught};
@@ -25,8 +25,11 @@ const PULLED_MS: u32 = 20;
 /// Time in which the firmware starts behind its bootloader, in ms.
 const START_MS: u32 = 3000;
 
-/// The same for a virtual Uno, which has none.
-const SIMULATED_START_MS: u32 = 300;
+/// The same for a virtual Uno, which has none: the heartbeat's 200 ms are the longest part of it.
+const SIMULATED_START_MS: u32 = 500;
+
+/// Before the end of this time, pulses are there again for so long, in ms: five frames.
+const AGAIN_MS: u32 = 100;
 
 /// The resets come within this time of the command, in ms. A byte takes 3.4 ms, and in simulation a changed number is there after 50 ms.
 const SAVE_MS: u32 = 120;
@@ -44,33 +47,44 @@ pub enum Way {
     Pin,
     /// The computer opens the port, which pulls it by the modem line DTR.
     Port,
+    /// `test watchdog` stops the main loop, in hold.
+    Watchdog,
 }
 
-/// What came of a reset at work.
+impl Way {
+    /// Whether the weeder works and rolls then. Only a weeder that stands in hold stops its loop.
+    pub const fn is_at_work(self) -> bool {
+        !matches!(self, Self::Watchdog)
+    }
+}
+
+/// What came of a reset.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct AtWork {
+pub struct Restart {
     /// From the last pulse's end to the first one's beginning behind the reset, in ms by the weeder's clock; infinite if none came.
     pub without_pulse_ms: f64,
     /// Whether all pulses behind it are for out, and the weeder is not at work.
     pub is_out: bool,
 }
 
-/// Resets the weeder at work, while it rolls with the tool in.
+/// Resets the weeder, if it can be at work while it rolls with the tool in.
 ///
 /// # Errors
 /// If a board does not answer.
-pub fn at_work(
+pub fn restart(
     way: Way,
     weeder: &mut Weeder,
     tester: &mut Tester,
     clock_ratio: f64,
     is_simulated: bool,
-) -> Result<AtWork, CheckError> {
+) -> Result<Restart, CheckError> {
     weeder.to_hold()?;
-    weeder.ask("start now")?;
-    let mut plan = Plan::new();
-    plan.roll(ROLL_COUNTS, ROLL_COUNTS_PER_S);
-    tester.begin(&plan.finish())?;
+    if way.is_at_work() {
+        weeder.ask("start now")?;
+        let mut plan = Plan::new();
+        plan.roll(ROLL_COUNTS, ROLL_COUNTS_PER_S);
+        tester.begin(&plan.finish())?;
+    }
     let mut records = tester.record_for_ms(300)?;
     let reset = tester.command(&Command::Clock)?.time;
     match way {
@@ -80,23 +94,26 @@ pub fn at_work(
             tester.command(&Command::Reset { pulled: false })?;
         }
         Way::Port => weeder.open_again()?,
+        Way::Watchdog => weeder.send("test watchdog")?,
     }
     records.extend(tester.record_for_ms(if is_simulated { SIMULATED_START_MS } else { START_MS })?);
-    if way == Way::Pin {
-        weeder.greeting()?;
+    let ended = tester.command(&Command::Clock)?.time;
+    if way != Way::Port && weeder.greeting()?.is_none() {
+        // What is left out must not end the check.
+        wiring::reset(weeder, tester)?;
     }
     tester.command(&Command::Stop)?;
     let status = weeder.status()?;
     let pulses = servo::pulses(&records, reset);
-    // While it is reset, pulses are missing; a machine that works has one every 20 ms.
+    // While it is reset, pulses are missing; a machine that runs has one every 20 ms.
     let gap = |number: &usize| pulses[number + 1].pulse.rise - pulses[*number].pulse.fall;
     let longest = (0..pulses.len().saturating_sub(1)).max_by_key(gap);
-    let came_back = pulses.last().is_some_and(|last| last.pulse.rise > ORIGIN + u64::from(ms(SIMULATED_START_MS / 2)));
-    let longest = longest.filter(|_| came_back);
+    let again = ORIGIN + u64::from(ended.wrapping_sub(reset).saturating_sub(ms(AGAIN_MS)));
+    let longest = longest.filter(|_| pulses.last().is_some_and(|last| last.pulse.rise > again));
     let in_ms = |cycles: u64| cycles as f64 * 1000.0 / CYCLES_PER_SECOND as f64 * clock_ratio;
     let is_wide = |measured: &Measured| measured.pulse.width_us() * clock_ratio > 1750.0;
     let stays_out = longest.is_some_and(|number| pulses[number + 1..].iter().all(is_wide));
-    Ok(AtWork {
+    Ok(Restart {
         without_pulse_ms: longest.map_or(f64::INFINITY, |number| in_ms(gap(&number))),
         is_out: stays_out && status.mode != Mode::Work && status.tool_out,
     })

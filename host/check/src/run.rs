@@ -197,18 +197,20 @@ fn resets(weeder: &mut Weeder, tester: &mut Tester, extent: Extent, ratio: f64) 
     resets::with_an_example(weeder, tester, |weeder, tester| {
         let before = Kept::read(weeder, tester)?;
         let mut figures = Vec::new();
-        for (way, id, words) in
-            [(Way::Pin, "pin", "reset by its pin"), (Way::Port, "port", "reset by opening the port")]
-        {
-            let at_work = resets::at_work(way, weeder, tester, ratio, extent.simulated)?;
-            let what = |what: &str| format!("{words}, at work and rolling: {what}");
+        for (way, id, words) in [
+            (Way::Pin, "pin", "reset by its pin, at work and rolling"),
+            (Way::Port, "port", "reset by opening the port, at work and rolling"),
+            (Way::Watchdog, "watchdog", "main loop stopped by `test watchdog`, in hold"),
+        ] {
+            let restart = resets::restart(way, weeder, tester, ratio, extent.simulated)?;
+            let what = |what: &str| format!("{words}: {what}");
             // A bootloader takes 2 s at most, and a virtual Uno has none: only the whole is limited.
             figures.extend([
                 Figure::new(
                     &format!("reset_{id}_pulse"),
                     &what("without a pulse"),
                     "ms",
-                    at_work.without_pulse_ms,
+                    restart.without_pulse_ms,
                     2500.0,
                 )
                 .at_most(2500.0),
@@ -216,7 +218,7 @@ fn resets(weeder: &mut Weeder, tester: &mut Tester, extent: Extent, ratio: f64) 
                     &format!("reset_{id}_out"),
                     &what("the tool is out behind it"),
                     "",
-                    f64::from(u8::from(at_work.is_out)),
+                    f64::from(u8::from(restart.is_out)),
                     0.0,
                 )
                 .at_least(1.0),

@@ -108,6 +108,9 @@ pub trait Machine: Sized {
     /// The state, as far as it is known.
     fn state(&self) -> State;
 
+    /// Whether the loop is to stop, as `test watchdog` has it.
+    fn stops_the_loop(&self) -> bool;
+
     /// Why the tool is out, if that can be seen.
     fn reason(&self) -> Option<Reason>;
 

@@ -237,6 +237,7 @@ fn line() -> BoxedStrategy<String> {
         "servo 1750",
         "servo 9999",
         "test row",
+        TEST_WATCHDOG,
         "start",
         "start now",
         "hold",

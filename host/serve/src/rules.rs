@@ -106,7 +106,8 @@ fn why_not(command: Command) -> Option<Forbidden> {
         | Command::ServoIn
         | Command::ServoOut
         | Command::Servo(_)
-        | Command::TestRow { .. } => Some(Forbidden::MovesTool),
+        | Command::TestRow { .. }
+        | Command::TestWatchdog => Some(Forbidden::MovesTool),
         Command::Set(..)
         | Command::Save
         | Command::Revert
@@ -133,7 +134,7 @@ mod tests {
     const HARMLESS: [&str; 11] =
         ["help", "help k", "status", "get", "get k", "events on", "examples", "dump", "version", "  status ", "get  k"];
     const STARTS: [&str; 4] = ["start", "clear", " start", "clear  "];
-    const NEVER: [(&str, Forbidden); 26] = [
+    const NEVER: [(&str, Forbidden); 27] = [
         ("start now", Forbidden::Unseen),
         ("  start   now ", Forbidden::Unseen),
         ("servo in", Forbidden::MovesTool),
@@ -141,6 +142,7 @@ mod tests {
         ("servo 1500", Forbidden::MovesTool),
         ("test row", Forbidden::MovesTool),
         ("test row 900", Forbidden::MovesTool),
+        ("test watchdog", Forbidden::MovesTool),
         ("calibrate servo", Forbidden::MovesTool),
         ("calibrate start", Forbidden::ChangesMachine),
         ("calibrate 10000", Forbidden::ChangesMachine),

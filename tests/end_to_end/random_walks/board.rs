@@ -343,6 +343,10 @@ impl Machine for Board {
         self.state
     }
 
+    fn stops_the_loop(&self) -> bool {
+        false
+    }
+
     fn reason(&self) -> Option<Reason> {
         None
     }

@@ -3,22 +3,22 @@
 
 #[rustfmt::skip]
 pub(super) const FRAGMENTS: &[&str] = &[
-    "\r\n", " [", " a ", " m", " mm", " ms", " o", " ob", " obj", " obje", " on", " p",
-    " s", " t", " ta", " take", " th", " the ", " the tool ", " ti", " to", " to ", " to the ", " tool",
-    "# ", "#,", "#,#,", ", ", ", or ", "0 ", "00", "100", ":#", "; ", "; 0 ", "; 0 n",
-    "=#", "=# ", "_m", "_mm", "_mm,", "_ms", "_s", "a ", "ac", "ach", "ack", "al",
-    "alar", "alarm ", "ali", "alibr", "all", "am", "an", "an ", "and", "and ", "ar", "ar ",
-    "are ", "at", "at ", "ate", "back", "be", "beam", "beam_", "bel", "br", "calibr", "calibrate",
-    "ce", "ch", "chan", "ck", "co", "coder", "comm", "con", "ct", "d ", "d_", "de",
-    "der", "di", "du", "e ", "e the ", "ee", "eed", "eed_mm", "el", "en", "en ", "encoder",
-    "er", "ervo", "ex", "exam", "examp", "example", "fa", "fi", "fir", "first", "for", "fr",
-    "fro", "ga", "ge", "he ", "hol", "il", "in", "ind", "ing", "is", "is ", "it",
-    "ke", "l ", "la", "le", "lea", "lead_", "li", "list", "lo", "m ", "mm", "nam",
-    "name", "no", "not ", "now", "of", "off", "ol", "on", "one", "op", "or", "or ",
-    "ou", "oun", "out", "ow", "pl", "plan", "plant", "re", "rol", "row", "s ", "s a ",
-    "s th", "s=# ", "s_", "sa", "save", "se", "servo", "servo_", "set", "sett", "setting", "sp",
-    "speed_mm", "st", "star", "start", "stat", "sw", "t ", "te", "ter", "th", "the ", "to",
-    "tool", "tool ", "ul", "un", "unse", "us", "ve", "ver", "vo", "wh", "whee", "y ",
+    "\r\n", " [", " mm", " ms", " p", " s", " ta", " take", "# ", "#,", "#,#,", ", ",
+    ", or ", "0 ", "00 ", ":#", "; ", "; 0 ", "; 0 n", "=#", "=# ", "_m", "_mm", "_mm,",
+    "_ms", "_s", "a ", "ac", "ack", "al", "alar", "alarm ", "ali", "alibr", "all", "am",
+    "ame", "an", "an ", "and", "and ", "ar", "ar ", "are ", "at", "at ", "atch", "ate",
+    "be", "beam", "beam_", "bel", "bj", "bje", "bjec", "br", "calibr", "calibrate", "ce", "ch",
+    "ch ", "chan", "ck", "co", "coder", "comm", "con", "d ", "d b", "d_", "de", "der",
+    "di", "do", "du", "e ", "ee", "eed", "eed ", "eed_mm", "el", "em", "en", "en ",
+    "encoder", "er", "ere ", "ervo", "ex", "exam", "examp", "example", "fa", "fi", "fir", "first",
+    "for", "force", "fr", "fro", "from ", "ga", "ge", "hol", "il", "in", "ind", "ing",
+    "ing ", "is", "is ", "ke", "know", "known", "l ", "la", "le", "lea", "lead_", "li",
+    "list", "lists th", "lo", "lost", "m ", "mm", "ms", "name", "no", "not ", "now", "of",
+    "off", "ol", "on", "one", "op", "or", "or ", "ou", "oun", "out", "ow", "p ",
+    "pl", "plan", "plant", "re", "row", "s ", "s th", "s=# ", "s_", "sa", "save", "se",
+    "servo", "servo_", "set", "sett", "setting", "sp", "speed_mm", "st", "st ", "star", "stat", "sw",
+    "t ", "ta", "te", "ter", "th", "the ", "the tool ", "ti", "to", "to ", "tool", "tool ",
+    "ts ", "ul", "un", "unse", "us", "ve", "ver", "vo", "wh", "whee", "wi", "y ",
 ];
 
 #[cfg(test)]
