@@ -5,12 +5,19 @@ mod common;
 use check::alarms::{Scene, play};
 use check::pair::Wiring;
 use check::rates::{self, Turning};
+use check::resets::Way;
 use check::{resets, row, servo, wiring};
-use common::boards;
+use common::{boards, boards_with};
 use field::wiring as pins;
+use object::{File, Object, ObjectSection};
 use std::cell::{Cell, RefCell};
+use std::fs;
+use std::io::Write;
+use std::path::Path;
 use std::rc::Rc;
+use tempfile::NamedTempFile;
 use tester_core::pins::Line;
+use trial::firmware;
 use uno::{Pin, PinChange};
 
 /// What the check says of these wires.
@@ -233,6 +240,47 @@ fn a_channel_that_falls_silent_on_the_way_costs_counts_in_a_row() {
     let trial = row::trial(3, 1, 2.5).expect("it grows");
     let outcome = row::weed(&trial, &mut weeder, &mut tester, 1.003).expect("both answer");
     assert!(outcome.lost_counts > 0, "{}", outcome.lost_counts);
+}
+
+/// The firmware without what writes WDTCSR, so that the watchdog is never on.
+fn without_watchdog() -> NamedTempFile {
+    /// `sts 0x60, r0`; the register is in the bits that are masked out.
+    const STS: (u16, u16) = (0x9200, 0xFE0F);
+    let mut bytes = fs::read(firmware::build().expect("the weeder's firmware is built")).expect("it is there");
+    let code = {
+        let elf = File::parse(&*bytes).expect("it is an ELF");
+        let (start, length) = elf.section_by_name(".text").and_then(|text| text.file_range()).expect("it has code");
+        start as usize..(start + length) as usize
+    };
+    let mut words = bytes[code].as_chunks_mut::<2>().0.iter_mut().peekable();
+    let mut writes = 0;
+    while let Some(word) = words.next() {
+        if u16::from_le_bytes(*word) & STS.1 == STS.0
+            && let Some(address) = words.next_if(|address| **address == [0x60, 0])
+        {
+            (*word, *address) = ([0; 2], [0; 2]);
+            writes += 1;
+        }
+    }
+    assert!(writes >= 4, "{writes}");
+    let mut file = NamedTempFile::new().expect("there is room for a file");
+    file.write_all(&bytes).expect("there is room for a file");
+    file
+}
+
+#[test]
+fn a_weeder_without_a_watchdog_is_named() {
+    let restart = |elf: &Path| {
+        let (_, mut weeder, mut tester) = boards_with(elf, Wiring::right());
+        let restart = resets::restart(Way::Watchdog, &mut weeder, &mut tester, 1.003, true).expect("both answer");
+        // The check goes on.
+        weeder.ask("get").expect("it is reset by its pin, and answers");
+        restart
+    };
+    let right = restart(&firmware::build().expect("the weeder's firmware is built"));
+    assert!(right.is_out && right.without_pulse_ms < 100.0, "{right:?}");
+    let dead = restart(without_watchdog().path());
+    assert!(!dead.is_out && dead.without_pulse_ms.is_infinite(), "{dead:?}");
 }
 
 #[test]

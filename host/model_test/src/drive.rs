@@ -12,7 +12,7 @@ pub use console::is_end;
 use crate::{
     machine::{Checked, Machine, World},
     model::{Model, Stretch},
-    run::{Beginning, Run, Step, TICKS_A_MM},
+    run::{Beginning, Run, Step, TEST_WATCHDOG, TICKS_A_MM},
     speeds::Speeds,
 };
 use control::{

@@ -5,6 +5,7 @@ use check::tester::Tester;
 use check::wiring::Weeder;
 use link::Link;
 use std::cell::RefCell;
+use std::path::Path;
 use std::rc::Rc;
 use trial::firmware;
 
@@ -16,9 +17,13 @@ pub fn boards(wiring: Wiring) -> (Weeder, Tester) {
 
 /// The same, with the Unos to look at.
 pub fn boards_and_pair(wiring: Wiring) -> (Rc<RefCell<Pair>>, Weeder, Tester) {
+    boards_with(&firmware::build().expect("the weeder's firmware is built"), wiring)
+}
+
+/// The same with another firmware of the weeder.
+pub fn boards_with(weeder: &Path, wiring: Wiring) -> (Rc<RefCell<Pair>>, Weeder, Tester) {
     let tester = firmware::build_tester().expect("the tester's firmware is built");
-    let weeder = firmware::build().expect("the weeder's firmware is built");
-    let pair = Rc::new(RefCell::new(Pair::power_up(&tester, &weeder, &[], wiring).expect("both start")));
+    let pair = Rc::new(RefCell::new(Pair::power_up(&tester, weeder, &[], wiring).expect("both start")));
     let tester = Tester::over(PairPort { pair: Rc::clone(&pair), side: Side::Tester }).expect("the tester answers");
     let opened = Rc::clone(&pair);
     let open = move || {
