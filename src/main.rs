@@ -97,11 +97,10 @@ fn run(typed: &mut LineBuffer, console: &mut Console, asleep: &mut UninitWeeder)
         let readings = read();
         beam.watch_second(controller.has_second_beam());
         let orders = controller.turn(readings, beam.edges());
-        heartbeat::beat(orders.pulse_out);
-        servo.command(orders.pulse, orders.gap_ms);
-        while controller.stops_the_loop() {
-            core::hint::spin_loop();
+        if controller.has_heartbeat() {
+            heartbeat::beat(orders.pulse_out);
         }
+        servo.command(orders.pulse, orders.gap_ms);
         let Ok(()) = lamp.set_state(controller.lamp_is_lit().into());
 
         // A turn has little time for the console: some bytes, or one thing that takes longer than a byte does. One that

@@ -76,8 +76,8 @@ pub struct Controller<C, M> {
     leads_are_old: bool,
     /// Whether this turn has done what takes long.
     turn_spent: bool,
-    /// Whether the loop is to stop.
-    stops: bool,
+    /// Whether the machine waits for the watchdog to reset it.
+    tests_watchdog: bool,
     /// Lines that were not understood, or came with a hole in them.
     mistakes: u16,
     /// Detections that were narrower than any plant or weed.
@@ -116,7 +116,7 @@ impl<C: Classifier, M: Memory> Uninit<C, M> {
             tool: Tool::NONE,
             leads_are_old: false,
             turn_spent: false,
-            stops: false,
+            tests_watchdog: false,
             mistakes: 0,
             dust: 0,
             classifying: Detection::NONE,

@@ -100,11 +100,13 @@ fn the_operator_has_the_watchdog_restart_a_machine_that_stands_in_hold() {
     let works = refusal(&mut run.uno, "test watchdog");
     assert!(works.contains("hold first"), "{works}");
     ask(&mut run.uno, "hold");
-    run_for_ms(&mut run.uno, 2000);
+    run.roll_to_the_end();
+    run_for_ms(&mut run.uno, 1000);
     ask(&mut run.uno, "servo in");
     run_for_ms(&mut run.uno, 100);
     let typed = run.uno.cycle();
-    run.uno.send(b"test watchdog\n");
+    ask(&mut run.uno, "test watchdog");
+    // Two frames later at most, the servo has the pulse for out, and keeps it.
     let greeting = greeting_with_the_tool_out_since(&mut run.uno, typed + CYCLES_PER_SECOND / 25);
     assert!(greeting.contains("reset by loop_stalled, state hold,"), "{greeting:?}");
     assert_eq!(run.uno.resets().len(), 1);

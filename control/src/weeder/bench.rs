@@ -98,19 +98,19 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         Ok(())
     }
 
-    /// Stops the loop behind the next turn, so that the heartbeat and the watchdog show that they work.
+    /// Takes the tool out and ends the loop's heartbeat, as if the loop had stopped: the watchdog resets the machine.
     ///
     /// # Errors
     /// [`CommandError::NotInHold`], [`CommandError::AlarmLatched`] and [`CommandError::Rolls`].
     pub fn test_watchdog(&mut self) -> Result<(), CommandError> {
         self.expect_rest()?;
-        (self.bench, self.stops) = (Bench::Idle, true);
+        (self.bench, self.tests_watchdog) = (Bench::Idle, true);
         Ok(())
     }
 
-    /// Whether the loop is to stop, see [`test_watchdog`](Self::test_watchdog).
-    pub const fn stops_the_loop(&self) -> bool {
-        self.stops
+    /// Whether the loop is to show that it turns; not from [`test_watchdog`](Self::test_watchdog) to the reset.
+    pub const fn has_heartbeat(&self) -> bool {
+        !self.tests_watchdog
     }
 
     /// Carries on with what is being tried; whether it has the tool out, if it says.

@@ -191,8 +191,8 @@ impl Machine for Decisions {
         let (inside, outside) = (pulse_of(Setting::ServoInUs), pulse_of(Setting::ServoOutUs));
         let Orders { pulse, pulse_out, .. } = self.orders;
         prop_assert_eq!(pulse_out, outside);
-        if self.weeder.stops_the_loop() {
-            prop_assert!(pulse == outside && self.weeder.state() == State::Hold, "the loop stops with a pulse of {pulse}");
+        if !self.weeder.has_heartbeat() {
+            prop_assert!(pulse == outside && self.weeder.state() == State::Hold, "a pulse of {pulse} when it tests the watchdog");
         }
         let (state, out) = (self.weeder.state(), self.weeder.tool_out());
         if state == State::Work {
@@ -219,8 +219,8 @@ impl Machine for Decisions {
         self.weeder.state()
     }
 
-    fn stops_the_loop(&self) -> bool {
-        self.weeder.stops_the_loop()
+    fn has_heartbeat(&self) -> bool {
+        self.weeder.has_heartbeat()
     }
 
     fn reason(&self) -> Option<Reason> {

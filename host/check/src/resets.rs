@@ -47,12 +47,12 @@ pub enum Way {
     Pin,
     /// The computer opens the port, which pulls it by the modem line DTR.
     Port,
-    /// `test watchdog` stops the main loop, in hold.
+    /// `test watchdog` ends the main loop's heartbeat, in hold.
     Watchdog,
 }
 
 impl Way {
-    /// Whether the weeder works and rolls then. Only a weeder that stands in hold stops its loop.
+    /// Whether the weeder works and rolls then. Only a weeder that stands in hold tests its watchdog.
     pub const fn is_at_work(self) -> bool {
         !matches!(self, Self::Watchdog)
     }

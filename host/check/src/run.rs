@@ -200,7 +200,7 @@ fn resets(weeder: &mut Weeder, tester: &mut Tester, extent: Extent, ratio: f64) 
         for (way, id, words) in [
             (Way::Pin, "pin", "reset by its pin, at work and rolling"),
             (Way::Port, "port", "reset by opening the port, at work and rolling"),
-            (Way::Watchdog, "watchdog", "main loop stopped by `test watchdog`, in hold"),
+            (Way::Watchdog, "watchdog", "restarted by the watchdog, in hold"),
         ] {
             let restart = resets::restart(way, weeder, tester, ratio, extent.simulated)?;
             let what = |what: &str| format!("{words}: {what}");

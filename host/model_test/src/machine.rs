@@ -108,8 +108,8 @@ pub trait Machine: Sized {
     /// The state, as far as it is known.
     fn state(&self) -> State;
 
-    /// Whether the loop is to stop, as `test watchdog` has it.
-    fn stops_the_loop(&self) -> bool;
+    /// Whether the loop shows that it turns.
+    fn has_heartbeat(&self) -> bool;
 
     /// Why the tool is out, if that can be seen.
     fn reason(&self) -> Option<Reason>;

@@ -11,7 +11,7 @@ const PLANT_MM: u32 = 80;
 /// Ticks of the ground wheel in a millimetre, whatever the machine is told of it.
 pub const TICKS_A_MM: f64 = 1.909_86;
 
-/// What stops the loop of a machine that stands in hold.
+/// What has the watchdog reset a machine that stands in hold.
 pub const TEST_WATCHDOG: &str = "test watchdog";
 
 /// Where and when a run begins, and how the machine is.

@@ -343,8 +343,8 @@ impl Machine for Board {
         self.state
     }
 
-    fn stops_the_loop(&self) -> bool {
-        false
+    fn has_heartbeat(&self) -> bool {
+        true
     }
 
     fn reason(&self) -> Option<Reason> {
