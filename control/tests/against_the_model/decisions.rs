@@ -192,7 +192,10 @@ impl Machine for Decisions {
         let Orders { pulse, pulse_out, .. } = self.orders;
         prop_assert_eq!(pulse_out, outside);
         if !self.weeder.has_heartbeat() {
-            prop_assert!(pulse == outside && self.weeder.state() == State::Hold, "a pulse of {pulse} when it tests the watchdog");
+            prop_assert!(
+                pulse == outside && self.weeder.state() == State::Hold,
+                "a pulse of {pulse} when it tests the watchdog"
+            );
         }
         let (state, out) = (self.weeder.state(), self.weeder.tool_out());
         if state == State::Work {
