@@ -1,17 +1,17 @@
-//! How often loops turn, said at the loop, for `weeder bounds`.
+//! Loop bounds for `weeder bounds`, written at the loop.
 //!
-//! A record in the ELF's section `.loop_bounds`, which takes no flash and no cycle, names a place in the loop and how often the program
-//! comes by it at most. The tool takes it at its word; what it says is to be seen in the source around it.
+//! A record in the ELF's section `.loop_bounds` names a point in the loop and how often it can run. The record takes no flash and
+//! no cycle. The tool does not check the number; the source around it has to show it.
 
 use core::arch::{asm, global_asm};
 
-// Nothing in the program refers to the records, so the linker is asked for them by this name (memory.x).
+// No code refers to the records, so memory.x makes the linker keep them by this symbol.
 global_asm!(".pushsection .loop_bounds, \"\", @progbits", ".globl loop_bounds", "loop_bounds:", ".popsection");
 
-/// The program comes by this place so often at most, each time that it comes to the innermost loop around it.
+/// Upper bound on executions of this point for each entry to the innermost loop.
 #[inline(always)]
 pub fn at_most<const PASSES: u8>() {
-    // SAFETY: there is no instruction in it, only a label and a record elsewhere in the ELF.
+    // SAFETY: it contains no instruction, only a label and a record in another section.
     unsafe {
         asm!(
             "7: .pushsection .loop_bounds, \"\", @progbits",
