@@ -75,18 +75,27 @@ pub enum AtTool {
     },
 }
 
-/// A complete detection without a class.
-///
-/// `repr(u8)` puts the tag first and gives `None` the value 0, so [`Ground::NONE`] is all zeros and needs no copy in flash.
+/// The complete detection that is being classified, if any.
 #[derive(Clone, Copy, Debug)]
-#[repr(u8)]
-enum Unclassified {
-    /// No detection is being classified.
-    None,
-    /// One is being classified, but its position is forgotten.
-    Forgotten,
-    /// One is being classified, with the extent that both beams have seen so far.
-    Seen(Canopy),
+pub struct Unclassified {
+    /// The detection.
+    pub detection: Detection,
+    /// What both beams have seen of it so far.
+    canopy: Canopy,
+    /// Whether the second beam reports it. The first beam may have reported it already.
+    pub of_second: bool,
+    known: Known,
+}
+
+/// What is known of a detection without a class. `Nothing` has the value 0, so [`Ground::NONE`] is all zeros and needs no copy in flash.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Known {
+    /// There is no detection.
+    Nothing,
+    /// Its ground is forgotten.
+    Detection,
+    /// Its ground is known.
+    Canopy,
 }
 
 impl Ground {
@@ -101,7 +110,12 @@ impl Ground {
         second_beam: SecondBeam::NONE,
         corrected_by: (0, 0),
         last_plant: WrappedPosition::new(0),
-        unclassified: Unclassified::None,
+        unclassified: Unclassified {
+            detection: Detection::NONE,
+            canopy: Canopy::NONE,
+            of_second: false,
+            known: Known::Nothing,
+        },
         rolled_back_too_far: false,
     };
 
@@ -226,8 +240,8 @@ impl Ground {
     #[cfg_attr(target_arch = "avr", inline(never))]
     pub fn forget(&mut self) {
         self.detector.forget();
-        if let Unclassified::Seen(_) = self.unclassified {
-            self.unclassified = Unclassified::Forgotten;
+        if self.unclassified.known == Known::Canopy {
+            self.unclassified.known = Known::Detection;
         }
         self.guard = Guard::NONE;
         self.forget_slip();
@@ -245,7 +259,7 @@ impl Ground {
         self.detector.begin(self.beam, self.detector.is_broken());
         self.last_plant = self.beam;
         self.forget();
-        self.unclassified = Unclassified::None;
+        self.unclassified.known = Known::Nothing;
     }
 
     /// The operator confirms that no plant stands on the unknown ground at the tool and ahead of it. Does nothing on known ground.
@@ -257,40 +271,51 @@ impl Ground {
     }
 
     /// Closes the ground from the start of a detection until it is classified.
-    pub fn await_class(&mut self, detection: Detection) {
+    pub fn await_class(&mut self, detection: Detection, of_second: bool) {
         let zone = if self.detector.is_parted() { Length::ZERO } else { self.geometry.stem_zone };
-        self.unclassified = Unclassified::Seen(Canopy::of(&detection, zone));
+        self.unclassified =
+            Unclassified { detection, canopy: Canopy::of(&detection, zone), of_second, known: Known::Canopy };
         // A wide detection reaches the second beam before the first has seen its end.
         if let Some(begin) = self.second_beam.open() {
             self.widen(begin, begin, End::Leading);
         }
     }
 
-    /// Takes the class of the detection, and remembers a plant or an unknown.
+    /// The detection that is being classified.
+    #[cfg_attr(not(target_arch = "avr"), inline)]
+    pub fn unclassified(&self) -> Option<&Unclassified> {
+        Some(&self.unclassified).filter(|unclassified| unclassified.known != Known::Nothing)
+    }
+
+    /// Takes the class of that detection, and remembers a plant or an unknown.
     ///
     /// # Errors [`ScheduleFull`] if more canopies stand between beam and tool than can be remembered.
-    pub fn classified(&mut self, detection: Detection, class: Class) -> Result<(), ScheduleFull> {
-        let unclassified = core::mem::replace(&mut self.unclassified, Unclassified::None);
-        if class == Class::Weed || matches!(unclassified, Unclassified::None) {
+    pub fn classified(&mut self, class: Class) -> Result<(), ScheduleFull> {
+        let Unclassified { detection, canopy, known, .. } = &mut self.unclassified;
+        let was_known = core::mem::replace(known, Known::Nothing);
+        if class == Class::Weed || was_known == Known::Nothing {
             return Ok(());
         }
         if detection.leading.is_ahead_of(self.last_plant) {
             self.last_plant = detection.leading;
         }
-        let Unclassified::Seen(mut plant) = unclassified else { return Ok(()) };
+        if was_known != Known::Canopy {
+            return Ok(());
+        }
         // An unknown detection may be several plants: it keeps its full width.
         if class != Class::Plant {
-            plant.trim = 0;
+            canopy.trim = 0;
         }
-        self.guard.see(&detection, &self.geometry);
-        self.keep_out.push(plant, self.tool(), self.geometry.margin)
+        self.guard.see(detection, &self.geometry);
+        let canopy = *canopy;
+        self.keep_out.push(canopy, self.tool(), self.geometry.margin)
     }
 
     /// Widens a canopy to the stretch that the second beam sees. Returns whether a canopy is there.
     fn widen(&mut self, from: WrappedPosition, to: WrappedPosition, end: End) -> bool {
         let within = Length(self.geometry.second_beam.0 >> 2);
-        if let Unclassified::Seen(canopy) = &mut self.unclassified {
-            canopy.widen(from, to, within, within, end);
+        if self.unclassified.known == Known::Canopy {
+            self.unclassified.canopy.widen(from, to, within, within, end);
         }
         self.keep_out.widen(from, to, within, end)
     }
@@ -385,7 +410,7 @@ impl Ground {
 
     /// The number of keep-out zones at the tool or ahead of it, with an open detection and an unclassified one.
     pub fn zones(&self) -> u8 {
-        let unclassified = matches!(self.unclassified, Unclassified::Seen(_));
+        let unclassified = self.unclassified.known == Known::Canopy;
         self.keep_out.ahead(self.tool(), self.geometry.margin)
             + u8::from(unclassified)
             + u8::from(self.detector.open().is_some())
@@ -439,11 +464,8 @@ impl Ground {
     /// Where the first detection begins that has no end yet, or no class.
     #[cfg_attr(not(target_arch = "avr"), inline)]
     fn open(&self) -> Option<WrappedPosition> {
-        if let Unclassified::Seen(detection) = self.unclassified {
-            Some(detection.leading)
-        } else {
-            self.detector.open()
-        }
+        let Unclassified { canopy, known, .. } = &self.unclassified;
+        if *known == Known::Canopy { Some(canopy.leading) } else { self.detector.open() }
     }
 
     /// The tool's position.
@@ -461,8 +483,8 @@ mod tests {
 
     /// Classifies a detection as a plant.
     fn keep(ground: &mut Ground, canopy: Detection) -> Result<(), ScheduleFull> {
-        ground.await_class(canopy);
-        ground.classified(canopy, Class::Plant)
+        ground.await_class(canopy, false);
+        ground.classified(Class::Plant)
     }
 
     /// Ground seen from 0 to 3000, with a canopy from 1000 to 1300, without leads.
@@ -499,12 +521,15 @@ mod tests {
             let (mut ground, mut settings) = ground();
             settings.set(Setting::StemZoneMm, 100).expect("within its range");
             ground.follow(&settings, Position::new(1400), SPEED);
-            ground.await_class(Detection {
-                leading: WrappedPosition::new(1500),
-                trailing: WrappedPosition::new(1800),
-                ..Detection::NONE
-            });
-            ground.classified(Detection::NONE, class).expect("there is room");
+            ground.await_class(
+                Detection {
+                    leading: WrappedPosition::new(1500),
+                    trailing: WrappedPosition::new(1800),
+                    ..Detection::NONE
+                },
+                false,
+            );
+            ground.classified(class).expect("there is room");
             assert_eq!(opens(&mut ground, 1500), 1800 - trim + 95 + 1, "{class:?}");
         }
     }

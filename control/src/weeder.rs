@@ -12,7 +12,7 @@ mod shown;
 use crate::{
     alarm::{Alarm, Warning},
     ground::{
-        Ground,
+        Ground, Unclassified,
         class::{Classifier, Vote},
         detection::Detection,
         features,
@@ -82,11 +82,6 @@ pub struct Controller<C, M> {
     mistakes: u16,
     /// Detections narrower than `min_width_mm`: dust.
     dust: u16,
-    /// The detection that is being classified, if `is_classifying`.
-    classifying: Detection,
-    is_classifying: bool,
-    /// Whether the second beam saw that detection. The first beam may have reported it already.
-    is_of_second: bool,
     plant_timeout: PlantTimeout,
     unknown_run: UnknownRun,
     told: ExampleEntry,
@@ -119,9 +114,6 @@ impl<C: Classifier, M: Memory> Uninit<C, M> {
             tests_watchdog: false,
             mistakes: 0,
             dust: 0,
-            classifying: Detection::NONE,
-            is_classifying: false,
-            is_of_second: false,
             plant_timeout: PlantTimeout::since(Position::new(0)),
             unknown_run: UnknownRun::NONE,
             told: ExampleEntry::NONE,
@@ -262,7 +254,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             } else if self.leads_are_old {
                 self.ground.lead(self.configuration.settings(), self.sensors.meter.speed());
                 (self.leads_are_old, self.turn_spent) = (false, true);
-            } else if self.is_classifying {
+            } else if self.ground.unclassified().is_some() {
                 // Last, because one detection can follow right after another.
                 self.go_on_classifying();
             }
@@ -309,18 +301,14 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             return;
         }
         // The previous detection, a few millimetres back, is still being classified. Unclassified detections count as plants.
-        if self.is_classifying {
-            self.decide(Some(Vote::UNKNOWN));
-        }
-        self.is_of_second = is_of_second;
+        self.decide(Some(Vote::UNKNOWN));
         let position = self.sensors.readings.position;
         let spacing_mm = self.ground.millimetres(self.ground.spacing(&detection));
         let speed_class_mm_s = features::speed_class(self.speed_mm_s());
         self.plant_timeout = PlantTimeout::since(position);
         let classified = Classified { speed_class_mm_s, spacing_mm, width_mm, vote: Vote::UNKNOWN, label: None };
         self.detections.remember(classified);
-        self.ground.await_class(detection);
-        (self.classifying, self.is_classifying) = (detection, true);
+        self.ground.await_class(detection, is_of_second);
         // A detection without a seen beginning may be the rest of a plant, as narrow as a weed. It stays unknown.
         let vote = if detection.cut {
             Some(Vote::UNKNOWN)
@@ -341,18 +329,21 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// Once there is a vote: reports the detection, and keeps its ground unless it is a weed.
     #[cfg_attr(target_arch = "avr", inline(never))]
     fn decide(&mut self, vote: Option<Vote>) {
-        let (Some(vote), Some(classified)) = (vote, self.detections.newest()) else { return };
+        let (Some(vote), Some(Unclassified { detection, of_second, .. }), Some(classified)) =
+            (vote, self.ground.unclassified(), self.detections.newest())
+        else {
+            return;
+        };
         classified.vote = vote;
-        let (detection, width_mm) = (self.classifying, classified.width_mm);
-        self.is_classifying = false;
+        let width_mm = if *of_second { 0 } else { classified.width_mm };
         let leading = self.ground.position_of(detection.leading, self.sensors.readings.position);
-        let (spacing, plan) = (self.ground.spacing(&detection), self.ground.plan(&detection));
+        let (spacing, plan) = (self.ground.spacing(detection), self.ground.plan(detection));
         self.events.add(Event::Detection { vote, leading, spacing, plan });
-        if self.ground.classified(detection, vote.class).is_err() {
+        if self.ground.classified(vote.class).is_err() {
             self.raise(Alarm::ScheduleFull);
         }
         // The first beam may have reported the same detection: the two count once.
-        self.count_misfit(vote.class, if self.is_of_second { 0 } else { width_mm });
+        self.count_misfit(vote.class, width_mm);
     }
 
     /// Latches an alarm, and forgets the ground, because its detections are no longer trustworthy.

@@ -41,6 +41,9 @@ pub struct Canopy {
 }
 
 impl Canopy {
+    /// No canopy.
+    pub(super) const NONE: Self = Self { leading: WrappedPosition::new(0), trailing: WrappedPosition::new(0), trim: 0 };
+
     /// The canopy of a detection, if it is a plant: `zone` around its middle, or all of it if `zone` is 0 or wider.
     ///
     /// A stem stands near the middle of its canopy. But the beam cannot tell one plant from two that have grown together, or from

@@ -110,11 +110,10 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// # Errors [`CommandError::NothingToLabel`], [`CommandError::TakenForPlant`], [`CommandError::TakenForWeed`],
     /// [`CommandError::ExamplesFull`]. The detection has no label then.
     pub fn label(&mut self, label: u8, forced: bool) -> Result<(), CommandError> {
-        let is_classified = !self.is_classifying;
         let detection = self
             .detections
             .newest()
-            .filter(|detection| is_classified && detection.label.is_none())
+            .filter(|detection| detection.label.is_none() && self.ground.unclassified().is_none())
             .ok_or(CommandError::NothingToLabel)?;
         let features = detection.features();
         // A wrong label would change the class of later detections, without any sign of the cause.
