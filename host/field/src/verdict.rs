@@ -204,13 +204,17 @@ pub fn judge(
         union(stretches.collect())
     };
     let closed = ground_of(&machine.times_not_clear_s(&stroke, &whole_s));
+    let over_zone = match timing.stem_zone_mm {
+        0 => closed.clone(),
+        zone_mm => ground_of(&machine.times_within_s(f64::from(zone_mm) / 2.0, &stroke, &whole_s)),
+    };
     let weeded = ground_of(&machine.times_weeding_s(&stroke, &whole_s));
     let run = motion.stretch_mm(&whole_s);
     let run = machine.tool_mm(run.start)..machine.tool_mm(run.end);
     let swings = Swing::all(&commands, motion, start_cycle);
 
     let mut plants: Vec<PlantOutcome> =
-        row.plants().map(|plant| plant_outcome(plant, &closed, machine, timing)).collect();
+        row.plants().map(|plant| plant_outcome(plant, &over_zone, machine, timing)).collect();
     let mut idle_swings = 0;
     for swing in &swings {
         let passed = swing.passed_mm(machine, motion);
