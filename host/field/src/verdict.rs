@@ -3,7 +3,8 @@
 //! Pulses become commands and the tool's angle over time ([`crate::servo`]); with the machine's motion that is an angle
 //! over the ground. A plant is damaged when the tool was anything but fully out at any time over its canopy, or where the
 //! stroke is too short for the canopy, which is taken to be as wide across the row as along it; its margin
-//! is cut when the tool was clear of the canopy by less than the margin and [`MARGIN_TOLERANCE_MM`]. Both are strict: for
+//! is cut when the tool was clear of the canopy by less than the margin and [`MARGIN_TOLERANCE_MM`]. With a stem zone, the tool
+//! is over it while its edge is nearer to the row's line than half of the zone. Both are strict: for
 //! most of its stroke the tool is beside the row's line already, and a canopy is as wide as the beam saw it only at the
 //! height of the beam.
 //!
