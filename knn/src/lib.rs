@@ -30,7 +30,7 @@
 //!
 //! - All examples as far as the k-th nearest vote, so that their order never changes the answer.
 //! - Each vote counts one. Among classes with equal votes the one with the nearest example is named, among these the smallest
-//! label, and the answer is a tie.
+//!   label, and the answer is a tie.
 //! - If the nearest example is beyond the radius, the answer is a stranger, with any votes.
 //!
 //! # Costs
