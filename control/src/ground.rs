@@ -268,7 +268,8 @@ impl Ground {
 
     /// Takes the class of the detection, and remembers a plant or an unknown.
     ///
-    /// # Errors [`ScheduleFull`] if more canopies stand between beam and tool than can be remembered.
+    /// # Errors
+    /// [`ScheduleFull`] if more canopies stand between beam and tool than can be remembered.
     pub fn classified(&mut self, detection: Detection, class: Class) -> Result<(), ScheduleFull> {
         let unclassified = core::mem::replace(&mut self.unclassified, Unclassified::None);
         if class == Class::Weed || matches!(unclassified, Unclassified::None) {
@@ -297,7 +298,8 @@ impl Ground {
 
     /// Guards the ground of an expected plant once the beam has passed it and seen none. Returns the middle of that ground.
     ///
-    /// # Errors [`ScheduleFull`], as for a plant.
+    /// # Errors
+    /// [`ScheduleFull`], as for a plant.
     #[cfg_attr(target_arch = "avr", inline(never))]
     #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn guard(&mut self) -> Option<Result<WrappedPosition, ScheduleFull>> {

@@ -291,7 +291,8 @@ impl Settings {
 
     /// Sets a value.
     ///
-    /// # Errors [`OutOfRange`] if the value is outside the table's range. The old value stays.
+    /// # Errors
+    /// [`OutOfRange`] if the value is outside the table's range. The old value stays.
     pub fn set(&mut self, setting: Setting, value: u16) -> Result<(), OutOfRange> {
         if !setting.allows(value) {
             return Err(OutOfRange);

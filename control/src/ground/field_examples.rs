@@ -89,7 +89,8 @@ impl<M: Memory> FieldExamples<M> {
 
     /// Adds an example and returns its slot. [`carry_on`](Self::carry_on) writes it.
     ///
-    /// # Errors The example, if all slots are taken.
+    /// # Errors
+    /// The example, if all slots are taken.
     pub fn add(&mut self, example: Taught) -> Result<u8, Taught> {
         let Some(number) = self.examples.iter().position(|example| !is_held(example)) else {
             return Err(example);

@@ -142,7 +142,8 @@ impl KeepOut {
 
     /// Adds a canopy. If all places are taken, it drops the oldest canopy behind the tool, and the ground up to that canopy's end.
     ///
-    /// # Errors [`ScheduleFull`] if even the oldest zone lies at the tool or ahead of it. The canopy is then not added.
+    /// # Errors
+    /// [`ScheduleFull`] if even the oldest zone lies at the tool or ahead of it. The canopy is then not added.
     pub fn push(&mut self, canopy: Canopy, tool: WrappedPosition, margin: Length) -> Result<(), ScheduleFull> {
         if self.canopies.is_full() {
             let oldest = self.canopies.first().ok_or(ScheduleFull)?;

@@ -120,7 +120,8 @@ pub enum ParseError {
 
 /// Parses a line.
 ///
-/// # Errors A [`ParseError`], whose text says what is allowed.
+/// # Errors
+/// A [`ParseError`], whose text says what is allowed.
 #[inline(never)]
 pub fn parse(line: &[u8]) -> Result<Command, ParseError> {
     let (word, rest) = split_word(line);
