@@ -68,8 +68,7 @@ impl<'a> Beam<'a> {
 
     /// The queued edges, and then [`Edge::Lost`] if edges were dropped.
     pub fn edges(&mut self) -> impl Iterator<Item = Edge> {
-        // Read before the edges: then all edges queued before the loss are taken first, and no later edge follows the level read at
-        // the end.
+        // Read before the edges. Then all edges queued before the loss come first, and none follows the level read at the end.
         let mut lost = take_lost();
         // At most as many as the queue holds, so that edges which keep coming cannot stop the loop.
         let mut left = SLOTS as u8;

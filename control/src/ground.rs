@@ -77,7 +77,7 @@ pub enum AtTool {
 
 /// A complete detection without a class.
 ///
-/// `repr(u8)` puts the tag first and gives `None` the value 0, so [`Ground::NONE`] is all zeros and needs no copy in flash.
+/// `repr(u8)` puts the tag first, and `None` is 0. So [`Ground::NONE`] is all zeros and needs no copy in flash.
 #[derive(Clone, Copy, Debug)]
 #[repr(u8)]
 enum Unclassified {

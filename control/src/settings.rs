@@ -86,7 +86,7 @@ settings! {
     StemZoneMm "stem_zone_mm" in "mm": 0 to 300, 0, true,
         "kept round a stem; 0 the canopy";
     /// Longest time from the command until the tool is out. The default is the default servo's slowest swing over the default
-    /// stroke: 80 ms dead time, 144 ms for 45 degrees against the soil, and 6 ms for the pulse on the line.
+    /// stroke. It has 80 ms dead time, 144 ms for 45 degrees against the soil, and 6 ms for the running pulse.
     LeadOutMs "lead_out_ms" in "ms": 0 to 500, 230, false,
         "longest time until the tool is out";
     /// Shortest time from the command until the tool begins to come back.

@@ -126,8 +126,8 @@ proptest! {
                 let next_mm = quick.place_mm + step_mm;
                 quick.roll_to(next_mm, speed_mm_s);
                 late.roll_to(next_mm, speed_mm_s);
-                // If the beams report two detections in the same turn, the quick machine keeps the one that it has no time for, and
-                // the late machine the other.
+                // The beams may report two detections in the same turn. The quick machine then keeps the one that it has no time
+                // for, and the late machine the other.
                 let keeps_unknown = second && quick.told_of(detection).iter().any(|&(vote, ..)| vote == Vote::UNKNOWN);
                 prop_assert!(
                     keeps_unknown || late.machine.tool_out() || !quick.machine.tool_out(),

@@ -1,6 +1,6 @@
 //! A row with small encoder faults: silences, spikes on both channels, missing edges.
 //!
-//! The machine rolls past plants at a constant speed. The encoder's edges are uneven by a third, as real ones are, and go through
+//! The machine rolls past plants at a constant speed. The encoder's edges are uneven by a third, like real ones. They go through
 //! the fault into the firmware's decoder. The controller turns like the firmware's loop, with some long turns. The tool follows
 //! like a servo. A plant is hit if the tool is not fully out over its canopy.
 //!

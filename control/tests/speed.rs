@@ -150,8 +150,8 @@ fn a_silent_wheel_is_slower_than_a_tick_in_its_silence_in_both_directions() {
         for silence_ms in 1..500 {
             run.roll(1, 200, |_| direction * 500.0);
             let speed = direction * run.speed();
-            // The last tick may have come up to a millisecond earlier, and the meter checks the silence only after each further
-            // eighth of it.
+            // The last tick may have come up to a millisecond earlier. The meter checks the silence only after each further eighth
+            // of it.
             let [least, most] = [silence_ms + 1, silence_ms].map(|ms| 1000.0 / f64::from(ms));
             let is_of_the_silence = (least - 1.0..=most * 9.0 / 8.0 + 1.0).contains(&speed);
             assert!(silence_ms < 12 || is_of_the_silence, "{speed} after {silence_ms} ms");

@@ -1,4 +1,4 @@
-//! Stem zones: the tool keeps off the middle of a single plant seen whole, and off the full width of any other detection.
+//! Stem zones: of a single plant seen whole, the middle is kept, and of any other detection the full width.
 
 mod common;
 #[path = "common/rolling.rs"]
@@ -135,8 +135,8 @@ fn a_detection_of_the_second_beam_alone_is_kept_from_end_to_end() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(200))]
 
-    /// Plants that have grown together, ragged plants, and weeds that touch. The tool never comes nearer to a stem than what a
-    /// single plant gives up on either side, at each position of the stem in its canopy.
+    /// Plants that have grown together, ragged plants, and weeds that touch. The tool never comes nearer to a stem than a single
+    /// plant's trim allows, at each position of the stem in its canopy.
     #[test]
     fn no_stem_is_nearer_to_the_tool_than_its_own_leaves_reach_less_what_one_side_gives_up(
         plants in prop::collection::vec((70.0..200.0_f64, prop::option::of((20.0..120.0_f64, 70.0..200.0_f64)), 150.0..400.0_f64), 1..8),

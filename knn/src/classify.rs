@@ -45,7 +45,7 @@ pub fn classify<const FEATURES: usize, const CLASSES: usize>(
 
 /// [`classify`] with at least `k` places.
 ///
-/// Out of line: AVR accesses the first 63 bytes of a stack frame by far the fastest, and the places are in the caller's frame.
+/// Out of line: AVR accesses the first 63 bytes of a stack frame by far the fastest. The places are in the caller's frame.
 #[inline(never)]
 fn search<const FEATURES: usize, const CLASSES: usize>(
     examples: &(impl Examples<FEATURES> + ?Sized),

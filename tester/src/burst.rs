@@ -50,7 +50,7 @@ pub fn play(steps: &[Step], repeats: u16, slower: u8, mut levels: u8) -> u8 {
     levels
 }
 
-// Two loads of two cycles, the sum, minus one for the delay's last turn, four for levels and count, two to repeat. After the last
+// Two loads of two cycles, the sum, minus one for the delay's last turn. Four for levels and count, two to repeat. After the last
 // step: minus one to continue, and 1 + 2 + 2 to restart with 1 + 1. The `nop` makes 55 cycles possible, the proved rate.
 const _: () = assert!(step_cycles(1) == 2 + 2 + 1 + 3 - 1 + 4 + 2 && REPEAT_CYCLES == 1 + 2 + 2 + 1 + 1 - 1);
 

@@ -1,8 +1,8 @@
 //! Timer1: the clock in cycles, the plan's events, and the servo's pulses on ICP1 (D8).
 //!
 //! The timer counts cycles and overflows every 4.096 ms; an interrupt counts the overflows. The compare interrupt fires the plan's
-//! events. Each wait counts from the time at which the event was due, so a late event does not delay the next. The capture unit
-//! stamps the servo's edges (data sheet, 16.6), so other interrupts do not change the measurement.
+//! events. Each wait counts from the time at which the last event was due. So a late event does not delay the next. The capture
+//! unit stamps the servo's edges (data sheet, 16.6), so other interrupts do not change the measurement.
 
 use crate::lines;
 use avr_device::{

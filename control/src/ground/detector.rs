@@ -5,9 +5,9 @@
 //! frontier, detection continues with the beam's level there. So a plant is one detection, even if the machine passes it several
 //! times.
 //!
-//! A canopy is ragged. Clear stretches shorter than the merging gap belong to the detection, which ends only after a clear stretch
-//! of that length. The beginning of a detection is certain only after such a clear stretch too. At the start, and after forgetting,
-//! an open detection therefore stands for the possible rest of a canopy. The detector does not classify.
+//! A canopy is ragged. Clear stretches shorter than the merging gap belong to the detection. It ends only after a clear stretch of
+//! that length. The beginning of a detection is certain only after such a clear stretch too. At the start, and after forgetting, an
+//! open detection therefore stands for the possible rest of a canopy. The detector does not classify.
 
 use super::detection::{Detection, End};
 use crate::units::{Length, WrappedPosition};

@@ -2,7 +2,7 @@
 //!
 //! [`Distance`] counts the ticks over a stretch that the operator has measured. So tyre wear and wheel slip are included.
 //! [`Swings`] times the servo with the end switch: from the command until the tool is out, and until it begins to come back.
-//! Without an end switch, the operator can time the same swings on a film, in which the LED shows the commands.
+//! Without an end switch, the operator can film and time the same swings: the LED shows the commands.
 
 use crate::{
     operate::command_error::CommandError,

@@ -50,11 +50,11 @@ mod tests {
 
     /// Which detection raises the alarm at `misfit_after` 3: these, then weeds.
     fn alarm_at(before: &[(Class, i16)]) -> usize {
-        let mut misfits = UnknownRun::NONE;
+        let mut run = UnknownRun::NONE;
         let weeds = core::iter::repeat(&(Class::Weed, 10));
         let mut detections = (1..).zip(before.iter().chain(weeds));
         detections
-            .find(|&(_, &(class, width_mm))| misfits.count(class, width_mm, 3))
+            .find(|&(_, &(class, width_mm))| run.count(class, width_mm, 3))
             .map(|(place, _)| place)
             .expect("endless weeds")
     }

@@ -1,10 +1,10 @@
-//! Compares the controller with a slow and simple model, in random runs with anything at any moment: each line of the console,
-//! alarms of each kind, the work switch, rolling in both directions, standing and trembling, resets and power cuts at any byte,
-//! lost edges, dust, a silent or disturbed encoder, and wrapping counters.
+//! Compares the controller with a slow and simple model, in random runs with anything at any moment. The operator uses each console
+//! line and the work switch. The machine rolls in both directions, stands and trembles. Faults are alarms of each kind, resets and
+//! power cuts at any byte, lost edges, dust, and a silent or disturbed encoder. Counters wrap.
 //!
 //! After each turn of the loop it checks:
-//! - the tool is never in the row over a canopy that the beam has seen, or over its margin, after any event; it may be commanded
-//!   back early by the lead at any speed of the last second;
+//! - after any event, the tool is never in the row over a seen canopy or its margin; it may be commanded back early by the lead at
+//!   any speed of the last second;
 //! - each weed was seen whole;
 //! - each line of the console is answered by its lines and then one `ok` or `error: `;
 //! - settings and examples answered with `ok` survive a reset and a power cut;
@@ -12,8 +12,8 @@
 //! - the tool is out in each state except WORK, and only the operator starts work or clears an alarm;
 //! - in the end, after the faults are repaired, the machine works again.
 //!
-//! With a second beam, each plant's real position counts: the tool keeps off each plant that at least one beam has seen, although
-//! the wheel slips, the slip changes, stands are too dense for the beams, and either beam misses plants or sees its own dust.
+//! With a second beam, each plant's real position counts. The tool keeps off each plant that at least one beam has seen. Meanwhile
+//! the wheel slips, the slip changes, and stands are too dense for the beams. Either beam misses plants, and sees its own dust.
 //!
 //! A failure is reduced to a few steps, printed as console lines and motion. Runs are the same each time, so that only a change of
 //! the code can change the result. Runs and model come from the crate `model_test`, which also tests the firmware with them. For

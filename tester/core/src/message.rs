@@ -1,7 +1,7 @@
 //! Messages: commands from the computer to the tester, and records from the tester to the computer.
 //!
 //! The tester answers each command with one [`Record::Done`] that has the command's number. Without an answer, the computer sends
-//! the command again with the same number, and the tester does not run it twice. Times are cycles of the tester's clock (62.5 ns),
+//! the command again with the same number. The tester does not run it twice. Times are cycles of the tester's clock (62.5 ns),
 //! modulo 2^32.
 
 use crate::piece::Piece;
