@@ -54,8 +54,8 @@ pub struct Orders {
     pub pulse_out: HalfMicros,
     /// The shortest gap between servo pulses in milliseconds; 0 for fixed frames.
     pub gap_ms: u8,
-    /// Whether this turn did long work: a classification step, or new leads, slip or settings. The loop then adds no more work to
-    /// the turn.
+    /// Whether this turn did long work: a classification step, or new leads, slip or settings. The loop then skips the console in
+    /// this turn.
     pub turn_spent: bool,
 }
 

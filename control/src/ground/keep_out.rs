@@ -36,7 +36,7 @@ pub struct Canopy {
     pub leading: WrappedPosition,
     /// Where it ends.
     pub trailing: WrappedPosition,
-    /// Leaves on either side under which the tool may work; 0 keeps the full width.
+    /// Width of the leaves on either side under which the tool may work; 0 keeps the full width.
     pub trim: u8,
 }
 

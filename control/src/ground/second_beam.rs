@@ -47,7 +47,7 @@ pub struct SecondBeam {
     /// Detections of the first beam, newest first, and how many the second beam has yet to reach.
     passed: [Passed; CAPACITY],
     awaited: u8,
-    /// One bit for each awaited detection that a detection of the second beam may be.
+    /// One bit for each awaited detection, set once a detection of the second beam fits it.
     claimed: u8,
     /// Whether the first beam has seen more than `CAPACITY` detections.
     is_crowded: bool,

@@ -12,8 +12,8 @@ const WITHOUT_SLIP: u8 = 6;
 /// at either end of a canopy adds to that.
 const AGREES: u8 = 24;
 
-/// A slip that differs by more than this (16 %) from the trusted one needs a third detection that agrees. Soft ground slips by 12
-/// %, and in no row does it change by more between plants.
+/// If a slip differs from the trusted one by more than this (16 %), a third detection has to agree. Soft ground slips by 12 %, and
+/// in no row does it change by more between plants.
 const JUMP: u8 = 40;
 
 /// How much farther the wheel turns than the machine rolls, in 256ths of the distance rolled; negative if less.

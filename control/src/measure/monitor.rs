@@ -328,7 +328,7 @@ mod tests {
 
     /// Whether reversals, one every `edge_ms`, raise "channel dead" within `edges` of them.
     fn is_dead_channel(edge_ms: u32, edges: u32) -> bool {
-        let mut monitor = awake();
+        let mut monitor = standing();
         (1..=edge_ms * edges).any(|ms| {
             let position = Position::new((ms / edge_ms % 2) as i32);
             monitor.read(at(ms), position, 0, 4) == Some(Alarm::EncoderChannelDead)
@@ -343,7 +343,7 @@ mod tests {
     }
 
     /// A monitor of a standing machine.
-    fn awake() -> EncoderMonitor {
+    fn standing() -> EncoderMonitor {
         let mut monitor = EncoderMonitor::NONE;
         monitor.init(at(0), Position::new(0));
         monitor
@@ -355,13 +355,13 @@ mod tests {
 
     /// The first alarm within a second, and its time in ms. `position` gives the encoder's position at each millisecond.
     fn first_alarm(position: impl Fn(u32) -> u32) -> Option<(u32, Alarm)> {
-        let mut monitor = awake();
+        let mut monitor = standing();
         (1..1000).find_map(|ms| Some((ms, monitor.read(at(ms), Position::new(position(ms) as i32), 0, 4)?)))
     }
 
     #[test]
     fn a_rolling_wheel_is_quiet_from_10_ms_without_progress_until_the_next_progress() {
-        let mut monitor = awake();
+        let mut monitor = standing();
         for ms in 0..100 {
             let position = if ms < 60 { ms.min(40) } else { ms - 20 };
             monitor.read(at(ms), Position::new(position as i32), 0, 4);

@@ -294,11 +294,11 @@ impl LineBuffer {
             }
             b'\t' | b' '..=b'~' => {
                 if self.characters.push(byte).is_err() {
-                    self.spoil(ParseError::TooLong);
+                    self.fail(ParseError::TooLong);
                 }
             }
-            GAP_MARK => self.spoil(ParseError::CharactersLost),
-            _ => self.spoil(ParseError::NotText),
+            GAP_MARK => self.fail(ParseError::CharactersLost),
+            _ => self.fail(ParseError::NotText),
         }
         false
     }
@@ -315,7 +315,7 @@ impl LineBuffer {
         line
     }
 
-    fn spoil(&mut self, error: ParseError) {
+    fn fail(&mut self, error: ParseError) {
         self.error.get_or_insert(error);
     }
 }
