@@ -115,7 +115,7 @@ handler! {
         "push r31",
         "lds  r30, {edges}+{pushed}",
         "lds  r31, {edges}+{taken}",
-        "sub  r31, r30", // less as many as wait
+        "sub  r31, r30", // minus the number waiting
         "cpi  r31, -{slots}",
         "breq 3f",
         "inc  r30",

@@ -138,13 +138,13 @@ handler! {
         "in   r24, 0x09", // PIND
         "push r30",
         "push r31",
-        // Z = TABLE + (memory | new levels)
+        // Z = TABLE + (state | new levels)
         "andi r24, 0x0c",
         "in   r30, 0x2a", // GPIOR1
         "or   r30, r24",
         "ldi  r31, hi8({table})",
         "subi r30, lo8(-({table}))",
-        "lpm  r24, Z", // the new memory
+        "lpm  r24, Z", // the new state
         "sbrc r24, 7",
         "rjmp 3f",
         "out  0x2a, r24",

@@ -111,7 +111,7 @@ handler! {
         "ldi  r24, {mark}",
         "lds  r30, {queue}+{pushed}",
         "lds  r31, {queue}+{taken}",
-        "sub  r31, r30", // less as many as wait
+        "sub  r31, r30", // minus the number waiting
         "cpi  r31, 2-{slots}",
         "brlt 3f",
         "1:",

@@ -1,5 +1,5 @@
 //! The tool is never in the row over a plant. Rows and motion are random, with stops, reversals, and speeds from a crawl to 10
-//! km/h. Plants are closer than the beam's distance, and farther.
+//! km/h. Plants stand closer than the beam's distance, and farther.
 //!
 //! The reference is slow and simple: it knows each plant's position and the real speed.
 
