@@ -158,8 +158,8 @@ const _: () = assert!(SECOND_BEAM_LEAST_MM as u32 * TICKS_PER_M_LEAST as u32 >= 
 /// Largest X with a second beam: with slip, X still has to fit the range of a [`Length`](crate::units::Length).
 pub const SLIPPING_BEAM_TO_TOOL_MM: u16 = 1000;
 
-/// The coarsest wheel with which an encoder fault is found in time, from 0.5 km/h on. Then four ticks come within [32
-/// ms](crate::measure::monitor). The largest unnoticed loss, 48 ticks, is about the usual margin.
+/// The coarsest wheel with which an encoder fault is found in time, from 0.5 km/h on. Then four ticks come within 32 ms, see
+/// [`monitor`](crate::measure::monitor). The largest unnoticed loss, 48 ticks, is about the usual margin.
 pub const TICKS_PER_M_LEAST: u16 = 900;
 
 /// Settings that contradict each other.

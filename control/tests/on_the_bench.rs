@@ -29,7 +29,7 @@ fn stand(machine: &mut Machine, from_ms: u64, duration_ms: u64, count: i32) -> O
 }
 
 #[test]
-fn the_tool_moves_by_hand_in_hold_only_and_is_out_again_when_the_machine_starts() {
+fn the_servo_is_driven_directly_in_hold_only_and_the_tool_is_out_again_at_work() {
     let mut machine = machine();
     machine.servo_in().unwrap();
     assert_eq!(stand(&mut machine, 0, 10, 0).pulse, servo::from_us(1500));

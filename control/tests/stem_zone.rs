@@ -138,7 +138,7 @@ proptest! {
     /// Plants that have grown together, ragged plants, and weeds that touch. The tool never comes nearer to a stem than a single
     /// plant's trim allows, at each position of the stem in its canopy.
     #[test]
-    fn no_stem_is_nearer_to_the_tool_than_its_own_leaves_reach_less_what_one_side_gives_up(
+    fn no_stem_is_nearer_to_the_tool_than_a_single_plants_trim_allows(
         plants in prop::collection::vec((70.0..200.0_f64, prop::option::of((20.0..120.0_f64, 70.0..200.0_f64)), 150.0..400.0_f64), 1..8),
         speed_mm_s in 100.0..900.0_f64,
     ) {

@@ -274,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn the_rest_of_a_half_seen_plant_is_cut_at_every_position_of_forgetting() {
+    fn the_rest_of_a_half_seen_plant_is_cut_after_forgetting_at_any_position() {
         for back in [0, 1, 50, 400] {
             for level_there in [false, true] {
                 let mut detector = begun(0, false);

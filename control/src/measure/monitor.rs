@@ -309,7 +309,7 @@ mod tests {
     use crate::units::Interval;
 
     #[test]
-    fn a_turn_at_either_end_of_a_time_is_allowed_for() {
+    fn a_time_may_be_off_by_a_turn_or_a_millisecond() {
         assert_eq!([0, 3, 4, 5, 200].map(grace), [4, 4, 5, 6, 201]);
     }
 

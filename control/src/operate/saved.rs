@@ -215,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn the_last_save_counts_however_often_the_sequence_wraps() {
+    fn the_last_save_counts_after_the_sequence_wraps() {
         let mut memory = Volatile::new();
         for time in 0..600 {
             memory = save(memory, &with_k(1 + time % 15));

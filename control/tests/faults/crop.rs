@@ -9,7 +9,7 @@ use control::{
 };
 
 #[test]
-fn a_row_of_stalks_that_are_taken_for_weeds_is_an_alarm_at_the_fifth() {
+fn a_row_of_stalks_classified_as_weeds_is_an_alarm_at_the_fifth() {
     let mut drive = Drive::at_work();
     assert_eq!((drive.pass_stalks(20), drive.alarm()), (5, Some(Alarm::CropUnknown)));
     drive.machine.clear();

@@ -74,7 +74,7 @@ fn the_third_silence_within_ten_metres_of_the_one_before_is_an_alarm() {
 }
 
 #[test]
-fn stops_are_never_an_alarm_however_many_and_however_hard() {
+fn many_and_hard_stops_are_no_alarm() {
     let mut drive = Drive::at_work();
     for stop in 0..30 {
         drive.roll(0.3 + f64::from(stop) / 30.0, 0.3);
@@ -86,7 +86,7 @@ fn stops_are_never_an_alarm_however_many_and_however_hard() {
 }
 
 #[test]
-fn a_hard_stop_is_no_silence_with_every_encoder() {
+fn a_hard_stop_is_no_silence_with_any_encoder() {
     // From 16,000 ticks a metre to 900. A person brakes with 3 m/s2, and the slipping wheel with a tenth more. The progress of an
     // encoder finer than 0.4 mm may be a little shorter.
     let machines =
@@ -249,7 +249,7 @@ fn a_wheel_that_trembles_on_an_edge_with_the_engine_is_no_alarm() {
 const TICKS_PER_M: [u16; 11] = [900, 1910, 2400, 2401, 4800, 4801, 9600, 9601, 15_000, 19_200, 20_000];
 
 #[test]
-fn a_machine_that_turns_round_at_work_has_no_dead_channel_with_every_encoder() {
+fn a_machine_that_reverses_at_work_has_no_dead_channel_with_any_encoder() {
     for ticks_per_m in TICKS_PER_M {
         for (speed_m_s, braking_m_s2, rest_s) in [(0.3, 0.3, 0.0), (0.7, 1.0, 0.0), (0.7, 3.0, 0.2), (1.2, 2.0, 0.05)] {
             let mut machine = machine();
@@ -304,7 +304,7 @@ fn a_dead_channel_is_an_alarm_with_every_encoder() {
 }
 
 #[test]
-fn a_wheel_that_trembles_where_a_slow_machine_has_stopped_is_no_alarm() {
+fn a_wheel_that_trembles_after_a_slow_stop_is_no_alarm() {
     for speed_m_s in [0.05, 0.1, 0.15, 0.2] {
         let mut drive = Drive::at_work();
         for _ in 0..10 {
