@@ -13,7 +13,7 @@
 use crate::{
     encoder,
     handler::handler,
-    passes,
+    loop_bound,
     ring::Ring,
     shared::{Byte, Shared},
 };
@@ -74,7 +74,7 @@ impl<'a> Beam<'a> {
         let mut left = SLOTS as u8;
         core::iter::from_fn(move || {
             // The edges, the loss, and the end.
-            passes::at_most::<{ SLOTS as u8 + 2 }>();
+            loop_bound::at_most::<{ SLOTS as u8 + 2 }>();
             if left > 0 {
                 left -= 1;
                 if let Some(edge) = next_edge() {

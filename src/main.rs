@@ -16,7 +16,7 @@ mod encoder;
 mod examples;
 mod handler;
 mod heartbeat;
-mod passes;
+mod loop_bound;
 mod reset;
 mod ring;
 mod serial;
@@ -105,7 +105,7 @@ fn run(typed: &mut LineBuffer, console: &mut Console, uninit: &mut UninitWeeder)
         // A turn has little time for the console: some bytes, or one longer step. After other long work there is none.
         let bytes = if orders.turn_spent { 0 } else { CONSOLE_BYTES };
         for _ in 0..bytes {
-            passes::at_most::<CONSOLE_BYTES>();
+            loop_bound::at_most::<CONSOLE_BYTES>();
             if serial.room() > 0
                 && let Some(byte) = console.next_byte()
             {
