@@ -13,7 +13,7 @@
 use crate::{
     encoder,
     handler::handler,
-    passes,
+    loop_bound,
     ring::Ring,
     shared::{Byte, Shared},
 };
@@ -68,14 +68,13 @@ impl<'a> Beam<'a> {
 
     /// The queued edges, and then [`Edge::Lost`] if edges were dropped.
     pub fn edges(&mut self) -> impl Iterator<Item = Edge> {
-        // Read before the edges: then all edges queued before the loss are taken first, and no later edge follows the level read at
-        // the end.
+        // Read before the edges. Then all edges queued before the loss come first, and none follows the level read at the end.
         let mut lost = take_lost();
         // At most as many as the queue holds, so that edges which keep coming cannot stop the loop.
         let mut left = SLOTS as u8;
         core::iter::from_fn(move || {
             // The edges, the loss, and the end.
-            passes::at_most::<{ SLOTS as u8 + 2 }>();
+            loop_bound::at_most::<{ SLOTS as u8 + 2 }>();
             if left > 0 {
                 left -= 1;
                 if let Some(edge) = next_edge() {
@@ -116,7 +115,7 @@ handler! {
         "push r31",
         "lds  r30, {edges}+{pushed}",
         "lds  r31, {edges}+{taken}",
-        "sub  r31, r30", // less as many as wait
+        "sub  r31, r30", // minus the number waiting
         "cpi  r31, -{slots}",
         "breq 3f",
         "inc  r30",

@@ -1,6 +1,6 @@
 //! The pins that the loop reads and sets: work switch (D4), end switch (D5) and status LED (D13).
 //!
-//! Encoder (D2, D3) and beams (D8, D10) belong to their interrupts, D9 to the servo's timer, D0 and D1 to the USART. Encoder and
+//! Encoder (D2, D3) and beams (D8, D10) belong to their interrupts. D9 is the servo timer's, D0 and D1 the USART's. Encoder and
 //! beams have external pull-ups; only the switches use internal ones.
 
 use avr_device::atmega328p::{PORTB, PORTD, portb};

@@ -27,8 +27,8 @@ pub fn finish(eeprom: &EEPROM) {
 impl<const BASE: u16> Half<BASE> {
     /// The half.
     ///
-    /// # Safety The caller makes at most one for each `BASE`, uses it from the loop only, and lets no other code use the EEPROM
-    /// before.
+    /// # Safety
+    /// The caller makes at most one for each `BASE`, and uses it from the loop only. No other code writes the EEPROM before.
     pub const unsafe fn new() -> Self {
         Self(())
     }

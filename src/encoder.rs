@@ -5,7 +5,7 @@
 //! than these two. PCINT2 would serve both pins, but the beam's PCINT0 has a higher priority than it: a sample could then wait for
 //! a handler that has just begun and for the beam's. Now it waits for one of them only.
 //!
-//! The handler is in assembly. It looks up the step in a table, counts it, and continues to the count's upper bytes only if they
+//! The handler is in assembly. It looks up the step in a table and counts it. It handles the count's upper bytes only if they
 //! change. The compiler makes the table from the decoder of `control`, for each state and each pair of levels. So there is no
 //! second decoder that could differ.
 
@@ -121,13 +121,13 @@ fn count() -> i32 {
 }
 
 handler! {
-    /// The handler of INT0 and INT1: 46 cycles for a step forward, 48 for a step back, more if upper bytes of the count change, and
-    /// for a jump.
+    /// The handler of INT0 and INT1: 46 cycles for a step forward, 48 for a step back. It takes more if upper bytes of the count
+    /// change, and for a jump.
     ///
     /// It samples in its 12th cycle. An edge that comes when another handler begins waits for that handler, one instruction of the
-    /// loop, a critical section that this instruction may open, the next instruction, and these 12 cycles. `weeder bounds` proves
-    /// the longest wait. This wait gives the rate up to which at most one edge is missed between two samples. Edges that keep this
-    /// rate leave the loop no time, so the loop's need of time is the real limit.
+    /// loop, and these 12 cycles. If that instruction opens a critical section, the edge also waits for the section and the
+    /// instruction after it. `weeder bounds` proves the longest wait. This wait gives the rate up to which at most one edge is
+    /// missed between two samples. Edges that keep this rate leave the loop no time, so the loop's need of time is the real limit.
     on_change = "__vector_1" {
         ".globl __vector_2",
         ".set __vector_2, __vector_1",
@@ -138,13 +138,13 @@ handler! {
         "in   r24, 0x09", // PIND
         "push r30",
         "push r31",
-        // Z = TABLE + (memory | new levels)
+        // Z = TABLE + (state | new levels)
         "andi r24, 0x0c",
         "in   r30, 0x2a", // GPIOR1
         "or   r30, r24",
         "ldi  r31, hi8({table})",
         "subi r30, lo8(-({table}))",
-        "lpm  r24, Z", // the new memory
+        "lpm  r24, Z", // the new state
         "sbrc r24, 7",
         "rjmp 3f",
         "out  0x2a, r24",

@@ -1,14 +1,14 @@
 //! Examples in flash, and the search through them and through those in SRAM.
 //!
-//! The search is the largest part of a classification, so it is in assembly. The query stays in registers, LPM loads one feature
-//! after the other, and the search leaves an example once it is too far. For that the sum starts at 2^24 - 1 minus the farthest
-//! neighbour's distance, so the carry out of its 24 bits means "too far". An example costs 7 cycles and 12 for each feature loaded:
-//! 19 to 67. An example near enough moves each farther neighbour by one place, 24 cycles each, and takes its own place, some 50
+//! The search is the largest part of a classification, so it is in assembly. The query stays in registers, and LPM loads one
+//! feature after the other. The search leaves an example once it is too far. For that the sum starts at 2^24 - 1 minus the farthest
+//! neighbour's distance. A carry out of its 24 bits then means "too far". An example costs 7 cycles and 12 for each feature loaded:
+//! 19 to 67. An example near enough moves each farther neighbour by one place, 24 cycles each. Taking its own place costs some 50
 //! cycles. Examples without a place that are as far as the farthest are counted.
 //!
-//! A table in flash is sorted by its first feature. The search starts at the query's own value and runs to the table's end, then
-//! from the start back to the table's beginning. So the nearest come first. Once the first feature alone is too far, that direction
-//! ends.
+//! A table in flash is sorted by its first feature. The search starts at the query's own value and runs to the table's end. Then it
+//! runs from the same start back to the table's beginning. So the nearest come first. Once the first feature alone is too far, that
+//! direction ends.
 
 use avr_progmem::{raw::read_byte, wrapper::ProgMem};
 use control::ground::{examples, features};
@@ -112,8 +112,8 @@ macro_rules! keep_nearest {
         let mut front = first + (free * size_of::<Neighbour>()) as u16;
         let (level, ones): (u8, u8);
         asm!(
-            // R17 and R16 are the sum's upper bytes, R19 and R18 those of its start, and R25:R24 is the next row's address. MOVW
-            // needs pairs with an even first register, which the compiler's choice does not guarantee. R1, elsewhere 0, takes the
+            // R17 and R16 are the sum's upper bytes, R19 and R18 those of its start. R25:R24 is the next row's address. MOVW needs
+            // pairs with an even first register, which the compiler's choice does not guarantee. R1, elsewhere 0, takes the
             // products, so another register is the zero for the carry. The stack holds the second direction's start and its number
             // of rows plus one.
             "push r24",

@@ -25,7 +25,7 @@ macro_rules! handler {
         #[unsafe(naked)]
         // SAFETY: the symbol is this interrupt's vector (data sheet, table 12-6), and no other code defines it.
         #[unsafe(export_name = $vector)]
-        // The first section after the vectors in memory.x, so that the vectors' short jump always reaches it.
+        // Placed right after the vectors (memory.x), so that their short jump always reaches it.
         #[unsafe(link_section = ".progmem.gcc_handlers")]
         unsafe extern "C" fn $name() {
             core::arch::naked_asm!(

@@ -4,8 +4,8 @@
 //! the interrupt does not return: it commands the servo out, leaves a mark for the next start, and lets the watchdog reset the
 //! machine. A panic does the same.
 //!
-//! The watchdog alone would leave the servo in its present position, and could cut a pulse short, which a servo may take for a
-//! command.
+//! The watchdog alone would leave the servo in its present position. It could also cut a pulse short, and a servo may take that for
+//! a command.
 
 use crate::{
     reset, servo,
@@ -51,7 +51,7 @@ fn give_up(mark: u16) -> ! {
     let out = OUT.get();
     if out != 0 {
         // SAFETY: interrupts are off and this never returns, so the loop, which owns the servo, does not continue. `out` is not 0,
-        // so the loop has beaten, and it does so only after it has started the servo's timer.
+        // so the loop has beaten. It beats only after it has started the servo's timer.
         unsafe { servo::end_with(out) };
     }
     watchdog::reset()

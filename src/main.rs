@@ -16,7 +16,7 @@ mod encoder;
 mod examples;
 mod handler;
 mod heartbeat;
-mod passes;
+mod loop_bound;
 mod reset;
 mod ring;
 mod serial;
@@ -46,16 +46,16 @@ const CONSOLE_BYTES: u8 = 8;
 
 #[avr_device::entry]
 fn main() -> ! {
-    let (console, asleep) = (&raw mut CONSOLE, &raw mut ASLEEP);
+    let (console, uninit) = (&raw mut CONSOLE, &raw mut UNINIT);
     // SAFETY: no other code names these statics, and the entry point runs once.
-    let (console, asleep) = unsafe { (&mut *console, &mut *asleep) };
+    let (console, uninit) = unsafe { (&mut *console, &mut *uninit) };
     // In a stack frame of its own: bytes more than 63 from a frame's end take five more instructions to access.
-    run(&mut LineBuffer::new(), console, asleep)
+    run(&mut LineBuffer::new(), console, uninit)
 }
 
 static mut CONSOLE: Console = Console::new();
 
-static mut ASLEEP: UninitWeeder = {
+static mut UNINIT: UninitWeeder = {
     // SAFETY: these are the only halves, and only the entry point takes the static, once.
     let (settings, examples) = unsafe { (eeprom::Lower::new(), eeprom::Upper::new()) };
     Uninit::new(Nearest::asleep(examples::BuiltIn, examples), settings)
@@ -63,7 +63,7 @@ static mut ASLEEP: UninitWeeder = {
 
 /// Sets up the peripherals and runs the loop.
 #[inline(never)]
-fn run(typed: &mut LineBuffer, console: &mut Console, asleep: &mut UninitWeeder) -> ! {
+fn run(typed: &mut LineBuffer, console: &mut Console, uninit: &mut UninitWeeder) -> ! {
     // SAFETY: the entry point is the first code to run, and runs once, so no other code holds the peripherals.
     let peripherals = unsafe { Peripherals::steal() };
     // Before the first interrupt, because the handlers overwrite GPIOR2.
@@ -86,7 +86,7 @@ fn run(typed: &mut LineBuffer, console: &mut Console, asleep: &mut UninitWeeder)
         Readings { now, position: Position::new(position), switch_on, lost, jumps, end_switch_on, stack_free }
     };
     eeprom::finish(&peripherals.EEPROM);
-    let controller = init(asleep, Startup { readings: read(), beam_broken: beam.is_broken(), cause });
+    let controller = init(uninit, Startup { readings: read(), beam_broken: beam.is_broken(), cause });
     // The pulse for "tool out" is a setting, so the servo starts after the settings are loaded.
     let mut servo = servo::Servo::new(peripherals.TC1, &peripherals.PORTB, controller.orders().pulse);
 
@@ -105,7 +105,7 @@ fn run(typed: &mut LineBuffer, console: &mut Console, asleep: &mut UninitWeeder)
         // A turn has little time for the console: some bytes, or one longer step. After other long work there is none.
         let bytes = if orders.turn_spent { 0 } else { CONSOLE_BYTES };
         for _ in 0..bytes {
-            passes::at_most::<CONSOLE_BYTES>();
+            loop_bound::at_most::<CONSOLE_BYTES>();
             if serial.room() > 0
                 && let Some(byte) = console.next_byte()
             {
@@ -115,8 +115,8 @@ fn run(typed: &mut LineBuffer, console: &mut Console, asleep: &mut UninitWeeder)
                 && let Ok(byte) = serial.read()
             {
                 if typed.collect(byte) {
-                    if let Some(said) = typed.read() {
-                        console.take(said);
+                    if let Some(line) = typed.read() {
+                        console.take(line);
                     }
                     break;
                 }
@@ -130,6 +130,6 @@ fn run(typed: &mut LineBuffer, console: &mut Console, asleep: &mut UninitWeeder)
 
 /// Starts the controller with the EEPROM's contents. A separate function, so that its stack frame is not part of the loop's.
 #[inline(never)]
-fn init(asleep: &mut UninitWeeder, startup: Startup) -> &mut Weeder {
-    asleep.init(startup)
+fn init(uninit: &mut UninitWeeder, startup: Startup) -> &mut Weeder {
+    uninit.init(startup)
 }

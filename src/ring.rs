@@ -1,9 +1,9 @@
 //! The indices of a lock-free queue between an interrupt handler and the loop.
 //!
 //! One side only pushes and the other only takes. Each has its own index, which the other side reads and never writes. A slot is
-//! filled before its index passes it on, and read before its index frees it. The indices wrap as bytes, not at the last slot, so
-//! their difference is the queue's length and all slots can be used. An item is in the slot that the incremented index names, which
-//! is what a handler has in its register. The user of the queue owns the slots.
+//! filled before its index passes it on, and read before its index frees it. The indices wrap as bytes, not at the last slot. So
+//! their difference is the queue's length, and all slots can be used. An item is in the slot that the incremented index names,
+//! which is what a handler has in its register. The user of the queue owns the slots.
 //!
 //! This file is the loop's side. A handler's side is a few lines of assembly beside its slots, with [`Ring::PUSHED`],
 //! [`Ring::TAKEN`] and [`Ring::MASK`].

@@ -26,10 +26,10 @@ const TO_SEND_SLOTS: usize = 32;
 /// The two values of UCSR0B, always written whole, so that loop and handler cannot overwrite each other's bits. Both have the
 /// receive interrupt; the second also has the interrupt for a free transmitter.
 ///
-/// That interrupt is on only while bytes wait. On an empty queue the chip would call the handler again and again, and some
-/// simulators clear the request at its first call and would never call it again. So the handler turns it off with the last byte,
-/// and the loop turns it on after each push. In between, the handler could take that byte and turn it off, and the loop would then
-/// turn it on for an empty queue. So the loop turns it off before the push.
+/// That interrupt is on only while bytes wait. On an empty queue the chip would call the handler again and again. Some simulators
+/// clear the request at its first call, and would never call it again. So the handler turns it off with the last byte, and the loop
+/// turns it on after each push. In between, the handler could take that byte and turn it off. The loop would then turn it on for an
+/// empty queue. So the loop turns it off before the push.
 const RECEIVING: u8 = 0b1001_1000; // RXCIE0, RXEN0, TXEN0
 const SENDING: u8 = RECEIVING | 1 << 5; // UDRIE0
 
@@ -111,7 +111,7 @@ handler! {
         "ldi  r24, {mark}",
         "lds  r30, {queue}+{pushed}",
         "lds  r31, {queue}+{taken}",
-        "sub  r31, r30", // less as many as wait
+        "sub  r31, r30", // minus the number waiting
         "cpi  r31, 2-{slots}",
         "brlt 3f",
         "1:",

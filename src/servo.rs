@@ -1,8 +1,8 @@
 //! The servo on D9: Timer1 in mode 14, in steps of 0.5 us, with pulses free of jitter.
 //!
-//! The timer counts up to ICR1 and restarts, sets the pin at 0 and clears it at OCR1A (data sheet, 16.9.3). No code runs for a
-//! pulse. A new OCR1A takes effect at the next 0. For an immediate pulse the counter is set just below ICR1, once the line has been
-//! low for the servo's gap. A running pulse is never changed.
+//! The timer counts up to ICR1 and restarts. It sets the pin at 0 and clears it at OCR1A (data sheet, 16.9.3). No code runs for a
+//! pulse. A new OCR1A takes effect at the next 0. For an immediate pulse the loop sets the counter just below ICR1, once the line
+//! was low for the servo's gap. A running pulse is never changed.
 //!
 //! Timer1's 16-bit registers share a temporary byte (16.3). So no interrupt may access them, except one that never returns
 //! ([`end_with`]).

@@ -25,7 +25,7 @@ pub struct Shared<T>(UnsafeCell<T>);
 /// A shared byte; each access is atomic.
 pub type Byte = Shared<u8>;
 
-// SAFETY: the chip has one core. A handler that interrupts an access can leave half of an old and half of a new number, which is a
+// SAFETY: the chip has one core. A handler that interrupts an access can leave half of an old and half of a new number. That is a
 // valid number too.
 unsafe impl<T: AnyBits> Sync for Shared<T> {}
 

@@ -1,8 +1,8 @@
 //! The benchmark on the chip: runs the tasks of `Task::ALL`, and shows each call on D13.
 //!
-//! It runs the firmware's own search of examples in flash, in the firmware's own profile. Then it classifies the same queries with
-//! the plain search of the crate `knn`, and counts different answers, also for a search of examples in SRAM. It prints nothing:
-//! `cargo bench-uno` reads the pin and the variables.
+//! It runs the firmware's own search of examples in flash, in the firmware's own profile. Then it repeats the queries with the
+//! plain search of the crate `knn`, and counts different answers. It does the same for examples in SRAM. It prints nothing: `cargo
+//! bench-uno` reads the pin and the variables.
 
 #![no_std]
 #![no_main]

@@ -87,7 +87,7 @@ pub struct Unclassified {
     known: Known,
 }
 
-/// What is known of a detection without a class. `Nothing` has the value 0, so [`Ground::NONE`] is all zeros and needs no copy in flash.
+/// What is known of a detection without a class. `Nothing` is 0, so [`Ground::NONE`] is all zeros and needs no copy in flash.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Known {
     /// There is no detection.
@@ -289,7 +289,8 @@ impl Ground {
 
     /// Takes the class of that detection, and remembers a plant or an unknown.
     ///
-    /// # Errors [`ScheduleFull`] if more canopies stand between beam and tool than can be remembered.
+    /// # Errors
+    /// [`ScheduleFull`] if more canopies stand between beam and tool than can be remembered.
     pub fn classified(&mut self, class: Class) -> Result<(), ScheduleFull> {
         let Unclassified { detection, canopy, known, .. } = &mut self.unclassified;
         let was_known = core::mem::replace(known, Known::Nothing);
@@ -322,7 +323,8 @@ impl Ground {
 
     /// Guards the ground of an expected plant once the beam has passed it and seen none. Returns the middle of that ground.
     ///
-    /// # Errors [`ScheduleFull`], as for a plant.
+    /// # Errors
+    /// [`ScheduleFull`], as for a plant.
     #[cfg_attr(target_arch = "avr", inline(never))]
     #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn guard(&mut self) -> Option<Result<WrappedPosition, ScheduleFull>> {

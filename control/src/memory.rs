@@ -10,8 +10,8 @@ pub const SIZE: usize = 512;
 /// The value of an erased byte.
 pub const ERASED: u8 = 0xFF;
 
-/// CRC-16/IBM-SDLC, a byte at a time and without a table, which would cost flash. A library's bit by bit takes 13,000 cycles for
-/// the settings, and a save computes it within a turn of the loop.
+/// CRC-16/IBM-SDLC, a byte at a time and without a table, which would cost flash. A library's, bit by bit, takes 13,000 cycles for
+/// the settings. That is too long, because a save computes it within a turn.
 pub(crate) const fn checksum(mut bytes: &[u8]) -> u16 {
     let mut crc = u16::MAX;
     while let Some((&byte, rest)) = bytes.split_first() {

@@ -1,9 +1,9 @@
 //! The console: commands in, answers and events out.
 //!
 //! Bytes become lines, and a line becomes a [`command`]. One turn of the loop runs it, and later turns answer it. An answer can be
-//! longer than the serial buffer, and no call may wait. So an [`Answer`] remembers how far it has been written, and builds its next
-//! [`Line`] once the line before it is sent. [`Console`] does one small step in each turn: it reads or writes a few characters,
-//! builds a line, or runs a command. No input can stop the loop.
+//! longer than the serial buffer, and no call may wait. So an [`Answer`] remembers how far it has been written. It builds its next
+//! [`Line`] once the last one is sent. [`Console`] does one small step in each turn: it reads or writes a few characters, builds a
+//! line, or runs a command. No input can stop the loop.
 //!
 //! All texts are in flash ([`packed`]), with the names of alarms and settings. No module below imports this one. Inside it imports
 //! run `words` -> `texts` -> `packed` -> `names`, `line` -> [`command`], and the modules that build lines -> `answer` -> `execute`

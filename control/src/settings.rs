@@ -86,7 +86,7 @@ settings! {
     StemZoneMm "stem_zone_mm" in "mm": 0 to 300, 0, true,
         "kept round a stem; 0 the canopy";
     /// Longest time from the command until the tool is out. The default is the default servo's slowest swing over the default
-    /// stroke: 80 ms dead time, 144 ms for 45 degrees against the soil, and 6 ms for the pulse on the line.
+    /// stroke. It has 80 ms dead time, 144 ms for 45 degrees against the soil, and 6 ms for the running pulse.
     LeadOutMs "lead_out_ms" in "ms": 0 to 500, 230, false,
         "longest time until the tool is out";
     /// Shortest time from the command until the tool begins to come back.
@@ -158,8 +158,8 @@ const _: () = assert!(SECOND_BEAM_LEAST_MM as u32 * TICKS_PER_M_LEAST as u32 >= 
 /// Largest X with a second beam: with slip, X still has to fit the range of a [`Length`](crate::units::Length).
 pub const SLIPPING_BEAM_TO_TOOL_MM: u16 = 1000;
 
-/// The coarsest wheel with which an encoder fault is found in time, from 0.5 km/h on. Four ticks then come within [32
-/// ms](crate::measure::monitor), and the largest unnoticed loss, 48 ticks, is about the usual margin.
+/// The coarsest wheel with which an encoder fault is found in time, from 0.5 km/h on. Then four ticks come within 32 ms, see
+/// [`monitor`](crate::measure::monitor). The largest unnoticed loss, 48 ticks, is about the usual margin.
 pub const TICKS_PER_M_LEAST: u16 = 900;
 
 /// Settings that contradict each other.
@@ -291,7 +291,8 @@ impl Settings {
 
     /// Sets a value.
     ///
-    /// # Errors [`OutOfRange`] if the value is outside the table's range. The old value stays.
+    /// # Errors
+    /// [`OutOfRange`] if the value is outside the table's range. The old value stays.
     pub fn set(&mut self, setting: Setting, value: u16) -> Result<(), OutOfRange> {
         if !setting.allows(value) {
             return Err(OutOfRange);

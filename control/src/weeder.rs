@@ -1,8 +1,8 @@
 //! The controller: beam edges, readings and commands go in, a servo pulse width comes out.
 //!
-//! The main loop calls [`Controller::turn`] once a turn. The controller takes the beam edges that the machine has passed, measures
-//! the speed, advances the ground, and asks it whether the tool may be in the row. No call waits. No call stores a time for a later
-//! action: each turn decides from the position and the speed of that turn.
+//! The main loop calls [`Controller::turn`] once a turn. The controller takes the new beam edges, measures the speed, and advances
+//! the ground. It then asks the ground whether the tool may be in the row. No call waits. No call stores a time for a later action:
+//! each turn decides from the position and the speed of that turn.
 
 mod bench;
 mod commands;
@@ -54,8 +54,8 @@ pub struct Orders {
     pub pulse_out: HalfMicros,
     /// The shortest gap between servo pulses in milliseconds; 0 for fixed frames.
     pub gap_ms: u8,
-    /// Whether this turn did long work: a classification step, or new leads, slip or settings. The loop then adds no more work to
-    /// the turn.
+    /// Whether this turn did long work: a classification step, or new leads, slip or settings. The loop then skips the console in
+    /// this turn.
     pub turn_spent: bool,
 }
 
@@ -90,8 +90,8 @@ pub struct Controller<C, M> {
     telemetry: Telemetry,
 }
 
-/// A controller before [`init`](Self::init). It is all zeros apart from its parts, so a `static` holds it without a copy in flash,
-/// and `init` works in place.
+/// A controller before [`init`](Self::init). It is all zeros apart from its parts, so a `static` holds it without a copy in flash.
+/// `init` works in place.
 #[derive(Debug)]
 pub struct Uninit<C, M>(Controller<C, M>);
 

@@ -10,7 +10,8 @@ use avr_progmem::{raw::read_byte, wrapper::ProgMem};
 
 /// The byte at an index of a table, from 0 to `LENGTH` - 1.
 ///
-/// # Panics If `place` is beyond the table.
+/// # Panics
+/// If `place` is beyond the table.
 #[inline(always)]
 pub fn byte<const LENGTH: usize>(table: &ProgMem<[u8; LENGTH]>, place: usize) -> u8 {
     assert!(place < LENGTH);

@@ -7,7 +7,7 @@ use crate::{Answer, ClassifyError, Examples, MAX_K, Nearest, Neighbour};
 /// - All examples that are as far as the k-th nearest vote, so that the order of the examples never matters.
 /// - Each vote counts one, near or far; the class with the most votes wins (see [`Answer::label`] for ties).
 /// - `radius` is a squared distance: if the nearest example is farther, the answer is a [`Kind::Stranger`](crate::Kind::Stranger)
-/// with any votes. `u32::MAX` turns this off.
+///   with any votes. `u32::MAX` turns this off.
 ///
 /// ```
 /// use knn::{Answer, Example, Kind, classify};
@@ -45,7 +45,7 @@ pub fn classify<const FEATURES: usize, const CLASSES: usize>(
 
 /// [`classify`] with at least `k` places.
 ///
-/// Out of line: AVR accesses the first 63 bytes of a stack frame by far the fastest, and the places are in the caller's frame.
+/// Out of line: AVR accesses the first 63 bytes of a stack frame by far the fastest. The places are in the caller's frame.
 #[inline(never)]
 fn search<const FEATURES: usize, const CLASSES: usize>(
     examples: &(impl Examples<FEATURES> + ?Sized),

@@ -149,7 +149,7 @@ impl<const FEATURES: usize, Store: Examples<FEATURES> + ?Sized> Examples<FEATURE
     }
 }
 
-/// Two stores searched as one set; the second's examples are counted after the first's.
+/// Two stores searched as one; the second's examples follow the first's.
 impl<const FEATURES: usize, First: Examples<FEATURES>, Second: Examples<FEATURES>> Examples<FEATURES>
     for (First, Second)
 {

@@ -29,8 +29,8 @@
 //! # Rules
 //!
 //! - All examples as far as the k-th nearest vote, so that their order never changes the answer.
-//! - Each vote counts one. Among classes with equal votes the one with the nearest example is named, among these the smallest
-//! label, and the answer is a tie.
+//! - Each vote counts one. Equal votes are a tie. The answer then names the class with the nearest example, among these the
+//!   smallest label.
 //! - If the nearest example is beyond the radius, the answer is a stranger, with any votes.
 //!
 //! # Costs
@@ -46,15 +46,14 @@
 //! | [`classify`] | about 130 + 2 C of stack | n F multiplications of 8 x 8 bits; k steps an example within reach; k + C to vote |
 //!
 //! The README has a table of cycles on an ATmega328P, for F = 5, C = 2 and k = 3. The calls and the vote take about 500 cycles, and
-//! each example that is loaded 19 to 67. An example that is among the k nearest at that moment takes some 75 more: about k (1 +
-//! ln(n / k)) of n in random order, and up to all of them if each one is a little nearer than the one before. [`classify`] clears
+//! each example that is loaded 19 to 67. An example that is among the k nearest at that moment takes some 75 more. In random order
+//! these are about k (1 + ln(n / k)) of n. If each one is a little nearer than the one before, they are all. [`classify`] clears
 //! its places first. The plain [`Examples::keep_nearest`] takes about 200 cycles an example. [`Scale::quantise`] takes 1,400
 //! cycles. `cargo bench-uno` in the weeder's workspace measures all of this in the simulator simavr.
 //!
 //! # What it does not do
 //!
-//! It does not learn a scale at run time, weight votes by distance, thin out examples, or choose k or the radius: the host does
-//! that.
+//! It does not learn a scale at run time, or weight votes by distance. The host thins out examples, and chooses k and the radius.
 
 #![no_std]
 #![forbid(unsafe_code)]

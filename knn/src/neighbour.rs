@@ -1,6 +1,6 @@
 //! An example in a search: its distance and its label.
 //!
-//! A neighbour is one number, with the distance above the label, so that a comparison compares distances first and labels next.
+//! A neighbour is one number, with the distance above the label. So a comparison compares distances first, then labels.
 
 /// An example in a search: its squared distance, and its label.
 ///

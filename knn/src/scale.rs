@@ -1,8 +1,8 @@
 //! From measured integers to bytes: one scale for each feature, so that no feature outweighs another.
 //!
 //! A distance adds differences in different units, such as mm and mm/s. So each feature is mapped from its own [`Range`] onto
-//! 0..=255, with one subtraction, one shift and one 16 x 16 bit multiplication. Values outside the range saturate. There is no
-//! division and no float, so host and microcontroller get the same byte from the same number.
+//! 0..=255. This takes one subtraction, one shift and one 16 x 16 bit multiplication. Values outside the range saturate. There is
+//! no division and no float, so host and microcontroller get the same byte from the same number.
 
 /// The values of one feature, in its own unit, that map onto 0 and 255.
 ///
@@ -45,8 +45,8 @@ impl<const FEATURES: usize> Scale<FEATURES> {
     /// Learns the ranges from the rows of a training table; `None` without a row.
     ///
     /// Each feature's values, from the smallest to the largest, take the middle half of the bytes (about 64 to 192). The quarters
-    /// on either side are for values outside the training, so that a stranger stays far from all examples instead of saturating
-    /// onto the outermost. One extreme value stretches its feature's range and compresses the other values: remove outliers first.
+    /// on either side are for values outside the training. So a stranger stays far from all examples, instead of saturating onto
+    /// the outermost. One extreme value stretches its feature's range and compresses the other values: remove outliers first.
     #[must_use]
     pub const fn learn_ranges(rows: &[[i32; FEATURES]]) -> Option<[Range; FEATURES]> {
         let Some((first, others)) = rows.split_first() else {

@@ -81,12 +81,14 @@ pub trait Classifier {
 
     /// Adds a detection as an example of the class `label`, and starts to save it.
     ///
-    /// # Errors [`ExamplesFull`]; the operator has to forget an example first.
+    /// # Errors
+    /// [`ExamplesFull`]; the operator has to forget an example first.
     fn teach(&mut self, features: &Features, label: u8) -> Result<(), ExamplesFull>;
 
     /// Adds a complete example, and starts to save it.
     ///
-    /// # Errors [`ExamplesFull`]; the operator has to forget an example first.
+    /// # Errors
+    /// [`ExamplesFull`]; the operator has to forget an example first.
     fn keep(&mut self, example: Example<{ features::COUNT }>) -> Result<(), ExamplesFull>;
 
     /// Forgets a field example. Returns whether it existed.

@@ -5,9 +5,9 @@
 //! frontier, detection continues with the beam's level there. So a plant is one detection, even if the machine passes it several
 //! times.
 //!
-//! A canopy is ragged. Clear stretches shorter than the merging gap belong to the detection, which ends only after a clear stretch
-//! of that length. The beginning of a detection is certain only after such a clear stretch too. At the start, and after forgetting,
-//! an open detection therefore stands for the possible rest of a canopy. The detector does not classify.
+//! A canopy is ragged. Clear stretches shorter than the merging gap belong to the detection. It ends only after a clear stretch of
+//! that length. The beginning of a detection is certain only after such a clear stretch too. At the start, and after forgetting, an
+//! open detection therefore stands for the possible rest of a canopy. The detector does not classify.
 
 use super::detection::{Detection, End};
 use crate::units::{Length, WrappedPosition};
@@ -274,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn the_rest_of_a_half_seen_plant_is_cut_at_every_position_of_forgetting() {
+    fn the_rest_of_a_half_seen_plant_is_cut_after_forgetting_at_any_position() {
         for back in [0, 1, 50, 400] {
             for level_there in [false, true] {
                 let mut detector = begun(0, false);

@@ -63,8 +63,8 @@ pub const COUNT: usize = table::TRAINED.len();
 const _: () = assert!(COUNT <= CAPACITY, "too many examples for the flash budget");
 
 /// The table, [sorted by speed](sorted_by_first_feature), and shuffled within each speed: neighbours are `STEP` places apart in the
-/// table. In the trained order similar examples are neighbours, so a search would come ever nearer, and each example would enter
-/// the list of the nearest for a while.
+/// table. In the trained order similar examples are neighbours, and a search comes ever nearer. Each example would then enter the
+/// list of the nearest for a while.
 pub const EXAMPLES: [Example<{ features::COUNT }>; COUNT] = {
     let mut examples = [Example::new([0; features::COUNT], 0); COUNT];
     let mut index = 0;

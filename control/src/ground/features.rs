@@ -64,8 +64,8 @@ impl Features {
     }
 }
 
-/// The distance rolled, in mm. In units of 20 ms, a speed class times a lead fits 16 bits, which the chip divides three times as
-/// fast as 32 bits.
+/// The distance rolled, in mm. In units of 20 ms, a speed class times a lead fits 16 bits. The chip divides 16 bits three times as
+/// fast as 32.
 const fn rolled(speed_mm_s: i16, milliseconds: u16) -> u16 {
     speed_mm_s as u16 * (milliseconds / 20) / 50
 }

@@ -1,10 +1,10 @@
 //! Field examples: taught by the operator, and kept in the EEPROM.
 //!
 //! Each of [`CAPACITY`] examples has a slot of eight bytes: five features, the label, and a CRC-16. The CRC covers features, label
-//! and the scale that turned the features into bytes, because on another scale the bytes mean something else. An erased slot reads
-//! as ones. A slot with a wrong CRC, after a power loss or a flipped bit, is dropped and counted. All slots are read once at
-//! start-up into SRAM. A search in the EEPROM would take two turns of the loop, more with the CRC, and would wait for a byte that
-//! is being written. The bytes of a slot are written one at a time, each when the memory is ready.
+//! and the features' scale, because on another scale the bytes mean something else. An erased slot reads as ones. A slot with a
+//! wrong CRC, after a power loss or a flipped bit, is dropped and counted. All slots are read once at start-up into SRAM. A search
+//! in the EEPROM would take two turns of the loop, and more with the CRC. It would also wait for a byte that is being written. The
+//! bytes of a slot are written one at a time, each when the memory is ready.
 
 use crate::{
     ground::{class::label, examples, features},
@@ -89,7 +89,8 @@ impl<M: Memory> FieldExamples<M> {
 
     /// Adds an example and returns its slot. [`carry_on`](Self::carry_on) writes it.
     ///
-    /// # Errors The example, if all slots are taken.
+    /// # Errors
+    /// The example, if all slots are taken.
     pub fn add(&mut self, example: Taught) -> Result<u8, Taught> {
         let Some(number) = self.examples.iter().position(|example| !is_held(example)) else {
             return Err(example);

@@ -23,7 +23,7 @@ pub struct Guard {
 }
 
 impl Guard {
-    /// No plant is due.
+    /// No plant is expected.
     pub const NONE: Self = Self { due: WrappedPosition::new(0), left: 0 };
 
     /// Takes a kept detection.

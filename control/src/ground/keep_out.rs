@@ -5,7 +5,7 @@
 //! margin ahead of it, for a plant that may end there.
 //!
 //! Zones are not merged. Two that overlap close the ground between them. The caller asks about a stretch as long as the servo
-//! needs, so a gap too short to swing in and out is closed too.
+//! needs. So a gap too short to swing in and out is closed too.
 
 use super::{
     detection::{Detection, End},
@@ -14,8 +14,8 @@ use super::{
 use crate::units::{Length, Ticks, WrappedPosition};
 use heapless::Vec;
 
-/// Canopies remembered at once, ahead of the tool and behind it: four plants between beam and tool at the longest distance and the
-/// closest spacing, and some six metres of row to roll back over.
+/// Canopies remembered at once, ahead of the tool and behind it. Four plants fit between beam and tool at the longest distance and
+/// closest spacing. The others allow rolling back over some six metres.
 pub const CAPACITY: usize = 16;
 
 /// Why the ground behind `known_from` is unknown.
@@ -36,7 +36,7 @@ pub struct Canopy {
     pub leading: WrappedPosition,
     /// Where it ends.
     pub trailing: WrappedPosition,
-    /// Leaves on either side under which the tool may work; 0 keeps the full width.
+    /// Width of the leaves on either side under which the tool may work; 0 keeps the full width.
     pub trim: u8,
 }
 
@@ -46,8 +46,8 @@ impl Canopy {
 
     /// The canopy of a detection, if it is a plant: `zone` around its middle, or all of it if `zone` is 0 or wider.
     ///
-    /// A stem stands near the middle of its canopy. But the beam cannot tell one plant from two that have grown together, or from
-    /// one with a weed beside it. So at most a fifth of the zone is cut off either end: no stem stands so near to an end.
+    /// A stem stands near the middle of its canopy. But two plants that have grown together, or a plant with a weed beside it, look
+    /// the same to the beam. So at most a fifth of the zone is cut off either end: no stem stands so near to an end.
     pub(super) fn of(detection: &Detection, zone: Length) -> Self {
         let beside = detection.width() - zone;
         let most = (zone.0 as u16 * 13) >> 6;
@@ -68,9 +68,9 @@ impl Canopy {
     /// Takes a stretch that the second beam sees, all of a detection or one `end`. Returns whether it lies within `reach` of the
     /// canopy.
     ///
-    /// If both beams have an end of a single plant within a quarter of `within`, the second beam's position is used: from there,
-    /// less distance is left for slip. Otherwise the canopy grows to include the stretch, and keeps its full width, because one
-    /// beam has not seen all of it.
+    /// If both beams see an end of a single plant within a quarter of `within`, the second beam's position counts: from there, less
+    /// distance is left for slip. Otherwise the canopy grows to include the stretch. It then keeps its full width, because one beam
+    /// has not seen all of it.
     #[cfg_attr(target_arch = "avr", inline(never))]
     pub(super) fn widen(
         &mut self,
@@ -143,9 +143,10 @@ impl KeepOut {
         (self.known_from, self.behind) = (place, Behind::Spoiled);
     }
 
-    /// Adds a canopy. If all places are taken, it drops the oldest canopy behind the tool, and the ground up to that canopy's end.
+    /// Adds a canopy. If all places are taken, drops the oldest canopy behind the tool, and the ground up to its end.
     ///
-    /// # Errors [`ScheduleFull`] if even the oldest zone lies at the tool or ahead of it. The canopy is then not added.
+    /// # Errors
+    /// [`ScheduleFull`] if even the oldest zone lies at the tool or ahead of it. The canopy is then not added.
     pub fn push(&mut self, canopy: Canopy, tool: WrappedPosition, margin: Length) -> Result<(), ScheduleFull> {
         if self.canopies.is_full() {
             let oldest = self.canopies.first().ok_or(ScheduleFull)?;

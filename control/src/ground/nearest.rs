@@ -1,7 +1,7 @@
 //! The classifier: the vote of the nearest labelled examples.
 //!
-//! Examples are feature vectors in bytes, scaled by [`examples::scale`]. The crate `knn` searches them, in flash and in SRAM. A
-//! tie, a detection far from all examples, and a table with fewer than k examples give [`Class::Unknown`], which counts as a plant.
+//! Examples are feature vectors in bytes, scaled by [`examples::scale`]. The crate `knn` searches them, in flash and in SRAM. Three
+//! cases give [`Class::Unknown`], which counts as a plant: a tie, a detection far from all examples, and fewer than k examples.
 
 use crate::{
     ground::{

@@ -1,4 +1,4 @@
-//! The machine's distances in units of the wheel, and the stretch of open ground that the servo needs at a speed.
+//! The machine's distances in units of the wheel, and the open ground that the servo needs at a speed.
 
 use super::slip::Slip;
 use crate::{
@@ -132,11 +132,11 @@ impl Leads {
         }
     }
 
-    /// The ground, counted from the tool in rolling direction, that must be open for the tool to be in the row: from near to far.
-    /// It is where the tool will be when a command of this turn takes effect.
+    /// The ground that must be open for the tool to be in the row: from near to far, counted from the tool in rolling direction.
+    /// The tool will be there when a command of this turn takes effect.
     ///
-    /// A tool that is in needs a shorter stretch, by a fifth at both ends, than a tool that is out. So at a steady speed the tool
-    /// leaves once and returns once for each zone, although the measured speed varies.
+    /// To stay in, the tool needs a stretch that is shorter, by a fifth at both ends, than to come in. So at a steady speed the
+    /// tool leaves once and returns once for each zone, although the measured speed varies.
     #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn stretch(&self, tool_out: bool) -> (Length, Length) {
         let (out, back) = (self.out.0.unsigned_abs(), self.back.0.unsigned_abs());

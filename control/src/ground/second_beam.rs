@@ -1,12 +1,12 @@
 //! The second beam: it sees each detection after the first beam does. This measures the wheel's slip, and shows when a beam is
 //! blind.
 //!
-//! The wheel's travel between the two detections, compared with the beams' distance, gives the slip ([`Slip`]). A detection of the
-//! second beam is paired with one of the first that is as wide and near enough for any slip. If two fit, nothing is measured; this
+//! The wheel's travel between the two detections, compared with the beams' distance, gives the slip ([`Slip`]). Each detection of
+//! the second beam is paired with one of the first: as wide, and near enough for any slip. If two fit, nothing is measured; this
 //! happens in a dense stand. A detection that one beam missed, or that may be two plants, ends the run of agreeing ones.
 //!
 //! While the slip is known, the second beam expects each detection of the first. Any other detection closes the ground from its
-//! edge on, and is classified as if the first beam had seen it. If one beam misses three detections in a row, it is blind.
+//! edge on, and is classified like one of the first beam. If one beam misses three detections in a row, it is blind.
 //!
 //! What it does not do: measure slip on empty ground, or see plants that are nearer to the tool than the second beam.
 
@@ -47,7 +47,7 @@ pub struct SecondBeam {
     /// Detections of the first beam, newest first, and how many the second beam has yet to reach.
     passed: [Passed; CAPACITY],
     awaited: u8,
-    /// One bit for each awaited detection that a detection of the second beam may be.
+    /// One bit for each awaited detection, set once a detection of the second beam fits it.
     claimed: u8,
     /// Whether the first beam has seen more than `CAPACITY` detections.
     is_crowded: bool,
@@ -153,7 +153,7 @@ impl SecondBeam {
         // Greatest difference between the widths of a pair.
         let same = least + Length(4);
         let near = apart.0 as u16 / 8;
-        let (mut bit, mut fitting, mut way, mut is_near) = (1_u8, 0_u8, Length::ZERO, false);
+        let (mut bit, mut fitting, mut travel, mut is_near) = (1_u8, 0_u8, Length::ZERO, false);
         for first in self.passed.iter().take(self.awaited.into()) {
             let (off, wider) = (detection.leading - first.leading, detection.width() - first.width);
             // At the expected place, with a tolerance for a change of slip.
@@ -166,7 +166,7 @@ impl SecondBeam {
                 if wider <= same && wider >= -same {
                     fitting |= bit;
                     // Between the middles: a leaf at either end moves the middle by half of its length.
-                    way = apart + off + Length(wider.0 >> 1);
+                    travel = apart + off + Length(wider.0 >> 1);
                 }
             }
             bit <<= 1;
@@ -177,9 +177,9 @@ impl SecondBeam {
         self.claimed |= fitting;
         // Exactly one bit is set only in a power of two.
         if self.is_crowded || fitting & fitting.wrapping_sub(1) != 0 {
-            way = Length::ZERO;
+            travel = Length::ZERO;
         }
-        self.slip.measure(apart, way);
+        self.slip.measure(apart, travel);
         if is_near {
             self.missed = 0;
         } else if !self.is_crowded {
@@ -227,7 +227,7 @@ mod tests {
 
     /// What the second beam reports.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-    enum Told {
+    enum Report {
         /// A measured slip.
         Slip,
         /// The slip is unknown again.
@@ -238,15 +238,15 @@ mod tests {
     }
 
     /// Where the first beam and the second see something, from and to, in ticks of the wheel.
-    type Thing = (Option<(i16, i16)>, Option<(i16, i16)>);
+    type Stretches = (Option<(i16, i16)>, Option<(i16, i16)>);
 
-    /// Rolls past things, in this order. Returns the reports.
-    fn compare(second: &mut SecondBeam, things: &[Thing]) -> Vec<Told> {
-        let mut told = Vec::new();
-        let end = things.iter().flat_map(|(first, second)| [first, second]).flatten().map(|&(_, to)| to).max();
+    /// Rolls past stretches, in this order. Returns the reports.
+    fn compare(second: &mut SecondBeam, stretches: &[Stretches]) -> Vec<Report> {
+        let mut reports = Vec::new();
+        let end = stretches.iter().flat_map(|(first, second)| [first, second]).flatten().map(|&(_, to)| to).max();
         for place in 0..end.unwrap_or(0) + 2 * APART.0 {
             // The first beam's detection is complete after the gap behind it.
-            let over = things.iter().filter_map(|&(first, _)| first).find(|&(_, to)| to + GAP.0 == place);
+            let over = stretches.iter().filter_map(|&(first, _)| first).find(|&(_, to)| to + GAP.0 == place);
             if let Some((from, to)) = over {
                 let detection = Detection {
                     leading: WrappedPosition::new(from),
@@ -255,28 +255,29 @@ mod tests {
                 };
                 second.await_detection(detection, LEAST);
             }
-            let broken = things.iter().filter_map(|&(_, second)| second).any(|(from, to)| (from..to).contains(&place));
+            let broken =
+                stretches.iter().filter_map(|&(_, second)| second).any(|(from, to)| (from..to).contains(&place));
             // The machine's distances follow the slip.
             let apart = Length((i32::from(APART.0) * (256 + i32::from(second.slip().excess())) / 256) as i16);
             let seen = second.look(WrappedPosition::new(place) - apart, broken, apart, GAP, LEAST);
             if let Some(blind) = second.blind() {
-                told.push(Told::Blind(blind));
+                reports.push(Report::Blind(blind));
                 second.missed = 0;
                 continue;
             }
-            told.extend(seen.map(Told::Alone));
+            reports.extend(seen.map(Report::Alone));
             match second.take_news() {
                 News::None => {}
-                News::Told => told.push(Told::Slip),
-                News::Lost => told.push(Told::Lost),
+                News::Told => reports.push(Report::Slip),
+                News::Lost => reports.push(Report::Lost),
             }
         }
-        told
+        reports
     }
 
     /// The reports without detections to classify: the ground knows which of those it has already.
-    fn news(second: &mut SecondBeam, things: &[Thing]) -> Vec<Told> {
-        compare(second, things).into_iter().filter(|told| !matches!(told, Told::Alone(_))).collect()
+    fn news(second: &mut SecondBeam, stretches: &[Stretches]) -> Vec<Report> {
+        compare(second, stretches).into_iter().filter(|report| !matches!(report, Report::Alone(_))).collect()
     }
 
     fn begun() -> SecondBeam {
@@ -285,27 +286,27 @@ mod tests {
         second
     }
 
-    /// A plant that the second beam sees `way` ticks after the first.
-    fn plant(from: i16, way: i16) -> Thing {
-        (Some((from, from + 300)), Some((from + way, from + way + 300)))
+    /// A plant that the second beam sees `travel` ticks after the first.
+    fn plant(from: i16, travel: i16) -> Stretches {
+        (Some((from, from + 300)), Some((from + travel, from + travel + 300)))
     }
 
     #[test]
     fn two_agreeing_plants_give_the_slip_three_give_a_large_one_and_a_half_seen_plant_ends_the_run() {
-        for (way, excess, plants) in [(400, 0_i32, 2), (444, 28, 2), (540, 89, 3), (330, -45, 3)] {
+        for (travel, excess, plants) in [(400, 0_i32, 2), (444, 28, 2), (540, 89, 3), (330, -45, 3)] {
             let mut second = begun();
-            let rows: Vec<_> = (0..plants).map(|number| plant(100 + 2000 * number, way)).collect();
+            let rows: Vec<_> = (0..plants).map(|number| plant(100 + 2000 * number, travel)).collect();
             let (last, before) = rows.split_last().unwrap();
             assert_eq!(news(&mut second, before), []);
-            assert_eq!((second.slip().excess(), second.slip().permille()), (0, None), "{way}");
+            assert_eq!((second.slip().excess(), second.slip().permille()), (0, None), "{travel}");
             // The second beam sees only the rear part of the next plant.
-            let half = (Some((8000, 8300)), Some((8100 + way, 8300 + way)));
+            let half = (Some((8000, 8300)), Some((8100 + travel, 8300 + travel)));
             let mut broken = begun();
-            assert_eq!(news(&mut broken, &[before, &[half], &[plant(10_000, way)]].concat()), [], "{way}");
-            assert_eq!(news(&mut begun(), &[before, &[*last]].concat()), [Told::Slip]);
+            assert_eq!(news(&mut broken, &[before, &[half], &[plant(10_000, travel)]].concat()), [], "{travel}");
+            assert_eq!(news(&mut begun(), &[before, &[*last]].concat()), [Report::Slip]);
             second = begun();
             news(&mut second, &rows);
-            assert_eq!(i32::from(second.slip().excess()), excess, "{way}");
+            assert_eq!(i32::from(second.slip().excess()), excess, "{travel}");
             let permille = 1000 - 256_000 / (256 + excess);
             assert_eq!(second.slip().permille().map(i32::from), Some(permille));
         }
@@ -313,9 +314,9 @@ mod tests {
 
     #[test]
     fn slip_beyond_thirty_percent_is_not_measured() {
-        for way in [300, 580] {
+        for travel in [300, 580] {
             let mut second = begun();
-            let plants: Vec<_> = (0..4).map(|number| plant(100 + 2000 * number, way)).collect();
+            let plants: Vec<_> = (0..4).map(|number| plant(100 + 2000 * number, travel)).collect();
             assert_eq!(news(&mut second, &plants), []);
             assert_eq!(second.slip().permille(), None);
         }
@@ -326,16 +327,16 @@ mod tests {
         let only_first = |from: i16| (Some((from, from + 300)), None);
         let only_second = |from: i16| (None, Some((from + 400, from + 700)));
         let at = |leading: i16| {
-            Told::Alone(Detection {
+            Report::Alone(Detection {
                 leading: WrappedPosition::new(leading),
                 trailing: WrappedPosition::new(leading + 300),
                 ..Detection::NONE
             })
         };
         let unseen = [only_first(0), only_first(1500), only_first(3000)];
-        assert_eq!(compare(&mut begun(), &unseen), [Told::Blind(Blind::Second)]);
+        assert_eq!(compare(&mut begun(), &unseen), [Report::Blind(Blind::Second)]);
         let alone = [only_second(0), only_second(1500), only_second(3000)];
-        assert_eq!(compare(&mut begun(), &alone), [at(0), at(1500), Told::Blind(Blind::First)]);
+        assert_eq!(compare(&mut begun(), &alone), [at(0), at(1500), Report::Blind(Blind::First)]);
         let mixed = [only_first(0), only_first(1500), plant(3000, 400), only_first(4500), only_first(6000)];
         assert_eq!(
             compare(&mut begun(), &mixed),
@@ -357,10 +358,10 @@ mod tests {
     fn ambiguous_or_too_many_detections_give_no_slip_and_report_it_once() {
         for spacing in [80, 120, 160] {
             let stand: Vec<_> = (0..40).map(|number| (100 + spacing * number, 130 + spacing * number)).collect();
-            let things: Vec<Thing> =
+            let stretches: Vec<Stretches> =
                 stand.iter().map(|&(from, to)| (Some((from, to)), Some((from + 400, to + 400)))).collect();
             let mut second = begun();
-            assert_eq!(news(&mut second, &things), [Told::Lost], "{spacing}");
+            assert_eq!(news(&mut second, &stretches), [Report::Lost], "{spacing}");
             assert_eq!(second.slip().permille(), None);
         }
     }
@@ -399,22 +400,22 @@ mod tests {
             mean in -40_i16..45,
         ) {
             let mut second = begun();
-            let (mut place, mut things, mut ways) = (0, Vec::new(), Vec::new());
+            let (mut place, mut stretches, mut travels) = (0, Vec::new(), Vec::new());
             for &(gap, width, more, has_insect) in &plants {
                 place += gap;
-                let way = APART.0 + mean + more;
-                things.push((Some((place, place + width)), Some((place + way, place + way + width))));
-                ways.push(way);
+                let travel = APART.0 + mean + more;
+                stretches.push((Some((place, place + width)), Some((place + travel, place + travel + width))));
+                travels.push(travel);
                 if has_insect {
-                    things.push((Some((place - 400, place - 385)), Some((place - 400 + APART.0, place - 385 + APART.0))));
+                    stretches.push((Some((place - 400, place - 385)), Some((place - 400 + APART.0, place - 385 + APART.0))));
                 }
                 place += width;
             }
-            things.sort_by_key(|(first, _)| *first);
-            let told = news(&mut second, &things);
-            prop_assert_eq!(told, ways[1..].iter().map(|_| Told::Slip).collect::<Vec<_>>());
-            let last = &ways[ways.len() - 2..];
-            let expected: i32 = last.iter().map(|&way| 128 * i32::from(way) / i32::from(APART.0)).sum::<i32>() - 256;
+            stretches.sort_by_key(|(first, _)| *first);
+            let reports = news(&mut second, &stretches);
+            prop_assert_eq!(reports, travels[1..].iter().map(|_| Report::Slip).collect::<Vec<_>>());
+            let last = &travels[travels.len() - 2..];
+            let expected: i32 = last.iter().map(|&travel| 128 * i32::from(travel) / i32::from(APART.0)).sum::<i32>() - 256;
             let excess = i32::from(second.slip().excess());
             prop_assert!((excess - expected).abs() <= 3, "{} of {:?}", excess, last);
         }

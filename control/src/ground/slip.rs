@@ -1,19 +1,19 @@
 //! Wheel slip, from detections that pass both beams.
 //!
-//! Consecutive detections have to agree before a slip is trusted: two, or three if the slip jumps. After `UNTOLD` detections
+//! Consecutive detections have to agree before a slip is trusted: two, or three if the slip jumps. After `WITHOUT_SLIP` detections
 //! without agreement the slip is unknown.
 
 use crate::units::Length;
 
 /// Consecutive detections without a slip until it is unknown: as few as a plant with its weeds, as many as the leaves of a canopy.
-const UNTOLD: u8 = 6;
+const WITHOUT_SLIP: u8 = 6;
 
-/// Greatest difference between consecutive slips that agree, in 256ths. The ground changes by some 5 % from plant to plant, and a
-/// leaf at either end of a canopy adds to that.
+/// Greatest difference between consecutive slips that agree, in 256ths. The ground changes by some 5 % from plant to plant. A leaf
+/// at either end of a canopy adds to that.
 const AGREES: u8 = 24;
 
-/// A slip that differs by more than this (16 %) from the trusted one needs a third detection that agrees. Soft ground slips by 12
-/// %, and in no row does the slip change by more from one plant to the next.
+/// If a slip differs from the trusted one by more than this (16 %), a third detection has to agree. Soft ground slips by 12 %, and
+/// in no row does it change by more between plants.
 const JUMP: u8 = 40;
 
 /// How much farther the wheel turns than the machine rolls, in 256ths of the distance rolled; negative if less.
@@ -21,12 +21,12 @@ const JUMP: u8 = 40;
 pub struct Slip {
     /// The slip of the last detection, and how many consecutive ones agree with it.
     last: i8,
-    running: u8,
+    agreeing: u8,
     /// The trusted slip, or the last trusted one.
     excess: i8,
     is_known: bool,
     /// Consecutive detections without agreement.
-    untold: u8,
+    without_slip: u8,
     news: News,
 }
 
@@ -44,7 +44,7 @@ pub enum News {
 
 impl Slip {
     /// No slip measured.
-    pub const NONE: Self = Self { last: 0, running: 0, excess: 0, is_known: false, untold: 0, news: News::None };
+    pub const NONE: Self = Self { last: 0, agreeing: 0, excess: 0, is_known: false, without_slip: 0, news: News::None };
 
     /// Units in the whole: `excess` is in 256ths.
     pub const WHOLE: i16 = 256;
@@ -66,7 +66,7 @@ impl Slip {
     /// Marks the slip as known.
     #[cfg(test)]
     pub(super) fn be_known(&mut self) {
-        (self.is_known, self.untold) = (true, 0);
+        (self.is_known, self.without_slip) = (true, 0);
     }
 
     /// What has changed since the last call.
@@ -76,7 +76,7 @@ impl Slip {
 
     /// The next detections start a new run of agreement.
     pub(super) fn break_run(&mut self) {
-        self.running = 0;
+        self.agreeing = 0;
     }
 
     /// [`excess`](Self::excess), and the last trusted slip even if it is now unknown.
@@ -92,31 +92,31 @@ impl Slip {
         self.is_known.then_some(1000 - rolled_permille)
     }
 
-    /// A detection passed both beams. `apart` is the beams' distance with the slip known so far, `way` the measured distance; 0 if
-    /// ambiguous.
+    /// A detection passed both beams. `apart` is the beams' distance with the slip known so far, `travel` how far the wheel turned
+    /// between them; 0 if ambiguous.
     #[cfg_attr(target_arch = "avr", inline(never))]
-    pub(super) fn measure(&mut self, apart: Length, way: Length) {
+    pub(super) fn measure(&mut self, apart: Length, travel: Length) {
         let believed = self.excess();
         let turned = (Self::WHOLE + i16::from(believed)) as u16;
-        let turned = u32::from(turned) * u32::from(way.0 as u16) / u32::from((apart.0 as u16).max(1));
+        let turned = u32::from(turned) * u32::from(travel.0 as u16) / u32::from((apart.0 as u16).max(1));
         let excess = turned as i16 - Self::WHOLE;
         let (last, now) = (self.last, excess as i8);
         self.last = now;
         if !(Self::LEAST..=Self::GREATEST).contains(&excess) {
-            self.running = 0;
+            self.agreeing = 0;
         } else if now.abs_diff(last) > AGREES {
-            self.running = 1;
-        } else if self.running < 3 {
-            self.running += 1;
+            self.agreeing = 1;
+        } else if self.agreeing < 3 {
+            self.agreeing += 1;
         }
-        if self.running > 1 + u8::from(now.abs_diff(believed) > JUMP) {
+        if self.agreeing > 1 + u8::from(now.abs_diff(believed) > JUMP) {
             self.excess = ((i16::from(last) + i16::from(now)) >> 1) as i8;
-            (self.is_known, self.untold, self.news) = (true, 0, News::Told);
+            (self.is_known, self.without_slip, self.news) = (true, 0, News::Told);
             return;
         }
-        if self.untold < UNTOLD {
-            self.untold += 1;
-            if self.untold == UNTOLD {
+        if self.without_slip < WITHOUT_SLIP {
+            self.without_slip += 1;
+            if self.without_slip == WITHOUT_SLIP {
                 (self.is_known, self.news) = (false, News::Lost);
             }
         }

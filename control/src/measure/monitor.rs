@@ -18,14 +18,14 @@ const PERIOD: u16 = Coarse::steps_in_ms(500);
 
 /// Reversals in a period, without progress, that no vibration causes. With one working channel each edge looks like a reversal:
 /// this many from 0.6 km/h on. An engine's vibration of 50 Hz causes only 50.
-const DEAD_CHANNEL_TURNS: u8 = 80;
+const DEAD_CHANNEL_REVERSALS: u8 = 80;
 
 /// Time without progress after which the machine stands: slower than 0.05 km/h.
 const STANDS: u16 = Coarse::steps_in_ms(150);
 
 /// Reversals without progress, while rolling slowly, from which on the distance is unknown. A machine that stops rolls back a
 /// little and forward again: two reversals.
-const FALTERS: u8 = 3;
+const FALTERING_REVERSALS: u8 = 3;
 
 /// Beam breaks while the machine stands. The wind moves leaves, but plants do not pass.
 const BREAKS: u8 = 3;
@@ -46,10 +46,9 @@ const STEADY: Short = 59;
 /// Tells steady rolling from braking, 15.6 ms. A braking machine takes longer for each progress than for the one before. So rolling
 /// is steady only if twice the last progress is at most this much above the one before.
 ///
-/// A machine that brakes with 3.3 m/s2 (3 on the ground, a tenth for wheel slip) exceeds this in the last progress but one. With
-/// `x` progresses left and ticks of 0.5 mm, a progress takes `sqrt(x + 1) - sqrt(x)` times 35.6 ms; `x` below 1 gives 18.2 ms. From
-/// `x` = 1 on another progress follows, within 2.42 times this one: `sqrt(x) - sqrt(x - 1)` is at most 2.42 times `sqrt(x + 1) -
-/// sqrt(x)`.
+/// Braking with 3.3 m/s2 (3 on the ground, a tenth for wheel slip) exceeds this in the last progress but one. With `x` progresses
+/// left and ticks of 0.5 mm, a progress takes `sqrt(x + 1) - sqrt(x)` times 35.6 ms; `x` below 1 gives 18.2 ms. From `x` = 1 on
+/// another progress follows, within 2.42 times this one: `sqrt(x) - sqrt(x - 1)` is at most 2.42 times `sqrt(x + 1) - sqrt(x)`.
 const BRAKES: Short = 61;
 
 /// Slower than four ticks in this time, 32.8 ms, a wheel may tremble while it rolls: below 0.5 km/h with the coarsest encoder
@@ -73,13 +72,13 @@ const PROGRESS: u8 = 4;
 
 /// Loss for half a missing pulse of one channel: the other channel then counts a tick back and forward again, which looks like two
 /// reversals.
-const TURNED_ROUND: u8 = 2;
+const REVERSAL_LOSS: u8 = 2;
 
 /// One loss is cancelled by this many progresses (32 quarters), so losing 3 % is tolerated.
-const PAID_BY: u8 = 8;
+const CANCELLED_BY: u8 = 8;
 
 /// Losses above this raise an alarm: 25 mm, half of the usual margin.
-const DEBT: u8 = 48;
+const MOST_LOST: u8 = 48;
 
 /// A time as a [`Short`], or the largest one.
 #[cfg_attr(target_arch = "avr", inline(never))]
@@ -116,12 +115,12 @@ pub struct EncoderMonitor {
     last: u16,
     read_at: Coarse,
     /// Reversals in this period without progress.
-    turns: u8,
+    reversals: u8,
     /// Beam breaks since the machine stands.
     breaks: u8,
     period_since: Coarse,
     /// Losses not yet cancelled.
-    debt: u8,
+    losses: u8,
     /// Silences, and progresses since the last one, modulo 137 m.
     silences: u8,
     since_silence: u16,
@@ -140,10 +139,10 @@ impl EncoderMonitor {
         silent: false,
         last: 0,
         read_at: Coarse::ZERO,
-        turns: 0,
+        reversals: 0,
         breaks: 0,
         period_since: Coarse::ZERO,
-        debt: 0,
+        losses: 0,
         silences: 0,
         since_silence: 0,
     };
@@ -159,8 +158,8 @@ impl EncoderMonitor {
     /// Takes a reading. `doubted` is the number of ticks from jumps that are probably noise. Returns a fault.
     ///
     /// `progress` is a distance of about two millimetres, and at least four ticks. So it means the same for every encoder. Four
-    /// ticks are one cycle of both channels, so uneven edge spacing does not matter, and neither a trembling wheel nor one dead
-    /// channel makes that many.
+    /// ticks are one cycle of both channels, so uneven edge spacing does not matter. A trembling wheel, or one dead channel, makes
+    /// fewer.
     #[cfg_attr(target_arch = "avr", inline(never))]
     #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn read(&mut self, now: Instant, position: Position, doubted: u8, progress: u8) -> Option<Alarm> {
@@ -168,9 +167,9 @@ impl EncoderMonitor {
         let place = position.count() as u16;
         if now.since(self.period_since) >= PERIOD {
             self.period_since = now;
-            self.turns = 0;
+            self.reversals = 0;
             if self.stands {
-                self.debt = 0;
+                self.losses = 0;
             }
         }
         let step = place.wrapping_sub(self.last).cast_signed();
@@ -190,10 +189,10 @@ impl EncoderMonitor {
             (self.anchor, self.progress_at) = (place, now);
             self.backwards = moved < 0;
             (self.stands, self.quiet, self.silent) = (false, false, false);
-            (self.turns, self.breaks) = (0, 0);
+            (self.reversals, self.breaks) = (0, 0);
             self.since_silence = self.since_silence.wrapping_add(1);
-            if (self.since_silence as u8).is_multiple_of(PAID_BY) {
-                self.debt -= u8::from(self.debt > 0);
+            if (self.since_silence as u8).is_multiple_of(CANCELLED_BY) {
+                self.losses -= u8::from(self.losses > 0);
             }
             // As fast after the gap as before: the machine was not slow in between.
             let steady = before.max(self.took);
@@ -204,7 +203,7 @@ impl EncoderMonitor {
                     self.silences = if self.since_silence > SILENCES_WITHIN { 1 } else { self.silences + 1 };
                     self.since_silence = 0;
                     if self.silences >= SILENCES {
-                        lost += DEBT + 1;
+                        lost += MOST_LOST + 1;
                     }
                 } else {
                     lost += PROGRESS;
@@ -217,27 +216,27 @@ impl EncoderMonitor {
             self.stands |= time >= STANDS;
             if step != 0 && (step < 0) != self.backwards {
                 self.backwards = !self.backwards;
-                self.turns = self.turns.wrapping_add(1);
+                self.reversals = self.reversals.wrapping_add(1);
                 // A rolling wheel does not turn back for a tick or two: one channel's pulses are missing.
                 if !self.silent && !self.stands && self.took <= SLOW {
                     alarm = Alarm::EncoderChannelDead;
-                    lost += TURNED_ROUND;
+                    lost += REVERSAL_LOSS;
                     if steady {
                         (self.anchor, self.progress_at) = (place, now);
                     } else {
-                        self.silent = self.turns >= FALTERS;
+                        self.silent = self.reversals >= FALTERING_REVERSALS;
                     }
                 }
             }
-            if self.turns > DEAD_CHANNEL_TURNS {
+            if self.reversals > DEAD_CHANNEL_REVERSALS {
                 return Some(Alarm::EncoderChannelDead);
             }
         }
-        self.debt += lost;
-        if self.debt <= DEBT {
+        self.losses += lost;
+        if self.losses <= MOST_LOST {
             return None;
         }
-        (self.debt, self.silences) = (0, 0);
+        (self.losses, self.silences) = (0, 0);
         Some(alarm)
     }
 
@@ -310,7 +309,7 @@ mod tests {
     use crate::units::Interval;
 
     #[test]
-    fn a_turn_at_either_end_of_a_time_is_allowed_for() {
+    fn a_time_may_be_off_by_a_turn_or_a_millisecond() {
         assert_eq!([0, 3, 4, 5, 200].map(grace), [4, 4, 5, 6, 201]);
     }
 
@@ -329,7 +328,7 @@ mod tests {
 
     /// Whether reversals, one every `edge_ms`, raise "channel dead" within `edges` of them.
     fn is_dead_channel(edge_ms: u32, edges: u32) -> bool {
-        let mut monitor = awake();
+        let mut monitor = standing();
         (1..=edge_ms * edges).any(|ms| {
             let position = Position::new((ms / edge_ms % 2) as i32);
             monitor.read(at(ms), position, 0, 4) == Some(Alarm::EncoderChannelDead)
@@ -344,7 +343,7 @@ mod tests {
     }
 
     /// A monitor of a standing machine.
-    fn awake() -> EncoderMonitor {
+    fn standing() -> EncoderMonitor {
         let mut monitor = EncoderMonitor::NONE;
         monitor.init(at(0), Position::new(0));
         monitor
@@ -356,13 +355,13 @@ mod tests {
 
     /// The first alarm within a second, and its time in ms. `position` gives the encoder's position at each millisecond.
     fn first_alarm(position: impl Fn(u32) -> u32) -> Option<(u32, Alarm)> {
-        let mut monitor = awake();
+        let mut monitor = standing();
         (1..1000).find_map(|ms| Some((ms, monitor.read(at(ms), Position::new(position(ms) as i32), 0, 4)?)))
     }
 
     #[test]
     fn a_rolling_wheel_is_quiet_from_10_ms_without_progress_until_the_next_progress() {
-        let mut monitor = awake();
+        let mut monitor = standing();
         for ms in 0..100 {
             let position = if ms < 60 { ms.min(40) } else { ms - 20 };
             monitor.read(at(ms), Position::new(position as i32), 0, 4);

@@ -69,7 +69,7 @@ impl Quadrature {
 }
 
 /// With more ticks than this in a turn, two noise spikes included, an edge may have been missed. A turn takes at least 0.2 ms, so
-/// the ticks are then 12 us apart, and the interrupt samples again within 8 us.
+/// the ticks are then 12 us apart. The interrupt samples again within 8 us.
 const CAN_BE_MISSED: u16 = 16;
 
 /// Speed in ticks a second above which an edge may be missed, so jumps count: edges are less than 50 us apart. No weeder with an
@@ -77,7 +77,7 @@ const CAN_BE_MISSED: u16 = 16;
 pub const FAST: u16 = 20_000;
 
 /// Most ticks reported as doubted: more change nothing.
-const ENOUGH: u16 = 32;
+const MOST_DOUBTED: u16 = 32;
 
 /// The machine's position: the encoder's count without the ticks that noise added.
 #[derive(Clone, Debug)]
@@ -117,7 +117,7 @@ impl Odometer {
         if jumped == 0 || is_fast || moved.unsigned_abs() > CAN_BE_MISSED {
             return 0;
         }
-        let jumped = jumped.min(ENOUGH) as u8;
+        let jumped = jumped.min(MOST_DOUBTED) as u8;
         // At most the distance moved: a trembling wheel may have stepped back in between.
         let added = Ticks((moved.unsigned_abs() as u8).min(jumped).into());
         self.surplus = if moved < 0 { self.surplus - added } else { self.surplus + added };

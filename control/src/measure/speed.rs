@@ -7,8 +7,8 @@
 
 use crate::units::{Coarse, Instant, Position, TicksPerSecond};
 
-/// The shortest time between two samples. With their number it sets the averaging time: long enough for an error below half a
-/// percent at 1 km/h from ticks and turns of the loop, short enough to follow a walking person.
+/// The shortest time between two samples. With their number it sets the averaging time. It is long enough that ticks and turns
+/// cause less than half a percent of error at 1 km/h. It is short enough to follow a walking person.
 pub(crate) const SPACING: u16 = Coarse::steps_in_ms(10);
 
 /// Samples; a power of two keeps the ring's arithmetic short.

@@ -47,8 +47,8 @@ impl Bench {
         matches!(self, Self::Swings(_) | Self::Row(_))
     }
 
-    /// Runs one step; `out` is the tool's present command. Returns the next command, or `None` if the test does not decide it, and
-    /// the result of timed swings once they end.
+    /// Runs one step; `out` is the tool's present command. Returns the next command, or `None` if the test does not decide it; and
+    /// the result of timed swings.
     #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn carry_on(&mut self, now: Instant, end_switch_on: bool, out: bool) -> (Option<bool>, Option<Outcome>) {
         let (out, outcome) = match self {

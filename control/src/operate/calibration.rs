@@ -2,7 +2,7 @@
 //!
 //! [`Distance`] counts the ticks over a stretch that the operator has measured. So tyre wear and wheel slip are included.
 //! [`Swings`] times the servo with the end switch: from the command until the tool is out, and until it begins to come back.
-//! Without an end switch, the operator can time the same swings on a film, in which the LED shows the commands.
+//! Without an end switch, the operator can film and time the same swings: the LED shows the commands.
 
 use crate::{
     operate::command_error::CommandError,
@@ -34,8 +34,9 @@ impl Distance {
     /// Ticks a metre, from a stretch of `length_mm` that ends at `position`, forward or back. `nominal` is the value from the
     /// wheel's diameter; `forced` allows any difference from it.
     ///
-    /// # Errors [`CommandError::NotBegun`], [`CommandError::TooShort`] and [`CommandError::WheelDiffers`]. The operator may end the
-    /// stretch again.
+    /// # Errors
+    /// [`CommandError::NotBegun`], [`CommandError::TooShort`] and [`CommandError::WheelDiffers`]. The operator may end the stretch
+    /// again.
     pub fn end(&mut self, position: Position, length_mm: u16, nominal: u16, forced: bool) -> Result<u16, CommandError> {
         let begin = self.begin.ok_or(CommandError::NotBegun)?;
         if length_mm < SHORTEST_MM {

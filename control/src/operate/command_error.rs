@@ -15,7 +15,7 @@ pub enum CommandError {
     PulsesEqual,
     /// The beam would be too near; [`needed_mm`](crate::operate::configuration::Configuration::needed_mm) has the least distance.
     BeamTooNear,
-    /// The second beam would be too near to the first, or not ahead of the tool, or X is too long for a second beam.
+    /// The second beam would be too near to the first or to the tool, or X is too long for it.
     SecondBeamAstray,
     /// The wheel gives too few ticks a metre.
     EncoderTooCoarse,

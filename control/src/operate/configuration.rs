@@ -60,7 +60,8 @@ impl<M: Memory> Configuration<M> {
 
     /// Sets all of these settings or none. `is_working` tells whether the machine works.
     ///
-    /// # Errors [`CommandError::NotInHold`], [`CommandError::OutOfRange`], and a new [`Contradiction`]. Nothing is changed then.
+    /// # Errors
+    /// [`CommandError::NotInHold`], [`CommandError::OutOfRange`], and a new [`Contradiction`]. Nothing is changed then.
     #[inline(never)]
     pub fn change(&mut self, changes: &[(Setting, u16)], is_working: bool) -> Result<(), CommandError> {
         let mut settings = self.settings.clone();
@@ -105,7 +106,8 @@ impl<M: Memory> Configuration<M> {
 
     /// Starts to save the settings; [`carry_on`](Self::carry_on) finishes it.
     ///
-    /// # Errors A [`Contradiction`].
+    /// # Errors
+    /// A [`Contradiction`].
     pub fn save(&mut self) -> Result<(), CommandError> {
         self.expect_no_contradiction()?;
         self.saved.save(&self.settings);
@@ -119,7 +121,8 @@ impl<M: Memory> Configuration<M> {
 
     /// Checks that the settings fit together.
     ///
-    /// # Errors A [`Contradiction`].
+    /// # Errors
+    /// A [`Contradiction`].
     #[inline(never)]
     pub fn expect_no_contradiction(&mut self) -> Result<(), CommandError> {
         self.settings.contradiction().map_or(Ok(()), |contradiction| Err(self.refusal(contradiction)))

@@ -89,14 +89,14 @@ impl<M: Memory> SavedSettings<M> {
             return false;
         }
         while self.left > 0 {
-            let spoils = self.left == STEPS;
+            let invalidates = self.left == STEPS;
             let place = if self.left > 1 { STEPS - self.left } else { 0 };
             let (address, right) = (self.newest() + u16::from(place), self.image[usize::from(place)]);
             self.left -= 1;
             // Correct bytes are not written again, because an EEPROM wears out. Nor is a first byte that is already wrong: a power
             // loss during a write can leave any value.
-            if (self.memory.read(address) == right) == spoils {
-                self.memory.write(address, if spoils { !right } else { right });
+            if (self.memory.read(address) == right) == invalidates {
+                self.memory.write(address, if invalidates { !right } else { right });
                 return false;
             }
         }
@@ -215,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn the_last_save_counts_however_often_the_sequence_wraps() {
+    fn the_last_save_counts_after_the_sequence_wraps() {
         let mut memory = Volatile::new();
         for time in 0..600 {
             memory = save(memory, &with_k(1 + time % 15));
@@ -246,14 +246,14 @@ mod tests {
         for (copy, left) in [(0, 7), (1, 5)] {
             for place in 0..COPY {
                 for bit in 0..8 {
-                    let mut spoiled = memory.clone();
-                    spoiled.bytes[usize::from(address(copy)) + place] ^= 1 << bit;
-                    assert_eq!(load(&spoiled), Some(with_k(left)), "byte {place}, bit {bit}");
-                    // A save never overwrites the remaining copy, and never makes the invalid copy valid again, for any value of
-                    // the byte that was being written at the power loss.
-                    let saved = save(spoiled.clone(), &with_k(9)).bytes;
+                    let mut corrupted = memory.clone();
+                    corrupted.bytes[usize::from(address(copy)) + place] ^= 1 << bit;
+                    assert_eq!(load(&corrupted), Some(with_k(left)), "byte {place}, bit {bit}");
+                    // A save never overwrites the remaining copy, and never makes the invalid copy valid again. At the power loss,
+                    // the byte being written may take any value.
+                    let saved = save(corrupted.clone(), &with_k(9)).bytes;
                     let cut = |power| {
-                        let mut failing = spoiled.clone();
+                        let mut failing = corrupted.clone();
                         failing.lose_power_after(power);
                         save(failing, &with_k(9)).with_power()
                     };

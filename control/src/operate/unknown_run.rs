@@ -1,8 +1,8 @@
-//! Consecutive narrow detections: a crop with thin stems that the examples do not know, or weeds in a gap of the stand.
+//! Consecutive narrow detections: a crop with thin stalks that the examples do not know, or weeds in a gap of the stand.
 //!
 //! Both are narrow, and neither is classified as a plant. The detections before tell them apart. A known crop has shown a plant
 //! before its gap. The alarm then needs `TRUST` more narrow detections: no gap has so many weeds. An unknown crop has shown no
-//! plant. Two stems grown together, or a stem and a weed, are wider than one, but narrower than a plant: they neither count nor
+//! plant. Two stalks grown together, or a stalk and a weed, are wider than one, but narrower than a plant: they neither count nor
 //! restart the count. The distances between them would not help: five are few, and maize has gaps and weeds too.
 //!
 //! `cargo test --release -p field --test crop_unknown` measures the error rate.
@@ -17,7 +17,7 @@ const TRUST: i8 = 4;
 
 /// Narrow detections since the last plant, the last label, or the start of work.
 ///
-/// Unknown detections are kept as plants, and count nevertheless. A thin stem far behind the last plant is like no example, crop or
+/// Unknown detections are kept as plants, and count nevertheless. A stalk far behind the last plant is like no example, crop or
 /// weed.
 #[derive(Clone, Debug)]
 pub struct UnknownRun {
@@ -50,11 +50,11 @@ mod tests {
 
     /// Which detection raises the alarm at `misfit_after` 3: these, then weeds.
     fn alarm_at(before: &[(Class, i16)]) -> usize {
-        let mut misfits = UnknownRun::NONE;
+        let mut run = UnknownRun::NONE;
         let weeds = core::iter::repeat(&(Class::Weed, 10));
         let mut detections = (1..).zip(before.iter().chain(weeds));
         detections
-            .find(|&(_, &(class, width_mm))| misfits.count(class, width_mm, 3))
+            .find(|&(_, &(class, width_mm))| run.count(class, width_mm, 3))
             .map(|(place, _)| place)
             .expect("endless weeds")
     }

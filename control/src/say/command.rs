@@ -120,7 +120,8 @@ pub enum ParseError {
 
 /// Parses a line.
 ///
-/// # Errors A [`ParseError`], whose text says what is allowed.
+/// # Errors
+/// A [`ParseError`], whose text says what is allowed.
 #[inline(never)]
 pub fn parse(line: &[u8]) -> Result<Command, ParseError> {
     let (word, rest) = split_word(line);
@@ -293,11 +294,11 @@ impl LineBuffer {
             }
             b'\t' | b' '..=b'~' => {
                 if self.characters.push(byte).is_err() {
-                    self.spoil(ParseError::TooLong);
+                    self.fail(ParseError::TooLong);
                 }
             }
-            GAP_MARK => self.spoil(ParseError::CharactersLost),
-            _ => self.spoil(ParseError::NotText),
+            GAP_MARK => self.fail(ParseError::CharactersLost),
+            _ => self.fail(ParseError::NotText),
         }
         false
     }
@@ -314,7 +315,7 @@ impl LineBuffer {
         line
     }
 
-    fn spoil(&mut self, error: ParseError) {
+    fn fail(&mut self, error: ParseError) {
         self.error.get_or_insert(error);
     }
 }

@@ -1,7 +1,7 @@
 //! A line that is being sent: its texts, and the numbers for the `#` in them.
 //!
-//! A line's values are taken at once, so they belong to one moment. It is sent a character at a time: each call unpacks a text, or
-//! divides a number, only as far as the next character, because a turn has little time.
+//! A line's values are taken at once, so they belong to one moment. It is sent a character at a time, because a turn has little
+//! time. Each call unpacks or divides only as far as the next character.
 
 use crate::{
     alarm::Alarm,

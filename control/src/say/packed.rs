@@ -3,8 +3,8 @@
 //! An AVR keeps Rust's string literals in SRAM, which has 2 KiB. So the table is in flash, and a [`Text`] is one byte: its number
 //! in the table. `texts` defines the texts.
 //!
-//! Frequent fragments take one byte each. A fragment is a pair of bytes, and each byte is a character or another fragment, so
-//! unpacking needs no search. The compiler packs, and [`Characters`] unpacks. A test finds the fragments (`fragments.rs`).
+//! Frequent fragments take one byte each. A fragment is a pair of bytes, each a character or another fragment. So unpacking needs
+//! no search. The compiler packs, and [`Characters`] unpacks. A test finds the fragments (`fragments.rs`).
 
 mod fragments;
 

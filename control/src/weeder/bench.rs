@@ -20,8 +20,9 @@ use crate::{
 impl<C: Classifier, M: Memory> Controller<C, M> {
     /// Drives the servo directly. `pulse_us` is the pulse width in microseconds.
     ///
-    /// # Errors [`CommandError::NotInHold`], [`CommandError::AlarmLatched`], [`CommandError::Rolls`], and
-    /// [`CommandError::OutOfRange`] for a width that no servo takes.
+    /// # Errors
+    /// [`CommandError::NotInHold`], [`CommandError::AlarmLatched`], [`CommandError::Rolls`], and [`CommandError::OutOfRange`] for a
+    /// width that no servo takes.
     #[inline(never)]
     pub fn servo_by_hand(&mut self, pulse_us: u16) -> Result<(), CommandError> {
         self.expect_rest()?;
@@ -74,8 +75,8 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// Sets the wheel's ticks a metre from the distance rolled since [`calibrate_start`](Self::calibrate_start).
     ///
-    /// # Errors Those of [`Distance::end`](crate::operate::calibration::Distance::end) and [`set`](Self::set). Nothing is changed
-    /// then.
+    /// # Errors
+    /// Those of [`Distance::end`](crate::operate::calibration::Distance::end) and [`set`](Self::set). Nothing is changed then.
     pub fn calibrate(&mut self, distance_mm: u16, force: bool) -> Result<(), CommandError> {
         let nominal = self.configuration.settings().nominal_ticks_per_m();
         let counted = self.distance.end(self.sensors.readings.position, distance_mm, nominal, force)?;
@@ -84,7 +85,8 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// Swings the tool as for a row of plants, at a speed in mm/s.
     ///
-    /// # Errors [`CommandError::NotInHold`], [`CommandError::AlarmLatched`], [`CommandError::Rolls`], a
+    /// # Errors
+    /// [`CommandError::NotInHold`], [`CommandError::AlarmLatched`], [`CommandError::Rolls`], a
     /// [`Contradiction`](crate::settings::Contradiction), and [`CommandError::TestSpeed`] for a speed outside the machine's limits.
     pub fn test_row(&mut self, speed_mm_s: u16) -> Result<(), CommandError> {
         self.expect_rest()?;

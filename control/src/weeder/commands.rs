@@ -16,7 +16,8 @@ use knn::Example;
 impl<C: Classifier, M: Memory> Controller<C, M> {
     /// Goes to work. With `now`, the tool may also enter ground that the beam has not seen.
     ///
-    /// # Errors [`CommandError::AlarmLatched`], and a [`Contradiction`](crate::settings::Contradiction) between settings.
+    /// # Errors
+    /// [`CommandError::AlarmLatched`], and a [`Contradiction`](crate::settings::Contradiction) between settings.
     pub fn start(&mut self, now: bool) -> Result<(), CommandError> {
         if let State::Alarm(_) = self.state {
             return Err(CommandError::AlarmLatched);
@@ -48,8 +49,9 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// Sets a setting.
     ///
-    /// # Errors [`CommandError::NotInHold`], [`CommandError::OutOfRange`], and a new
-    /// [`Contradiction`](crate::settings::Contradiction). Nothing is changed then.
+    /// # Errors
+    /// [`CommandError::NotInHold`], [`CommandError::OutOfRange`], and a new [`Contradiction`](crate::settings::Contradiction).
+    /// Nothing is changed then.
     pub fn set(&mut self, setting: Setting, value: u16) -> Result<(), CommandError> {
         self.configuration.change(&[(setting, value)], self.is_working())
     }
@@ -92,7 +94,8 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// Starts to save the settings; [`carry_on`](Self::carry_on) finishes it.
     ///
-    /// # Errors [`CommandError::NotInHold`], and a [`Contradiction`](crate::settings::Contradiction).
+    /// # Errors
+    /// [`CommandError::NotInHold`], and a [`Contradiction`](crate::settings::Contradiction).
     pub fn save(&mut self) -> Result<(), CommandError> {
         if self.is_working() {
             return Err(CommandError::NotInHold);
@@ -107,7 +110,8 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// Labels the last detection and teaches it to the classifier. `forced` allows a label that contradicts the built-in examples.
     ///
-    /// # Errors [`CommandError::NothingToLabel`], [`CommandError::TakenForPlant`], [`CommandError::TakenForWeed`],
+    /// # Errors
+    /// [`CommandError::NothingToLabel`], [`CommandError::TakenForPlant`], [`CommandError::TakenForWeed`],
     /// [`CommandError::ExamplesFull`]. The detection has no label then.
     pub fn label(&mut self, label: u8, forced: bool) -> Result<(), CommandError> {
         let detection = self
@@ -139,7 +143,8 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// Teaches the classifier the entered example. The built-in examples are not asked: the example comes from another machine or a
     /// file.
     ///
-    /// # Errors [`CommandError::NotInHold`], because new examples would classify the plants between beam and tool differently;
+    /// # Errors
+    /// [`CommandError::NotInHold`], because new examples would classify the plants between beam and tool differently;
     /// [`CommandError::IncompleteExample`] and [`CommandError::ExamplesFull`].
     pub fn teach(&mut self, label: u8) -> Result<(), CommandError> {
         if self.is_working() {

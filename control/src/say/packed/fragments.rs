@@ -95,7 +95,7 @@ mod tests {
     }
 
     #[test]
-    fn the_fragments_are_up_to_date() {
+    fn the_fragments_are_those_that_are_found() {
         let found: Vec<_> = found().into_iter().collect();
         if std::env::var_os("UPDATE_EXPECT").is_none() {
             assert_eq!(FRAGMENTS, found, "`UPDATE_EXPECT=1 cargo test -p control fragments` writes them");
