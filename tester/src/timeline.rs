@@ -15,7 +15,8 @@ use tester_core::message::{QUEUE_PIECES, Record};
 use tester_core::piece::Piece;
 use tester_core::player::{Next, Player};
 
-/// Longest wait set in the compare unit at once, in cycles: half of the timer's range separates future from past.
+/// Longest wait set in the compare unit at once, in cycles. It is below half of the timer's range, which separates future from
+/// past.
 const STRIDE: u16 = 0x4000;
 
 /// From the command to the plan's start, in cycles: 200 us.
