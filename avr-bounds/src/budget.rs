@@ -1,5 +1,6 @@
-//! What a program may need at most, as a file says it, and whether it keeps to that. The file tells what the ELF does not say as well:
-//! how often loops turn, where calls lead, how deep recursion goes.
+//! The budgets file: the limits that a program must keep, and the check that it keeps them.
+//!
+//! The file also holds facts that the ELF does not: loop bounds, targets of indirect calls, and the depth of recursion.
 
 use crate::error::BoundsError;
 use crate::loops::LoopBounds;
@@ -25,7 +26,7 @@ pub struct Budgets {
     pub loops_without_bound: Option<u64>,
     /// The longest turn of that loop, without the handlers that come in.
     pub turn_cycles: Option<u64>,
-    /// Edges of the input in a second of which none is lost: at least so many.
+    /// The lowest rate of edges, in edges a second, at which no edge may be lost.
     pub never_lost_per_s: Option<u64>,
     /// What is to be proved of values in registers.
     pub registers: RegisterRule,
@@ -56,7 +57,8 @@ pub enum RegisterRule {
     /// Functions preserve r2 to r17, r28 and r29 and leave zero in r1, as the calling convention has it, and handlers all registers and flags.
     #[default]
     Convention,
-    /// Whatever a caller needs behind a call is preserved, and handlers preserve all: for compilers that drop the convention.
+    /// Every value that a caller needs after a call is preserved, and handlers preserve all registers. For compilers
+    /// that drop the calling convention.
     Followed,
     /// Nothing.
     Unchecked,

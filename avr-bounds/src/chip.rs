@@ -1,8 +1,9 @@
-//! The chips that are known: memories, vectors and the few registers that matter to the analysis.
+//! The supported chips: memories, vectors, and the few registers that the analysis uses.
 //!
-//! One row a chip. Memories, vectors and register addresses are those of the device's header in avr-libc (`FLASHEND`, `RAMEND`,
-//! `_VECTORS_SIZE`, `EECR`, `GPIOR0`), which a test compares with this table. Cycles of calls and of the interrupt response are those of
-//! the data sheets' instruction set summary and section "Interrupt Response Time".
+//! Each chip has one row. Memories, vectors and register addresses come from the device's header in avr-libc
+//! (`FLASHEND`, `RAMEND`, `_VECTORS_SIZE`, `EECR`, `GPIOR0`). A test compares them with this table. The cycles of calls
+//! and of the interrupt response come from the data sheets: the instruction set summary, and section "Interrupt
+//! Response Time".
 
 use crate::decode::Operation;
 

@@ -1,4 +1,4 @@
-//! The command: what it is asked, and what it prints.
+//! The command line: its arguments, and its output.
 
 use crate::{Bounds, BoundsError, Budgets, Frame, FunctionBounds, Held, Longest, Program, order, prove};
 use anyhow::{Context, Result, ensure};

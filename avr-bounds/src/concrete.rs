@@ -1,6 +1,6 @@
-//! What arithmetic instructions make of registers and flags that are known, as the AVR instruction set manual gives it.
+//! The results of arithmetic instructions on known registers and flags, from the AVR instruction set manual.
 //!
-//! A test compares each of them with the simulator.
+//! A test compares each instruction with the simulator.
 
 use crate::decode::Instruction;
 use crate::decode::Operation::*;

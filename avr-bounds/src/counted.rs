@@ -1,8 +1,9 @@
-//! How often a loop turns that counts by itself.
+//! Loop bounds of loops that count by themselves.
 //!
-//! A loop is counted where a branch that leaves it goes by registers which only arithmetic in the loop changes, each of these instructions runs
-//! exactly once a turn, and the registers hold constants wherever the loop is entered. Then those instructions are carried out,
-//! turn after turn, until the branch leaves. Another way out makes the loop shorter, never longer. Everything else is not counted.
+//! A loop is counted under three conditions. A branch leaves the loop, and it depends on registers that only arithmetic
+//! in the loop changes. Each of these instructions runs exactly once a turn. The registers hold constants at every
+//! entry to the loop. The analysis then executes those instructions, turn after turn, until the branch leaves. Another
+//! exit can only make the loop shorter. All other loops are not counted.
 
 use crate::concrete::Concrete;
 use crate::decode::Operation::*;

@@ -1,11 +1,13 @@
-//! How long a program may take: the longest path through a routine, and the longest stretch in which no interrupt comes in.
+//! The longest time of a routine, and the longest stretch in which no interrupt is served.
 //!
-//! A path's length is the sum of its instructions' cycles, with what is called on it. Where paths form a loop, the longest is
-//! found for one turn first, from the loop's head back to it, and taken as often as the loop may turn. Loops within loops are
-//! taken from the inside out. How often a loop turns is said by its source or by a table ([`crate::loops`]), or counted
-//! (`counted`). Else the loop is taken once and its head is kept in the result, which then is no bound ([`Time::is_bound`]).
+//! A path's length is the sum of its instructions' cycles, with the called functions. For a loop, the longest path of
+//! one turn is found first, from the loop's head back to it. It is multiplied by the loop bound. Inner loops are
+//! calculated before outer loops. A loop bound comes from the source or a table ([`crate::loops`]), or is counted
+//! (`counted`). Without a bound the loop is taken once, and its head is kept in the result. Such a result is no bound
+//! ([`Time::is_bound`]).
 //!
-//! Paths that never come to an end are left out: a loop that waits for the watchdog's reset is not the longest time of anything.
+//! Paths that never end are left out. For example, a loop that waits for the watchdog's reset adds no time to a
+//! routine.
 
 use crate::counted;
 use crate::flow::{Code, Node, Routine, Way};

@@ -1,10 +1,10 @@
-//! The instructions of the family: what a word of flash means, and how many cycles it takes.
+//! The AVR instructions: the meaning of a word in flash, and its cycles.
 //!
-//! The table has a row for every form of every instruction, its bits written as the AVR instruction set manual writes them, and
-//! its cycles as the data sheet's instruction set summary gives them.
-//! It is the project's own because what would have been there is not dependable enough for a proof: the one crate that decodes AVR
-//! gives `jmp` and `call`, the two that this is about, a wrong length, and the text of avr-objdump is made for readers. A
-//! test holds the table against avr-objdump, over all 65,536 words.
+//! The table has a row for every form of every instruction. Its bits are written as in the AVR instruction set manual.
+//! Its cycles come from the instruction set summary in the data sheet. This project has its own table because no
+//! existing decoder is reliable enough for a proof. The only crate that decodes AVR gives `jmp` and `call` a wrong
+//! length, and this analysis depends on both. The text of avr-objdump is made for readers. A test compares the table
+//! with avr-objdump over all 65,536 words.
 
 use std::sync::LazyLock;
 

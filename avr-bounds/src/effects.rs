@@ -1,7 +1,7 @@
-//! What an instruction reads and what it changes, of registers and of the flags in SREG.
+//! The registers and SREG flags that an instruction reads and changes.
 //!
-//! As the AVR instruction set manual gives it. The interrupt flag is not among the flags here ([`crate::flow`] follows it). A
-//! call, a jump and a return have no effects of their own; what a call does to registers is what the called function does.
+//! The source is the AVR instruction set manual. The interrupt flag is left out here: [`crate::flow`] follows it.
+//! Calls, jumps and returns have no effects of their own. The effects of a call are those of the called function.
 
 use crate::decode::Instruction;
 use crate::decode::Operation::*;
@@ -134,7 +134,8 @@ impl Instruction {
         let flag = flags(1 << self.operand('s')) & R::FLAGS;
         let pointer = self.pointer().map_or(R::NONE, R::pair);
         let moved = self.moved_pointer().map_or(R::NONE, R::pair);
-        // A register less itself, or with itself by exclusive or, is 0 or made of the carry, whatever it held.
+        // Subtracting a register from itself, or XOR with itself, gives 0 or a value made from the carry. The old value
+        // does not matter.
         let is_same = d == r;
         let (reads, changes, acts) = match self.operation {
             Sub | Eor if is_same => (R::NONE, to | if self.operation == Sub { HSVNZC } else { SVNZ }, false),
@@ -237,7 +238,8 @@ mod tests {
         }
     }
 
-    /// Whatever registers and flags can hold, with pointers into SRAM, and away from its ends by more than a displacement.
+    /// Random registers and flags. Pointers lead into SRAM, and stay further from its ends than the largest
+    /// displacement.
     fn any_contents(random: &mut ChaCha8Rng) -> Contents {
         std::array::from_fn(|register| match register {
             27 | 29 | 31 => random.random_range(2..6),

@@ -1,5 +1,5 @@
-//! What the analysis takes from an ELF: the bytes in flash and of initialised variables, the functions, the chip, and what the program says
-//! of its loops.
+//! Reads an ELF: the bytes in flash and of initialised variables, the functions, the chip, and the program's records of
+//! loop bounds.
 
 use crate::chip::Chip;
 use crate::lines::Lines;

@@ -1,4 +1,4 @@
-//! Why nothing could be proved of a program, where, and what to write.
+//! The errors of the analysis: the reason why no proof was possible, the address, and what to write in the budgets.
 
 use crate::elf::ElfError;
 use crate::proved::Place;

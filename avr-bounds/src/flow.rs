@@ -1,17 +1,20 @@
-//! Where a program goes: its calls, its paths, how deep the stack is on each of them and whether interrupts are on.
+//! The control flow of a program: its calls and paths, the depth of the stack on each path, and whether interrupts are
+//! on.
 //!
-//! A [`Routine`] is what is entered at one place, with interrupts on or off: a function, a handler, or the program after a
-//! reset. From its entry every path is followed to its ends. A place on a path is an address together with the bytes that lie on
-//! the stack there and the state of the interrupts; so a stack that differs between two paths to one address is two places,
-//! and one that grows in a loop never ends, which is found. For every place it is known what the registers hold, as far as it
-//! matters (`values`). What a call leaves of them is worked out from the function that is called, not from a convention.
+//! A [`Routine`] has one entry, with interrupts on or off: a function, a handler, or the program after a reset. From
+//! its entry every path is followed to its ends. A place on a path consists of an address, the bytes on the stack, and
+//! the state of the interrupts. Two paths that reach an address with different stacks therefore make two places. A
+//! stack that grows in a loop makes places without end, and the analysis detects this. For every place the analysis
+//! knows the register contents that matter (`values`). It derives the registers that a call preserves from the called
+//! function, not from a convention.
 //!
-//! A jump into another function, as compilers make of a call at the end, is followed like any jump. The reset vector's address
-//! is where a program starts again, so a path ends there. Calls and jumps to addresses that are worked out lead to all their
+//! A jump into another function is followed like any jump: compilers make it from a call at the end (tail call). The
+//! program starts again at the reset vector's address, so a path ends there. Computed calls and jumps lead to all their
 //! targets (`targets`).
 //!
-//! What cannot be followed is refused: indirect calls without targets, recursion that the budgets do not bound, a stack pointer or a
-//! handler's interrupt flag made of what is not known. It is assumed that no store by a pointer hits a return address or a saved register.
+//! The analysis refuses what it cannot follow: indirect calls without targets, recursion without a bound in the
+//! budgets, and a stack pointer or a handler's interrupt flag with an unknown value. It assumes that no store through a
+//! pointer hits a return address or a saved register.
 
 use crate::budget::Budgets;
 use crate::decode::Instruction;
@@ -454,7 +457,7 @@ impl<'p, 'a> Follower<'p, 'a> {
                 let is_start_up = self.entry.kind == Kind::Reset;
                 let done = known.carry_out(&instruction, &chip, place.interrupts, &mut interrupts, is_start_up);
                 let problem = match done {
-                    // Whatever is put there: both can be.
+                    // The value is unknown, so interrupts can be on or off.
                     Err(Doubt::Status) if self.entry.kind != Kind::Handler => {
                         self.go(&mut step, instruction.next(), known.clone(), Interrupts::Off, cycles, None);
                         turn(&mut interrupts, true);

@@ -1,12 +1,13 @@
-//! The order of functions in flash in which most calls are short.
+//! An order of functions in flash that makes most calls short.
 //!
-//! `rcall` and `rjmp` take a word, `call` and `jmp` two. A linker that relaxes (`--relax`) takes the short form where it reaches, 4 KiB either
-//! way, but leaves the functions in the order in which the compiler happened to write them. [`order`] begins with that order and moves
-//! functions towards their callers and callees, at first also where that costs something (simulated annealing). Its numbers come from a
-//! fixed seed, so the same program gives the same order.
+//! `rcall` and `rjmp` take one word, `call` and `jmp` two. A linker that relaxes (`--relax`) uses the short form within
+//! its reach of 4 KiB either way. It leaves the functions in the compiler's order. [`order`] starts with that order and
+//! moves functions towards their callers and callees. At first it also accepts moves that cost something (simulated
+//! annealing). Its random numbers come from a fixed seed, so the same program gives the same order.
 //!
-//! A linker script takes the order as patterns of section names, which is why the compiler has to give each function a section of its own.
-//! A pattern that no section has costs nothing, and functions without a pattern follow behind. Assembly and libraries stay where they are.
+//! A linker script takes the order as patterns of section names. So the compiler must give each function its own
+//! section. A pattern without a section costs nothing, and functions without a pattern follow at the end. Assembly and
+//! libraries are not moved.
 
 use crate::decode::Instruction;
 use crate::elf::Program;

@@ -1,4 +1,4 @@
-//! Ways over the places of a routine: which parts of it are loops, and what can be come to from where.
+//! The graph of a routine's places: its loops, and which places can be reached from which.
 
 use crate::flow::Node;
 use std::collections::{BTreeMap, BTreeSet};

@@ -1,4 +1,4 @@
-//! What was proved of a program, and of which input.
+//! The result of a proof: the bounds, and the program that they hold for.
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
@@ -86,11 +86,11 @@ fn clock_hz() -> u64 {
 pub struct EdgeBounds {
     /// The longest time from an edge until a handler looks, in cycles.
     pub wait_cycles: u64,
-    /// Evenly spaced edges in a second of which none is ever lost.
+    /// The highest rate of evenly spaced edges, in edges a second, at which no edge is lost.
     pub never_lost_per_s: u64,
 }
 
-/// Values in registers that last over calls, each of which was found to be left alone or put back.
+/// Values that are live over a call. Each register was found to be untouched, or saved and restored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Lasting {
     /// Places that call a function.

@@ -1,43 +1,46 @@
-//! Whether every value in a register lasts as long as it is needed: over calls, and over interrupts.
+//! Checks that every live register is preserved over calls and interrupts.
 //!
-//! By default every function is held to the calling convention: it preserves R2 to R17, R28 and R29, and leaves zero in R1. That finds a
-//! push or a pop that is missing, in assembly as well. The rest of this page is about the rule `followed`, for programs whose compiler drops the
-//! convention or goes beyond it. With GCC's `-fipa-ra`, which `-Os` turns on, a caller keeps values in registers that the function which it
-//! calls leaves alone. With LLVM's `--enable-ipra` a function need not save what none of its callers needs. Which registers those are
-//! stands nowhere in the ELF. It can be worked out there, though:
+//! By default every function must keep the calling convention: it preserves R2 to R17, R28 and R29, and leaves zero in
+//! R1. This also finds a missing push or pop in assembly. The rest of this page describes the rule `followed`, for
+//! programs whose compiler drops the convention or goes beyond it. With GCC's `-fipa-ra`, part of `-Os`, a caller keeps
+//! values in registers that the called function does not change. With LLVM's `--enable-ipra` a function need not save a
+//! register that none of its callers needs. The ELF does not list those registers, but the analysis can derive them:
 //!
-//! - **what a function keeps**: the registers that hold at each of its returns what they held at its entry, because nothing has
-//!   changed them or because they were saved and put back ([`Preserved`]);
-//! - **what is needed** behind a call: the registers that are read later on before anything changes them, in the caller, in what it
-//!   calls, or behind its own return in one of its callers ([`LiveIn`]). To save a register and to put it back is no use of it;
-//! - **what a function gives back**: see below.
+//! - **preserved**: at each return of the function the register holds its value at the entry. It was not changed, or it
+//!   was saved and restored ([`Preserved`]);
+//! - **live** after a call: the register is read later before it is changed. The reader is the caller, a function that
+//!   the caller calls, or code behind the caller's own return ([`LiveIn`]). Saving and restoring a register does not
+//!   count as a read;
+//! - **results** of a function: see below.
 //!
-//! A register that is needed behind a call has to be one that the function keeps, or one in which it gives something back. All else
-//! has been clobbered: whoever called the function reads what happened to be left in the register.
+//! A register that is live after a call must be preserved by the function, or hold its result. All other registers are
+//! clobbered: after the call they hold values that the caller must not use.
 //!
-//! # What a function gives back
+//! # Results of a function
 //!
-//! Results are in R18 to R25 and nowhere else, and end in R25 or R24 (AVR calling conventions of GCC and LLVM, libgcc's division
-//! included). Of those a register counts as a result where an instruction puts something there that the function itself does not
-//! need, and that reaches a return. What is read only to work out what nobody needs is not needed, so a result that is worked
-//! out in a loop counts. A counter, a pointer or a temporary value is needed until the function has done with it, so it does not.
-//! The division routines go by what they have worked out so far; for them it is written down ([`LIBRARY`]). All between a result
-//! and R25 goes with it, and R25 with R24, since a value of several bytes lies in neighbours.
+//! Results are in R18 to R25 only, and end in R25 or R24 (AVR calling conventions of GCC and LLVM, libgcc's division
+//! included). One of these registers holds a result if an instruction writes a value that reaches a return and that the
+//! function itself does not need. A value that serves only to calculate unneeded values is itself unneeded. So a result
+//! that is calculated in a loop counts. A counter, a pointer or a temporary value is needed until its last use in the
+//! function, so it does not count. The division routines branch on their partial results; a list names those results
+//! ([`LIBRARY`]). All registers between a result and R25 also count, and R25 counts with R24, because a value of
+//! several bytes uses neighbouring registers.
 //!
-//! # What is found, and what is not
+//! # What the check finds, and what it does not
 //!
-//! Found is an instruction that reads what a call has clobbered, whichever way the program came to it; and a call that clobbers a register
-//! other than a result's, which was set before it, has not been read since, and is needed behind it.
+//! It finds an instruction that reads a clobbered register, on any path. It also finds a call that clobbers a live
+//! register which holds no result, if that register was set before the call and not read since.
 //!
-//! A read that clobbered and proper values can both reach, of a register that was read before the call too, is let pass. Compilers make such
-//! reads of the payload of an empty `Option`, which nobody has set and which they copy with the rest: an analysis of registers
-//! cannot tell the two apart. A test takes from functions of the firmware the saving of a register, and counts how often it is found.
+//! It accepts one kind of read. The register was also read before the call, and both a clobbered and a valid value can
+//! reach the read. Compilers make such reads when they copy an empty `Option`: its payload was never set and is copied
+//! with the rest. An analysis of registers cannot tell this from an error. A test removes the saving of a register from
+//! functions of the firmware, and counts how often the check finds it.
 //!
-//! # What else is held
+//! # Other checks
 //!
-//! R1 is zero at every call of a function that reads it or lets its caller read it, and at every return. A handler leaves every register
-//! and every flag as it found them. That handlers and main program share no memory by accident is Rust's to say, not this
-//! proof's.
+//! R1 is zero at every return, and at every call of a function that reads it or lets its caller read it. A handler
+//! leaves every register and every flag as it found them. This proof does not check that handlers and main program
+//! share memory correctly. Rust ensures that.
 
 use crate::decode::Instruction;
 use crate::decode::Operation::*;
@@ -80,7 +83,7 @@ enum Content {
 #[derive(Clone, Debug, PartialEq)]
 struct Preserved {
     registers: [Content; 32],
-    /// The flags, of which these are as they were at the entry.
+    /// The flags that still have their values from the entry.
     flags: Registers,
     /// The register that has just been counted down, while the flag says whether it has come to zero.
     counted: Option<usize>,

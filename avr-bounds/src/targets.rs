@@ -1,20 +1,22 @@
-//! Where calls and jumps lead whose address is worked out.
+//! Targets of computed calls and jumps.
 //!
-//! - **A constant** in the pointer: there (`-mcall-prologues`, pointers that the compiler knows).
-//! - **A compiler's jump table** (libgcc's `__tablejump2__`): to every entry of the table that lies in the same function. The table's length
-//!   is not needed: what stands behind it belongs to another function, or is another place of this one.
-//! - **Constructors and destructors** of global objects: to every entry of their tables.
-//! - **Listed** in the budgets' `[calls]`: there, and nowhere else.
-//! - **Any other call**: to every function whose address the program takes. The relocations tell these, if the program was linked with
-//!   `-Wl,--emit-relocs`. Else they are the functions whose word address stands somewhere in the initial values of variables, in
-//!   flash where no function is, or in a pair of registers that a function loads with constants; that can be too many. A virtual call, which loads its pointer from a slot behind a pointer that it loaded as well, leads to this slot of every virtual
-//!   table and to functions whose address is taken elsewhere.
+//! - **A constant** in the pointer: this address (`-mcall-prologues`, pointers that the compiler knows).
+//! - **A compiler's jump table** (libgcc's `__tablejump2__`): every entry of the table that lies in the same function.
+//!   The table's length is not needed: the words after it belong to another function, or lead to another place in this
+//!   one.
+//! - **Constructors and destructors** of global objects: every entry of their tables.
+//! - **Listed** in the budgets' `[calls]`: these functions, and no others.
+//! - **Any other call**: every function whose address the program takes. The relocations list these functions, if the
+//!   program was linked with `-Wl,--emit-relocs`. Else the analysis searches for word addresses of functions, which can
+//!   give too many. It searches the initial values of variables, flash outside functions, and pairs of registers that a
+//!   function loads with constants. A virtual call loads its pointer from a slot behind another loaded pointer. It
+//!   leads to this slot of every virtual table, and to functions whose address is taken elsewhere.
 //!
-//! A jump through a pointer that is none of a virtual table's and no variable at a fixed address could be a computed `goto`, and is
-//! refused. So is a call for which no function is found.
+//! A jump could be a computed `goto` if its pointer comes from no virtual table and no variable at a fixed address.
+//! Such a jump is refused. So is a call without any target.
 //!
-//! What this takes for granted: that a program has a function's address from one of these places. One that works it out by arithmetic has to list
-//! its calls.
+//! Assumption: a program gets a function's address only from one of these places. A program that calculates an address
+//! must list its calls.
 
 use crate::budget::Budgets;
 use crate::decode::Instruction;
@@ -102,7 +104,7 @@ impl Targets {
             Some(u32::from(u16::from_le_bytes([bytes[0], bytes[1]])) * 2)
         };
         for of in ["ctors", "dtors"] {
-            // It is called in a loop from the start-up code, right in front of which its label stands.
+            // The start-up code calls it in a loop. Its label stands directly in front of that loop.
             let caller = label(&format!("__do_global_{of}"));
             let in_loop = caller.is_some_and(|caller| (caller..caller + 32).contains(&at));
             if in_loop && matches!(call.operation, Call | Rcall) {
@@ -206,7 +208,7 @@ fn found_taken(elf: &Program) -> BTreeSet<u32> {
             taken.extend(word(bytes));
         }
     }
-    // Pairs of registers that a function loads with constants, in whatever order.
+    // Pairs of registers that a function loads with constants, in either order.
     for &first in elf.functions.keys() {
         let Some((_, end)) = elf.extent(first) else { continue };
         let mut loaded: BTreeMap<usize, BTreeSet<u8>> = BTreeMap::new();

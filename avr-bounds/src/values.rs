@@ -1,8 +1,8 @@
-//! What is known of the registers and the stack at a place of the program, and what an instruction makes of it.
+//! Known values of registers and stack at a place, and how an instruction changes them.
 //!
-//! Only what decides where a program goes is followed: bytes of a stack pointer, a saved status register, constants, what the caller
-//! left, and from where a pointer to a function was loaded. All else is unknown, and so is what two paths that meet disagree on. Where
-//! it goes from there is worked out in `flow`.
+//! Only values that decide the control flow are followed: bytes of a stack pointer, a saved status register, constants,
+//! values from the caller, and the source of a function pointer. All other values are unknown. A value is also unknown
+//! where two paths meet with different values. The module `flow` follows the paths.
 
 use crate::chip::Chip;
 use crate::concrete::Concrete;

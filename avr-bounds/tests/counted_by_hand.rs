@@ -1,4 +1,4 @@
-//! What is proved of small programs in assembly, whose stack and cycles can be counted by hand.
+//! Proofs of small assembly programs. Their stack and cycles can be counted by hand.
 
 use avr_bounds::{Bounds, BoundsError, Budgets, Input, LoopBound, LoopBounds, Program, RegisterRule, prove};
 use std::io::Write;
@@ -234,7 +234,7 @@ fn a_nested_critical_section_ends_with_the_outer_one() {
 fn an_instruction_between_two_critical_sections_lets_nothing_in() {
     let apart = proved("start:\n sei\n1: cli\n nop\n sei\n nop\n cli\n nop\n sei\n rjmp 1b");
     assert_eq!((apart.critical_section.cycles, apart.closed.cycles), (Some(2), Some(1 + 2 + 2)));
-    // The instruction behind the first `sei` is the second `cli`: both sections are one to whoever waits.
+    // The instruction after the first `sei` is the second `cli`. So a waiting interrupt sees both sections as one.
     let joined = proved("start:\n sei\n1: nop\n cli\n nop\n sei\n cli\n nop\n sei\n rjmp 1b");
     assert_eq!((joined.critical_section.cycles, joined.closed.cycles), (Some(2), Some(1 + 2 + 1 + 2 + 2)));
 }

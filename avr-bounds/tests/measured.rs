@@ -1,8 +1,9 @@
-//! Programs that this project did not write, proved and measured: examples of the Arduino core and its libraries on three boards, its
-//! bootloaders, and the programs of simavr's own tests and of avr-libc's manual.
+//! Programs from outside this project, proved and measured: examples of the Arduino core and its libraries on three
+//! boards, its bootloaders, and the programs of simavr's own tests and of avr-libc's manual.
 //!
-//! Each runs in simavr while its pins, its serial line and its converter get random input. What is measured never exceeds what is proved:
-//! stack, handlers, stretches without interrupts. README.md has the table that this test makes; `UPDATE_EXPECT=1` writes it.
+//! Each program runs in simavr while its pins, its serial line and its converter get random input. No measured value
+//! may exceed its proved bound: stack, handlers, stretches without interrupts. This test writes the table in README.md
+//! when `UPDATE_EXPECT=1` is set.
 
 mod programs;
 

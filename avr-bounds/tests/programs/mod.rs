@@ -1,7 +1,8 @@
-//! Programs that others wrote, built from what Debian and simavr bring: arduino-core-avr with its bootloaders, avr-libc's manual, simavr's
-//! tests.
+//! Builds test programs that Debian and simavr supply: arduino-core-avr with its bootloaders, avr-libc's manual,
+//! simavr's tests.
 //!
-//! They are linked with `--emit-relocs`, which changes no byte of the program. A built program is kept in the target folder.
+//! They are linked with `--emit-relocs`, which changes no byte of the program. A built program is kept in the target
+//! folder.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
