@@ -19,7 +19,7 @@ const SETTLE_MS: u32 = 150;
 /// Time in which a stuck tool raises its alarm: the longest lead, 0.1 s, and as much again, in ms.
 const STUCK_MS: u32 = 800;
 
-/// The width of the pulse by which the tester checks its own capture, in cycles.
+/// Width of the pulse with which the tester checks its own capture, in cycles.
 const OWN_PULSE: u16 = 16_000;
 
 /// What the tester may measure of its own pulse too much: the loop that makes it looks at the clock every few microseconds.

@@ -48,7 +48,7 @@ pub struct CourseArguments {
     row: Option<PathBuf>,
 }
 
-/// Tall weeds in a row for which nobody has said how many, where there is room for them.
+/// The default number of tall weeds in a row. A row without room for them gets fewer.
 const WEEDS: usize = 5;
 
 /// Scatter of a grown row, as shares of the mean spacing and the mean canopy; never more than a quarter of the gap

@@ -41,14 +41,14 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     let mut differ = Vec::new();
     for path in &arguments.pages {
         let page = fs::read_to_string(path).with_context(|| format!("{} cannot be read", path.display()))?;
-        let anew = renew(&page, path)?;
-        if anew == page {
+        let renewed = renew(&page, path)?;
+        if renewed == page {
             continue;
         }
         if arguments.check {
-            differ.push(format!("{}\n{}", path.display(), difference(&page, &anew)));
+            differ.push(format!("{}\n{}", path.display(), difference(&page, &renewed)));
         } else {
-            whole_file::write(path, |to| Ok::<_, anyhow::Error>(to.write_all(anew.as_bytes())?))
+            whole_file::write(path, |to| Ok::<_, anyhow::Error>(to.write_all(renewed.as_bytes())?))
                 .with_context(|| format!("{} cannot be written", path.display()))?;
         }
     }
@@ -62,9 +62,9 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
 
 /// The page with the figures that its commands print now.
 fn renew(page: &str, path: &Path) -> Result<String> {
-    let (mut anew, mut lines) = (String::new(), page.lines().enumerate());
+    let (mut renewed, mut lines) = (String::new(), page.lines().enumerate());
     while let Some((_, line)) = lines.next() {
-        anew += &format!("{line}\n");
+        renewed += &format!("{line}\n");
         let Some(command) = line.strip_prefix(MARK).and_then(|rest| rest.strip_suffix(" -->")) else { continue };
         let place = |number: usize| format!("{}:{}", path.display(), number + 1);
         let Some((number, fence)) = lines.next() else {
@@ -77,9 +77,9 @@ fn renew(page: &str, path: &Path) -> Result<String> {
         );
         ensure!(lines.by_ref().any(|(_, line)| line == "```"), "{}: the figure's block has no end", place(number));
         let figure = print(command).with_context(|| place(number))?;
-        anew += &format!("{fence}\n{figure}```\n");
+        renewed += &format!("{fence}\n{figure}```\n");
     }
-    Ok(anew)
+    Ok(renewed)
 }
 
 /// What a command prints, which does not depend on the machine that it runs on.
@@ -100,12 +100,12 @@ fn print(command: &str) -> Result<String> {
 }
 
 /// The lines that differ, those of the page first.
-fn difference(page: &str, anew: &str) -> String {
-    let (page, anew): (Vec<&str>, Vec<&str>) = (page.lines().collect(), anew.lines().collect());
+fn difference(page: &str, renewed: &str) -> String {
+    let (page, renewed): (Vec<&str>, Vec<&str>) = (page.lines().collect(), renewed.lines().collect());
     let only = |sign: char, these: &[&str], others: &[&str]| -> String {
         these.iter().filter(|line| !others.contains(line)).map(|line| format!("{sign} {line}\n")).collect()
     };
-    only('-', &page, &anew) + &only('+', &anew, &page)
+    only('-', &page, &renewed) + &only('+', &renewed, &page)
 }
 
 #[cfg(test)]

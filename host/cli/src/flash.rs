@@ -136,7 +136,7 @@ impl<W: Write> Messages<W> {
         let mut buffer = [0; 256];
         while let Ok(count @ 1..) = from.read(&mut buffer) {
             buffer[..count].iter().for_each(|&byte| self.take(byte));
-            // Nobody is left who could be told, and avrdude goes on.
+            // The output is closed, so no message can be shown. avrdude goes on.
             let _ = self.to.flush();
         }
         self.end_line();

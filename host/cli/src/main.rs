@@ -1,8 +1,8 @@
-//! The `weeder` command: tries the firmware on a simulated field, and puts it on an Arduino Uno.
+//! The `weeder` command: runs the firmware on a simulated field, and flashes and operates an Arduino Uno.
 //!
-//! `weeder sim` and `weeder classify` end with status 0 where no plant was damaged, or would be, and 1 where one was;
-//! commands that compare end with 1 where something differs, `weeder bounds` where a bound is over its budget. Whatever else
-//! goes wrong ends with status 2 and a message that says what would be right.
+//! `weeder sim` and `weeder classify` exit with 0 if no plant was damaged, or would be, and with 1 otherwise. Commands
+//! that compare exit with 1 if something differs. `weeder bounds` exits with 1 if a bound is over its budget. All other
+//! errors exit with 2 and print a message that says what would be right.
 
 // A result is printed in one way, which a closed pipe or a full disk does not bring down.
 #![deny(clippy::print_stdout, clippy::print_stderr)]

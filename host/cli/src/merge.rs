@@ -1,6 +1,6 @@
-//! `weeder merge`: the parts of a study put together, to the result that one machine would have given.
+//! `weeder merge`: joins the parts of a study into the result of an undivided study.
 //!
-//! It computes nothing anew: the parts hold all outcomes, which go to the code that shows those of an undivided study.
+//! It simulates nothing. The parts hold all outcomes, and the code of an undivided study shows them.
 
 use crate::destination::Replace;
 use crate::finding::Finding;

@@ -1,7 +1,7 @@
-//! `--shard`: a part of a study goes to a file, for `weeder merge`.
+//! `--shard`: writes a part of a study to a file, for `weeder merge`.
 //!
-//! A part tells by which program it was computed: by the version, and by a check sum of the program's own file, since what is not
-//! released yet has the version of what was.
+//! A part names the program that computed it: the version, and a checksum of the program's file. The version alone is
+//! not enough, because an unreleased build has the version of the last release.
 
 use crate::destination::{FileName, OutFile, Replace};
 use crate::output::{say, tell};

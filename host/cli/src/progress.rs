@@ -1,6 +1,6 @@
-//! The bar that shows how far a simulation is.
+//! The progress bar of a simulation.
 //!
-//! Whoever interrupts the command finds the terminal's line empty, not half a bar.
+//! After an interrupt of the command the terminal's line is empty, without half a bar.
 
 use indicatif::{ProgressBar, ProgressStyle};
 use std::process;

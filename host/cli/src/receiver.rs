@@ -202,7 +202,7 @@ impl Paced {
             if let Line::Report(report) = Line::parse(line)
                 && let Some(time_ms) = report.time_ms
             {
-                // Past midnight it begins anew.
+                // The time of day restarts at 0 at midnight.
                 due_ms += last_ms.map_or(0, |last_ms| (time_ms - last_ms).rem_euclid(DAY_MS)).unsigned_abs();
                 last_ms = Some(time_ms);
             }

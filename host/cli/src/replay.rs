@@ -1,4 +1,4 @@
-//! `weeder replay`: a log's swings, decided anew on the host.
+//! `weeder replay`: repeats the decisions of a log on the PC.
 
 use crate::finding::Finding;
 use crate::output::say;

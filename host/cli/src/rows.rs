@@ -1,4 +1,4 @@
-//! `weeder rows`: which Uno is which row's, told apart after they were plugged in anew.
+//! `weeder rows`: lists the Unos and the rows that they control, and finds them again at other ports.
 
 use crate::output::say;
 use crate::ports::NamesFile;

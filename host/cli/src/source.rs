@@ -38,7 +38,7 @@ pub fn preset_or_file() -> impl TypedValueParser<Value = String> {
     offering(|| presets().collect(), named)
 }
 
-/// What `parser` reads, with names of which a shell that completes offers those that fit. Other words are read as well.
+/// A value that `parser` reads. A shell's completion offers these names, but other words are also accepted.
 pub fn offering<P: TypedValueParser>(
     names: fn() -> Vec<&'static str>,
     parser: P,

@@ -98,7 +98,7 @@ impl ConsoleLine {
     }
 }
 
-/// `weeder VERSION, reset by CAUSE`, behind whatever line the reset has cut.
+/// Parses `weeder VERSION, reset by CAUSE`, also behind a line that the reset has cut.
 fn greeting(line: &str) -> Option<ConsoleLine> {
     let (before, behind) = line.split_once(", reset by ")?;
     let version = before.get(before.rfind(NAME)? + NAME.len()..)?;

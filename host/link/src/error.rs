@@ -39,7 +39,7 @@ pub enum LinkError {
     /// There is no such port.
     #[error("there is no port {0}: plug the Uno in, or leave --port out to have it found")]
     Absent(String),
-    /// Somebody else has the port.
+    /// Another program has the port open.
     #[error("{0} is in use: close the serial monitor, or the other program that has it open")]
     Busy(String),
     /// The user may not open the port.
@@ -79,7 +79,7 @@ pub enum LinkError {
     /// Something else answers.
     #[error("it is not the weeder's firmware that answers, but {0:?}: put it on the Uno by `weeder flash`")]
     NotTheWeeder(String),
-    /// The firmware started anew while it was asked.
+    /// The firmware restarted before it had answered.
     #[error("the Uno was reset while it was asked `{0}`: see to its supply, then try again")]
     Restarted(String),
     /// The firmware refused.

@@ -137,7 +137,8 @@ pub fn push(link: &mut Link, wanted: &[Taught], replace: bool) -> Result<Pushed,
         link.ask(&format!("forget {number}"))?;
     }
     for example in &new {
-        // Where somebody has left features behind, these are too many: that is refused, and the next time begins anew.
+        // Features from an earlier command may be left in the buffer. Then these are too many, and the firmware refuses
+        // them and clears the buffer. The second try starts with an empty buffer.
         teach(link, example).or_else(|_| teach(link, example))?;
     }
     let after = read(link)?;

@@ -1,16 +1,17 @@
-//! The console from the other end of the wire: what the weeder's firmware says and takes over its serial line.
+//! The PC's end of the console: reads and writes the firmware's serial line.
 //!
-//! [`Link::open`] opens an Uno's port, real or virtual, waits out the reset that opening a real one causes, and makes sure
-//! that the weeder's firmware answers. [`Link::ask`] types a command and waits for its answer; [`Link::next_line`] hears
-//! what the machine says by itself, and a [`session`] does both for as long as one likes. [`ConsoleLine`] is what a line means, and
-//! [`settings`] and [`settings_file`] move all settings at once, [`examples`] all that was taught.
+//! [`Link::open`] opens the port of a real or virtual Uno. It waits for the reset that opening a real port causes, and
+//! checks that the weeder's firmware answers. [`Link::ask`] types a command and waits for its answer.
+//! [`Link::next_line`] returns the lines that the machine sends by itself. A [`session`] does both, and runs until the
+//! caller ends it. [`ConsoleLine`] is a parsed line. [`settings`] and [`settings_file`] transfer all settings, and
+//! [`examples`] transfers all taught examples.
 //!
-//! Whatever comes from the port is suspect: noise, lines without an end, a firmware that is not the weeder's. What is kept
-//! of it is bounded, characters that could move a terminal's cursor are taken out, and no wait is endless.
+//! Input from the port is not trusted: it may be noise, lines without an end, or another firmware. Buffers are bounded,
+//! control characters are removed, and every wait has a timeout.
 //!
-//! A link does not reconnect: one whose port is gone says so, and the session opens another. [`rows`] has several
-//! sessions at once, and [`row_names`] knows which board is which row's. Nothing here knows what stands in a row, or a
-//! simulator. In a browser there is no serial port, and all but that compiles for it.
+//! A link does not reconnect. If its port is gone, it returns an error, and the session opens a new link. [`rows`] runs
+//! several sessions at once. [`row_names`] maps boards to rows. This crate knows no plants and no simulator. All except
+//! the serial port also compiles for a browser.
 
 pub mod advice;
 pub mod completion;
@@ -109,7 +110,7 @@ impl Link {
         let mut link =
             Self { port: Box::new(port), lines: LineReader::new(), events: VecDeque::new(), version: String::new() };
         link.wait_for_greeting(if resets { BOOT_READS } else { 0 })?;
-        // Whatever was typed before ends here, and its answer is nobody's.
+        // Ends a line that was typed before. Its answer is ignored.
         link.type_line("")?;
         link.wait_until_quiet()?;
         let mut answer = link.ask("version");
@@ -254,7 +255,7 @@ pub fn is_command(line: &str) -> bool {
     line.len() <= COMMAND_LENGTH && line.bytes().all(|byte| matches!(byte, b' '..=b'~'))
 }
 
-/// Whether a line is the one by which the firmware says that it has started.
+/// Whether a line is the firmware's greeting after a start.
 pub fn is_greeting(line: &str) -> bool {
     matches!(ConsoleLine::parse(line), ConsoleLine::Greeting { .. })
 }

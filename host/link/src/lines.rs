@@ -1,7 +1,7 @@
-//! Bytes to lines, whatever the bytes are.
+//! Splits bytes into lines. Any bytes are accepted.
 //!
-//! A line ends with CR, LF or both, or where it has more characters than any that the firmware writes. Every byte that is
-//! not printable ASCII becomes [`STRANGE`], so that noise can be shown, and cannot move a terminal's cursor.
+//! A line ends with CR, LF or both, or when it is longer than any line of the firmware. Every byte that is not
+//! printable ASCII becomes [`STRANGE`]. So noise can be shown, and cannot move a terminal's cursor.
 
 use std::collections::VecDeque;
 

@@ -208,7 +208,7 @@ impl LogWriter {
 
     fn line(&mut self, time_ms: u64, kind: Kind, line: &str) -> Result<(), LogError> {
         self.added += 1;
-        // A table's line is one, whatever the system says of a port that is gone.
+        // A record is one line of the table, even if the system's message about a lost port has several.
         self.record([time_ms.to_string().as_str(), kind.name(), &in_a_line(line)])
     }
 
@@ -272,7 +272,7 @@ pub struct Pieces {
 }
 
 impl Pieces {
-    /// A log of which nothing is read yet. The path is for errors.
+    /// A log before its first line. The path is for error messages.
     pub fn new(path: &Path) -> Self {
         Self { path: path.into(), head: String::new(), has_header: false, cut: Vec::new(), lines: 0, is_empty: true }
     }

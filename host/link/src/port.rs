@@ -112,7 +112,7 @@ fn explain(name: &str, error: serialport::Error) -> LinkError {
         ErrorKind::Io(io::ErrorKind::PermissionDenied) => LinkError::Forbidden(name),
         ErrorKind::Io(io::ErrorKind::ResourceBusy) => LinkError::Busy(name),
         ErrorKind::Io(io::ErrorKind::NotFound) => LinkError::Absent(name),
-        // A port that is there and yet no device is one that somebody else has locked.
+        // The port exists but is no device: another program has locked it.
         ErrorKind::NoDevice if std::fs::exists(&name).unwrap_or(false) => LinkError::Busy(name),
         ErrorKind::NoDevice => LinkError::Absent(name),
         _ => LinkError::NotOpened { port: name, source: error },

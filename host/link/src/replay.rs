@@ -1,25 +1,28 @@
-//! A log replayed: the firmware's own decisions on the host, given what the log says that the machine met.
+//! Replays a log: the firmware's decisions, repeated on the PC from the inputs in the log.
 //!
-//! A log holds where the beam broke and cleared, place and speed ten times a second, the settings, the examples and what was
-//! typed. From these [`replay`] rebuilds the machine's way and the beam's edges, tick by tick, has
-//! [`control::weeder::Controller`] decide anew, and compares what it tells with what the log tells: each detection with its
-//! class and votes, each swing with its place, each alarm.
+//! A log holds the positions where the beam broke and cleared, position and speed ten times a second, the settings, the
+//! examples, and the typed commands. From these [`replay`] rebuilds the machine's motion and the beam's edges, tick by
+//! tick. [`control::weeder::Controller`] decides on them again. The replay compares its events with the log's: each
+//! detection with its class and votes, each swing with its position, and each alarm.
 //!
-//! # How near it is
+//! # Accuracy
 //!
-//! - A detection's edges are right to [`DETECTION_TICKS`]. A swing leads by the speed, and the log has that only now and then: it may
-//!   differ by [`SWING_TICKS`], and by [`SWING_MS`] of the machine's way, which at 2.5 km/h is another 17 mm. Whether the ground between
-//!   two windows is long enough to come into the row rests on the speed too. So all is replayed at three paces, as even, as slow and
-//!   as fast as the log allows, and a swing differs where none of them has it like the log.
-//! - A detection's vote rests on the speed class, which the line does not tell: it is the same where one of the classes that the machine
-//!   may have been in gives it. What was seen before the log began is believed.
-//! - Where the state changed is not in the log. The swing that follows says it, and is not judged by its place. Without one the tool was
-//!   out already, and the statuses around it say enough. The time at which a command was typed does not: a busy host is late.
-//! - An alarm that encoder, beam, end switch or stack gave rests on what the log does not hold. It is raised where the log has it.
-//! - Where a log begins with ground already seen, what the tool did there is not judged.
-//! - A command that the firmware refused is left out, as it did nothing there.
-//! - A replay ends where the bench was used (`servo`, `calibrate`, `test`), examples were forgotten, or a second beam was set. A log of
-//!   a machine that has one already is not replayed.
+//! - A detection's edges are right to [`DETECTION_TICKS`]. The lead of a swing depends on the speed, which the log
+//!   holds ten times a second. So a swing may differ by [`SWING_TICKS`], and by the distance that the machine travels
+//!   in [`SWING_MS`]: 17 mm at 2.5 km/h. The speed also decides whether the gap between two zones is long enough to
+//!   swing in. So the log is replayed at three paces: even, and as slow and as fast as the log allows. A swing differs
+//!   only if no pace reproduces it.
+//! - The votes of a detection depend on the speed class, which the line does not tell. Votes agree if any possible
+//!   speed class gives them. Detections from before the start of the log are taken as logged.
+//! - The log does not hold the position of a change of state. The next swing shows the change, and its position is not
+//!   compared. Without a swing the tool was already out, and the statuses before and after the change suffice. The time
+//!   of a typed command is not exact: a busy PC records it late.
+//! - An alarm from the encoder, the beam, the end switch or the stack depends on inputs that the log lacks. The replay
+//!   raises it at its logged position.
+//! - If a log begins on ground that was already seen, the tool's swings there are not compared.
+//! - A refused command is left out, because it had no effect.
+//! - A replay ends at a bench command (`servo`, `calibrate`, `test`), where examples were forgotten, or where a second
+//!   beam was set. A log of a machine with a second beam is not replayed.
 
 mod classifier;
 mod compare;
@@ -130,7 +133,7 @@ fn replay_stretch(
     Ok(())
 }
 
-/// Has the decisions made anew at a pace.
+/// Replays a stretch at one pace.
 fn play(stretch: &Stretch, pace: Pace, progress: &mut Progress<impl FnMut(f64)>) -> Result<Played, ReplayError> {
     let mut player = Player::new(stretch, pace);
     let mut logged: Vec<Heard> = Vec::new();

@@ -1,10 +1,10 @@
-//! The names of a machine's rows, and which board each of them has: a small TOML file with a line a row.
+//! The names of a machine's rows, and the board of each row: a small TOML file with one line a row.
 //!
-//! A board is known by its USB serial number, at whichever port the system puts it after it was plugged in anew. Boards without one, and
-//! boards of which several have the same, are known by their port: on Linux by udev's link for the place where they are plugged in,
-//! where there is one. A virtual Uno is known by its path. The file keeps its comments and its order, which is that of the rows.
+//! A board is known by its USB serial number, at any port. Some boards have no serial number, or share one. They are
+//! known by their port: on Linux by udev's link for the USB socket, if there is one. A virtual Uno is known by its
+//! path. Changes preserve the file's comments and its order. The order of lines is the order of rows.
 //!
-//! Nothing here opens a port but [`Board::open`], and nothing but [`Names::write`] changes the file.
+//! Only [`Board::open`] opens a port. Only [`Names::write`] changes the file.
 
 use super::port::{is_uno, open};
 use super::{Link, LinkError, find_uno};
@@ -165,7 +165,7 @@ fn of(port: &SerialPortInfo, ports: &[SerialPortInfo], by_place: &Path) -> Board
     let links = fs::read_dir(by_place).into_iter().flatten().flatten().map(|entry| entry.path());
     let leads_there =
         |link: &PathBuf| fs::canonicalize(link).is_ok_and(|path| path.to_str() == Some(port.port_name.as_str()));
-    // udev makes two of a place, of which the shorter one has been there for longer.
+    // udev makes two links for a socket. The shorter one is the older form.
     let place = links.filter(leads_there).min_by_key(|link| link.as_os_str().len());
     Board::Port(place.map_or_else(|| port.port_name.clone(), |link| link.display().to_string()))
 }
@@ -371,7 +371,7 @@ mod tests {
         for number in [None, Some("0001"), Some(" ")] {
             let ports = [usb(&first, number), usb(&second, number)];
             assert_eq!(of(&ports[0], &ports, &places), by_place);
-            assert_eq!(of(&ports[1], &ports, &places), Board::Port(second.clone()), "nobody knows its place");
+            assert_eq!(of(&ports[1], &ports, &places), Board::Port(second.clone()), "it has no link for a socket");
         }
         let twins = [usb(&first, Some("0001")), usb(&second, Some("0001"))];
         let error = numbered("0001", &twins).unwrap_err().to_string();

@@ -14,7 +14,7 @@ use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender, TryRecvError};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// A way to a link, tried again whenever it is lost.
+/// Opens a link. Called again each time that the link is lost.
 pub type Opener = Box<dyn FnMut() -> Result<Link, LinkError> + Send>;
 
 /// What one row says.
@@ -79,7 +79,7 @@ impl Rows {
                     if let Some(why) = &missing {
                         talk.tell(What::Happened(Happening::Lost(why.to_string())));
                     }
-                    // Nobody waits any more where nobody hears.
+                    // The receiver is gone if the caller no longer waits.
                     let _ = tried.send(missing);
                     talk.run(session, &ordered);
                 });
@@ -147,7 +147,7 @@ struct Talk {
 }
 
 impl Talk {
-    /// Goes on until nobody orders or hears any more.
+    /// Runs until all senders of orders and all receivers of events are gone.
     fn run(mut self, mut session: Session, orders: &Receiver<Order>) {
         loop {
             loop {
@@ -241,7 +241,7 @@ pub struct Hold {
 }
 
 impl Hold {
-    /// One that is asked for now, of rows of which these are there.
+    /// A hold that is requested at `since`. `are_there` says for each row whether it is connected.
     pub fn new(since: Instant, are_there: impl IntoIterator<Item = bool>) -> Self {
         let held = |is_there| if is_there { Held::Waiting } else { Held::NotThere };
         Self { since, rows: are_there.into_iter().map(held).collect() }
@@ -263,7 +263,7 @@ impl Hold {
         }
     }
 
-    /// Whether nobody is waited for any more.
+    /// True if no row is left to answer.
     pub fn is_over(&self) -> bool {
         !self.rows.contains(&Held::Waiting)
     }

@@ -124,10 +124,10 @@ pub fn shown(line: &str) -> Option<(Setting, u16)> {
     Some((setting, value))
 }
 
-/// The values to send, one after the other, that lead from some settings to others with no contradiction on the way.
+/// The settings to send, in order, so that no intermediate state contradicts itself.
 ///
-/// Whatever makes room for others can always go first. Only the two pulses can be in each other's way, where they change
-/// places: one of them then goes by way of its neighbour.
+/// A change that widens the valid range of others can always go first. Only the two pulse widths can block each other,
+/// if they are exchanged. Then one of them first takes a neighbouring value.
 pub fn steps(from: &Settings, to: &Settings) -> Vec<(Setting, u16)> {
     let mut now = from.clone();
     let mut steps = Vec::new();
@@ -185,7 +185,7 @@ pub fn push(link: &mut Link, wanted: &[(Setting, u16)], save: bool) -> Result<Ve
     let names = |wheel: Setting| wanted.iter().any(|&(setting, _)| setting == wheel);
     let is_another = |setting: Setting| setting.is_of_the_wheel() && before.get(setting) != after.get(setting);
     if Setting::all().any(is_another) && !names(Setting::TicksPerM) {
-        // Nobody has measured that wheel yet.
+        // The new wheel has no measured value yet.
         let _ = after.set(Setting::TicksPerM, 0);
     }
     if let Some(contradiction) = after.contradiction() {

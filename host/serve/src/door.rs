@@ -1,14 +1,14 @@
-//! The door: which requests come in at all, before anybody asks what they want.
+//! The first check of a request: decides whether it is let in, before its path is read.
 //!
-//! A request has to name the address at which it came in as its host, exactly: a page of somebody else's whose name was made to
-//! lead here (DNS rebinding) names its own. What a page of another origin sends is refused, and so is whatever wants to do something
-//! and does not say where it comes from. Over the network, all but the form for the code is for those who are paired.
+//! The request's `Host` must be exactly an address of this server. A foreign page whose name was made to lead here (DNS
+//! rebinding) sends its own name. Requests from a page of another origin are refused. So are requests that want to
+//! change something and name no origin. Over the network, unpaired clients get only the form for the code.
 
 use super::rules::Reach;
 use std::net::Ipv4Addr;
 use thiserror::Error;
 
-/// Paths at which whoever is not paired yet finds the form for the code, and nothing else.
+/// Paths that are open to unpaired clients: the form for the code.
 const FORM: [&str; 4] = ["/", "/pair", "/pair.css", "/pair.js"];
 
 /// An address at which requests come in.
@@ -35,17 +35,17 @@ pub struct Knock<'a> {
     pub origins: &'a [&'a [u8]],
     /// `Sec-Fetch-Site`: from where a page asks, where the browser says so.
     pub sites: &'a [&'a [u8]],
-    /// Whether its cookie is that of somebody who is paired.
+    /// Whether its cookie belongs to a paired browser.
     pub is_paired: bool,
 }
 
 /// Why a request does not come in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum Denial {
-    /// It means somebody else.
+    /// Its `Host` is not an address of this server.
     #[error("this is not the address that `weeder serve` printed: type that one, with its number")]
     ForeignHost,
-    /// It comes from a page of somebody else's, or does not say from which.
+    /// It comes from a page of another origin, or names no origin.
     #[error("this request comes from another page: open the address that `weeder serve` printed")]
     ForeignOrigin,
     /// It has shown no code.
@@ -92,7 +92,8 @@ impl Door {
             [origin] if origin.strip_prefix(b"http://") == Some(host) => {}
             _ => return Err(Denial::ForeignOrigin),
         }
-        // What a page of somebody else's puts into itself as a picture has no origin. A link to the front is followed all the same.
+        // A foreign page can embed a path of this server as a picture, and such a request has no origin. A link to the
+        // front page is followed all the same.
         let is_own = |site: &&[u8]| matches!(*site, b"same-origin" | b"none");
         if knock.path != "/" && !knock.sites.iter().all(is_own) {
             return Err(Denial::ForeignOrigin);

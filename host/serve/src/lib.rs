@@ -171,7 +171,7 @@ impl Server {
                 sleep(LOOK).await;
             }
         });
-        // Whoever listens is not waited for.
+        // Open connections are closed without waiting for their clients.
         self.runtime.shutdown_background();
     }
 }
@@ -189,7 +189,8 @@ pub fn find_lan() -> Result<Ipv4Addr, ServeError> {
 }
 
 fn only_lan(addresses: impl Iterator<Item = Ipv4Addr>) -> Result<Ipv4Addr, ServeError> {
-    // Others are seen from everywhere, or by nobody else; whoever wants one of them names it.
+    // Other addresses are visible from everywhere, or to this computer alone. The operator must name one of them
+    // explicitly.
     let mut networks: Vec<Ipv4Addr> =
         addresses.filter(|address| address.is_private() || address.is_link_local()).collect();
     networks.dedup();
@@ -261,7 +262,7 @@ async fn attend(listener: TcpListener, door: Arc<Door>, places: Places, routes: 
     }
 }
 
-/// Serves a connection to its end. Whoever sends too slowly or does not read is let go of.
+/// Serves a connection to its end. Closes it if the client sends too slowly or does not read.
 async fn serve(stream: TcpStream, lengths: Arc<Lengths>, routes: Router) {
     // It is only slower where it fails.
     let _ = stream.set_nodelay(true);

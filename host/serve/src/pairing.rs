@@ -1,8 +1,9 @@
-//! Pairing: a code that stands on the terminal, typed or scanned on a phone once, for a token that its browser shows from then on.
+//! Pairing: the operator types or scans the terminal's code on a phone once, and its browser then presents a token.
 //!
-//! Code and tokens come from outside, out of the system's randomness; so does the time. Both are compared in a time that
-//! says nothing of how much was right. After five wrong codes no code is taken for a minute, the right one included, whoever
-//! types it: an address is easily changed. The code has 40 bits, of which that leaves nobody more than a guess in a hundred million a day.
+//! The caller passes the code and the tokens, made from the system's random source, and the time. Comparison takes
+//! constant time, so its duration does not tell how much was right. After five wrong codes every code is refused for a
+//! minute, also the right one and from any address, because an address is easily changed. The code has 40 bits. At this
+//! rate an attacker guesses it with a chance of one in a hundred million a day.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
@@ -90,12 +91,12 @@ pub struct Pairing {
 }
 
 impl Pairing {
-    /// Nobody is paired yet.
+    /// No browser is paired yet.
     pub fn new(code: Code) -> Self {
         Self { code, wrong: 0, locked_until: None, paired: VecDeque::new(), next: 0 }
     }
 
-    /// Somebody types a code. Where it is right, he is to be given a [`token`](Self::pair).
+    /// Checks a typed code. If it is right, the caller gives the browser a [`token`](Self::pair).
     pub fn try_code(&mut self, typed: &str, now: Instant) -> Try {
         if let Some(until) = self.locked_until {
             if now < until {
@@ -114,7 +115,7 @@ impl Pairing {
         Try::Wrong { left: TRIES - self.wrong }
     }
 
-    /// Pairs whoever has this token from now on; returns how many are paired.
+    /// Pairs the browser with this token; returns the number of paired browsers.
     pub fn pair(&mut self, token: Token) -> usize {
         if self.paired.len() == PHONES {
             self.paired.pop_front();

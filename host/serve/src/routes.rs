@@ -207,7 +207,7 @@ async fn front(State(served): State<Arc<Served>>, Extension(Known(known)): Exten
     }
 }
 
-/// Pairs whoever sends the code.
+/// Pairs the client if it sends the right code.
 async fn pair(
     State(served): State<Arc<Served>>,
     Extension(Visitor { address, door, .. }): Extension<Visitor>,
@@ -298,7 +298,8 @@ async fn command(
     }
 }
 
-/// Has all machines hold at once, which whoever comes in may: of each why it has not obeyed, or nothing, and the time of the last that has.
+/// Holds all machines at once. Every client that is let in may do this. Returns for each machine why it has not obeyed,
+/// or nothing, and the time of the last one that has.
 async fn hold_all(
     State(served): State<Arc<Served>>,
     Extension(Visitor { place, .. }): Extension<Visitor>,
@@ -325,7 +326,7 @@ async fn hold_all(
     ([(CONTENT_TYPE, "application/json")], said.to_string())
 }
 
-/// Why a machine has not obeyed a `hold`, of which this came.
+/// Returns why a machine has not obeyed a `hold`, from its result.
 fn why_not_held(typed: Option<Typed>) -> Option<String> {
     match typed {
         Some(Typed::Answered(lines)) => lines.last().filter(|line| line.starts_with("error:")).cloned(),
@@ -382,8 +383,8 @@ async fn events(
     Sse::new(heard(&served.hub).map(|message| Ok(Event::default().data(&*message))))
 }
 
-/// What a page hears: how all machines are, then what comes, and a beat where nothing does. To a page that is too far behind it is
-/// said at the end that it has missed something; it may listen anew.
+/// The messages to a page: the state of all machines, then changes, and a heartbeat while nothing changes. A page that
+/// falls too far behind gets a last message that says so. It may connect again.
 fn heard(hub: &Hub) -> impl Stream<Item = Message> + use<> {
     let (first, later) = hub.listen();
     let later = stream::unfold(Some(later), |later| async move {

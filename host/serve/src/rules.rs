@@ -1,14 +1,15 @@
-//! Who may type what. The lines are taken apart by the firmware's own parser (`control::say::command`), so that what is forbidden
-//! here is what the machine would do there.
+//! The rules that decide who may type which command. The firmware's own parser (`control::say::command`) reads the
+//! lines, so a line means here what it means on the machine.
 //!
-//! Whoever sits at the computer that has the port may type everything, as in `weeder monitor`. Over the network, what cannot put the
-//! tool into the row or change the machine may be typed by everybody who is paired; `start` and `clear` where the operator
-//! allowed it as he started `weeder serve`; all else by nobody. What this version does not know it does not pass on.
+//! The operator at the computer with the port may type everything, as in `weeder monitor`. Over the network, a paired
+//! client may type commands that neither put the tool into the row nor change the machine. It may type `start` and
+//! `clear` only if the operator allowed this when starting `weeder serve`. All other commands are refused over the
+//! network, and so are commands that this version does not know.
 
 use control::say::command::{Command, parse};
 use thiserror::Error;
 
-/// From where somebody types.
+/// The origin of a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reach {
     /// From the computer that has the port.
@@ -41,7 +42,7 @@ pub enum Forbidden {
     /// The operator has not allowed it.
     #[error("this is not allowed from here: go to the machine, or have `weeder serve` started with --allow-start")]
     NoStart,
-    /// It puts the tool over ground that nobody has seen.
+    /// It moves the tool over ground that the beam has not seen.
     #[error(
         "this takes the tool over ground that the beam has not seen, and is never allowed over the network: go to the machine"
     )]
@@ -99,7 +100,7 @@ fn why_not(command: Command) -> Option<Forbidden> {
         | Command::Examples
         | Command::Dump
         | Command::Version => None,
-        // A latched alarm is not cleared by somebody who has not seen what is wrong.
+        // A client that has not seen the fault must not clear a latched alarm.
         Command::Start { now: false } | Command::Clear => Some(Forbidden::NoStart),
         Command::Start { now: true } => Some(Forbidden::Unseen),
         Command::CalibrateServo

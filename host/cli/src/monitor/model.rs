@@ -98,7 +98,7 @@ pub struct Model {
 }
 
 impl Model {
-    /// Rows of which nothing is known yet.
+    /// Rows in unknown state.
     pub fn new(names: Vec<String>) -> Self {
         Self {
             rows: names.into_iter().map(RowModel::new).collect(),
@@ -249,7 +249,7 @@ impl Model {
 }
 
 impl RowModel {
-    /// A row of which nothing is known yet.
+    /// A row in unknown state.
     fn new(name: String) -> Self {
         Self {
             name,

@@ -27,12 +27,12 @@ const LOOK: Duration = Duration::from_millis(20);
 /// Where a line is no command, an Uno goes away with commands unanswered, or output or log fail.
 pub fn run(rows: &Rows, are_there: &[bool], chosen: &Chosen, logs: Option<Logs>) -> Result<Finding> {
     let (sender, commands) = mpsc::channel();
-    // Reading waits for as long as nobody types, so it does so by itself; it ends with the process.
+    // Reading blocks until the operator types, so it has its own thread. The thread ends with the process.
     thread::spawn(move || io::stdin().lock().lines().map_while(Result::ok).try_for_each(|line| sender.send(line)));
     let standing = are_there.iter().map(|&is_there| Standing { is_there, ..Standing::default() }).collect();
     let talk = Talk { rows, chosen, logs, standing, hold: None, finding: Finding::Good };
     match talk.run(&commands, &mut io::stdout().lock()) {
-        // Whoever read the output has seen enough.
+        // The reader has closed the pipe: it has read enough.
         Err(error) if error.downcast_ref::<io::Error>().is_some_and(|error| error.kind() == ErrorKind::BrokenPipe) => {
             Ok(Finding::Good)
         }
@@ -179,7 +179,7 @@ impl Talk<'_> {
         self.tell_of_hold(output)
     }
 
-    /// Says what came of a `hold` to all once nobody is waited for any more.
+    /// Prints the result of a `hold` to all rows, once no row is left to answer.
     fn tell_of_hold(&mut self, output: &mut impl Write) -> Result<()> {
         if let Some(hold) = self.hold.take_if(|hold| hold.is_over()) {
             writeln!(output, "{}", hold.summary(&self.chosen.names()))?;

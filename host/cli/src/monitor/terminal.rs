@@ -10,7 +10,7 @@ use ratatui::crossterm::event::{self, Event, KeyCode, KeyEvent, KeyEventKind, Ke
 use std::io::{self, Write};
 use std::time::{Duration, Instant};
 
-/// Time between two looks at the keyboard, after which the screen is drawn anew.
+/// Time between two reads of the keyboard. After each, the screen is drawn again.
 const TURN: Duration = Duration::from_millis(20);
 
 /// Watches until Ctrl-C or Ctrl-D.
@@ -57,8 +57,8 @@ fn ring(model: &mut Model, mut terminal: impl Write) -> io::Result<()> {
     Ok(())
 }
 
-/// Takes a key: Esc before all others, whatever is being typed. What was typed by half goes with it, or it would stand before the next
-/// command.
+/// Handles a key. Esc comes before all others, even while a command is being typed. It also clears the half-typed line,
+/// which would otherwise stand before the next command.
 fn take_key(model: &mut Model, rows: &Rows, key: KeyEvent) {
     match key.code {
         _ if key.kind == KeyEventKind::Release => {}

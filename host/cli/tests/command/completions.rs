@@ -11,7 +11,7 @@ fn completions(shell: &str) -> String {
     String::from_utf8(output.stdout).expect("it is text")
 }
 
-/// What Tab offers in bash behind these words, the last of which is begun.
+/// The words that Tab offers in bash after these words. The last word is incomplete.
 fn offered_by_bash(words: &[&str]) -> Vec<String> {
     let folder = tempfile::tempdir().expect("there is room for a file");
     let file = folder.path().join("weeder");

@@ -18,7 +18,7 @@ fn lines_of(log: &Path, kind: &str) -> usize {
     text.lines().filter(|line| line.split(',').nth(1) == Some(kind)).count()
 }
 
-/// Says a line to whoever listens to this receiver until the log has so many lines of a kind.
+/// Sends a line to all clients of this receiver, until the log has this number of lines of a kind.
 #[track_caller]
 fn say_until(receiver: Option<&mut Pty>, log: &Path, kind: &str, count: usize) {
     const GGA: &[u8] = b"$GPGGA,092750.000,5321.6802,N,00630.3372,W,1,8,1.03,61.7,M,55.2,M,,*76\r\n";
@@ -119,7 +119,7 @@ fn settings_are_pulled_changed_compared_and_pushed() {
     let again = printed(&weeder(&["settings", "push", name, "--json"], uno.path(), ""), 0);
     let again: serde_json::Value = serde_json::from_str(&again).expect("it is JSON");
     assert_eq!(again, serde_json::json!({ "set": [], "saved": true }));
-    // Each of these opened the port anew, which is a reset: what was saved is still there.
+    // Each of these opened the port again, which resets the Uno. The saved settings are still there.
     printed(&weeder(&["settings", "diff", name], uno.path(), ""), 0);
     let json = printed(&weeder(&["settings", "pull", "--json"], uno.path(), ""), 0);
     assert!(json.contains("\"wheel_mm\": 405") && json.contains("\"end_switch\": false"), "{json}");
@@ -151,7 +151,7 @@ fn examples_are_pulled_taught_to_another_machine_and_compared() {
     let pushed: serde_json::Value = serde_json::from_str(&pushed).expect("it is JSON");
     assert_eq!(pushed, serde_json::json!({ "taught": 0, "forgotten": 0 }));
 
-    // Each of these opened the port anew, which is a reset.
+    // Each of these opened the port again, which resets the Uno.
     printed(&weeder(&["examples", "diff", taught], uno.path(), ""), 0);
     printed(&weeder(&["examples", "pull", again, "--force"], uno.path(), ""), 0);
     printed(&weeder(&["examples", "push", again, "--force"], other.path(), ""), 0);

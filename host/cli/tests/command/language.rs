@@ -61,7 +61,7 @@ fn banned(text: &str) -> Vec<&'static str> {
     BANNED.into_iter().filter(|word| text.contains(&format!(" {word} "))).collect()
 }
 
-/// The text without code between backticks and without the targets of links, each of which is a word.
+/// The text without code between backticks and without the targets of links. Each of them counts as one word.
 fn plain(text: &str) -> String {
     let without_code: Vec<&str> =
         text.split('`').enumerate().map(|(index, part)| if index % 2 == 0 { part } else { "code" }).collect();

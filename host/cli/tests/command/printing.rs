@@ -9,7 +9,7 @@ use std::thread::sleep;
 use std::time::Duration;
 use uno::pty::Pty;
 
-/// Objects, none of which would be cut.
+/// Detections. The tool cuts none of them.
 const OBJECTS: &str = "speed_mm_s,spacing_mm,delay_mm,hold_mm,actuation_mm,label\n694,500,226,250,573,plant\n";
 
 /// The manual's example of a trial.

@@ -1,7 +1,8 @@
-//! `weeder serve` as a phone finds it: the real process at a real `weeder virtual-uno`, asked over http by good and bad clients.
+//! `weeder serve` from a phone's side: the real process with a real `weeder virtual-uno`, and good and bad http
+//! clients.
 //!
-//! 127.0.0.2 stands for the computer's address in the network: what comes in there is the network's, whoever sent it. Waits end when
-//! what is waited for has come.
+//! 127.0.0.2 stands for the computer's address in the network: every request to it counts as a request from the
+//! network. The tests wait for results, not for fixed times.
 
 use serde_json::Value;
 use socket2::{Domain, Socket, Type};
@@ -111,7 +112,7 @@ fn serve(folder: &TempDir, ports: &[&Path], options: &[&str]) -> Served {
     let (heard, stderr) = (Arc::clone(&told), process.stderr.take().expect("it is piped"));
     thread::spawn(move || {
         for line in BufReader::new(stderr).lines().map_while(Result::ok) {
-            heard.lock().expect("nobody died").push_str(&(line + "\n"));
+            heard.lock().expect("no thread has panicked").push_str(&(line + "\n"));
         }
     });
     let agent = Agent::config_builder().http_status_as_error(false).max_redirects(0).timeout_global(Some(PATIENCE));
@@ -121,7 +122,7 @@ fn serve(folder: &TempDir, ports: &[&Path], options: &[&str]) -> Served {
 impl Served {
     /// Whether the operator has been told this.
     fn has_told(&self, words: &str) -> bool {
-        self.told.lock().expect("nobody died").contains(words)
+        self.told.lock().expect("no thread has panicked").contains(words)
     }
 
     #[track_caller]
@@ -132,7 +133,7 @@ impl Served {
             }
             thread::sleep(LOOK);
         }
-        panic!("{words:?} is not told, but {:?}", self.told.lock().expect("nobody died"));
+        panic!("{words:?} is not told, but {:?}", self.told.lock().expect("no thread has panicked"));
     }
 
     /// Looks at a path of a host: the status and what came.
@@ -313,7 +314,7 @@ fn of_a_hundred_wrong_codes_five_are_looked_at_and_the_operator_knows() {
     let (status, said, cookie) = served.try_code(&served.code);
     assert!(status == 429 && said.contains("too many wrong codes") && cookie.is_none(), "{status} {said}");
     served.wait_until_told("127.0.0.1 has sent a wrong code, the last of five: no code is taken for a minute");
-    // Whoever was paired before is not locked out.
+    // A phone that was paired before is not locked out.
     assert_eq!(served.get(&served.lan, "/machines", &phone).0, 200);
 }
 
@@ -402,7 +403,7 @@ fn a_paired_phone_watches_and_holds_and_nothing_else_unless_the_operator_allowed
             assert_eq!(served.command(&served.here, "", "start"), (200, "ok\n".to_owned()));
         }
         events.wait_for(|message| message["is"] == "event" && has(message, "line", "state is=work"));
-        // Whoever did not start it may hold it.
+        // A phone that did not start the machine may hold it.
         assert_eq!(served.command(&served.lan, &other, "hold"), (200, "ok\n".to_owned()));
         events.wait_for(|message| message["is"] == "event" && has(message, "line", "state is=hold"));
         served.process.interrupt();

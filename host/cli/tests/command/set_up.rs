@@ -133,7 +133,7 @@ fn the_page_and_the_design_give_the_same_numbers() {
     let folder = TempDir::new().expect("there is room for a folder");
     fs::write(folder.path().join("my.toml"), machine).expect("there is room for a file");
     let printed = said(folder.path(), &["design", "--machine", "my.toml"]);
-    // Its margin is that of a machine of which nothing was measured: the page's follows from measurements.
+    // Nothing was measured on this machine, so it has the default margin. The page's margin comes from measurements.
     let set_lines: Vec<&str> =
         printed.lines().filter(|line| line.starts_with("set ") && !line.starts_with("set margin_mm ")).collect();
     let of_a_step = |step: &ManualStep| -> Vec<String> {

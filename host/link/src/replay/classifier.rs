@@ -66,7 +66,7 @@ pub(super) struct ReplayClassifier<'a> {
 }
 
 impl<'a> ReplayClassifier<'a> {
-    /// A classifier with a log's examples, of which so many are built in: the first.
+    /// A classifier with a log's examples. The first `built_in` of them are those of the firmware.
     pub(super) fn new(examples: &'a [Example<{ features::COUNT }>], built_in: usize, witness: Rc<Witness>) -> Self {
         let nearest = |examples| Nearest::new(examples, Volatile::new());
         let (built_in, all) = (nearest(&examples[..built_in]), nearest(examples));

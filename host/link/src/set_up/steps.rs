@@ -1,6 +1,6 @@
-//! The steps by which a machine is set up, as the manual's page has them.
+//! The steps of setting up a machine, read from the manual.
 //!
-//! The steps of `docs/set-up.md` are the one list of parts and settings. The terminal, the page and the tests read it here.
+//! `docs/set-up.md` is the only list of parts and settings. The terminal, the page and the tests read its steps here.
 
 use crate::settings::{Setting, name};
 

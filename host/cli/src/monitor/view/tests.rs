@@ -196,7 +196,7 @@ const AT_WORK: &str = "state=work tool=in pos=2196 speed_mm_s=556 windows=1 unse
 const IN_ALARM: &str =
     "state=alarm code=2-2 name=encoder_channel_dead tool=out pos=2700 speed_mm_s=0 windows=0 unseen_mm=400";
 
-/// A machine of so many rows, the third of which is in alarm and the last of which is lost.
+/// A machine with this number of rows. The third row is in alarm, and the last one is lost.
 fn rows(count: usize) -> Model {
     let mut model = Model::new((1..=count).map(|number| format!("row {number}")).collect());
     for row in 0..count {

@@ -128,7 +128,7 @@ fn attack<'a, T>(host: &'a str, text: &'a str, meanwhile: impl FnOnce() -> T) ->
         has_begun.recv().expect("the attack stands");
         let came = meanwhile();
         is_over.store(true, Ordering::Relaxed);
-        attackers.join().expect("nobody died");
+        attackers.join().expect("no thread has panicked");
         came
     })
 }
