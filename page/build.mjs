@@ -1,10 +1,11 @@
-// Makes what runs out of what is written: `node build.mjs page` makes dist/, `node build.mjs tests` makes build/tests/. Both
-// make build/lockstep.mjs, the page's virtual Uno for another program.
+// Builds the page: `node build.mjs page` makes dist/, and `node build.mjs tests` makes build/tests/. Both make
+// build/lockstep.mjs, the page's virtual Uno for another program.
 //
-// The page is three files that a browser opens from anywhere, the disk included, and three more by which it can be installed where it
-// comes from a server. The firmware is inside, and so is the project's own Rust, as a browser gives no page a file of the disk. Both are
-// packed, as they would be more than half of the page. The firmware comes from `cargo firmware`, which has to be run first; the
-// command `weeder`, the one that WEEDER names or else this repository's, proves its bounds. The Rust is built here.
+// The page has three files that a browser opens from any source, also from the disk. Three more files make it
+// installable from a server. The firmware and the project's Rust are inside the page, because a page opened from the
+// disk may read no file. Both are compressed, as they would be more than half of the page. The firmware comes from
+// `cargo firmware`, which must run first. The command `weeder` proves its bounds: the one that WEEDER names, else this
+// repository's. The Rust is built here.
 
 import { execFileSync } from "node:child_process";
 import { createHash } from "node:crypto";
@@ -100,7 +101,8 @@ const common = {
     bundle: true,
     charset: "utf8",
     target: "es2022",
-    // avr8js as modules also for node: its other form looks each function up anew at every call, and takes twice the time.
+    // avr8js as modules, also for node. Its other form resolves each function again at every call, and takes twice the
+    // time.
     mainFields: ["module", "main"],
     alias: {
         "weeder.hex": resolve(hex),

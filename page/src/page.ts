@@ -82,7 +82,7 @@ const wire: Wire = {
     close: async () => {},
 };
 trial.onText = (text) => wire.onText(text);
-/** The chip's time: a trial that is slow, or stands still, keeps nobody waiting in vain. */
+/** The chip's time. Timeouts use it, so that a slow or paused trial causes no timeout. */
 const trialMs = () => (trial.uno.cycle / CYCLES_PER_SECOND) * 1000;
 trialPanel.connect(wire, trialMs(), true);
 trialPanel.onHappening = (happening) => {
@@ -189,7 +189,7 @@ sound.addEventListener("click", () => {
     showSound();
 });
 
-/** Shows a slider's value beside it, and does with it what it is for, now and whenever it is moved. */
+/** Shows a slider's value beside it and applies it, now and after each move. */
 function slider(id: string, shown: (value: number) => string, use: (value: number) => void): void {
     const [input, output] = [find(id, HTMLInputElement), find(`${id}-is`, HTMLOutputElement)];
     const apply = () => {
@@ -271,7 +271,7 @@ let lastMs = performance.now();
 function frame(nowMs: number): void {
     const outsideS = Math.min(Math.max((nowMs - lastMs) / 1000, 0), LONGEST_FRAME_S);
     lastMs = nowMs;
-    // A trial that nobody looks at stands still.
+    // A hidden trial is paused.
     if (!find("view-try", HTMLElement).hidden) {
         passed.chipS += trial.advance(outsideS * Number(time.value), outsideS * 1000 * CHIP_SHARE);
         passed.outsideS += outsideS;

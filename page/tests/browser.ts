@@ -1,7 +1,7 @@
-// What the tests in a browser share: headless Chromium, the page opened from the disk as somebody without a network does, and
-// what is held against every page: no error, no request, nothing wider than the screen, nothing that axe-core finds.
+// Shared code of the browser tests: starts headless Chromium, opens the page from the disk as without a network, and
+// checks every page. A page must have no error, no request, nothing wider than the screen, and no finding of axe-core.
 //
-// CHROMIUM and FIREFOX name the browsers where they are not Debian's. Screenshots go to build/screenshots.
+// CHROMIUM and FIREFOX name the browsers if they are not Debian's. Screenshots go to build/screenshots.
 
 import assert from "node:assert/strict";
 import { existsSync, readFileSync } from "node:fs";

@@ -23,7 +23,7 @@ const AT_REST: [number, boolean][] = [
 
 export class Operator {
     readonly uno: Uno;
-    /** All that the firmware has sent and nobody has taken. */
+    /** The firmware's output that was not read yet. */
     #heard = "";
 
     constructor(uno: Uno) {
@@ -54,7 +54,7 @@ export class Operator {
         return this.take();
     }
 
-    /** Types a line and gives back all lines of its answer, the last of which is `ok` or begins with `error:`. */
+    /** Types a line and returns all lines of its answer. The last line is `ok` or begins with `error:`. */
     exchange(line: string): string[] {
         this.take();
         this.uno.send(`${line}\n`);

@@ -145,7 +145,7 @@ test("a setting that is saved is there after the supply has sagged", async () =>
     await close(opened);
 });
 
-test("HOLD takes the tool out at once, whatever else waits for its answer", async () => {
+test("HOLD takes the tool out at once, even while other commands wait for their answers", async () => {
     const opened = await tryIt(browser);
     const { page } = opened;
     await page.getByLabel("Work switch").check();

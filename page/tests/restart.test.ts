@@ -5,7 +5,7 @@ import test from "node:test";
 import type { ResetCause } from "../src/uno/uno.ts";
 import { type Operator, poweredUp, wokenUp } from "./operator.ts";
 
-/** Starts the machine anew and gives back its first line. */
+/** Restarts the machine and returns its first line. */
 function restart(operator: Operator, cause: Exclude<ResetCause, "watchdog">): string {
     operator.take();
     operator.uno.reset(cause);

@@ -78,7 +78,7 @@ test("the address with the code pairs by itself, and machines side by side are s
     await part(page, "right", "state").filter({ hasText: "work" }).waitFor();
     assert.equal(await part(page, "left", "state").textContent(), "hold");
     await inspect(page, "phone-served-two");
-    // At the computer itself nobody needs a code, and all of the panel is there.
+    // The computer itself needs no code, and shows the whole panel.
     const here = await openAt(browser, served.here);
     await part(here.page, "right", "state").filter({ hasText: "work" }).waitFor();
     assert(await part(here.page, "right", "tab-calibrate").isVisible());

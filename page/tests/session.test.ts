@@ -57,7 +57,7 @@ class Connected {
     async turn(): Promise<void> {
         this.#operator.run(TURN_MS);
         this.session.turn(this.nowMs);
-        // Whoever waits for an answer goes on.
+        // Lets the code that waits for an answer continue.
         await new Promise((done) => setImmediate(done));
     }
 

@@ -97,7 +97,7 @@ test("without the servo's leads plants are damaged, and that is said", () => {
     assert.match(tried.trial.why, /^Why plants were not kept: \d+ the swing was late or early for this speed\./);
 });
 
-test("a plant over which the tool is taken by hand is damaged, and stays so when the machine rolls back and passes it anew", () => {
+test("a plant is damaged if the tool is driven over it directly, and stays damaged when the machine rolls back and passes it again", () => {
     const tried = new Tried();
     const [first] = tried.trial.machine.things;
     assert(first?.kind === "plant");

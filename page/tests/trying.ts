@@ -27,7 +27,7 @@ export async function pass(page: Page, seconds: number): Promise<void> {
     await page.evaluate((seconds) => globalThis.trial.advance(seconds, Number.POSITIVE_INFINITY), seconds);
 }
 
-/** Types a command and waits for what the machine says to it: an answer like this behind the command itself, which is shown anew. */
+/** Types a command, and waits until the console shows the command again and an answer like this. */
 export async function type(page: Page, command: string, answer: RegExp): Promise<void> {
     const typed = part(page, "said").locator("div", { hasText: new RegExp(`^> ${command}$`) });
     const before = await typed.count();

@@ -160,7 +160,7 @@ test("a value that cannot be is refused beside its field, in the machine's words
     await close({ page, errors });
 });
 
-test("settings go to a file that weeder reads, and come from one, whatever the order", async (test) => {
+test("settings go to a file that weeder reads, and come from one, in any order", async (test) => {
     const { page, errors } = await atHold(test);
     await page.getByRole("tab", { name: "Settings" }).click();
     // What the settings are comes behind the settings.

@@ -212,7 +212,7 @@ fn loops_are_said_to_turn_as_often_as_the_constants_behind_them_have_it() {
             "{function}"
         );
     }
-    // A search goes in two directions, each of which comes to its end. Of the places, all but one move up.
+    // A search goes in two directions, and each comes to its end. All positions except one move up.
     let moving = usize::from(MAX_K);
     let search = by_depth("weeder_firmware::examples::BuiltIn::keep_nearest");
     assert_eq!(search, [examples::COUNT + 2, moving]);

@@ -200,7 +200,7 @@ fn a_machine_that_is_pushed_faster_than_its_limit_is_an_alarm() {
 #[test]
 fn a_beam_that_flickers_in_dust_is_an_alarm() {
     let mut run = with_fault(bare_ground(), 2500.0, |fault, mut changes| {
-        // 600 edges a second, each of which can be followed.
+        // 600 edges a second: the firmware can follow each of them.
         changes.extend((0..300_u64).map(|edge| PinChange {
             cycle: fault + edge * CYCLES_PER_SECOND / 600,
             pin: wiring::BEAM,

@@ -1,8 +1,8 @@
-//! How long the main loop takes to turn, whatever is typed and told.
+//! The longest turn of the main loop, for all commands and all output.
 //!
-//! Between two turns nobody looks at the ground: what the loop decides is as late as a turn is long. A turn may
-//! therefore take a millisecond, in which a machine at 5 km/h rolls 1.4 mm, and what takes longer is done over several. It is
-//! counted in cycles from one reset of the watchdog to the next, what interrupts take of it included.
+//! The loop reads the ground once a turn, so its decisions are late by up to a turn. A turn may therefore take a
+//! millisecond. In that time a machine at 5 km/h rolls 1.4 mm. Longer work is divided over several turns. The time is
+//! counted in cycles from one reset of the watchdog to the next, interrupts included.
 
 use crate::common::{Run, run_for_ms, steady, trial, woken_up};
 use control::ground::field_examples;

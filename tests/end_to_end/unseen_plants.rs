@@ -7,7 +7,7 @@ use field::row::{Row, Thing};
 /// From beam to tool.
 const X_MM: f64 = 400.0;
 
-/// A run past plants half a metre apart, the third of which the beam does not see; behind the fourth the row is at its end.
+/// A run past plants half a metre apart. The beam does not see the third plant. The row ends behind the fourth.
 fn past_an_unseen_plant(commands: &[&str]) -> Run {
     let seen = [600.0, 1100.0, 2100.0].map(|place_mm| Thing::plant(place_mm, 150.0));
     let row = Row::new(seen.to_vec()).expect("the plants stand apart");

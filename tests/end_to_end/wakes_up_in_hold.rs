@@ -1,4 +1,5 @@
-//! Waking up: in HOLD with the tool out, whatever the switch says, and in the row only over ground that was seen.
+//! Start-up: in HOLD with the tool out, for every level of the switch. The tool enters the row only over ground that
+//! the beam has seen.
 
 use crate::common::{
     Run, SWING_TOLERANCE_TICKS, assert_all_kept, bare_ground, elf, is_out_at_the_pin, number, run_for_ms, status,

@@ -1,9 +1,10 @@
-//! A field trial judged: from what somebody with a notebook writes down of each plot to the paper's measures (Eq. 22 to 27),
-//! and from these to models and analyses of variance, with the paper's own figures beside them.
+//! The evaluation of a field trial: from the counts of each plot to the paper's measures (Eq. 22 to 27), and from these
+//! to models and analyses of variance, beside the paper's own figures.
 //!
-//! A trial has plots of some speeds and plant spacings, with replications. [`PlotRecord`] is one plot, [`table`] reads and
-//! writes them as CSV, [`PlotRecord::performance`] is what follows from one, [`Analysis`] what follows from all, and [`published`] is what
-//! the paper printed. Nothing here knows whether a plot was real or simulated.
+//! A trial has plots at some speeds and plant spacings, with replications. [`PlotRecord`] is one plot. [`table`] reads
+//! and writes plots as CSV. [`PlotRecord::performance`] calculates the measures of one plot, and [`Analysis`] analyses
+//! all plots. [`published`] holds the paper's printed figures. The code does not distinguish real plots from simulated
+//! plots.
 
 mod findings;
 mod plot;

@@ -1,11 +1,11 @@
-//! The paper's experiment: speeds by plant spacings by replications, in a simulated field, with several controllers on the
-//! same ground.
+//! The paper's experiment: speeds by plant spacings by replications, in a simulated field, with several controllers on
+//! the same ground.
 //!
-//! Each plot's rows grow and are driven from the seed, the plot and the row alone, so that the result depends neither
-//! on the number of threads or machines nor on which controllers take part. The firmware is either its native run
-//! ([`field::native`]) or the ELF on the virtual Uno ([`mod@trial`]); its baselines ([`field::baselines`]) are models in both
-//! cases. A plot comes out as somebody with a notebook would write it down ([`PlotRecord`]), and is judged by the same
-//! code as a real one.
+//! The rows of a plot and the motion depend on the seed, the plot and the row only. So the result depends neither on
+//! the number of threads or machines, nor on the choice of controllers. The firmware runs as a native run
+//! ([`field::native`]), or as the ELF on the virtual Uno ([`mod@trial`]). Its baselines ([`field::baselines`]) are
+//! models in both cases. A simulated plot has the same record as one counted by hand ([`PlotRecord`]), and the same
+//! code evaluates both.
 
 mod taught;
 
@@ -62,7 +62,8 @@ pub enum Treatment {
     WithoutLookAhead,
     /// The paper's: one slot, no look-ahead, a loop that polls.
     Paper,
-    /// Who knows where each stem stands and allows for the servo's slowest swing: whose damage, if any, nobody can avoid.
+    /// The ideal controller: it knows every stem and allows for the servo's slowest swing. No controller can avoid the
+    /// damage that it does.
     Ideal,
 }
 
@@ -231,7 +232,7 @@ impl Experiment {
             .collect()
     }
 
-    /// Number of plots, each of which all controllers weed.
+    /// Number of plots. All controllers weed each of them.
     pub fn size(&self) -> u64 {
         self.plots().len() as u64
     }
@@ -322,7 +323,7 @@ impl Experiment {
         Ok(outcomes)
     }
 
-    /// A plot that nobody has weeded yet.
+    /// A plot before weeding.
     fn untouched(&self, plot: &Plot, controller: Treatment) -> PlotOutcome {
         let Conditions { plot: area, machine, .. } = &self.conditions;
         let width_m = area.row_spacing_mm / 1000.0;
@@ -426,7 +427,7 @@ struct Weeded {
     reasons: Vec<Reason>,
 }
 
-/// What a trial's sensors tell the native run, whatever it is set to; worked out where somebody asks.
+/// The sensors of a trial for native runs. They do not depend on the settings. They are calculated at first use.
 fn sensors(trial: &Trial) -> LazyCell<Sensors, impl FnOnce() -> Sensors> {
     LazyCell::new(|| Sensors::new(trial, native::TURN_S))
 }
@@ -477,7 +478,7 @@ impl PlotOutcome {
         let Effect { plants, in_plot, counted, .. } = self.effect;
         // As many as a plot can have stand in its record.
         let in_a_plot = |weeds: u64| u32::try_from(weeds).unwrap_or(u32::MAX);
-        // Where no weed stands on the ground that was to be counted, somebody counts the plot.
+        // If no weed stands on the counted ground, the whole plot is counted.
         let weeds = if counted.before > 0 { counted } else { in_plot };
         self.record = PlotRecord {
             weeds_before: in_a_plot(weeds.before),

@@ -1,8 +1,7 @@
-//! The plan of a field trial: which plot is weeded at which speed and spacing, and in which order, drawn by lot; and the table for
-//! it, in which somebody fills in by hand what was counted.
+//! The plan of a field trial: the speed, spacing and order of the plots, randomised, and the table for the counts.
 //!
-//! A block has each treatment once, in an order of its own: neighbouring plots are alike, and what differs from block to block
-//! can be told from the treatments. Blocks are the replications of the table that [`crate::evaluation`] reads.
+//! A block has each treatment once, in random order. Neighbouring plots are alike, so the differences between blocks
+//! can be separated from the treatments. Blocks are the replications of the table that [`crate::evaluation`] reads.
 
 use rand::SeedableRng;
 use rand::seq::SliceRandom;

@@ -32,7 +32,7 @@ use thiserror::Error;
 /// Most examples that the firmware's flash budget has room for.
 pub const MOST_EXAMPLES: usize = examples::CAPACITY;
 
-/// Most examples where nobody asks for more: enough for the simulated field, and each makes the search longer.
+/// Default maximum of examples. It suffices for the simulated field, and each example makes the search longer.
 pub const DEFAULT_MOST_EXAMPLES: usize = 64;
 
 /// What the training learned, and how well.

@@ -56,7 +56,7 @@ fn comparison() -> Comparison {
     }
 }
 
-/// A metre of row, of which so much was weeded; three tenths are a canopy, and the rest went to swings.
+/// One metre of row: `weeded_mm` of it weeded, 300 mm of canopy, and the rest lost to swings.
 fn work(speed_km_h: f64, weeded_mm: f64) -> Work {
     let machine = Machine::default();
     let motion = Motion::steady(machine.beam_to_tool_mm, 1e9, 1000.0, machine.beam_to_tool_mm + 1000.0);

@@ -1,16 +1,18 @@
-//! Other controllers for the same field, to hold the firmware against: the paper's, and one that knows everything.
+//! Baselines for the same field: the paper's controller, and an ideal controller.
 //!
-//! The paper's sketch was never published. [`as_in_the_paper`] is what its text describes, in the kindest reading: one slot holds
-//! the place at which to swing out and the place at which to come back (Eq. 1 to 3), a loop polls beam and encoder, nothing is
-//! led, and the Arduino's servo library shows a new pulse in the next frame. It measures the next canopy while the slot is
-//! still in use, closes the gaps in a canopy as the firmware does, and takes no weed for a plant.
+//! The paper's sketch was never published. [`as_in_the_paper`] follows its text, in the most favourable reading. One
+//! slot holds the position to swing out and the position to come back (Eq. 1 to 3). A loop polls beam and encoder, and
+//! nothing leads. The Arduino's servo library shows a new pulse in the next frame. The controller measures the next
+//! canopy while the slot is still in use. It closes the gaps in a canopy as the firmware does, and takes no weed for a
+//! plant.
 //!
-//! Where the beam stands nearer to the tool than a canopy is wide, it is late for another reason than its authors knew.
+//! If the distance from beam to tool is shorter than a canopy, it is late for a further reason, which its authors did
+//! not know.
 //!
-//! [`ideal`] knows where each stem stands and what the servo may take: it has the tool out over the zones round
-//! the stems, by the servo's slowest swing, and in the row everywhere else. Nobody could keep a plant that it damages. It is no
-//! bound: it allows for the slowest swing each time, and keeps the whole length of a zone that is round. The bound is
-//! [`crate::optimum`]. Both have the machine of the [`Trial`], with the same servo.
+//! [`ideal`] knows every stem and the servo's slowest swing. It has the tool out over the zones round the stems, timed
+//! for that swing, and in the row everywhere else. No controller can save a plant that it damages. It is no upper
+//! bound: it allows for the slowest swing each time, and keeps the whole length of a round zone. The upper bound is
+//! [`crate::optimum`]. Both baselines use the machine and the servo of the [`Trial`].
 
 use crate::budget::{Part, Reason, Reasons, part_of};
 use crate::ground::union;
@@ -95,7 +97,7 @@ pub fn as_in_the_paper(trial: &Trial) -> Weeded {
     Weeded { pulses, reasons: reasons.until(motion.duration_s()) }
 }
 
-/// Whoever knows where each stem stands weeds the trial's row.
+/// The ideal controller weeds the trial's row.
 pub fn ideal(trial: &Trial, stems: &[Stem]) -> Weeded {
     let Trial { machine, motion, .. } = trial;
     let Servo { dead_time_ms, scatter, out_us, .. } = machine.servo;
@@ -138,8 +140,9 @@ fn out_during(times_s: Vec<Range<f64>>) -> impl FnMut(f64) -> (bool, f64) {
     }
 }
 
-/// A loop that has the tool out whenever `is_out` at the time of a turn says so, which also says before which time it says nothing
-/// else: turns until then are passed over, once the line shows it. It begins in the row.
+/// A loop that has the tool out while `is_out` says so at the time of a turn. `is_out` also returns the time until
+/// which its answer stays the same. The turns until then are skipped, once the line shows the answer. The tool begins
+/// in the row.
 fn swing(
     trial: &Trial,
     servo: Servo,

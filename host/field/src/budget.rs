@@ -1,13 +1,13 @@
-//! The loss budget: where a row's ground goes. Its parts add up to the whole row.
+//! The loss budget: how a row's ground divides into weeded ground and losses. Its parts add up to the whole row.
 //!
-//! A controller hands over why it kept the tool out, over the time of the trial ([`Reason`]); the tool's path says what was weeded all
-//! the same ([`Budget::of`]). Ground that was weeded is [`Part::Weeded`], whatever the controller thought of it. The rest belongs
-//! to the reason that held when the tool passed it. Ground that the controller had open and the tool did not weed is
-//! [`Part::Swings`]: dead time, travel, and the lead that waits for both.
+//! A controller records its reason for keeping the tool out, over the time of the trial ([`Reason`]). The tool's path
+//! shows which ground was weeded ([`Budget::of`]). Weeded ground is [`Part::Weeded`], for any reason of the controller.
+//! Other ground belongs to the reason that held when the tool passed it. If the controller had the ground open and the
+//! tool did not weed it, the ground is [`Part::Swings`]: dead time, travel, and the lead that waits for both.
 //!
-//! A zone is the one that the controller kept: a stem zone where it keeps that, else a whole canopy. Whether a plant stands in it, the
-//! row says ([`part_of`]): what was kept for a weed, for dust or for something unknown is [`Part::Weeds`], with its margins. Ground
-//! that was passed several times belongs to the first part, in the order of [`Part::ALL`].
+//! A zone is the controller's own keep-out zone: a stem zone if it uses stem zones, else a whole canopy. The row tells
+//! whether a plant stands in it ([`part_of`]). A zone round a weed, dust or an unknown detection is [`Part::Weeds`],
+//! with its margins. Ground that was passed several times belongs to the first part, in the order of [`Part::ALL`].
 
 use crate::ground::{share_of, union};
 use crate::machine::Machine;

@@ -1,15 +1,15 @@
 //! The machine between row and firmware: wheel, encoder, beam, servo, arm and tool.
 //!
-//! The machine's position `p` is a place along the row: the beam sees the ground at `p`, and the tool works the ground at
-//! `p` less the distance from beam to tool. Rolling along a [`Motion`] past a [`Row`], the machine gives the firmware the
-//! levels of its encoder and its beam as a list of [`PinChange`]s. The motion does not depend on what the firmware does,
-//! so the list is complete before the firmware runs.
+//! The machine's position `p` is a distance along the row. The beam sees the ground at `p`. The tool works the ground
+//! at `p` less the distance from beam to tool. While the machine rolls along a [`Motion`] past a [`Row`], it gives the
+//! firmware the levels of encoder and beam as a list of [`PinChange`]s. The motion does not depend on the firmware, so
+//! the list is complete before the firmware runs.
 //!
 //! The arm swings sideways about a pivot beside the row. At an angle `a` the tool's middle is `arm * sin(a)` beside the
-//! row's line, so the tool works the line while that is less than half its width. It is *clear* of the row only when it is
-//! fully out: that is the strict measure by which a trial judges plants, since canopies reach sideways as well.
+//! row's line. So the tool works the line while that is less than half its width. It is *clear* of the row only when it
+//! is fully out. A trial uses this strict measure for plants, because canopies also reach sideways.
 //!
-//! The encoder has no jitter; where its disc is dirty, pulses of its channel A are missing.
+//! The encoder has no jitter. If its disc is dirty, pulses of its channel A are missing.
 
 use crate::motion::{Motion, marks};
 use crate::row::Row;

@@ -375,7 +375,7 @@ impl Motion {
     }
 }
 
-/// A motion as somebody sees it who goes along: asked for one time after the other, it need not search for the piece.
+/// A cursor on a motion, for times that ascend: it does not search for the piece each time.
 #[derive(Clone, Debug)]
 pub struct Course<'a> {
     /// The piece of the last time asked for, those behind it, and behind all of them the machine that stands.

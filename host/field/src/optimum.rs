@@ -1,11 +1,13 @@
-//! The most of a row's ground that anybody could weed with this machine and damage no plant: a bound, not a controller.
+//! The upper bound of weeded ground: the most that any controller could weed with this machine without damage to a
+//! plant.
 //!
-//! Whoever keeps it would have to know each stem, the exact zone round it, how the machine strays and rolls, and each swing's dead time
-//! ahead; and each swing would have to be as quick as the servo is without load. At every place beside a stem the tool needs an angle at
-//! which its edge is past the zone. A servo that turns at its rate can be below the angle at which the tool works the row's
-//! line only so long before and behind. What is left of the row is the bound: no tool path that touches no zone weeds more.
+//! It is not a controller. To reach it, a controller would need to know in advance each stem, the exact zone round it,
+//! the machine's deviations, and each swing's dead time. Each swing would also have to be as quick as the servo is
+//! without load. At every position beside a stem the tool needs an angle at which its edge is past the zone. The
+//! servo's rate limits how close to a zone the tool can still work the row's line. The remaining ground is the bound:
+//! no tool path that touches no zone weeds more.
 //!
-//! It asks nothing of canopies and margins. With these, [`crate::verdict::weedable_share`] is the bound.
+//! Canopies and margins play no part here. With them, [`crate::verdict::weedable_share`] is the bound.
 
 use crate::ground::{share_of, union};
 use crate::machine::Machine;

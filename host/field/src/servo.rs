@@ -59,7 +59,7 @@ pub fn slowed(load: f64) -> f64 {
 /// Pulse widths that differ by less than this ask for the same angle: the dead band of a digital servo.
 const DEAD_BAND_US: f64 = 2.0;
 
-/// Widths that a servo takes for a command. It ignores whatever else comes along its line, and so does this one.
+/// Pulse widths that a servo accepts as a command. It ignores all other pulses on its line, and so does this model.
 pub const WIDTHS_US: RangeInclusive<f64> = 400.0..=2600.0;
 
 /// A change of the angle asked for.

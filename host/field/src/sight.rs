@@ -1,11 +1,11 @@
-//! What a beam sees of what stands in the row: who is tall enough for it, how wide each is at its height, and which leaves
+//! What a beam sees of a row: which canopies and weeds are tall enough, their width at its height, and which leaves
 //! cover enough of it.
 //!
-//! A canopy is an ellipse from the ground to its top, widest half way up. A beam lower or higher than that sees it narrower,
-//! one above its top not at all. That plants are ellipses is assumed.
+//! A canopy is an ellipse from the ground to its top, widest half way up. A lower or higher beam sees it narrower, and
+//! a beam above its top does not see it. The ellipse is an assumption.
 //!
-//! A beam has a diameter: its sensor reports it broken while more than half of it is covered. So what is narrower than half
-//! of it is not seen, nor are gaps as narrow, while the ends of whatever is wider stay where they are.
+//! A beam has a diameter. Its sensor reports it broken while more than half of it is covered. So it does not see
+//! objects or gaps that are narrower than half its diameter. The edges of wider objects stay where they are.
 
 use crate::ground::union;
 use std::ops::Range;

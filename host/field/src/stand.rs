@@ -1,12 +1,12 @@
-//! A crop stand: the plants and weeds of a row, as they grow from a seed under some conditions.
+//! A crop stand: the plants and weeds of a row, grown from a seed under some conditions.
 //!
-//! It is seen twice. The beam sees a [`Row`]: canopies and weeds that are tall enough for it, as wide as they are at its height
-//! ([`crate::sight`]), of which those that touch have grown together, and dust. The tools meet stems with a protected zone round
-//! each, not quite in the middle of their canopies, and weeds everywhere ([`crate::tool_path`]). A stem of the next row may be
-//! met as well, by a tool that swings aside that far.
+//! It has two views. The beam sees a [`Row`]: dust, and canopies and weeds that are tall enough for it, as wide as they
+//! are at its height ([`crate::sight`]). Those that touch have grown together. The tools meet weeds everywhere, and
+//! stems with a protected zone round each ([`crate::tool_path`]). A stem is not exactly in the middle of its canopy. A
+//! tool that swings aside far enough may also meet a stem of the next row.
 //!
-//! Places are millimetres along the row, and across it from its line, left above 0. What grows does not depend on the
-//! machine, nor on what is done there.
+//! Positions are millimetres along the row, and across it from its line, positive to the left. The stand does not
+//! depend on the machine or on its work.
 
 use crate::conditions::Conditions;
 use crate::ground::union;
@@ -32,7 +32,7 @@ pub struct Stem {
     pub is_seen: bool,
 }
 
-/// A weed, of whatever height.
+/// A weed of any height.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Weed {
     /// Its place along the row.
@@ -52,7 +52,7 @@ pub struct Stand {
     pub neighbours: Vec<Stem>,
     /// The weeds, those that are tall included.
     pub weeds: Vec<Weed>,
-    /// The ground, across the whole width, on which somebody counts the weeds: the row's part of the plot's square metres.
+    /// The ground, across the whole width, on which weeds are counted: the row's part of the plot's square metres.
     pub counted_mm: Range<f64>,
     /// The row's ground.
     pub span_mm: Range<f64>,
@@ -249,7 +249,7 @@ mod tests {
         let mut conditions = Conditions::preset("direct-sown").unwrap().unwrap();
         conditions.set("plot.row_m", 1000.0).unwrap();
         let stand = grow(&conditions, 3);
-        // 2000 places less 12 %, a tenth of which are double; three standard deviations are about 60.
+        // 2000 planting positions less 12 %; a tenth of them are double. Three standard deviations are about 60.
         let expected = 2000.0 * 0.88 * 1.1;
         assert!((stand.stems.len() as f64 - expected).abs() < 60.0, "{}", stand.stems.len());
     }

@@ -1,17 +1,18 @@
-//! Damage and weeding as geometry: what the tools pass through, seen from above.
+//! Damage and weeding as geometry: the ground that the tools pass through, seen from above.
 //!
-//! The arm swings sideways, so the tool's middle is `arm * sin(angle)` to the left of the row's line. It is `tool_width` wide,
-//! across the row; along the row it is taken for a line. (An arm that lies along the row also carries the tool along it, by 10 mm where it
-//! leaves a stem's zone: that is left out.) A plant is *damaged* where the tool passes through the protected zone round its stem.
-//! A weed is *removed* where the tool passes it, or one of the sweeps, which run between the rows without ever swinging and keep
-//! off the zones, so far as the machine keeps its line: where it strays, they cut plants as well. So does a tool that swings
-//! aside as far as the next row. Each is counted by itself. Between the tool in the row and the nearest sweep a strip may be left
-//! that nobody weeds ([`unweeded_strip_mm`]).
+//! The arm swings sideways, so the tool's middle is `arm * sin(angle)` to the left of the row's line. The tool is
+//! `tool_width` wide across the row, and is treated as a line along it. (An arm that lies along the row also carries
+//! the tool along it, by 10 mm where it leaves a stem zone. The model leaves that out.) A plant is *damaged* if the
+//! tool passes through the protected zone round its stem. A weed is *removed* if the tool or a sweep passes it. The
+//! sweeps run between the rows, do not swing, and stay clear of the zones while the machine keeps its line. If the
+//! machine strays, they cut plants as well. So does a tool that swings as far as the next row. Each kind of damage is
+//! counted by itself. A strip that no tool weeds may remain between the tool in the row and the nearest sweep
+//! ([`unweeded_strip_mm`]).
 //!
-//! Weeding efficiency is counted twice (Eq. 22). *In the row* are the weeds between the sweeps on either side: what becomes of them
-//! is the controller's doing. *In the whole plot* are all weeds between the middles of two gaps between rows, as in the paper's
-//! square metre: most of them fall to the sweeps, whatever the controller does. *Counted* are those of them that stand on the
-//! ground on which somebody counts.
+//! Weeding efficiency is counted twice (Eq. 22). *In the row* are the weeds between the sweeps on either side: they
+//! depend on the controller. *In the whole plot* are all weeds between the middles of two gaps between rows, as in the
+//! paper's square metre. Most of them fall to the sweeps, under any controller. *Counted* are those that stand on the
+//! ground where weeds are counted.
 
 use crate::conditions::Mechanism;
 use crate::machine::Machine;
@@ -74,7 +75,7 @@ pub struct Effect {
 }
 
 impl Effect {
-    /// Plants that somebody would find injured, whatever injured them.
+    /// Plants that an inspection would find injured, from any cause.
     pub fn injured(&self) -> u32 {
         (self.damaged + self.swept + self.neighbours).min(self.plants)
     }
@@ -102,7 +103,7 @@ struct Tools<'a> {
     stroke: Stroke,
 }
 
-/// Width, on each side of the row, of the ground between the tool in the row and the nearest sweep: nobody weeds it.
+/// Width of the strip, on each side of the row, between the tool in the row and the nearest sweep. No tool weeds it.
 pub fn unweeded_strip_mm(machine: &Machine, mechanism: &Mechanism) -> f64 {
     if mechanism.sweeps_a_side == 0 { 0.0 } else { (mechanism.sweep_from_mm - machine.tool_width_mm / 2.0).max(0.0) }
 }

@@ -28,9 +28,9 @@ pub const MARGIN_TOLERANCE_MM: f64 = 10.0;
 pub struct Timing {
     /// Ground kept free on both sides of a canopy.
     pub margin_mm: u32,
-    /// Time by which the command to leave the row comes ahead.
+    /// Lead of the command to leave the row.
     pub lead_out_ms: u32,
-    /// Time by which the command to come back comes ahead.
+    /// Lead of the command to come back.
     pub lead_in_ms: u32,
     /// The zone that is kept of a single plant, where its leaves may be worked under; 0 for all of its canopy.
     pub stem_zone_mm: u32,
@@ -99,10 +99,10 @@ pub struct PlantOutcome {
     pub clearance_behind_mm: Option<f64>,
     /// How often the tool was swung out over it.
     pub swings: usize,
-    /// Counts by which the command to swing out for this plant came late (early: negative). `None` where the plant had no
+    /// How late the command to swing out for this plant was, in ticks; negative if early. `None` if the plant had no
     /// such command of its own.
     pub out_error_ticks: Option<f64>,
-    /// Counts by which the command to come back behind this plant came late (early: negative). `None` as above.
+    /// How late the command to come back behind this plant was, in ticks; negative if early. `None` as above.
     pub in_error_ticks: Option<f64>,
     /// The verdict.
     pub verdict: Verdict,
@@ -303,7 +303,7 @@ impl SwingError<'_> {
         self.ticks(time_s, window_mm, self.timing.lead_in_ms)
     }
 
-    /// Counts by which a command came behind its ideal place. There is one only while the machine rolls forward.
+    /// How late a command was against its ideal position, in ticks. `None` unless the machine rolls forward.
     fn ticks(&self, time_s: f64, window_mm: f64, lead_ms: u32) -> Option<f64> {
         let speed_mm_s = self.motion.speed_mm_s(time_s);
         let ideal_mm = window_mm + self.machine.beam_to_tool_mm - speed_mm_s * f64::from(lead_ms) / 1000.0;

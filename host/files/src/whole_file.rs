@@ -1,8 +1,8 @@
-//! Files that are written whole or not at all: what goes wrong half-way leaves what was there before.
+//! Writes a file completely or not at all: after an error the old file is still there.
 //!
-//! The text goes to a temporary file in the same folder, which then takes the name; behind a link it is the file to which that
-//! leads. What is no file, such as `/dev/null` or a pipe, is written as it is. It does not make folders. The temporary name is
-//! nobody's business, and in no error.
+//! The text goes to a temporary file in the same folder, which is then renamed. If the path is a link, its target is
+//! replaced. Paths that are no files, such as `/dev/null` or a pipe, are written directly. Folders are not made. Error
+//! messages name the path, not the temporary file.
 
 use std::borrow::Cow;
 use std::fs::OpenOptions;

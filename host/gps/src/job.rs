@@ -1,17 +1,16 @@
-//! A record read as a job: what the machine met and did, each with its distance, its place and its time.
+//! Reads a log as a job: the machine's detections and actions, each with its distance, position and time.
 //!
-//! [`Job::read`] goes through a log's lines in their order. From one start of the Uno to the next, or to where its
-//! wheel is set anew, or the log was opened again, is a stretch: the wheel's distance goes on within one alone. In each
-//! the fixes get the distance at which they were taken, by the statuses around them, and what was told gets its place
-//! by [`Track`].
+//! [`Job::read`] reads the log's lines in order and divides them into stretches. A new stretch begins when the Uno
+//! restarts, when the wheel's settings change, and when the log is opened again. Distances are comparable only within a
+//! stretch. Each fix gets the distance at which it was taken, from the statuses around it. Each event gets its position
+//! from [`Track`].
 //!
-//! - A plant or weed is the middle of what the beam saw of it, and stands where the beam was. So is ground that was
-//!   guarded.
-//! - Swings and alarms are where the tool was when they were told; a swing is the command, which the tool follows by
-//!   its lead.
-//! - Ground is weeded where the machine is at work and the tool is told to be in the row, not weeded where it is told
-//!   to be out. Ground is passed once: rolling back over it, and over it again, adds nothing.
-//! - A label is what the last detection was, where the machine took it.
+//! - A plant or weed is the middle of its detection, at the beam's position. So is guarded ground.
+//! - A swing or an alarm has the tool's position at the time of its event. A swing is the command: the tool follows
+//!   after the lead.
+//! - Ground is weeded if the machine is at work and the tool is commanded into the row. It is not weeded if the tool is
+//!   commanded out. Ground counts once: passing it again after rolling back adds nothing.
+//! - A label is the class that the operator gave the last detection, if the machine accepted it.
 
 use crate::antenna::Antenna;
 use crate::plane::Place;
@@ -58,7 +57,7 @@ pub enum What {
     },
     /// Ground that is kept free, because a plant was due.
     Guarded,
-    /// What somebody said that the last detection was.
+    /// The label of the last detection.
     Label(Class),
     /// The tool was told to swing out of the row.
     SwingOut,

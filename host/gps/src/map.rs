@@ -1,8 +1,8 @@
-//! A job as GeoJSON (RFC 7946), for QGIS and whatever else draws maps.
+//! A job as GeoJSON (RFC 7946), for QGIS and other map programs.
 //!
-//! It is one FeatureCollection: a point for each plant, weed, swing, alarm, label and jump of the receiver, and a line
-//! for each piece of ground weeded or not. What has no place stands there without a geometry, and with the reason. The
-//! crate `geojson` writes it.
+//! It is one FeatureCollection. A plant, weed, swing, alarm, label or jump of the receiver is a point. A piece of
+//! ground, weeded or not, is a line. An object without a position has no geometry, and gives the reason. The crate
+//! `geojson` writes the file.
 
 use crate::job::{Did, Ground, Job, Thing, What};
 use crate::plane::Place;

@@ -1,18 +1,18 @@
-//! A receiver, heard line by line: its fixes by the record's clock, and what is wrong with them.
+//! A satellite receiver, read line by line: its fixes on the log's clock, and its faults.
 //!
-//! [`Receiver::take`] is given each line with the time at which it came, and [`Receiver::rolled`] how far the wheel has
-//! rolled. Both while a record is written, which has the marks, and when it is read: the same lines give the same fixes
-//! and marks.
+//! [`Receiver::take`] gets each line with the time at which it came, and [`Receiver::rolled`] gets the wheel's
+//! distance. Both are called while a log is written, to add marks, and when it is read. The same lines give the same
+//! fixes and marks.
 //!
-//! - **Moments.** RMC and GGA of the same time are one fix, which is told when the next moment begins, or by
-//!   [`Receiver::end`]. A date counts for the days before and behind it; a time that jumps back by half a day or more
-//!   is past midnight.
-//! - **When.** A line comes some time after the moment that it tells of, and more or less so by turns: others go before
-//!   it on the wire, and the computer is busy. The least delay of the last ten or twenty seconds is taken for that of
-//!   all, and less it cannot be; what is left of it is the antenna's setting `delay_ms`.
-//! - **Jumps.** A fix that is farther from the last one than the wheel has rolled, and than both errors explain, is
-//!   none. Where such agree with each other for [`AGREEING_MS`], those before may have been the wrong ones: the track
-//!   begins anew with the first.
+//! - **Moments.** RMC and GGA of the same time are one fix. It is returned when the next moment begins, or by
+//!   [`Receiver::end`]. A date also counts for the days before and after it. A time that jumps back by half a day or
+//!   more is past midnight.
+//! - **Time.** A line comes some time after its moment. The delay varies, because other lines go first on the wire and
+//!   the PC is busy. The receiver uses the shortest delay of the last ten or twenty seconds, since the real delay
+//!   cannot be longer. The antenna's setting `delay_ms` covers the rest.
+//! - **Jumps.** A fix is dropped if it is farther from the last fix than the wheel's distance and both errors explain.
+//!   If dropped fixes agree with each other for [`AGREEING_MS`], the earlier fixes may have been wrong. The track then
+//!   starts again with the first of them.
 
 use crate::plane::Place;
 use crate::sentence::{DAY_MS, Line, Quality, Report};
@@ -111,7 +111,7 @@ pub struct Counts {
     pub damaged: u64,
 }
 
-/// A moment of which something was told.
+/// A moment, and the values received for it.
 #[derive(Clone, Copy, Debug)]
 struct Moment {
     arrived_ms: f64,
@@ -186,7 +186,7 @@ impl Receiver {
         self.wheel = Some(Wheel { time_ms, rolled_m, speed_mm_s });
     }
 
-    /// Nobody knows how far the wheel rolls between this and what is heard of it next: the Uno has begun anew.
+    /// The Uno has restarted: the distance until the next status is unknown.
     pub fn wheel_lost(&mut self) {
         self.wheel = None;
         if let Some(moment) = &mut self.moment {

@@ -1,9 +1,9 @@
-//! What a record has of a receiver, while it is written: its lines, and what is noticed of them.
+//! The receiver's part of a log while it is written: its lines, and marks for its faults.
 //!
-//! [`Recorder::take`] makes lines of the log out of bytes as they come. Sentences that tell of place or time stand
-//! there as they came, and so does every line that came damaged; other sentences are left out. Marks are those that a
-//! reader of the record finds anew. It knows no port: who has one tells by [`Recorder::found`] and [`Recorder::lost`]
-//! when it comes and goes.
+//! [`Recorder::take`] makes lines of the log from received bytes. Sentences with a position or time are logged
+//! unchanged, and so is every damaged line. Other sentences are left out. A reader of the log can derive the same marks
+//! again. The recorder opens no port: the caller reports a connected or lost port by [`Recorder::found`] and
+//! [`Recorder::lost`].
 
 use crate::antenna::Antenna;
 use crate::job::{LONGEST_WAY, tick_mm};

@@ -39,7 +39,7 @@ pub struct Summary {
     pub swings: u64,
     /// Alarms.
     pub alarms: u64,
-    /// What somebody has labelled.
+    /// Number of labels.
     pub labels: u64,
     /// Ground of the row over which the machine was at work, in metres.
     pub worked_m: f64,

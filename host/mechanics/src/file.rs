@@ -1,7 +1,7 @@
-//! A machine from a TOML file, with errors that name the line and the key, and say what would be right.
+//! Reads a machine from a TOML file. Errors name the line and the key, and say what would be right.
 //!
-//! Every key may be left out; then it is as on the paper's machine. A key that nobody knows is an error, because it is
-//! most likely a slip in one that matters.
+//! Every key may be left out, and then has the value of the paper's machine. An unknown key is an error, because it is
+//! most likely a misspelt key.
 
 use crate::machine::{Input, Machine};
 use std::fmt::Write;

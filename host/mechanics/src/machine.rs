@@ -214,7 +214,7 @@ sections! {
         /// Diameter of a shank (Table 1, no. 9).
         shank_diameter: Length = 16.0, MM, 2.0 to 200.0;
     }
-    /// The tool in the row, of which there is one, and its servo.
+    /// The tool in the row and its servo. There is one of each.
     intra_row: IntraRow {
         /// Width of cut; Eq. 7 takes 50 mm, though the sweep of Table 1 has 55 mm.
         width: Length = 50.0, MM, 5.0 to 1000.0;

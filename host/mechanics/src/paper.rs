@@ -54,7 +54,7 @@ pub struct Comparison {
     pub remark: String,
 }
 
-/// Share by which a printed figure may be off where intermediate results were rounded.
+/// Allowed relative deviation of a printed figure, if intermediate results were rounded.
 const ROUNDING: f64 = 0.005;
 
 impl Verdict {

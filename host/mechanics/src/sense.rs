@@ -15,7 +15,7 @@ use uom::si::f64::{Force, Length, Ratio};
 /// Teeth of a good sprocket: fewer wear the chain out quickly, on more a worn chain climbs.
 const GOOD_TEETH: RangeInclusive<u32> = 9..=120;
 
-/// Share by which the speed may miss the wanted one before it is worth a word.
+/// Allowed relative deviation of the speed, before a warning.
 const SPEED_TOLERANCE: f64 = 0.05;
 
 /// Times the needed power from which an engine is too large.

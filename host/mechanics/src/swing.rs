@@ -1,11 +1,13 @@
-//! The swing of the tool in the row: the smallest angle that clears the widest canopy, or the zone round a stem, the pulse for it, the time
-//! that it takes by the servo's torque-speed line, and the lead that follows. A shorter stroke takes less time, and leaves more ground
-//! weeded. Where the zone is kept, the settings for it follow as well: the zone is longer than the protected width by what a stem
-//! stands off the middle, and the margin pays for a wheel and a servo that nobody has measured yet.
+//! The swing of the tool in the row: its angle, pulse, time and lead.
 //!
-//! The arm swings sideways about a pivot beside the row: at an angle the tool's middle is `arm * sin(angle)` from the row's
-//! line. A servo turns at full speed without load, and falls in a straight line to nothing at the torque at which it stalls. What it
-//! has to turn against is the torque of the whole blade in the soil (above Eq. 10), which the paper sizes its servo by.
+//! The angle is the smallest that clears the widest canopy, or the zone round a stem. Its time follows from the servo's
+//! torque-speed line. A shorter stroke takes less time and leaves more ground weeded. With a stem zone, its settings
+//! follow as well. The zone is longer than the protected width, because a stem may stand off the middle. The margin
+//! covers a wheel and a servo that were not measured yet.
+//!
+//! The arm swings sideways about a pivot beside the row: at an angle the tool's middle is `arm * sin(angle)` from the
+//! row's line. A servo turns at full speed without load. Its speed falls in a straight line to zero at the stall
+//! torque. The load is the torque of the whole blade in the soil (above Eq. 10), by which the paper sizes its servo.
 
 use crate::machine::{Machine, SwingInputs};
 use crate::unit::{KG_CM, MM};

@@ -116,7 +116,7 @@ impl Change {
         let mut to = to;
         let is_another = |setting: Setting| setting.is_of_the_wheel() && from.get(setting) != to.get(setting);
         if Setting::all().any(is_another) && !self.to.contains_key(&name(Setting::TicksPerM)) {
-            // Nobody has measured that wheel yet: the firmware forgets the measure by itself.
+            // The new wheel has no measured value yet: the firmware resets it by itself.
             let _ = to.set(Setting::TicksPerM, 0);
         }
         if let Some(contradiction) = to.contradiction() {

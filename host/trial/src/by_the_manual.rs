@@ -39,7 +39,7 @@ pub enum ManualError {
 const TIMINGS: u64 = 2;
 const STRETCHES: u64 = 3;
 
-/// Time between two of the swings by which the firmware times the servo, in milliseconds.
+/// Time between two swings of the firmware's measurement of the servo, in milliseconds.
 const SWING_MS: u32 = 1500;
 
 /// Speed at which stretches and rows are rolled along.
@@ -62,7 +62,7 @@ pub struct Novice {
 }
 
 impl Novice {
-    /// With a machine of which nothing was measured.
+    /// A machine before any measurement.
     pub fn new(conditions: Conditions, seed: u64) -> Self {
         Self { conditions, measured: SetUp::default(), seed }
     }

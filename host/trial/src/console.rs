@@ -62,7 +62,7 @@ pub fn ask(uno: &mut Uno, command: &str) -> Result<Vec<String>, ConsoleError> {
         lines.take(received.as_bytes());
         while let Some(line) = lines.next_line() {
             if line == "ok" {
-                // The end of its line belongs to it, and what comes behind that is somebody else's.
+                // The line end belongs to the line. Bytes behind it are left for the next read.
                 while received.ends_with('\r') {
                     uno.run_until(uno.cycle() + CHARACTER_CYCLES)?;
                     received += &uno.received();

@@ -1,21 +1,22 @@
-//! The virtual Uno, live: in real time, at a pseudo terminal that any serial program opens, with a machine around it that rolls
-//! along a row again and again.
+//! The live virtual Uno: it runs in real time, at a pseudo terminal that any serial program opens. A simulated machine
+//! rolls along a row again and again.
 //!
-//! [`LiveUno::start`] powers it up, [`LiveUno::run`] lets it run until it is told to stop, and
-//! [`Live::run_in_background`] does so in a thread. [`rows`] has several, whose encoder is the same. Each millisecond
-//! of the chip's time, bytes are taken from and given to the terminal; then the host's clock is waited for. A host that
-//! is too slow makes the chip slower, never the time between two of its events wrong.
+//! [`LiveUno::start`] powers it up. [`LiveUno::run`] runs it until it is stopped, and [`Live::run_in_background`] does
+//! so in a thread. [`rows`] has several Unos that share one encoder. Each millisecond of the chip's time it exchanges
+//! bytes with the terminal, and then waits for the PC's clock. A slow PC makes the chip slower, but does not change the
+//! time between two of its events.
 //!
-//! - **Reset.** A program that opens the port of a real Uno resets it, by the modem line DTR. A pseudo terminal has no such
-//!   line; so the opening itself is what resets, unless [`Setup::keeps_running_when_opened`]. Then a bootloader waits for a
-//!   new firmware for a second or two, as on the desk.
-//! - **Baud rate.** The chip sends and receives at the pace of its UBRR. The terminal carries bytes at any rate, so that a
-//!   program's wrong one goes unnoticed. What no program has read is lost when the next one opens the port.
-//! - **The machine.** It stands, gains its speed ahead of the row, rolls past it and brakes behind it; after a few seconds it does
-//!   so again, forward, with the same row before it. The tool does what the firmware says and the row does not mind.
-//! - **The end switch.** It closes while the arm is fully out, as the machine's servo turns it by the pulses on its line.
-//! - **The receiver.** Where there is a satellite receiver on the machine, it has a pseudo terminal of its own.
-//! - **EEPROM.** It is read from a file at the start, where there is one, and written to it whenever it has changed.
+//! - **Reset.** A program that opens the port of a real Uno resets it through the modem line DTR. A pseudo terminal has
+//!   no such line. So the opening itself resets the Uno, unless [`Setup::keeps_running_when_opened`] is set. A
+//!   bootloader then waits a second or two for new firmware, as on a real board.
+//! - **Baud rate.** The chip sends and receives at the pace of its UBRR. The terminal carries bytes at any rate, so a
+//!   wrong rate in a program has no effect. Unread bytes are lost when the next program opens the port.
+//! - **The machine.** It stands, accelerates before the row, rolls past it and brakes behind it. After a few seconds it
+//!   repeats this, forward, with the same row ahead. The tool follows the firmware, and does not change the row.
+//! - **The end switch.** It closes while the arm is fully out. The machine's servo turns the arm by the pulses on its
+//!   line.
+//! - **The receiver.** A satellite receiver on the machine has its own pseudo terminal.
+//! - **EEPROM.** It is read from a file at the start, if there is one, and written to it after each change.
 
 use crate::receiver::{ReceiverSetup, SimulatedReceiver};
 use field::machine::{Machine, cycle_at, time_at_s};
@@ -143,7 +144,8 @@ impl Course {
         Self { span_mm: row.span_mm(), row, machine, speed_mm_s, slip: 0.0, stands_first_s: STANDING_S }
     }
 
-    /// A machine with several rows and one wheel: a course for each row, all of which roll along the same ground at the same time.
+    /// A machine with several rows and one wheel: one course for each row. All rows roll along the same ground at the
+    /// same time.
     pub fn of_rows(rows: Vec<Row>, machine: Machine, speed_mm_s: f64) -> Vec<Self> {
         let spans = || rows.iter().map(Row::span_mm);
         let start = spans().map(|span| span.start).fold(f64::INFINITY, f64::min);
@@ -428,7 +430,7 @@ impl LiveUno {
     /// Resets the chip where a program has opened the port, and passes bytes both ways.
     fn serve_terminal(&mut self) -> Result<(), LiveError> {
         let Some(pty) = &mut self.pty else {
-            // What it says is heard by nobody.
+            // Discards the output: no program is connected.
             self.uno.received_bytes();
             return Ok(());
         };

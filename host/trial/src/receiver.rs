@@ -42,7 +42,7 @@ pub struct ReceiverSetup {
 /// What goes wrong with a receiver, over and over.
 #[derive(Clone, Debug)]
 pub struct Trouble {
-    /// Seconds after which it begins anew.
+    /// Seconds after which it repeats.
     pub every_s: f64,
     /// When there is no fix, in seconds of that.
     pub outage_s: Range<f64>,
@@ -50,7 +50,7 @@ pub struct Trouble {
     pub jump_s: Range<f64>,
     /// How far that is, in metres to the north.
     pub jump_m: f64,
-    /// The share of lines of which a byte is changed.
+    /// The share of lines with a changed byte.
     pub damaged: f64,
 }
 

@@ -28,7 +28,7 @@ pub enum TrialError {
     /// The firmware's console did not answer as it should.
     #[error(transparent)]
     Console(#[from] ConsoleError),
-    /// The firmware started anew on the way.
+    /// The firmware restarted during the trial.
     #[error("the firmware restarted {} during the trial, so that its position means nothing", counted(.0, "time"))]
     Restarted(usize),
 }
@@ -66,10 +66,10 @@ const STILL_MS: u64 = 50;
 /// Simulated time between two reports of progress.
 const PROGRESS_CYCLES: u64 = CYCLES_PER_SECOND / 20;
 
-/// Powers up the firmware with these levels on its inputs, and waits for the line by which it says that it is there.
+/// Powers up the firmware with these levels on its inputs, and waits for its greeting.
 ///
 /// # Errors
-/// Where the ELF cannot be run, or no line comes.
+/// If the ELF cannot be run, or no greeting comes.
 pub fn power_up(elf: &Path, levels: &[PinChange]) -> Result<Uno, UnoError> {
     let mut uno = Uno::boot(elf)?.wired(&wiring::WIRES);
     for level in levels {
@@ -79,7 +79,7 @@ pub fn power_up(elf: &Path, levels: &[PinChange]) -> Result<Uno, UnoError> {
     Ok(uno)
 }
 
-/// As [`power_up`], and clears the alarm by which the firmware says that its EEPROM holds no settings yet.
+/// As [`power_up`], and then clears the alarm for an EEPROM without settings.
 ///
 /// # Errors
 /// As [`power_up`].

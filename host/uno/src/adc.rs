@@ -63,7 +63,7 @@ pub(super) unsafe fn set_right(avr: *mut simavr::avr_t, adc: *mut simavr::avr_ad
         for (value, &input) in (*adc).adc_values.iter_mut().zip(millivolts) {
             let reference = u32::from(reference);
             let result = (u32::from(input) * 1024 / reference).min(LARGEST);
-            // The smallest voltage of which simavr makes this result.
+            // The smallest voltage that simavr converts to this result.
             *value = (result * reference).div_ceil(LARGEST) as u16;
         }
     }

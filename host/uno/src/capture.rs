@@ -1,8 +1,8 @@
-//! Recordings of real signals: what a logic analyser saw on some pins, from its VCD file.
+//! Recordings of real signals: the levels of some pins, from a logic analyser's VCD file.
 //!
-//! A [`Capture`] is the recording as levels on the Uno's pins, in cycles, whatever unit the file counts in. Channels are chosen
-//! by the names that the analyser's software gave them. Nothing is filtered or repaired: a level that the file leaves open is an
-//! error, and what the signal means is for the firmware to say.
+//! A [`Capture`] holds levels on the Uno's pins, in cycles. It converts from any time unit of the file. The caller
+//! chooses channels by the names in the analyser's software. Nothing is filtered or repaired: an undefined level is an
+//! error. The firmware, not this module, interprets the signal.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -104,7 +104,7 @@ pub enum CaptureError {
     },
 }
 
-/// Longest recording, in hours. Nobody waits for the firmware to play a longer one.
+/// Longest recording, in hours. Playing a longer one takes too long to be useful.
 const MOST_HOURS: u64 = 24;
 
 /// Most scopes within each other. An analyser makes one or two, and each takes of the reader's stack.
@@ -129,12 +129,12 @@ struct Channel {
 }
 
 impl Capture {
-    /// Reads the recording at `path`. `channels` says by which channel of the file a pin is known; a name that stands in several
+    /// Reads the recording at `path`. `channels` maps pins to channel names in the file. A name that exists in several
     /// scopes is written `scope.name`.
     ///
     /// # Errors
     ///
-    /// Where the file is no VCD, has no such channels, or leaves their levels open.
+    /// If the file is no VCD, lacks a channel, or leaves a level undefined.
     pub fn read(path: &Path, channels: &[(Pin, &str)]) -> Result<Capture, CaptureError> {
         let file = File::open(path).map_err(|source| CaptureError::Read { path: path.into(), source })?;
         Capture::parse(path, BufReader::new(file), channels)

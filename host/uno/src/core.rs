@@ -569,7 +569,7 @@ impl Core {
 impl Drop for Core {
     fn drop(&mut self) {
         // SAFETY: both were allocated in `new`, the chip by simavr's malloc, which leaves freeing `avr_t` itself to its
-        // maker; nobody uses them after this.
+        // maker. Neither is used after this.
         unsafe {
             simavr::avr_terminate(self.chip.as_ptr());
             libc::free(self.chip.as_ptr().cast());

@@ -47,7 +47,7 @@ struct Write {
 pub(super) struct TornByte {
     /// Its address.
     pub(super) address: usize,
-    /// Bits that are set in it whatever was to be written: all of them while it is being erased.
+    /// Bits that the cell sets for any written value: all of them while it is being erased.
     pub(super) ones: u8,
 }
 
@@ -75,12 +75,12 @@ impl Eeprom {
     }
 }
 
-/// Puts this file's writer of EECR in the place of simavr's.
+/// Replaces simavr's writer of EECR by the one in this file.
 ///
 /// # Safety
 ///
-/// `avr` must be an initialised chip and `eeprom` its own, which stays where it is for as long as the chip runs, and of which no
-/// reference is alive while it does.
+/// `avr` must be an initialised chip, and `eeprom` its own EEPROM. `eeprom` must not move while the chip runs, and no
+/// reference to it may be alive while the chip runs.
 pub(super) unsafe fn take_over_writes(avr: *mut simavr::avr_t, eeprom: *mut Eeprom) {
     // SAFETY: the caller vouches for both; the address is that of an I/O register.
     unsafe { Writer::replace(avr, EECR, on_control_write, eeprom.cast()) };

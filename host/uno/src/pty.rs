@@ -45,7 +45,7 @@ pub enum PtyError {
     /// Something else is where the link should be.
     #[error("{0} exists already and is no link to a pseudo terminal: name another link, or remove it")]
     LinkExists(PathBuf),
-    /// The link leads to a pseudo terminal that somebody uses.
+    /// The link leads to a pseudo terminal that another process uses.
     #[error(
         "{} leads to {}, which {holder} has: end it, or name another link; if it is none of your virtual Unos, remove the link",
         path.display(), target.display()
@@ -114,11 +114,12 @@ impl Pty {
         self.link.as_deref().unwrap_or(&self.path)
     }
 
-    /// Makes a symbolic link to it, which is removed again at the end. A link to another pseudo terminal, which a process that was
-    /// killed has left over, is replaced, unless somebody has that terminal now.
+    /// Makes a symbolic link to it, and removes it at the end. A link to another pseudo terminal is replaced, unless a
+    /// process uses that terminal. Killed processes leave such links.
     ///
     /// # Errors
-    /// Where something else is there, somebody uses it, or the folder cannot be written to.
+    /// If the path is something else than a link, another process uses the terminal, or the folder cannot be written
+    /// to.
     pub fn link(&mut self, path: &Path) -> Result<(), PtyError> {
         let target = std::fs::read_link(path).ok().filter(|target| target.starts_with(TERMINALS));
         // What was left over may lead to this very one: the system gives the numbers away again.
@@ -228,7 +229,7 @@ impl Drop for Pty {
         if let Some(link) = &self.link
             && std::fs::read_link(link).is_ok_and(|target| target == self.path)
         {
-            // Nobody can be told, and the next one replaces a link that leads nowhere.
+            // An error here cannot be reported. The next process replaces a link that leads nowhere.
             let _ = std::fs::remove_file(link);
         }
     }

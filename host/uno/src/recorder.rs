@@ -1,8 +1,9 @@
-//! What simavr calls back: levels on the output pins, interrupts, bytes to transmit, and resets.
+//! The callbacks from simavr: levels on output pins, interrupts, transmitted bytes, and resets.
 //!
-//! The callbacks only write down what happened in the [`Recorder`] and set simavr's clock and its UART's pace right, while there is
-//! time for it; they call nothing of simavr's. Their parameter is the recorder's address, which [`super::core::Core`]
-//! registers and keeps alive; its text says why nobody else looks at the recorder meanwhile.
+//! The callbacks write events into the [`Recorder`]. They also correct simavr's clock and the pace of its UART, because
+//! this is the only time for it. They call no function of simavr. Their parameter is the recorder's address, which
+//! [`super::core::Core`] registers and keeps alive. Its text explains why no other code accesses the recorder
+//! meanwhile.
 
 use std::ffi::c_void;
 
@@ -23,7 +24,7 @@ const INTERRUPT_ENTRY_CYCLES: u64 = 4;
 /// Cycles of `reti`; its end is the end of the handler.
 const RETURN_CYCLES: u64 = 4;
 
-/// Why the chip started anew.
+/// Why the chip restarted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ResetCause {
     /// Power came back ([`Uno::power_cycle`](crate::Uno::power_cycle)).
@@ -113,7 +114,7 @@ impl Recorder {
         self.driven_high[usize::from(pin.number())]
     }
 
-    /// No pin is driven any more: the chip starts anew, or has no power.
+    /// The chip drives no pin any more: it restarts, or has no power.
     pub(super) fn release_pins(&mut self, cycle: u64) {
         self.timer_levels = Default::default();
         for pin in Pin::ALL {

@@ -98,12 +98,12 @@ pub(super) unsafe fn stop_all(avr: *mut simavr::avr_t, timer1: &Timer1) {
     }
 }
 
-/// Puts this file's writers of OCR1A and TCNT1 in the place of simavr's.
+/// Replaces simavr's writers of OCR1A and TCNT1 by those in this file.
 ///
 /// # Safety
 ///
-/// `avr` must be an initialised chip and `timer` its own, which stays where it is for as long as the chip runs, and of which no
-/// reference is alive while it does.
+/// `avr` must be an initialised chip, and `timer` its own timer. `timer` must not move while the chip runs, and no
+/// reference to it may be alive while the chip runs.
 pub(super) unsafe fn take_over_writes(avr: *mut simavr::avr_t, timer: *mut Timer1) {
     // SAFETY: the caller vouches for both; the addresses are those of I/O registers.
     unsafe {

@@ -1,7 +1,7 @@
-//! Waveform files: what happened on the Uno's pins, as a VCD for PulseView or GTKWave.
+//! Waveform files: the levels of the Uno's pins over time, as a VCD for PulseView or GTKWave.
 //!
-//! One file holds every wire by its name ([`Wire::name`]), inputs and outputs together. The file counts in
-//! 100 ps, of which a cycle of 62.5 ns is exactly 625, so that [`crate::capture`] reads back the very cycles.
+//! One file holds every wire by its name ([`Wire::name`]), inputs and outputs together. The time unit is 100 ps: a
+//! cycle of 62.5 ns is exactly 625 units. So [`crate::capture`] reads back exactly the same cycles.
 
 use std::io::{self, Write};
 

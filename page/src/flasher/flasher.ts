@@ -11,7 +11,7 @@ import { BOARDS, type Board } from "./boards.ts";
 import { Bootloader, FlashError, PAGE_BYTES, type Progress } from "./stk500.ts";
 
 export class Flasher {
-    /** Called before a port is opened for flashing: whoever has it lets go of it. */
+    /** Called before a port is opened for flashing. The owner of the port must close it. */
     onBegin: (port: SerialPort) => Promise<void> = async () => {};
     /** The operator wants to work with the board that was just flashed. */
     onWork: (port: SerialPort) => void = () => {};

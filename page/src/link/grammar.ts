@@ -1,7 +1,7 @@
-// What a line of the machine means. This is the page's one door to the console's grammar: `read` tells what was said, and nothing
-// else takes a line apart. Behind it is the project's own Rust (host/link/src/console_line.rs), of which these are the types.
+// Parses the machine's lines. This is the only place in the page that parses console lines: `read` returns the meaning
+// of a line. The parser is the project's own Rust (host/link/src/console_line.rs), and these are its types.
 //
-// Commands are put together where they are typed; their words stand in the firmware's help.
+// Commands are composed where they are typed. Their words are in the firmware's help.
 
 import { ask } from "../core.ts";
 import { type Mode, TOLD, type Told } from "./events.ts";

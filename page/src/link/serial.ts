@@ -145,7 +145,7 @@ export function wireOf(line: SerialLine): Wire {
         send: (text) => void line.write(encoder.encode(text)).catch(() => {}),
         close: () => line.close(),
     };
-    // A byte is a character: noise is nobody's UTF-8.
+    // A byte is one character: the input may be noise, which is no valid UTF-8.
     line.onBytes = (bytes) => wire.onText(String.fromCharCode(...bytes));
     line.onEnd = ({ message }) => wire.onEnd(message);
     return wire;

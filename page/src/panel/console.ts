@@ -37,7 +37,7 @@ export class Console {
         });
     }
 
-    /** Adds a line, of which kind. */
+    /** Adds a line of this kind. */
     add(line: string, kind: "typed" | "error" | "happened" | ""): void {
         this.#waiting.push(make("div", kind, line));
         if (this.#waiting.length > LINES) this.#waiting.shift();

@@ -120,7 +120,7 @@ export class Uno {
         return this.#toSend.length === 0;
     }
 
-    /** Starts the chip anew. Only where the power went does SRAM lose its content. */
+    /** Resets the chip. SRAM loses its content only after a power failure. */
     reset(cause: Exclude<ResetCause, "watchdog">): void {
         this.#restart(
             cause,

@@ -171,7 +171,9 @@ export function show(element: Element, text?: () => string): void {
 
 const words = new Map(Object.entries(en.words).map(([word, text]) => [text as string, word as Word]));
 
-/** Puts the page's texts and the names of its elements into the language, now and whenever it is another one. */
+/**
+ * Sets the page's texts and the names of its elements in the current language, now and after each change of language.
+ */
 export function translate(root: Element | DocumentFragment): void {
     const nodes: (() => void)[] = [];
     const take = (text: string, write: (text: string) => void) => {

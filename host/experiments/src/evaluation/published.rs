@@ -27,7 +27,7 @@ pub struct PublishedMachine {
     pub sees_by: &'static str,
     /// Its speeds.
     pub speed_km_h: &'static str,
-    /// Weeds that were gone, and of which ground.
+    /// Weeds removed, in percent, and the ground on which they were counted.
     pub weeds_gone_percent: &'static str,
     /// Crop plants that were damaged.
     pub damaged_percent: &'static str,

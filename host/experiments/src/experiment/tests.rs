@@ -1,4 +1,4 @@
-//! The experiment: what its controllers come to in the presets, whatever the threads, the seed and the parameters.
+//! The experiment: the results of its controllers in the presets, for all thread counts, seeds and parameters.
 
 use super::*;
 use crate::evaluation::Analysis;
@@ -109,8 +109,9 @@ fn the_loss_budget_is_what_a_hand_calculation_says() {
     let budget = totals(&run(&experiment))[0].budget;
     // A canopy of 150 mm, a margin of 50 mm on both sides, a plant every 500 mm, 694.4 mm/s.
     let mm_s = 2.5e6 / 3600.0;
-    // Out: led by 181 ms, of which 2 ms of pulse, 65 ms of dead time, and 12 ms to the 4.5 degrees at which the tool leaves the line go
-    // by before ground is lost. In: led by 41 ms, then pulse, dead time and 108 ms back to the line.
+    // Out: the command leads by 181 ms. Before the tool loses ground, 2 ms of pulse, 65 ms of dead time and 12 ms of
+    // travel pass: at 4.5 degrees the tool leaves the line. In: the command leads by 41 ms. Then come pulse, dead time
+    // and 108 ms of travel back to the line.
     let swings_mm = mm_s * ((0.181 - 0.002 - 0.065 - 0.012) + (0.0015 + 0.065 + 0.108 - 0.041));
     let expected = [
         (Part::Plants, 150.0),

@@ -20,7 +20,7 @@ pub struct Comparison {
 pub struct Work {
     /// Speed of the machine, km/h.
     pub speed_km_h: f64,
-    /// Plants damaged, whatever damaged them.
+    /// Damaged plants, from any cause.
     pub damage: Share,
     /// Weeds gone in the row, %; none where no weed stood.
     pub in_row_percent: Option<f64>,

@@ -1,4 +1,4 @@
-//! An object of which somebody knows what it was.
+//! A labelled detection.
 
 use control::ground::{class::label, features::Features};
 use field::row::Kind;

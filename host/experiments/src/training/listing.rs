@@ -12,7 +12,7 @@ use std::io;
 const HEAD: &str = "\
 //! The trained example table: scale, radius, k and examples, in millimetres and millimetres a second.
 //!
-//! Written by `{how}`. Do not edit it: train it anew.
+//! Written by `{how}`. Do not edit it: train it again.
 
 use crate::ground::class::label;
 use crate::ground::features::COUNT as FEATURES;

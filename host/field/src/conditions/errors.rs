@@ -78,7 +78,7 @@ pub enum WrongValue {
         /// Its value.
         value: f64,
     },
-    /// Nobody knows the name.
+    /// The name is unknown.
     #[error("{0} is neither a parameter of the field nor a setting of the firmware; there are {known}", known = names().collect::<Vec<_>>().join(", "))]
     Unknown(String),
 }

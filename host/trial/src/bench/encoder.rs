@@ -1,21 +1,20 @@
-//! How fast the encoder may turn: the highest rate at which the firmware loses no count.
+//! The encoder benchmark: the highest rate at which the firmware loses no count.
 //!
-//! A trial turns the encoder at one rate and then asks the firmware for its position. It is passed where that is exact, where
-//! the firmware knows of no lost count, where it did not start anew, and where its telemetry went on meanwhile: a
-//! trial lasts longer than its heartbeat and its watchdog wait for a loop that gets no time any more.
+//! A trial turns the encoder at one rate and then asks the firmware for its position. It passes under four conditions.
+//! The position is exact. The firmware reports no lost count. The firmware did not restart. Its telemetry continued
+//! meanwhile: a trial lasts longer than the heartbeat and the watchdog wait for a starved loop.
 //!
-//! Each rate has two trials. [`turn`] turns the encoder evenly, or with jitter by chance, and so leaves the loop as little time
-//! as the rate does. But an edge comes at the worst moment there by chance alone, and a function that has moved makes
-//! for another chance. [`turn_at_worst`] sees to it: the edge waits, no shorter than the rate has it, until another interrupt's
-//! handler begins, and then the next two come as soon as they may. The beam's edges and the bytes received, whose
-//! moments the world has in hand, come right before the loop turns interrupts off, so that the edge has to wait for the
-//! critical section as well.
+//! Each rate has two trials. [`turn`] turns the encoder evenly, or with random jitter. This leaves the loop as little
+//! time as the rate allows. But an edge comes at the worst moment only by chance, and each change of the code changes
+//! the chance. [`turn_at_worst`] makes the worst case. The edge waits until another interrupt's handler begins, but
+//! comes no earlier than the rate allows. The next two edges then come as soon as they may. The beam's edges and the
+//! received bytes come directly before the loop turns interrupts off, so the edge also waits for the critical section.
 //!
-//! [`highest_rate`] finds the rate by bisection to [`RESOLUTION`], and then tries rates below it: edges that come in step with
-//! something else may pass at a rate by chance.
+//! [`highest_rate`] finds the rate by bisection to [`RESOLUTION`]. Then it tries rates below it, because edges in step
+//! with other events may pass at one rate by chance.
 //!
-//! The firmware is in HOLD. What weeding adds is less than [`Load::Telemetry`], which asks for more than the serial line can
-//! carry and has the beam flicker as fast as its sensor can.
+//! The firmware is in HOLD. Weeding adds less load than [`Load::Telemetry`], which requests more output than the serial
+//! line can carry, and makes the beam flicker as fast as its sensor can.
 
 use super::error::BenchError;
 use super::load::{EDGE_CYCLES, Telemetry, flicker};
@@ -83,7 +82,7 @@ pub struct Counted {
     pub position_ticks: Option<i64>,
     /// Counts that it knows to have lost.
     pub lost_ticks: u64,
-    /// How often it started anew.
+    /// Number of restarts.
     pub restarts: usize,
     /// Share of the serial line's capacity that it used meanwhile, from 0 to 1.
     pub line_share: f64,
@@ -153,7 +152,7 @@ const RUN: std::ops::RangeInclusive<u32> = 3..=12;
 const RUN_UP: u32 = 4000;
 const RUN_UP_CYCLES: u64 = CYCLES_PER_SECOND / 40_000;
 
-/// Critical sections of the loop that pass between two of which one is made worse, at most: some turns of the loop.
+/// The most critical sections of the loop between two that are made worse: some turns of the loop.
 const SECTIONS_PASSED: u32 = 40;
 
 /// Turns the encoder of the firmware at `elf` for half a second, with edges that wait for the moments at which they have to wait
@@ -191,7 +190,7 @@ pub fn turn_at_worst(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<
             uno.drive([PinChange { cycle, ..nth_edge(turning.direction, number) }]);
             number += 1;
         }
-        // Whatever its own shift: the next edge is one that comes late.
+        // An edge's own shift does not matter here: the next edge comes late.
         let next = moment + (f64::from(edges) * step_cycles).ceil() as u64;
         uno.run_until(next)?;
         while uno.place() == Place::InHandler {

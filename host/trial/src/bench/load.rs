@@ -29,7 +29,7 @@ pub(super) struct Telemetry {
 }
 
 impl Telemetry {
-    /// Runs to a cycle, asking the next question whenever one is answered.
+    /// Runs to a cycle, and asks the next question after each answer.
     pub(super) fn run_until(&mut self, uno: &mut Uno, cycle: u64) -> Result<(), UnoError> {
         while uno.cycle() < cycle {
             while self.unanswered < QUESTIONS_AHEAD {

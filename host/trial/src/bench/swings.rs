@@ -48,7 +48,7 @@ pub struct Lateness {
     pub ticks_per_s: f64,
     /// Plants passed.
     pub plants: usize,
-    /// Plants of which the tool did not keep clear by the margin.
+    /// Plants to which the tool did not keep the margin.
     pub not_kept: usize,
     /// Plants damaged.
     pub damaged: usize,

@@ -16,7 +16,8 @@ use std::thread;
 use std::time::{Duration, Instant};
 use uno::Uno;
 
-/// Rows that one thread has at least: it runs so many in real time by itself, and has nobody to wait for.
+/// The least number of rows for one thread. A single thread can run this many in real time, without waiting for other
+/// threads.
 const ROWS_OF_A_THREAD: usize = 3;
 
 /// Slices after which the threads wait for each other: seldom enough not to matter on a busy host, and less than a person notices.

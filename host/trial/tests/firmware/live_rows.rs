@@ -87,7 +87,7 @@ impl Laptop {
         panic!("{what} does not come: {:?}, lost {:?}, alarms {:?}", self.modes, self.lost, self.alarms);
     }
 
-    /// Types a command to all, each of which does it.
+    /// Types a command to all rows. Each row executes it.
     #[track_caller]
     fn command(&mut self, command: &str) {
         for row in self.all() {
@@ -112,7 +112,7 @@ impl Laptop {
         self.until("work", |laptop, _| laptop.modes.iter().all(|mode| *mode == Some(Mode::Work)));
     }
 
-    /// HOLD to all, until nobody is waited for any more.
+    /// Holds all rows, and waits until no row is left to answer.
     #[track_caller]
     fn hold(&mut self, are_there: &[bool]) -> Hold {
         let mut hold = Hold::new(Instant::now(), are_there.iter().copied());

@@ -205,9 +205,9 @@ fn a_row_with_changes_of_speed_and_a_stop_is_decided_the_same_on_the_host() {
     assert_same(&logged(&row(), &motion, &["start"]), 9);
 }
 
-/// Rows by chance, at speeds of which half lie where one speed class ends and the next begins. The session begins before the machine
-/// sets off, while it gains its speed, or while it rolls past plants; whoever sits there types at any moment, and every other host is
-/// busy with something else now and then.
+/// Random rows. Half of their speeds are at the limit between two speed classes. The session begins before the machine
+/// sets off, while it accelerates, or while it rolls past plants. The operator types at random times, and every other
+/// PC is busy now and then.
 #[test]
 fn rows_by_chance_are_decided_the_same_on_the_host_whatever_is_typed_and_whenever_it_is_read() {
     let rows = cases(20);
