@@ -25,25 +25,26 @@ use control::operate::servo;
 use std::ops::Range;
 use uno::Pulse;
 
-/// A turn of the paper's loop: `Arduino_KNN` takes 92,309 cycles for 32 examples, measured on the Uno.
+/// A turn of the paper's loop, in seconds: `Arduino_KNN` takes 92,309 cycles for 32 examples, measured on the Uno.
 const PAPER_TURN_S: f64 = 92_309.0 / 16e6;
 
-/// Ground that the paper leaves alone on both sides of a canopy.
+/// The paper's margin on both sides of a canopy.
 const PAPER_MARGIN_MM: f64 = 50.0;
 
 /// Clear stretches shorter than this belong to the canopy: the firmware's default.
 const GAP_MM: f64 = 21.0;
 
-/// Objects narrower than this are no plants: half way between the built-in examples' widest weed and narrowest plant.
+/// Detections narrower than this are no plants: half way between the built-in examples' widest weed and narrowest
+/// plant.
 const NARROWEST_PLANT_MM: f64 = 60.0;
 
-/// A turn of the loop that knows everything.
+/// A turn of the ideal controller's loop, in seconds.
 const TURN_S: f64 = 0.001;
 
 /// Shortest gap between two servo pulses, the firmware's default; 0 for fixed frames.
 const SERVO_GAP_MS: u8 = 3;
 
-/// What a baseline did.
+/// The result of a baseline.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Weeded {
     /// The first of the servo's pulses of each width.
@@ -108,7 +109,7 @@ pub fn ideal(trial: &Trial, stems: &[Stem]) -> Weeded {
     let passed_s = |place_mm: f64| Some(motion.passings(place_mm + machine.beam_to_tool_mm).next()?.time_s);
     let zones =
         union(stems.iter().map(|stem| stem.along_mm - stem.protected_mm..stem.along_mm + stem.protected_mm).collect());
-    // What is neither a zone nor weeded is lost to swings.
+    // Ground that is neither a zone nor weeded is lost to swings.
     let mut reasons = vec![Reason { times_s: 0.0..motion.duration_s(), part: Part::Swings }];
     reasons.extend(
         zones.iter().filter_map(|zone| {
@@ -119,7 +120,7 @@ pub fn ideal(trial: &Trial, stems: &[Stem]) -> Weeded {
         .into_iter()
         .filter_map(|zone| Some(passed_s(zone.start)? - slowest_s..passed_s(zone.end)? - quickest_s))
         .collect();
-    // A tool that has no time to be in the row and out again stays out.
+    // If there is no time to swing in and out again, the tool stays out.
     let swings_s = union(windows.into_iter().map(|window| window.start..window.end + slowest_s).collect());
     let out_s = swings_s.into_iter().map(|swing| swing.start..swing.end - slowest_s).collect();
     Weeded { pulses: swing(trial, machine.servo, TURN_S, SERVO_GAP_MS, out_during(out_s)), reasons }
@@ -194,7 +195,7 @@ mod tests {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
             let machine = Machine::default();
             let trial = Trial::at_speed(row.clone(), machine, Timing::default(), rng.random_range(200.0..1500.0));
-            // From less than a turn to many frames, and some that begin with a turn.
+            // Times from less than a turn to many frames. Some begin with a turn.
             let mut time_s = 0.0;
             let out_s: Vec<Range<f64>> = (0..40)
                 .map(|_| {
@@ -220,7 +221,7 @@ mod tests {
                 let stems = PLACES.map(|along_mm| Stem { along_mm, across_mm: 0.0, protected_mm, is_seen: true });
                 reached_by(|trial| ideal(trial, &stems), speed_km_h)
             };
-            // As wide as the canopy, and narrower.
+            // Stroke as wide as the canopy, and narrower.
             assert_eq!(reached(75.0), 0, "at {speed_km_h} km/h");
             assert_eq!(reached(40.0), PLACES.len(), "at {speed_km_h} km/h");
         }

@@ -24,13 +24,13 @@ use serde::{Deserialize, Serialize};
 use std::ops::{AddAssign, Range};
 use uno::Pulse;
 
-/// A sweep that is in a zone by less than this touches it.
+/// A sweep that enters a zone by less than this only touches it.
 const TOUCH_MM: f64 = 1e-6;
 
-/// Time between two looks at where the tool is in a protected zone: at 2.5 km/h it moves by a millimetre or so.
+/// Time between two checks of the tool in a protected zone: at 2.5 km/h the machine moves about a millimetre.
 const LOOK_S: f64 = 0.000_5;
 
-/// Weeds, counted: there are some ten a plant, and many plants in a study.
+/// Counts of weeds. `u64`, because there are about ten a plant, and many plants in a study.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct WeedCount {
     /// Before weeding.
@@ -40,7 +40,7 @@ pub struct WeedCount {
 }
 
 impl WeedCount {
-    /// Weeding efficiency (Eq. 22), in percent; none where no weed stood.
+    /// Weeding efficiency (Eq. 22), in percent. `None` if there was no weed.
     pub fn efficiency_percent(self) -> Option<f64> {
         (self.before > 0).then(|| 100.0 * (self.before - self.after) as f64 / self.before as f64)
     }
@@ -53,18 +53,18 @@ impl AddAssign for WeedCount {
     }
 }
 
-/// What the tools did to a stand.
+/// The effect of the tools on a stand.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Effect {
     /// Crop plants.
     pub plants: u32,
     /// Crop plants through whose protected zone the tool passed.
     pub damaged: u32,
-    /// Those of them that the beam cannot see: lower than it, bent, eaten, or planted late.
+    /// Damaged plants that the beam cannot see: too low, bent, eaten, or planted late.
     pub unseen: u32,
     /// Crop plants through whose protected zone a sweep passed, but not the tool.
     pub swept: u32,
-    /// Crop plants of the next row through whose protected zone the tool passed that swung aside.
+    /// Crop plants of the next row whose protected zone the tool entered while it was out.
     pub neighbours: u32,
     /// Weeds in the row.
     pub in_row: WeedCount,
@@ -94,7 +94,7 @@ impl AddAssign for Effect {
     }
 }
 
-/// The tools of a machine on its way.
+/// The tools of a machine, with its motion.
 struct Tools<'a> {
     machine: &'a Machine,
     mechanism: &'a Mechanism,
@@ -108,7 +108,7 @@ pub fn unweeded_strip_mm(machine: &Machine, mechanism: &Mechanism) -> f64 {
     if mechanism.sweeps_a_side == 0 { 0.0 } else { (mechanism.sweep_from_mm - machine.tool_width_mm / 2.0).max(0.0) }
 }
 
-/// What a machine did to a stand with these servo pulses. The motion began at `start_cycle`.
+/// The effect of a machine with these servo pulses on a stand. The motion began at `start_cycle`.
 pub fn effect(
     stand: &Stand,
     machine: &Machine,
@@ -144,7 +144,7 @@ pub fn effect(
 }
 
 impl Tools<'_> {
-    /// Where a place across the row is from the machine's middle, at a place along it.
+    /// Distance of a position from the machine's middle, across the row.
     fn across_mm(&self, place_mm: f64, across_mm: f64) -> f64 {
         across_mm - self.steering.across_mm(place_mm)
     }
@@ -165,7 +165,7 @@ impl Tools<'_> {
             let beside_mm = protected_mm * f64::from(step) / f64::from(steps);
             let chord_mm = (protected_mm.powi(2) - beside_mm.powi(2)).max(0.0).sqrt();
             let across_mm = self.across_mm(along_mm + beside_mm, across_mm).abs();
-            // What only touches does not cut: sweeps may run along the zones.
+            // Touching is no cut: sweeps may run along the zones.
             across_mm + chord_mm > sweep_from_mm + TOUCH_MM && across_mm - chord_mm < to_mm - TOUCH_MM
         })
     }
@@ -191,14 +191,15 @@ impl Tools<'_> {
         };
         self.motion.times_within_s(&(zone.start + x_mm..zone.end + x_mm)).into_iter().any(|times| {
             let looks = ((times.end - times.start) / LOOK_S).ceil() as u32;
-            // Between two turns of the servo the tool is nowhere beyond where it is at them: often that is clear of the zone.
+            // Between two ends of the servo's turning, the tool stays between its positions at them. Often that is
+            // clear of the zone.
             self.between_turns_s(&times).any(|stretch| {
                 let [from, to] = [stretch.start, stretch.end].map(|time_s| self.covered_mm(time_s));
                 let near_mm = protected_mm + self.steering.within_mm();
                 let comes_near =
                     from.start.min(to.start) < across_mm + near_mm && across_mm - near_mm < from.end.max(to.end);
                 let look_at = |time_s: f64| (time_s - times.start) / LOOK_S;
-                // Not at the very ends, where the zone is a point.
+                // Not at the very ends: there the zone is a point.
                 let first = (look_at(stretch.start).floor() as u32).max(1);
                 let behind = (look_at(stretch.end).ceil() as u32 + 1).min(looks);
                 comes_near && (first..behind).any(|look| enters(times.start + f64::from(look) * LOOK_S))
@@ -319,8 +320,8 @@ mod tests {
 
     #[test]
     fn a_plant_is_damaged_from_the_place_on_at_which_the_tool_no_longer_gets_past_its_zone() {
-        // The tool's edge passes the zone's 40 mm at 11.1 degrees: 62 + 30 ms after the command, 92 mm farther. There the zone
-        // is a point, and a little later it is wider than the tool is aside.
+        // The tool's edge leaves the zone's 40 mm at 11.1 degrees: 62 + 30 ms after the command, and 92 mm farther.
+        // There the zone is a point. A little later the zone is wider than the tool is aside.
         let last_good = (0..200).map(f64::from).take_while(|&mm| effect_of(800.0 + mm, 1400.0).damaged == 0).count();
         assert!((75..=95).contains(&last_good), "{last_good} mm");
     }
