@@ -102,7 +102,7 @@ impl Budgets {
     /// Reads them from a TOML file.
     ///
     /// # Errors
-    /// Where it cannot be read, or says what is not known.
+    /// If it cannot be read, or says what is not known.
     pub fn read(path: &Path) -> Result<Budgets, BudgetsError> {
         let read = || Ok(toml::from_str(&std::fs::read_to_string(path)?)?);
         read().map_err(|problem| BudgetsError { path: path.into(), problem })
@@ -111,7 +111,7 @@ impl Budgets {
     /// Holds bounds against the budgets that there are.
     ///
     /// # Errors
-    /// Where there is a budget for a time that has no bound.
+    /// If there is a budget for a time that has no bound.
     pub fn hold(&self, bounds: &Bounds) -> Result<Vec<Held>, BoundsError> {
         let mut held = Vec::new();
         let mut at_most = |name, proved, budget: Option<u64>| {

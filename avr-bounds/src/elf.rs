@@ -123,7 +123,7 @@ impl Program {
     /// Reads the ELF at `path`, for the chip named, or the one that the file names.
     ///
     /// # Errors
-    /// Where the file cannot be read, is no ELF for AVR, is for no known chip, or holds more than it.
+    /// If the file cannot be read, is no ELF for AVR, is for no known chip, or holds more than it.
     pub fn read(path: &Path, chip: Option<&str>) -> Result<Program, ElfError> {
         let bytes = std::fs::read(path).map_err(|source| ElfError::Read { path: path.into(), source })?;
         let not_elf = |reason| ElfError::NotElf { path: path.into(), reason };

@@ -94,7 +94,7 @@ pub fn instruction_at(flash: &[u8], address: u32) -> Option<(u32, String)> {
 /// used: how often loops turn, where calls lead, how deep recursion goes. Their limits are not ([`Budgets::hold`]).
 ///
 /// # Errors
-/// Where the program cannot be followed.
+/// If the program cannot be followed.
 pub fn prove(elf: &Program, budgets: &Budgets) -> Result<Bounds, BoundsError> {
     let known: BTreeSet<&str> = elf.functions.values().map(|symbol| symbol.name.as_str()).collect();
     let tables: [(_, Vec<&String>); 2] =

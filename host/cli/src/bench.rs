@@ -29,7 +29,7 @@ const ROWS: u64 = 50;
 /// Measures and prints the figures.
 ///
 /// # Errors
-/// Where the bench or the firmware cannot be built or run.
+/// If the bench or the firmware cannot be built or run.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let bench_elf = firmware::build_bench()?;
     let elf = firmware::build()?;

@@ -94,7 +94,7 @@ impl Firmware {
     /// Proves this ELF's bounds, and says where that fails but is insisted on.
     ///
     /// # Errors
-    /// Where it fails, or a bound is over its budget, without `--unproved`.
+    /// If it fails, or a bound is over its budget, without `--unproved`.
     pub fn check(&self, elf: &Path) -> Result<()> {
         let budgets = if self.tester { tester_budgets() } else { repository_budgets() };
         let why = match prove(elf, &budgets) {

@@ -42,7 +42,7 @@ pub struct Arguments {
 /// Classifies, and prints a line an object and, where there are labels, who was taken for whom.
 ///
 /// # Errors
-/// Where the file or its contents are wrong.
+/// If the file or its contents are wrong.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let objects = table::read(&arguments.file)?;
     let mut model = Model::built_in();

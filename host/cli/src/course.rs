@@ -60,7 +60,7 @@ impl CourseArguments {
     /// The row, read or grown.
     ///
     /// # Errors
-    /// Where the file is wrong, or the numbers make no row.
+    /// If the file is wrong, or the numbers make no row.
     pub fn row(&self) -> Result<Row> {
         self.nth_row(0)
     }
@@ -100,7 +100,7 @@ impl CourseArguments {
     /// The machine and what is around it, in this field.
     ///
     /// # Errors
-    /// Where it is no field, or its machine has no room for the distance from beam to tool.
+    /// If it is no field, or its machine has no room for the distance from beam to tool.
     pub fn conditions_of(&self, field: &str) -> Result<Conditions> {
         let mut conditions = Conditions::load(field, |file| fs::read_to_string(file))?;
         if let Some(beam_to_tool_mm) = self.beam_to_tool {

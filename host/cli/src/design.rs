@@ -37,7 +37,7 @@ pub struct Arguments {
 /// Calculates and prints.
 ///
 /// # Errors
-/// Where the machine's file cannot be read, or makes no machine that could be calculated.
+/// If the machine's file cannot be read, or makes no machine that could be calculated.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let own = arguments.machine.as_deref().map(file::read).transpose()?;
     let machine = own.unwrap_or_default();

@@ -76,7 +76,7 @@ impl FileName {
     /// Whether it could be written, and nothing is lost by it.
     ///
     /// # Errors
-    /// Where it could not, and why.
+    /// If it could not, and why.
     pub fn check(&self, replace: Replace) -> Result<OutFile<'_>> {
         ensure!(!self.0.is_dir(), "{} is a folder, and a file has to be named", self.0.display());
         replace.check(&self.0)?;
@@ -106,7 +106,7 @@ impl OutFile<'_> {
     /// Writes it whole, or leaves what was there.
     ///
     /// # Errors
-    /// Where it cannot be written.
+    /// If it cannot be written.
     pub fn write<E>(&self, contents: impl FnOnce(&mut dyn Write) -> Result<(), E>) -> Result<()>
     where
         E: From<io::Error>,
@@ -125,7 +125,7 @@ impl FolderName {
     /// Whether files could be written there, and nothing is lost by those of these names.
     ///
     /// # Errors
-    /// Where they could not, and why.
+    /// If they could not, and why.
     pub fn check<N: Into<String>>(
         &self,
         names: impl IntoIterator<Item = N>,
@@ -155,7 +155,7 @@ impl FolderName {
     /// Makes it where there is none.
     ///
     /// # Errors
-    /// Where it cannot be made.
+    /// If it cannot be made.
     pub fn make(&self) -> Result<()> {
         fs::create_dir_all(&self.0).with_context(|| format!("the folder {} cannot be made", self.0.display()))
     }
@@ -165,7 +165,7 @@ impl OutFolder<'_> {
     /// Writes a file there whole, or leaves what was there; makes the folder where there is none.
     ///
     /// # Errors
-    /// Where folder or file cannot be written, or this name was not checked.
+    /// If folder or file cannot be written, or this name was not checked.
     pub fn write<E>(&self, name: &str, contents: impl FnOnce(&mut dyn Write) -> Result<(), E>) -> Result<()>
     where
         E: From<io::Error>,

@@ -79,7 +79,7 @@ Example: weeder examples push chilli.csv --replace")]
 /// Pulls, pushes or compares.
 ///
 /// # Errors
-/// Where table or machine cannot be used; each says what would be right.
+/// If table or machine cannot be used; each says what would be right.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     match &arguments.action {
         Action::Pull { file, replace, json, port } => {
@@ -142,7 +142,7 @@ fn on_machine(port: &Port) -> Result<Vec<Taught>> {
 /// A table's examples, each once; at least one.
 ///
 /// # Errors
-/// Where it is no such table.
+/// If it is no such table.
 pub fn in_table(file: &Path) -> Result<Vec<Taught>> {
     let objects = table::read(file)?;
     let mut examples = Vec::new();

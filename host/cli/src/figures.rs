@@ -36,7 +36,7 @@ const MARK: &str = "<!-- figures: ";
 /// Writes the figures, or compares them.
 ///
 /// # Errors
-/// Where a page cannot be read or written, has a figure without a block, or a command fails.
+/// If a page cannot be read or written, has a figure without a block, or a command fails.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let mut differ = Vec::new();
     for path in &arguments.pages {

@@ -45,7 +45,7 @@ pub const OLD_AVAILABLE_BYTES: usize = 30_720;
 /// Flashes, with each of avrdude's own messages once on the terminal.
 ///
 /// # Errors
-/// Where there is no Uno, it cannot be opened, or building, proving or writing fails; each says what to do.
+/// If there is no Uno, it cannot be opened, or building, proving or writing fails; each says what to do.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let (baud, available) =
         if arguments.old_bootloader { (OLD_BAUD, OLD_AVAILABLE_BYTES) } else { (BAUD, AVAILABLE_BYTES) };

@@ -31,7 +31,7 @@ pub struct Arguments {
 /// Writes it.
 ///
 /// # Errors
-/// Where the firmware cannot be built, read or proved, or the file cannot be written.
+/// If the firmware cannot be built, read or proved, or the file cannot be written.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let out = arguments.out.check(arguments.replace)?;
     let elf = arguments.firmware.elf()?;

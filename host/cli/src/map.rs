@@ -60,7 +60,7 @@ pub struct Arguments {
 /// Reads the records, writes the map, and prints the count.
 ///
 /// # Errors
-/// Where a record cannot be read, or a file not be written.
+/// If a record cannot be read, or a file not be written.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let replace = arguments.replace;
     let out = arguments.out.check(replace)?;

@@ -56,7 +56,7 @@ pub enum To {
 /// What a typed line says: of several rows, the one that stands before a colon or all, and the command.
 ///
 /// # Errors
-/// Where there is no such row, or the rest is no command; in words.
+/// If there is no such row, or the rest is no command; in words.
 fn addressed<'a>(line: &'a str, names: &[String]) -> Result<(To, &'a str), String> {
     let (to, command) = match line.split_once(':').map(|(name, command)| (row(name.trim(), names), command.trim())) {
         Some((Ok(to), command)) => (to, command),
@@ -83,7 +83,7 @@ fn row(name: &str, names: &[String]) -> Result<To, String> {
 /// Watches until the user has seen enough.
 ///
 /// # Errors
-/// Where there is no Uno to begin with, or terminal or log fail.
+/// If there is no Uno to begin with, or terminal or log fail.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let chosen = arguments.ports.choose()?;
     let logs = arguments.log.as_deref().map(|out| Logs::open(out, &chosen)).transpose()?;

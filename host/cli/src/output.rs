@@ -44,7 +44,7 @@ pub fn tell_line(line: Arguments) {
 /// The command as it was typed, for a report that says how to make it again.
 ///
 /// # Errors
-/// Where a word cannot be quoted for a shell.
+/// If a word cannot be quoted for a shell.
 pub fn command_line() -> Result<String> {
     let words: Vec<String> = ["weeder".to_owned()].into_iter().chain(env::args().skip(1)).collect();
     Ok(shlex::try_join(words.iter().map(String::as_str))?)

@@ -25,7 +25,7 @@ impl<'a> Part<'a> {
     /// A shard's.
     ///
     /// # Errors
-    /// Where the file could not be written, or this program cannot be read.
+    /// If the file could not be written, or this program cannot be read.
     pub fn new(shard: Shard, out: &'a FileName, replace: Replace) -> Result<Self> {
         Ok(Self { shard, out: out.check(replace)?, program: program()?, began: Instant::now() })
     }
@@ -38,7 +38,7 @@ impl<'a> Part<'a> {
     /// Writes it whole, once all is computed, and says so.
     ///
     /// # Errors
-    /// Where the file cannot be written.
+    /// If the file cannot be written.
     pub fn write<T: Serialize>(
         self,
         command: &str,
@@ -59,7 +59,7 @@ impl<'a> Part<'a> {
 /// This program.
 ///
 /// # Errors
-/// Where its file cannot be read.
+/// If its file cannot be read.
 pub fn program() -> Result<Program> {
     let file = env::current_exe().context("the running program cannot be found")?;
     Ok(Program { version: env!("WEEDER_VERSION").to_owned(), build: check_sum(&file)? })
@@ -68,7 +68,7 @@ pub fn program() -> Result<Program> {
 /// A file's check sum, CRC-32 as of zip: it tells builds apart that differ by accident.
 ///
 /// # Errors
-/// Where it cannot be read.
+/// If it cannot be read.
 pub fn check_sum(file: &Path) -> Result<String> {
     let bytes = fs::read(file).with_context(|| format!("{} cannot be read", file.display()))?;
     Ok(format!("{:08x}", crc32fast::hash(&bytes)))

@@ -30,7 +30,7 @@ impl NamesFile {
     /// Its path.
     ///
     /// # Errors
-    /// Where the user has no folder.
+    /// If the user has no folder.
     pub fn path(&self) -> Result<PathBuf> {
         match &self.rows_file {
             Some(path) => Ok(path.clone()),
@@ -45,7 +45,7 @@ impl NamesFile {
     /// The names in it.
     ///
     /// # Errors
-    /// Where it cannot be read; one that was named has to be there.
+    /// If it cannot be read; one that was named has to be there.
     pub fn read(&self) -> Result<Names> {
         let path = self.path()?;
         ensure!(
@@ -85,7 +85,7 @@ impl Port {
     /// The board there.
     ///
     /// # Errors
-    /// Where the file of the names cannot be read.
+    /// If the file of the names cannot be read.
     pub fn board(&self) -> Result<Board> {
         match &self.port {
             Some(port) if may_be_name(port) => Ok(board(port, Some(&self.names.read()?))),
@@ -97,7 +97,7 @@ impl Port {
     /// The machine there.
     ///
     /// # Errors
-    /// Where there is none, or another than a weeder.
+    /// If there is none, or another than a weeder.
     pub fn open(&self) -> Result<Link> {
         Ok(self.board()?.open()?)
     }
@@ -115,7 +115,7 @@ pub struct Named {
 /// Reads `NAME=PORT`, or a port or a row's name alone.
 ///
 /// # Errors
-/// Where it is neither, in words.
+/// If it is neither, in words.
 pub fn named(text: &str) -> Result<Named, String> {
     let (name, port) = match text.split_once('=') {
         // A path may have the sign in it.
@@ -143,7 +143,7 @@ impl Ports {
     /// The rows that are meant.
     ///
     /// # Errors
-    /// Where there is none, two have a name, or the file of the names cannot be read.
+    /// If there is none, two have a name, or the file of the names cannot be read.
     pub fn choose(&self) -> Result<Chosen> {
         let rows = if self.all {
             every_row(&self.names.read()?)?
@@ -238,7 +238,7 @@ impl Chosen {
     /// What came of a work with each row, told of those with which it went wrong, under their names.
     ///
     /// # Errors
-    /// Where it went wrong with one: the only one's own error, or which rows those were.
+    /// If it went wrong with one: the only one's own error, or which rows those were.
     pub fn check<T>(&self, mut done: Vec<Result<T>>) -> Result<()> {
         if let (false, [_]) = (self.are_several, done.as_slice()) {
             return done.remove(0).map(drop);
@@ -267,7 +267,7 @@ impl Chosen {
     /// The row of this name.
     ///
     /// # Errors
-    /// Where there is none.
+    /// If there is none.
     pub fn find(&self, name: &str) -> Result<usize> {
         let found = self.rows.iter().position(|row| row.name == name);
         found.with_context(|| format!("there is no row {name}: there are {}", self.names().join(", ")))

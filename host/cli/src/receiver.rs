@@ -77,7 +77,7 @@ impl GpsArguments {
     /// The receiver, where there is to be one, and the first lines of the record.
     ///
     /// # Errors
-    /// Where its row is not among those that are recorded, or its port cannot be opened now: later that is no error.
+    /// If its row is not among those that are recorded, or its port cannot be opened now: later that is no error.
     pub fn open(&self, chosen: &Chosen) -> Result<Option<(Gps, Lines)>> {
         let antenna = self.antenna.over(Antenna::default());
         let Some(Named { name, port }) = &self.gps else {

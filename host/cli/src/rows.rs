@@ -58,7 +58,7 @@ enum Action {
 /// Lists, names or forgets.
 ///
 /// # Errors
-/// Where the file, a name or a port is wrong.
+/// If the file, a name or a port is wrong.
 pub fn run(arguments: &Arguments) -> Result<()> {
     match &arguments.action {
         None => list(&arguments.file.read()?, arguments.json),

@@ -57,7 +57,7 @@ pub struct Arguments {
 /// Serves until Ctrl-C.
 ///
 /// # Errors
-/// Where there is no page, two machines have a name, or an address cannot be had.
+/// If there is no page, two machines have a name, or an address cannot be had.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let page = match (&arguments.page, Page::inside()) {
         (Some(folder), _) => Page::read(folder)?,

@@ -55,7 +55,7 @@ const ROLLED_TICKS: u32 = 500;
 /// Leads through the steps.
 ///
 /// # Errors
-/// Where file or machine cannot be used; each says what would be right.
+/// If file or machine cannot be used; each says what would be right.
 pub fn run(arguments: &Arguments) -> Result<()> {
     if arguments.simulated {
         return say!("{}", simulated::table()?);

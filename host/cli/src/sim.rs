@@ -76,7 +76,7 @@ const REPORT: [&str; 5] = ["row.svg", "weeding.svg", "row.csv", "plants.csv", "w
 /// Runs it and prints the result.
 ///
 /// # Errors
-/// Where an argument or a file is wrong, or the firmware cannot be run.
+/// If an argument or a file is wrong, or the firmware cannot be run.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let replace = arguments.replace;
     let folder = arguments.out.as_ref().map(|out| out.check(REPORT, replace)).transpose()?;

@@ -82,7 +82,7 @@ impl Study {
 /// Runs it and prints what it has shown, or writes a part of it.
 ///
 /// # Errors
-/// Where nothing is asked for, or the firmware cannot be built or run.
+/// If nothing is asked for, or the firmware cannot be built or run.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let &Arguments { hours, uno_minutes, seed, faults, json, .. } = arguments;
     ensure!(
@@ -139,7 +139,7 @@ fn write_part(study: &Study, elf: Option<&Path>, part: Part) -> Result<Finding> 
 /// Prints what all hours and rows have shown, which were computed somewhere.
 ///
 /// # Errors
-/// Where it cannot be printed.
+/// If it cannot be printed.
 pub fn merge(study: &Study, mut tallies: Vec<Tally>, json: bool) -> Result<Finding> {
     let rows = tallies.split_off((study.hours as usize).min(tallies.len()));
     let mut stages = Vec::new();

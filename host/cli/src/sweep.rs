@@ -164,7 +164,7 @@ impl Shown {
 /// Runs it and prints the result, or writes a part of it.
 ///
 /// # Errors
-/// Where an axis or the field is wrong, or the file cannot be written.
+/// If an axis or the field is wrong, or the file cannot be written.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let &Arguments { ref out, replace, json, ref result, .. } = arguments;
     let sweep = Sweep {
@@ -194,7 +194,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 /// Prints the result of all points' plots, which were weeded somewhere.
 ///
 /// # Errors
-/// Where the file cannot be written.
+/// If the file cannot be written.
 pub fn merge(sweep: &Sweep, outcomes: &[PlotOutcome], shown: &Shown) -> Result<()> {
     let out = shown.out()?;
     show(sweep, &sweep.points(outcomes)?, shown, out.as_ref())

@@ -105,7 +105,7 @@ impl FromStr for Votes {
 /// Trains, and prints what came of it.
 ///
 /// # Errors
-/// Where a file or its contents are wrong, or the table would not fit.
+/// If a file or its contents are wrong, or the table would not fit.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let replace = arguments.replace;
     let table = arguments.out.as_ref().map(|out| Destination::of(out, replace)).transpose()?;

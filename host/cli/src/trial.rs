@@ -218,7 +218,7 @@ impl Shown {
 /// Runs it and prints the result, or writes a part of it.
 ///
 /// # Errors
-/// Where the field is wrong, the firmware cannot be built or run, or a file cannot be written.
+/// If the field is wrong, the firmware cannot be built or run, or a file cannot be written.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let &Arguments { replace, json, brief, .. } = arguments;
     let file = arguments.out.as_ref().map(FileName::from);
@@ -275,7 +275,7 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
 /// Prints the result of all plots, which were weeded somewhere.
 ///
 /// # Errors
-/// Where a file cannot be written.
+/// If a file cannot be written.
 pub fn merge(study: Study, mut plots: Vec<PlotPart>, shown: &Shown) -> Result<Finding> {
     let folder = shown.folder()?;
     let picture = plots.first_mut().and_then(|plot| plot.picture.take());

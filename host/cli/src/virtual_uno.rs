@@ -102,7 +102,7 @@ fn bootloader(name: &Path) -> Result<Bootloader, HexError> {
 /// Runs until Ctrl-C, or until it is asked to end by SIGTERM or SIGHUP.
 ///
 /// # Errors
-/// Where a file is wrong, no pseudo terminal is to be had, or the firmware crashes.
+/// If a file is wrong, no pseudo terminal is to be had, or the firmware crashes.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let bootloader = arguments.bootloader.as_deref().map(bootloader).transpose()?;
     let count = arguments.rows;

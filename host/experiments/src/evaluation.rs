@@ -89,7 +89,7 @@ impl Analysis {
     /// Analyses the plots of a trial.
     ///
     /// # Errors
-    /// Where there is no plot, or one that cannot be. What a single measure has no model for is said in its place.
+    /// If there is no plot, or one that cannot be. What a single measure has no model for is said in its place.
     pub fn of(records: Vec<PlotRecord>) -> Result<Self, AnalysisError> {
         if records.is_empty() {
             return Err(AnalysisError::NoPlots);

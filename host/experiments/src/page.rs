@@ -76,7 +76,7 @@ impl Page<'_> {
     /// The page as HTML, to be written to a file as it is.
     ///
     /// # Errors
-    /// Where a figure of the comparison is not finite, or plotters cannot draw.
+    /// If a figure of the comparison is not finite, or plotters cannot draw.
     pub fn html(&self) -> Result<String, PageError> {
         let comparison = self.comparison.map(Headline::of).transpose()?;
         let analysis = self.analysis;

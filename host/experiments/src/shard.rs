@@ -224,7 +224,7 @@ pub fn write<T: Serialize>(
 /// Reads the first line of a part, called `name`.
 ///
 /// # Errors
-/// Where it cannot be read, or is something else.
+/// If it cannot be read, or is something else.
 pub fn read_header(name: &str, from: &mut dyn BufRead) -> Result<Header, PartError> {
     let no_part = |problem: String| PartError::NoPart { name: name.to_owned(), problem };
     let mut line = Vec::new();
@@ -255,7 +255,7 @@ const MOST_HEADER: u64 = 1 << 24;
 /// Reads the outcomes of a part behind its header: all of them, in the order of their numbers.
 ///
 /// # Errors
-/// Where it cannot be read, a line is wrong, or one is missing or too many.
+/// If it cannot be read, a line is wrong, or one is missing or too many.
 pub fn read_outcomes<T: DeserializeOwned>(
     name: &str,
     header: Header,

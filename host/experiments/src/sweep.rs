@@ -238,7 +238,7 @@ impl Sweep {
     /// The points, of what came of all their plots.
     ///
     /// # Errors
-    /// Where an axis has a value that cannot be.
+    /// If an axis has a value that cannot be.
     pub fn points(&self, outcomes: &[PlotOutcome]) -> Result<Vec<Point>, SweepError> {
         let point = |(place, outcome): (&Place, &PlotOutcome)| {
             let results = Results::of(outcome, place.experiment.conditions.plot.rows);

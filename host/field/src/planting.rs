@@ -85,7 +85,7 @@ impl Planting {
     /// The row that grows from a seed. The first plant's centre is half a spacing from the origin.
     ///
     /// # Errors
-    /// Where plants or weeds do not fit.
+    /// If plants or weeds do not fit.
     pub fn grow(&self, seed: u64) -> Result<Row, PlantingError> {
         let tightest_mm = self.spacing_mm - self.spacing_scatter_mm;
         let widest_mm = self.canopy_mm + self.canopy_scatter_mm;

@@ -194,7 +194,7 @@ impl Row {
     /// A row of things, in any order.
     ///
     /// # Errors
-    /// Where there are none, one is malformed, or two overlap.
+    /// If there are none, one is malformed, or two overlap.
     pub fn new(mut things: Vec<Thing>) -> Result<Self, Problem> {
         if things.is_empty() {
             return Err(Problem::Empty);

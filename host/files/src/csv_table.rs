@@ -105,7 +105,7 @@ fn opened(text: &str, before: u64, record: &StringRecord) -> Option<u64> {
 /// What stands in a file.
 ///
 /// # Errors
-/// Where it cannot be read.
+/// If it cannot be read.
 pub fn bytes(path: &Path) -> Result<Vec<u8>, FileError> {
     fs::read(path).map_err(|source| FileError::unread(path, source))
 }
@@ -133,7 +133,7 @@ impl Line<'_> {
     /// The value in a column. `right` says what it has to be.
     ///
     /// # Errors
-    /// Where the text is none.
+    /// If the text is none.
     pub fn value<T: FromStr>(&self, column: &str, right: &str) -> Result<T, FileError> {
         let text = self.text(column);
         text.parse().map_err(|_| self.error(format!("{column} is `{text}`: it has to be {right}")))

@@ -94,7 +94,7 @@ impl Heading {
 /// Reads the examples that the machine was taught, with their numbers.
 ///
 /// # Errors
-/// Where the console fails, [`ExamplesError::NoObject`] and [`ExamplesError::OtherTable`].
+/// If the console fails, [`ExamplesError::NoObject`] and [`ExamplesError::OtherTable`].
 pub fn read(link: &mut Link) -> Result<Vec<(u16, Taught)>, ExamplesError> {
     let (mut built_in, mut taught) = (Vec::new(), Vec::new());
     for line in link.ask("examples")? {

@@ -92,7 +92,7 @@ impl Link {
     /// Opens a port by its name, or that of the only Uno, and makes sure that the weeder's firmware answers.
     ///
     /// # Errors
-    /// Where the port is absent, busy or forbidden, or something else than the weeder's firmware is at its other end.
+    /// If the port is absent, busy or forbidden, or something else than the weeder's firmware is at its other end.
     #[cfg(not(target_arch = "wasm32"))]
     pub fn open(port: Option<&str>) -> Result<Self, LinkError> {
         let (port, resets) = match port {
@@ -105,7 +105,7 @@ impl Link {
     /// A link over a port that is open already; `resets` says whether opening it has reset the Uno.
     ///
     /// # Errors
-    /// Where the port is gone, or something else than the weeder's firmware is at its other end.
+    /// If the port is gone, or something else than the weeder's firmware is at its other end.
     pub fn over(port: impl Port + 'static, resets: bool) -> Result<Self, LinkError> {
         let mut link =
             Self { port: Box::new(port), lines: LineReader::new(), events: VecDeque::new(), version: String::new() };
@@ -139,7 +139,7 @@ impl Link {
     /// Types a command and returns the lines of its answer, the `ok` left out.
     ///
     /// # Errors
-    /// Where it is no command, the firmware refuses, or no whole answer comes.
+    /// If it is no command, the firmware refuses, or no whole answer comes.
     pub fn ask(&mut self, command: &str) -> Result<Vec<String>, LinkError> {
         self.send(command)?;
         let deadline = Instant::now() + ANSWER_TIME;
@@ -181,7 +181,7 @@ impl Link {
     /// Types a command and does not wait for its answer, which comes by [`next_line`](Self::next_line).
     ///
     /// # Errors
-    /// Where it is no command, or the port is gone.
+    /// If it is no command, or the port is gone.
     pub fn send(&mut self, command: &str) -> Result<(), LinkError> {
         if !is_command(command) {
             return Err(LinkError::NoCommand(command.to_owned()));
@@ -192,7 +192,7 @@ impl Link {
     /// The next line that the machine says; none where no line was complete within a fiftieth of a second.
     ///
     /// # Errors
-    /// Where the port is gone.
+    /// If the port is gone.
     pub fn next_line(&mut self) -> Result<Option<String>, LinkError> {
         if let Some(line) = self.events.pop_front() {
             return Ok(Some(line));

@@ -129,7 +129,7 @@ impl LogWriter {
     /// Opens a log; one that is there is gone on with.
     ///
     /// # Errors
-    /// Where the file cannot be written, or is something else.
+    /// If the file cannot be written, or is something else.
     pub fn open(path: &Path) -> Result<Self, LogError> {
         let failed = |source| LogError::File { path: path.into(), source };
         let mut file =
@@ -159,7 +159,7 @@ impl LogWriter {
     /// Writes down what happened.
     ///
     /// # Errors
-    /// Where the file cannot be written.
+    /// If the file cannot be written.
     pub fn write(&mut self, happening: &Happening) -> Result<(), LogError> {
         self.write_at(self.now_ms(), happening)
     }
@@ -167,7 +167,7 @@ impl LogWriter {
     /// Writes down what happened at a time that another clock tells.
     ///
     /// # Errors
-    /// Where the file cannot be written.
+    /// If the file cannot be written.
     pub fn write_at(&mut self, time_ms: u64, happening: &Happening) -> Result<(), LogError> {
         match happening {
             Happening::Connected { version, settings, examples } => {
@@ -191,7 +191,7 @@ impl LogWriter {
     /// Writes lines of some kinds at a time, of what is no [`Happening`].
     ///
     /// # Errors
-    /// Where the file cannot be written.
+    /// If the file cannot be written.
     pub fn lines_at(&mut self, time_ms: u64, lines: &[(Kind, String)]) -> Result<(), LogError> {
         lines.iter().try_for_each(|(kind, line)| self.line(time_ms, *kind, line))
     }

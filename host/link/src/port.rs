@@ -33,7 +33,7 @@ const UNOS: [(u16, u16); 10] = [
 /// The only Uno's port among those of this machine.
 ///
 /// # Errors
-/// Where there is none, or several.
+/// If there is none, or several.
 pub fn find_uno() -> Result<String, LinkError> {
     only_uno(&serialport::available_ports().map_err(LinkError::NoList)?)
 }
@@ -41,7 +41,7 @@ pub fn find_uno() -> Result<String, LinkError> {
 /// The ports of all Unos.
 ///
 /// # Errors
-/// Where the ports cannot be listed.
+/// If the ports cannot be listed.
 pub fn find_unos() -> Result<Vec<String>, LinkError> {
     Ok(unos(&serialport::available_ports().map_err(LinkError::NoList)?))
 }
@@ -54,7 +54,7 @@ fn unos(ports: &[SerialPortInfo]) -> Vec<String> {
 /// The only Uno's port among these.
 ///
 /// # Errors
-/// Where there is none, or several.
+/// If there is none, or several.
 fn only_uno(ports: &[SerialPortInfo]) -> Result<String, LinkError> {
     let unos = unos(ports);
     match unos.as_slice() {
@@ -75,7 +75,7 @@ pub(super) fn is_uno(port: &SerialPortInfo) -> bool {
 /// Opens a port by its name and closes it again.
 ///
 /// # Errors
-/// Where it is absent, in use, forbidden, or no serial port; each says what to do.
+/// If it is absent, in use, forbidden, or no serial port; each says what to do.
 pub fn try_port(name: &str) -> Result<(), LinkError> {
     open(name).map(drop)
 }
@@ -99,7 +99,7 @@ pub fn open_other(name: &str) -> Result<Box<dyn crate::Port>, LinkError> {
 /// Opens the port of something that only talks, such as a satellite receiver, at so many bits in a second.
 ///
 /// # Errors
-/// Where it is absent, in use, forbidden, or no serial port.
+/// If it is absent, in use, forbidden, or no serial port.
 pub fn listen(name: &str, baud: u32) -> Result<Box<dyn Read + Send>, LinkError> {
     let port = serialport::new(name, baud).timeout(Duration::from_millis(1)).open();
     Ok(Box::new(port.map_err(|error| explain(name, error))?))

@@ -44,7 +44,7 @@ use files::in_a_line;
 /// Replays a log.
 ///
 /// # Errors
-/// Where it holds no machine, or a line says what cannot be.
+/// If it holds no machine, or a line says what cannot be.
 pub fn replay(log: &[Entry]) -> Result<Replayed, ReplayError> {
     replay_with(log, |_| {})
 }

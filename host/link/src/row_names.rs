@@ -97,7 +97,7 @@ impl Board {
     /// The board at a port: whether it has a serial number of its own, the system's list tells.
     ///
     /// # Errors
-    /// Where there is no such port.
+    /// If there is no such port.
     pub fn at(port: &str) -> Result<Self, LinkError> {
         let path = Path::new(port);
         // What a link leads to now is what the list has.
@@ -117,7 +117,7 @@ impl Board {
     /// Opens a link to it, at whichever port it is now.
     ///
     /// # Errors
-    /// Where it is not plugged in, or as [`Link::open`].
+    /// If it is not plugged in, or as [`Link::open`].
     pub fn open(&self) -> Result<Link, LinkError> {
         let (port, resets) = open(&self.port()?)?;
         Link::over(port, resets)
@@ -126,7 +126,7 @@ impl Board {
     /// The port at which it is now.
     ///
     /// # Errors
-    /// Where it is not plugged in, or cannot be told from another.
+    /// If it is not plugged in, or cannot be told from another.
     pub fn port(&self) -> Result<String, LinkError> {
         match self {
             Self::Only => find_uno(),
@@ -173,7 +173,7 @@ fn of(port: &SerialPortInfo, ports: &[SerialPortInfo], by_place: &Path) -> Board
 /// The Unos at this computer's USB ports.
 ///
 /// # Errors
-/// Where the system has no list of its ports.
+/// If the system has no list of its ports.
 pub fn plugged() -> Result<Vec<Plugged>, LinkError> {
     let ports = serialport::available_ports().map_err(LinkError::NoList)?;
     let board = |port: &SerialPortInfo| of(port, &ports, Path::new(BY_PLACE));
@@ -241,7 +241,7 @@ impl Names {
     /// Calls a board so. Another name that it had is dropped, and so is another board that had the name; the row keeps its place.
     ///
     /// # Errors
-    /// Where it cannot be a row's name.
+    /// If it cannot be a row's name.
     pub fn name(&mut self, name: &str, board: Board) -> Result<(), NamesError> {
         let refused = |problem| NamesError::Name { name: name.to_owned(), problem };
         if let Some(problem) = wrong_with(name) {
@@ -273,7 +273,7 @@ impl Names {
     /// Forgets a row.
     ///
     /// # Errors
-    /// Where there is none of this name.
+    /// If there is none of this name.
     pub fn forget(&mut self, name: &str) -> Result<(), NamesError> {
         if self.document.remove(name).is_none() {
             let known: Vec<&str> = self.rows.iter().map(|row| row.name.as_str()).collect();
@@ -287,7 +287,7 @@ impl Names {
     /// Writes the file, and makes its folder where there is none.
     ///
     /// # Errors
-    /// Where it cannot be written.
+    /// If it cannot be written.
     pub fn write(&self) -> Result<(), NamesError> {
         let text = format!("{}{}", self.head, self.document);
         let folder = self.path.parent().filter(|folder| !folder.as_os_str().is_empty());

@@ -92,7 +92,7 @@ pub fn explain(contradiction: Contradiction) -> String {
 /// Reads all settings in use.
 ///
 /// # Errors
-/// Where the console fails, or the firmware has other settings than this program.
+/// If the console fails, or the firmware has other settings than this program.
 pub fn read(link: &mut Link) -> Result<Settings, SettingsError> {
     shown_by(&link.ask("get")?)
 }
@@ -100,7 +100,7 @@ pub fn read(link: &mut Link) -> Result<Settings, SettingsError> {
 /// The settings that the answer to `get` shows.
 ///
 /// # Errors
-/// Where one of them is missing, or has a value that cannot be.
+/// If one of them is missing, or has a value that cannot be.
 pub(super) fn shown_by(lines: &[String]) -> Result<Settings, SettingsError> {
     let shown: Vec<(Setting, u16)> = lines.iter().filter_map(|line| shown(line)).collect();
     let mut settings = Settings::new();

@@ -105,7 +105,7 @@ impl Design {
     /// Calculates the design of a machine.
     ///
     /// # Errors
-    /// Where a value of the machine is out of its range, or values do not go together.
+    /// If a value of the machine is out of its range, or values do not go together.
     pub fn of(machine: &Machine) -> Result<Self, MachineError> {
         machine.check()?;
         let Machine { weeder, soil, crop, inter_row, intra_row, engine, chain, .. } = machine;

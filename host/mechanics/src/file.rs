@@ -37,7 +37,7 @@ pub enum FileError {
 /// Reads a machine and checks it.
 ///
 /// # Errors
-/// Where the file cannot be read, is no TOML, has unknown keys or units, or makes no machine that could be calculated.
+/// If the file cannot be read, is no TOML, has unknown keys or units, or makes no machine that could be calculated.
 pub fn read(path: &Path) -> Result<Machine, FileError> {
     let text = fs::read_to_string(path).map_err(|source| FileError::Unreadable { path: path.to_owned(), source })?;
     parse(&text).map_err(|Mistake { line, message }| FileError::Wrong { path: path.to_owned(), line, message })

@@ -112,7 +112,7 @@ impl Machines {
 /// Compares the paper's figures with ours, and with those of a machine of one's own.
 ///
 /// # Errors
-/// Where the machine of one's own cannot be calculated.
+/// If the machine of one's own cannot be calculated.
 pub fn compare(own: Option<&Machine>) -> Result<Vec<Comparison>, MachineError> {
     let machines = Machines { paper: Design::of(&Machine::default())?, own: own.map(Design::of).transpose()? };
     let mut comparisons = traction(&machines);

@@ -80,7 +80,7 @@ impl Swing {
     /// The swing of a machine, whose servo turns against this torque.
     ///
     /// # Errors
-    /// Where the arm is too short or the servo too weak.
+    /// If the arm is too short or the servo too weak.
     pub fn of(machine: &Machine, torque: Torque) -> Result<Self, NoSwing> {
         Self::with_tool(machine, torque, MM.value(machine.intra_row.width))
     }

@@ -199,7 +199,7 @@ impl WrittenError {
 /// Reads a number and a unit. Spaces between them, and spaces and dots within the unit, do not matter.
 ///
 /// # Errors
-/// Where there is no number, or the unit is missing or of another kind of quantity; it says which units there are.
+/// If there is no number, or the unit is missing or of another kind of quantity; it says which units there are.
 pub fn parse<Q: Written>(text: &str) -> Result<Q, WrittenError> {
     let error = || WrittenError::new::<Q>(format_args!("\"{text}\""));
     let (number, name) = text.split_at(number_end(text));

@@ -129,7 +129,7 @@ impl Server {
     /// Takes the addresses, and starts to talk to the machines. A machine that is not there is waited for.
     ///
     /// # Errors
-    /// Where an address cannot be had.
+    /// If an address cannot be had.
     pub fn open(setup: Setup) -> Result<Self, ServeError> {
         let runtime = runtime::Builder::new_current_thread().enable_io().enable_time().build();
         let runtime = runtime.map_err(|error| ServeError::System("way to wait for sockets", error))?;
@@ -179,7 +179,7 @@ impl Server {
 /// This computer's address in its network, where it is in one.
 ///
 /// # Errors
-/// Where it is in none, or in several.
+/// If it is in none, or in several.
 pub fn find_lan() -> Result<Ipv4Addr, ServeError> {
     let addresses = if_addrs::get_if_addrs().map_err(|error| ServeError::System("list of its addresses", error))?;
     only_lan(addresses.into_iter().filter_map(|interface| match interface.ip() {

@@ -43,7 +43,7 @@ impl Page {
     /// Reads the page's files.
     ///
     /// # Errors
-    /// Where one of them is not there.
+    /// If one of them is not there.
     pub fn read(folder: &Path) -> Result<Self, NoPage> {
         let read = |name: &str| {
             let path = folder.join(name);

@@ -70,7 +70,7 @@ impl Novice {
     /// Does a step of the manual.
     ///
     /// # Errors
-    /// Where the simulated field does not know what the step is about.
+    /// If the simulated field does not know what the step is about.
     pub fn follow(&mut self, step: &ManualStep) -> Result<(), ManualError> {
         step.tasks.iter().try_for_each(|&task| self.follow_task(task))
     }

@@ -51,7 +51,7 @@ const CHARACTER_CYCLES: u64 = 500;
 /// The Uno's clock runs until the answer is complete. What the firmware had sent before is dropped.
 ///
 /// # Errors
-/// Where the firmware refuses, goes silent or stops.
+/// If the firmware refuses, goes silent or stops.
 pub fn ask(uno: &mut Uno, command: &str) -> Result<Vec<String>, ConsoleError> {
     uno.received();
     uno.send(format!("{command}\n").as_bytes());

@@ -62,7 +62,7 @@ pub enum BuildError {
 ///
 /// # Errors
 ///
-/// Where cargo cannot be started, fails, or makes no ELF.
+/// If cargo cannot be started, fails, or makes no ELF.
 pub fn build() -> Result<PathBuf, BuildError> {
     static BUILT: OnceLock<Result<PathBuf, BuildError>> = OnceLock::new();
     BUILT.get_or_init(|| FIRMWARE.build()).clone()

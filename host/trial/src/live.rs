@@ -329,7 +329,7 @@ impl LiveUno {
     /// Powers it up. Its clock stands until it runs.
     ///
     /// # Errors
-    /// Where there is nothing to run or it does not fit, no terminal is to be had, or a file is wrong.
+    /// If there is nothing to run or it does not fit, no terminal is to be had, or a file is wrong.
     pub fn start(setup: Setup) -> Result<LiveUno, LiveError> {
         let eeprom = setup.eeprom.map(EepromFile::open).transpose()?;
         let content = eeprom.as_ref().map_or(&[][..], |file| &file.content);
@@ -372,7 +372,7 @@ impl LiveUno {
     /// Runs until `stop` is set.
     ///
     /// # Errors
-    /// Where the firmware crashes or halts, or the terminal or the EEPROM's file fails.
+    /// If the firmware crashes or halts, or the terminal or the EEPROM's file fails.
     pub fn run(&mut self, stop: &AtomicBool) -> Result<(), LiveError> {
         let mut pace = (!self.fast).then(Pace::new);
         while !stop.load(Ordering::Relaxed) {

@@ -44,7 +44,7 @@ const PROGRESS_CYCLES: u64 = CYCLES_PER_SECOND / 20;
 /// Plays the recording to the firmware at `elf`. `progress` is told the share done, from 0 to 1.
 ///
 /// # Errors
-/// Where the firmware cannot be run or does not answer.
+/// If the firmware cannot be run or does not answer.
 pub fn replay(capture: &Capture, elf: &Path, mut progress: impl FnMut(f64)) -> Result<Replay, TrialError> {
     let (first_levels, edges) = split_first_levels(&capture.changes);
     let mut uno = boot(elf, &first_levels)?;

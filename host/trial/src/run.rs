@@ -93,7 +93,7 @@ pub fn boot(elf: &Path, levels: &[PinChange]) -> Result<Uno, UnoError> {
 /// Has the firmware at `elf` weed a trial's row. `progress` is told the share of the motion done, from 0 to 1.
 ///
 /// # Errors
-/// Where the firmware cannot be run or does not answer.
+/// If the firmware cannot be run or does not answer.
 pub fn run(trial: &Trial, elf: &Path, mut progress: impl FnMut(f64)) -> Result<Outcome, TrialError> {
     let Trial { row, machine, motion, .. } = trial;
     let mut inputs = vec![machine.beam_before(row, motion)];
@@ -149,7 +149,7 @@ pub fn run(trial: &Trial, elf: &Path, mut progress: impl FnMut(f64)) -> Result<O
 /// Tells the firmware what it has to know of machine and timing, by its settings, and of the crop, by examples.
 ///
 /// # Errors
-/// Where it refuses something, or does not answer.
+/// If it refuses something, or does not answer.
 pub fn set_up(trial: &Trial, uno: &mut Uno) -> Result<(), ConsoleError> {
     for (setting, value) in trial.firmware_settings() {
         ask(uno, &format!("set {} {value}", name(setting)))?;

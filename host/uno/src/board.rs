@@ -33,7 +33,7 @@ impl Uno {
     ///
     /// # Errors
     ///
-    /// Where the ELF cannot be read or does not fit the chip.
+    /// If the ELF cannot be read or does not fit the chip.
     pub fn boot(elf: &Path) -> Result<Uno, UnoError> {
         Uno::boot_with_eeprom(elf, &[])
     }
@@ -170,7 +170,7 @@ impl Uno {
     ///
     /// # Panics
     ///
-    /// Where the pin is none of A0 to A5.
+    /// If the pin is none of A0 to A5.
     pub fn set_millivolts(&mut self, pin: Pin, millivolts: u16) {
         let channel = pin.adc_channel().unwrap_or_else(|| panic!("{pin} is not an analogue pin: take A0 to A5"));
         if millivolts >= SUPPLY_MILLIVOLTS / 10 * 6 {
@@ -202,7 +202,7 @@ impl Uno {
     ///
     /// # Errors
     ///
-    /// Where the firmware crashed or halted for good.
+    /// If the firmware crashed or halted for good.
     pub fn run_until(&mut self, cycle: u64) -> Result<(), UnoError> {
         while self.cycle() < cycle {
             self.step(cycle)?;
@@ -394,7 +394,7 @@ impl Uno {
     ///
     /// # Errors
     ///
-    /// Where there is no such symbol, or more bytes than it has.
+    /// If there is no such symbol, or more bytes than it has.
     pub fn write(&mut self, symbol: &str, bytes: &[u8]) -> Result<(), UnoError> {
         let length = bytes.len();
         match self.image.variables.get(symbol) {
@@ -407,7 +407,7 @@ impl Uno {
     ///
     /// # Errors
     ///
-    /// Where they do not fit into SRAM, which is from 0x0100 to 0x08FF.
+    /// If they do not fit into SRAM, which is from 0x0100 to 0x08FF.
     pub fn write_sram(&mut self, address: u16, bytes: &[u8]) -> Result<(), UnoError> {
         let length = bytes.len();
         let fits = u16::try_from(length).is_ok_and(|count| self.core.sram(address, count).len() == length);

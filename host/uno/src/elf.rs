@@ -36,7 +36,7 @@ impl Size {
     ///
     /// # Errors
     ///
-    /// Where the file cannot be read or is no ELF for AVR.
+    /// If the file cannot be read or is no ELF for AVR.
     pub fn read(path: &Path) -> Result<Size, ImageError> {
         let bytes = read_bytes(path)?;
         parse(path, &bytes).map(|file| size(&file))
@@ -113,7 +113,7 @@ impl Image {
     ///
     /// # Errors
     ///
-    /// Where the file cannot be read, is no ELF for AVR, or holds more than the ATmega328P does.
+    /// If the file cannot be read, is no ELF for AVR, or holds more than the ATmega328P does.
     pub fn read(path: &Path) -> Result<Image, ImageError> {
         let bytes = read_bytes(path)?;
         let file = parse(path, &bytes)?;

@@ -87,7 +87,7 @@ impl Bootloader {
     /// Reads a bootloader's Intel HEX file.
     ///
     /// # Errors
-    /// Where it cannot be read, is not Intel HEX, or does not lie in the chip's boot section.
+    /// If it cannot be read, is not Intel HEX, or does not lie in the chip's boot section.
     pub fn read(path: &Path) -> Result<Bootloader, HexError> {
         let text = std::fs::read_to_string(path).map_err(|source| HexError::Read { path: path.into(), source })?;
         let pieces = pieces(&text).map_err(|reason| HexError::NotHex { path: path.into(), reason })?;
@@ -108,7 +108,7 @@ impl Bootloader {
     /// Compiles Optiboot, the Uno's own bootloader. The file of it that Debian has ready is longer than its boot section.
     ///
     /// # Errors
-    /// Where avr-gcc or the source is missing.
+    /// If avr-gcc or the source is missing.
     pub fn optiboot() -> Result<Bootloader, HexError> {
         let not_compiled = |reason: &dyn ToString| HexError::NotCompiled(reason.to_string());
         let elf = tempfile::NamedTempFile::new().map_err(|error| not_compiled(&error))?;
@@ -136,7 +136,7 @@ impl Bootloader {
     /// All that goes into flash: the firmware, then erased flash, then the bootloader.
     ///
     /// # Errors
-    /// Where the firmware reaches into the bootloader.
+    /// If the firmware reaches into the bootloader.
     pub fn behind(&self, firmware: &[u8]) -> Result<Vec<u8>, HexError> {
         check_room(firmware.len(), self.start.into())?;
         let mut flash = firmware.to_vec();
@@ -149,7 +149,7 @@ impl Bootloader {
 /// Checks that a firmware of so many bytes fits into the flash that a bootloader leaves.
 ///
 /// # Errors
-/// Where it does not.
+/// If it does not.
 pub fn check_room(bytes: usize, available: usize) -> Result<(), HexError> {
     if bytes <= available { Ok(()) } else { Err(HexError::NoRoom { bytes, available }) }
 }
@@ -157,7 +157,7 @@ pub fn check_room(bytes: usize, available: usize) -> Result<(), HexError> {
 /// What goes into flash from address 0 on as Intel HEX.
 ///
 /// # Panics
-/// Where `flash` is longer than the ATmega328P's.
+/// If `flash` is longer than the ATmega328P's.
 pub fn text(flash: &[u8]) -> String {
     assert!(flash.len() <= FLASH_BYTES, "the ATmega328P holds {FLASH_BYTES} bytes");
     let lines = flash.chunks(LINE_BYTES).zip((0..).step_by(LINE_BYTES));

@@ -88,7 +88,7 @@ impl Pty {
     /// Opens one.
     ///
     /// # Errors
-    /// Where the system has none to give.
+    /// If the system has none to give.
     pub fn open() -> Result<Pty, PtyError> {
         let open = || -> io::Result<Pty> {
             let device = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)?;
@@ -146,7 +146,7 @@ impl Pty {
     /// that is gone.
     ///
     /// # Errors
-    /// Where it has failed.
+    /// If it has failed.
     pub fn was_opened(&mut self) -> Result<bool, PtyError> {
         let mut opened = false;
         let mut buffer = [MaybeUninit::uninit(); 1024];
@@ -176,7 +176,7 @@ impl Pty {
     /// Takes what programs have written, up to `buffer`'s length; without waiting. Returns the number of bytes.
     ///
     /// # Errors
-    /// Where it has failed.
+    /// If it has failed.
     pub fn read(&mut self, buffer: &mut [u8]) -> Result<usize, PtyError> {
         self.count(|mut device| device.read(buffer))
     }
@@ -184,7 +184,7 @@ impl Pty {
     /// Hands over bytes to the program that reads, as many as it has room for; without waiting. Returns the number of bytes.
     ///
     /// # Errors
-    /// Where it has failed.
+    /// If it has failed.
     pub fn write(&mut self, bytes: &[u8]) -> Result<usize, PtyError> {
         self.count(|mut device| device.write(bytes))
     }

@@ -24,7 +24,7 @@ const LOOK: Duration = Duration::from_millis(20);
 /// says which rows were there when they were opened.
 ///
 /// # Errors
-/// Where a line is no command, an Uno goes away with commands unanswered, or output or log fail.
+/// If a line is no command, an Uno goes away with commands unanswered, or output or log fail.
 pub fn run(rows: &Rows, are_there: &[bool], chosen: &Chosen, logs: Option<Logs>) -> Result<Finding> {
     let (sender, commands) = mpsc::channel();
     // Reading blocks until the operator types, so it has its own thread. The thread ends with the process.

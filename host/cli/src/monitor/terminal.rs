@@ -16,7 +16,7 @@ const TURN: Duration = Duration::from_millis(20);
 /// Watches until Ctrl-C or Ctrl-D.
 ///
 /// # Errors
-/// Where the terminal or a log fails.
+/// If the terminal or a log fails.
 pub fn run(rows: &Rows, names: Vec<String>, mut logs: Option<Logs>) -> Result<()> {
     let mut terminal = ratatui::try_init().context("the terminal cannot be drawn on: --plain does without")?;
     let result = watch(&mut terminal, rows, Model::new(names), &mut logs);

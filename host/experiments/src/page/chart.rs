@@ -89,7 +89,7 @@ impl Chart<'_> {
     /// Draws it.
     ///
     /// # Errors
-    /// Where plotters cannot draw it, as for a range without extent.
+    /// If plotters cannot draw it, as for a range without extent.
     pub fn svg(&self) -> Result<String, DrawingError> {
         svg(CHART_SIZE, |area| {
             let mut chart = ChartBuilder::on(area)
@@ -136,7 +136,7 @@ impl Chart<'_> {
 /// Draws the mark of a series in a legend, on a piece of its line where it has one.
 ///
 /// # Errors
-/// Where plotters cannot draw it.
+/// If plotters cannot draw it.
 pub fn key(look: Look, has_line: bool) -> Result<String, DrawingError> {
     let (width, height) = (KEY_SIZE.0 as i32, KEY_SIZE.1 as i32);
     svg(KEY_SIZE, |area| {

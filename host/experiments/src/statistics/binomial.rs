@@ -74,10 +74,10 @@ impl BinomialModel {
     /// Fits the model to a plot's count, and to how many it is of.
     ///
     /// # Errors
-    /// Where the plots carry none: nothing was counted or everything, no factor varies, or the counts lie on one side.
+    /// If the plots carry none: nothing was counted or everything, no factor varies, or the counts lie on one side.
     ///
     /// # Panics
-    /// Where there are more or fewer counts than plots.
+    /// If there are more or fewer counts than plots.
     pub fn fit(design: &Design, counts: &[(u32, u32)]) -> Result<Self, NoModel> {
         assert_eq!(counts.len(), design.plots(), "a response has a count for each plot");
         let (all, of) =

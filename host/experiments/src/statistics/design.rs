@@ -22,7 +22,7 @@ impl Design {
     /// The same plots, each in its block: what differs from block to block is no chance to the analysis of variance.
     ///
     /// # Panics
-    /// Where there are more or fewer blocks than plots.
+    /// If there are more or fewer blocks than plots.
     pub fn in_blocks(self, blocks: Vec<u32>) -> Self {
         assert_eq!(blocks.len(), self.plots(), "each plot lies in a block");
         Self { blocks, ..self }
@@ -36,7 +36,7 @@ impl Design {
     /// The columns of a model with all factors that vary, and a remark on each that does not.
     ///
     /// # Errors
-    /// Where the plots carry none.
+    /// If the plots carry none.
     pub(super) fn columns(&self) -> Result<(Vec<Column>, Vec<Remark>), NoModel> {
         let mut columns = vec![("constant", vec![1.0; self.plots()])];
         let mut remarks = Vec::new();

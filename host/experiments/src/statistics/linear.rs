@@ -44,10 +44,10 @@ impl LinearModel {
     /// Fits the model to a response with a finite value for each plot.
     ///
     /// # Errors
-    /// Where the plots carry none.
+    /// If the plots carry none.
     ///
     /// # Panics
-    /// Where there are more or fewer values than plots.
+    /// If there are more or fewer values than plots.
     pub fn fit(design: &Design, values: &[f64]) -> Result<Self, NoModel> {
         assert_eq!(values.len(), design.plots(), "a response has a value for each plot");
         let total = scatter(values);

@@ -47,10 +47,10 @@ impl AnalysisOfVariance {
     /// Takes a response apart that has a finite value for each plot.
     ///
     /// # Errors
-    /// Where the plots carry no such analysis.
+    /// If the plots carry no such analysis.
     ///
     /// # Panics
-    /// Where there are more or fewer values than plots.
+    /// If there are more or fewer values than plots.
     pub fn of(design: &Design, values: &[f64]) -> Result<Self, NoModel> {
         assert_eq!(values.len(), design.plots(), "a response has a value for each plot");
         if is_zero(scatter(values), values) {

@@ -42,7 +42,7 @@ impl Model {
     /// The classifier's answer to an object.
     ///
     /// # Errors
-    /// Where k does not suit the number of examples.
+    /// If k does not suit the number of examples.
     pub fn answer(&self, features: &Features) -> Result<Answer<{ label::COUNT }>, ClassifyError> {
         classify(self.examples.as_slice(), &self.scale.quantise(&features.values()), self.k, self.radius)
     }
@@ -55,7 +55,7 @@ impl Model {
     /// A line an object: what it was, what it is taken for, and what speaks for it.
     ///
     /// # Errors
-    /// Where k does not suit the number of examples.
+    /// If k does not suit the number of examples.
     pub fn table(&self, objects: &[Recorded]) -> Result<Table, ClassifyError> {
         let mut table = Table::new();
         table.load_style(presets::UTF8_BORDERS_ONLY).set_header([

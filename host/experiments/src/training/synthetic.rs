@@ -154,7 +154,7 @@ pub enum SyntheticError {
 /// All objects of the crop's field that grows from a seed, in the order in which the machine meets them.
 ///
 /// # Errors
-/// Where rows cannot grow or be seen as they should.
+/// If rows cannot grow or be seen as they should.
 pub fn objects(crop: &Crop, seed: u64) -> Result<Vec<Labelled>, SyntheticError> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut objects = Vec::new();

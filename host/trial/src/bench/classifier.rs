@@ -51,7 +51,7 @@ pub struct ClassifierCosts {
 /// Runs the bench at `elf`. `progress` is told the share of the calls done, from 0 to 1.
 ///
 /// # Errors
-/// Where the ELF cannot be run or is not the bench, and where its search answers otherwise than the plain one.
+/// If the ELF cannot be run or is not the bench, and where its search answers otherwise than the plain one.
 pub fn classifier(elf: &Path, mut progress: impl FnMut(f64)) -> Result<ClassifierCosts, BenchError> {
     let mut uno = Uno::boot(elf)?;
     variable(&uno, "DIFFERENT_ANSWERS")?;

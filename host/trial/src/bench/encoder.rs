@@ -102,7 +102,7 @@ const SETTLE_MS: u64 = 100;
 /// Turns the encoder of the firmware at `elf` for half a second and by 40,000 counts at least.
 ///
 /// # Errors
-/// Where the ELF cannot be run.
+/// If the ELF cannot be run.
 pub fn turn(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<Counted, BenchError> {
     let mut uno = run::boot(elf, &[])?;
     ask(&mut uno, "events on")?;
@@ -159,7 +159,7 @@ const SECTIONS_PASSED: u32 = 40;
 /// longest themselves, and are never closer together than `counts_per_s` and the jitter have them.
 ///
 /// # Errors
-/// Where the ELF cannot be run.
+/// If the ELF cannot be run.
 pub fn turn_at_worst(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<Counted, BenchError> {
     let mut uno = run::boot(elf, &[])?;
     ask(&mut uno, "events on")?;
@@ -310,7 +310,7 @@ fn follow(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<Option<Rate
 /// Searches the highest rate of the firmware at `elf`. `progress` is told the share of the search done, from 0 to 1.
 ///
 /// # Errors
-/// Where the ELF cannot be run.
+/// If the ELF cannot be run.
 pub fn highest_rate(elf: &Path, turning: Turning, mut progress: impl FnMut(f64)) -> Result<Rate, BenchError> {
     let mut passed = Rate { counts_per_s: LOWEST_PER_S, line_share: 0.0 };
     let mut failed = HIGHEST_PER_S;

@@ -31,7 +31,7 @@ const FRAME_CYCLES: u64 = CYCLES_PER_SECOND / 50;
 /// `progress` is told the share of the time that has passed, from 0 to 1.
 ///
 /// # Errors
-/// Where the ELF cannot be run.
+/// If the ELF cannot be run.
 pub fn jitter(elf: &Path, mut progress: impl FnMut(f64)) -> Result<Jitter, BenchError> {
     let mut uno = run::boot(elf, &[])?;
     uno.send(b"events on\n");

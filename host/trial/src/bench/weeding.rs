@@ -50,7 +50,7 @@ const PROGRESS_CYCLES: u64 = CYCLES_PER_SECOND / 20;
 /// carries the answers. `progress` is told the share of the motion done, from 0 to 1.
 ///
 /// # Errors
-/// Where the ELF cannot be run, or does not go to work.
+/// If the ELF cannot be run, or does not go to work.
 pub fn weeding(elf: &Path, mut progress: impl FnMut(f64)) -> Result<FirmwareCosts, BenchError> {
     let trial = Trial::at_speed(PLANTING.grow(1)?, Machine::default(), Timing::default(), mm_s(SPEED_KM_H));
     let mut uno = run::boot(elf, &[trial.machine.beam_before(&trial.row, &trial.motion)])?;

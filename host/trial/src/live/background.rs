@@ -51,7 +51,7 @@ impl<L: Live> Background<L> {
     /// What has ended it before.
     ///
     /// # Panics
-    /// Where its thread did.
+    /// If its thread did.
     pub fn stop(mut self) -> Result<L, L::Failure> {
         self.stop.store(true, Ordering::Relaxed);
         let thread = self.thread.take().expect("it is taken here and by drop alone");
