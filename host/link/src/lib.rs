@@ -48,26 +48,25 @@ use std::time::{Duration, Instant};
 /// Characters that the firmware takes in a line.
 pub const COMMAND_LENGTH: usize = control::say::command::LINE_LENGTH;
 
-/// Reads in which nothing came, after which an answer is given up: two seconds.
+/// Silent reads after which the link gives up an answer: two seconds.
 const SILENT_READS: usize = 100;
 
-/// Longest time that an answer may take although something keeps coming. The longest good one, all examples, takes less than
-/// a second.
+/// Longest time of an answer while lines keep coming. The longest valid answer, all examples, takes less than a second.
 const ANSWER_TIME: Duration = Duration::from_secs(10);
 
-/// Bytes in which an answer has to end, six times what the longest one takes.
+/// Greatest length of an answer in bytes: six times the longest valid one.
 const ANSWER_BYTES: usize = 40_000;
 
-/// Silent reads in which the greeting has to come after a reset: the longest wait of an old bootloader, and some patience.
+/// Silent reads until the greeting must come after a reset: the longest wait of an old bootloader, and a reserve.
 const BOOT_READS: usize = 150;
 
 /// Times that the version is asked for again.
 const RETRIES: usize = 2;
 
-/// A line of bytes, both ways.
+/// A connection that carries bytes both ways.
 ///
-/// A read waits at most some hundredths of a second, and then fails by [`io::ErrorKind::TimedOut`]. A read of no bytes, and every
-/// other error, says that the port is gone.
+/// A read waits some hundredths of a second at most, and then fails with [`io::ErrorKind::TimedOut`]. A read of zero
+/// bytes, and any other error, means that the port is gone.
 pub trait Port: Read + Write {}
 
 impl<T: Read + Write + ?Sized> Port for T {}
@@ -83,7 +82,7 @@ enum Received {
 pub struct Link {
     port: Box<dyn Port>,
     lines: LineReader,
-    /// Lines that came before an answer and belong to none.
+    /// Lines that came before an answer and do not belong to it.
     events: VecDeque<String>,
     version: String,
 }
@@ -114,7 +113,7 @@ impl Link {
         link.type_line("")?;
         link.wait_until_quiet()?;
         let mut answer = link.ask("version");
-        // The Uno may be starting right now, which no modem line has told.
+        // The Uno may be starting right now for another reason than this opening.
         for _ in 0..RETRIES {
             if !matches!(answer, Err(LinkError::Restarted(_) | LinkError::Silent { .. })) {
                 break;
@@ -163,7 +162,7 @@ impl Link {
                     return Err(LinkError::Refused { command: command.to_owned(), answer: line });
                 }
                 ConsoleLine::Greeting { .. } => return Err(LinkError::Restarted(command.to_owned())),
-                // Events come before an answer, and never within it.
+                // An event can come before an answer, never within it.
                 ConsoleLine::Event(_) if answer.is_empty() => self.events.push_back(line),
                 _ => answer.push(line),
             }
@@ -211,7 +210,7 @@ impl Link {
         self.port.flush().map_err(gone)
     }
 
-    /// A line that is there already, or one read.
+    /// Returns a buffered line, or reads one.
     fn hear(&mut self) -> Result<Received, LinkError> {
         if let Some(line) = self.lines.next_line() {
             return Ok(Received::Line(line));
@@ -239,7 +238,7 @@ impl Link {
         Ok(())
     }
 
-    /// Drops what comes until nothing comes any more, or for a second if it does not end.
+    /// Discards input until the line is silent, for a second at most.
     fn wait_until_quiet(&mut self) -> Result<(), LinkError> {
         let deadline = Instant::now() + Duration::from_secs(1);
         let mut quiet_reads = 0;
@@ -250,7 +249,7 @@ impl Link {
     }
 }
 
-/// Whether this can be typed into the console: one line of printable ASCII, and not too long.
+/// Whether this text can be typed into the console: one line of printable ASCII, and short enough.
 pub fn is_command(line: &str) -> bool {
     line.len() <= COMMAND_LENGTH && line.bytes().all(|byte| matches!(byte, b' '..=b'~'))
 }
@@ -260,7 +259,7 @@ pub fn is_greeting(line: &str) -> bool {
     matches!(ConsoleLine::parse(line), ConsoleLine::Greeting { .. })
 }
 
-/// Whether a read ended without a byte, but may be repeated.
+/// Whether a read ended without a byte and can be repeated.
 fn is_nothing(error: &io::Error) -> bool {
     matches!(error.kind(), io::ErrorKind::TimedOut | io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted)
 }

@@ -5,10 +5,10 @@
 
 use std::collections::VecDeque;
 
-/// Stands for a byte that is no printable character.
+/// Replaces a byte that is no printable character.
 pub(super) const STRANGE: char = '\u{FFFD}';
 
-/// Characters after which a line ends by itself: the firmware's own have less than 128.
+/// The longest line in characters. The firmware's own lines are shorter than 128.
 const LIMIT: usize = 256;
 
 /// Lines that wait to be taken; when more come the oldest go.
@@ -40,7 +40,7 @@ impl LineReader {
         }
     }
 
-    /// The oldest line that is complete and was not taken yet, without its end. Empty lines say nothing.
+    /// The oldest complete line that was not taken yet, without its line end. Empty lines are dropped.
     pub fn next_line(&mut self) -> Option<String> {
         self.complete.pop_front()
     }

@@ -49,7 +49,7 @@ pub fn replay(log: &[Entry]) -> Result<Replayed, ReplayError> {
     replay_with(log, |_| {})
 }
 
-/// As [`replay`], and tells how far it is, from 0 to 1, a hundred times at most.
+/// As [`replay`]. Calls `tell` with the progress, from 0 to 1, a hundred times at most.
 ///
 /// # Errors
 /// As [`replay`].
@@ -74,7 +74,7 @@ pub fn replay_with(log: &[Entry], tell: impl FnMut(f64)) -> Result<Replayed, Rep
 
 /// How far a replay is.
 struct Progress<Tell> {
-    /// Lines replayed, of so many at all paces.
+    /// Replayed lines, of the total at all paces.
     done: usize,
     all: usize,
     tell: Tell,
@@ -91,17 +91,17 @@ impl<Tell: FnMut(f64)> Progress<Tell> {
     }
 }
 
-/// What came of a stretch at one pace.
+/// The result of a stretch at one pace.
 struct Played {
     logged: Vec<Heard>,
     replayed: Vec<Heard>,
-    /// What was left out, and why.
+    /// Notes on skipped parts, with the reasons.
     notes: Vec<String>,
     /// The last place.
     end: i32,
 }
 
-/// Replays a stretch, and adds what comes of it.
+/// Replays a stretch and adds its result.
 fn replay_stretch(
     stretch: &Stretch,
     replayed: &mut Replayed,
@@ -125,7 +125,7 @@ fn replay_stretch(
         played.push(play(stretch, pace, progress)?);
     }
     let heard: Vec<&[Heard]> = played.iter().map(|played| played.replayed.as_slice()).collect();
-    // What the log says is the same at every pace.
+    // The logged values are the same at every pace.
     let Played { logged, notes, end, .. } = &played[0];
     let bounds = Bounds { first: stretch.first.position, judged_from, end: *end };
     compare(logged, &heard, &bounds, replayed);
@@ -168,7 +168,7 @@ fn play(stretch: &Stretch, pace: Pace, progress: &mut Progress<impl FnMut(f64)>)
             }
             Happened::Command { is_refused: true, .. } => {}
             Happened::Command { line, .. } => {
-                // The line that tells of the new state comes nearer to where it was taken.
+                // The status that shows the new state must come nearer to the command.
                 if stretch.is_told_by_state(place) {
                     starts_now = matches!(command::parse(line.as_bytes()), Ok(Command::Start { now: true }));
                     continue;
@@ -193,8 +193,8 @@ fn play(stretch: &Stretch, pace: Pace, progress: &mut Progress<impl FnMut(f64)>)
 mod tests {
     use super::*;
 
-    /// The log of a machine that rolls at half a metre a second over bare ground. At each of the statuses, ten a second, something
-    /// is typed and answered, or told.
+    /// The log of a machine that rolls at half a metre a second over bare ground. At each status, ten times a second,
+    /// `happens` adds typed lines, answers or events.
     fn log(statuses: u64, happens: impl Fn(u64) -> Vec<(Kind, &'static str)>) -> Vec<Entry> {
         let mut lines = vec![(0, Kind::Connected, "0.2.0".to_owned())];
         for status in 0..statuses {
@@ -216,7 +216,7 @@ mod tests {
         let replayed = replay(&never).unwrap();
         assert_eq!((replayed.difference, replayed.swings), (None, 0));
 
-        // The same start where it was taken has the tool come into the row.
+        // If the same start was accepted, the tool swings into the row.
         let taken = log(20, |status| if status == 2 { start("ok") } else { Vec::new() });
         let difference = replay(&taken).unwrap().difference.expect("the log has no swing");
         assert!(difference.replayed.contains("swing tool=in"), "{difference}");
@@ -242,7 +242,7 @@ mod tests {
 
     #[test]
     fn answers_belong_to_commands_in_their_order() {
-        // `hold` does not wait for the answer before it.
+        // `hold` does not wait for the previous answer.
         let log = log(20, |status| match status {
             2 => vec![(Kind::Command, "set margin_mm 9999"), (Kind::Command, "start")],
             3 => vec![(Kind::Answer, "error: margin_mm takes a whole number from 0 to 200"), (Kind::Answer, "ok")],

@@ -16,20 +16,20 @@ use std::path::{Path, PathBuf};
 use thiserror::Error;
 use toml_edit::{DocumentMut, InlineTable, Item, TomlError, Value};
 
-/// Characters that a row's name has at the most: it stands before its machine on a phone.
+/// Longest name of a row, in characters. A phone shows it before the machine.
 pub const NAME_LENGTH: usize = 24;
 
-/// What addresses every row, and is no row's name.
+/// The name that addresses all rows. No row may have it.
 pub const ALL: &str = "all";
 
-/// Where Linux keeps links to ports by the place where they are plugged in.
+/// Linux keeps links to ports here, by USB socket.
 const BY_PLACE: &str = "/dev/serial/by-path";
 
 /// The keys of the file.
 const SERIAL_NUMBER: &str = "serial_number";
 const PORT: &str = "port";
 
-/// What stands at the head of a new file.
+/// The head of a new file.
 const HEAD: &str = "\
 # The rows of a machine, in their order: `weeder rows` lists and names them.
 # A row is known by its board's USB serial number, or by the port at which the board is.
@@ -40,16 +40,16 @@ const HEAD: &str = "\
 pub enum Board {
     /// The only Uno at this computer.
     Only,
-    /// The one of this USB serial number.
+    /// The board with this USB serial number.
     SerialNumber(String),
-    /// The one at this port.
+    /// The board at this port.
     Port(String),
 }
 
 /// A row.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Row {
-    /// What the operator calls it.
+    /// The operator's name for it.
     pub name: String,
     /// Its board.
     pub board: Board,
@@ -58,7 +58,7 @@ pub struct Row {
 /// An Uno that is plugged in.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Plugged {
-    /// The port at which it is now.
+    /// Its present port.
     pub port: String,
     /// How it is known.
     pub board: Board,
@@ -67,7 +67,7 @@ pub struct Plugged {
 /// Why the rows' names cannot be had.
 #[derive(Debug, Error)]
 pub enum NamesError {
-    /// The file itself, or a line of it.
+    /// An error of the file, or of a line in it.
     #[error(transparent)]
     File(#[from] FileError),
     /// A name that no row can have.
@@ -75,7 +75,7 @@ pub enum NamesError {
     Name {
         /// The name.
         name: String,
-        /// What is wrong with it, and what would be right.
+        /// The problem, and what would be right.
         problem: String,
     },
     /// There is no such row.
@@ -100,7 +100,7 @@ impl Board {
     /// If there is no such port.
     pub fn at(port: &str) -> Result<Self, LinkError> {
         let path = Path::new(port);
-        // What a link leads to now is what the list has.
+        // The list of ports has the link's present target.
         let now = fs::canonicalize(path).map_or(port.to_owned(), |path| path.to_string_lossy().into_owned());
         let ports = serialport::available_ports().map_err(LinkError::NoList)?;
         let listed = ports.iter().find(|listed| listed.port_name == port || listed.port_name == now);
@@ -109,7 +109,7 @@ impl Board {
             // A link of the user's own is meant to lead elsewhere some day.
             Some(listed) if listed.port_name == port => Ok(of(listed, &ports, Path::new(BY_PLACE))),
             None if !path.exists() => Err(LinkError::Absent(port.to_owned())),
-            // From wherever the next command is typed.
+            // An absolute path is valid in any folder.
             _ => Ok(Self::Port(std::path::absolute(path).map_or(port.to_owned(), |path| path.display().to_string()))),
         }
     }
@@ -147,7 +147,7 @@ fn numbered(number: &str, ports: &[SerialPortInfo]) -> Result<String, LinkError>
     }
 }
 
-/// The serial number of the board at a port, where it has one.
+/// The serial number of the board at a port, if it has one.
 fn serial_number(port: &SerialPortInfo) -> Option<&str> {
     match &port.port_type {
         SerialPortType::UsbPort(usb) => usb.serial_number.as_deref().map(str::trim).filter(|number| !number.is_empty()),
@@ -155,7 +155,7 @@ fn serial_number(port: &SerialPortInfo) -> Option<&str> {
     }
 }
 
-/// How the board at a port is known: links by place are looked for in this folder.
+/// How to identify the board at a port. `by_place` is the folder with links by socket.
 fn of(port: &SerialPortInfo, ports: &[SerialPortInfo], by_place: &Path) -> Board {
     if let Some(number) = serial_number(port)
         && numbered(number, ports).is_ok()
@@ -181,7 +181,8 @@ pub fn plugged() -> Result<Vec<Plugged>, LinkError> {
     Ok(unos.map(|port| Plugged { port: port.port_name.clone(), board: board(port) }).collect())
 }
 
-/// What keeps a word from being a row's name, with what would be right: it becomes a file's name, and stands before a colon.
+/// Why a word cannot be a row's name, and what would be right. The name becomes part of a file name, and stands before
+/// a colon.
 pub fn wrong_with(name: &str) -> Option<String> {
     let length = name.chars().count();
     if length == 0 || length > NAME_LENGTH {
@@ -198,7 +199,7 @@ pub fn wrong_with(name: &str) -> Option<String> {
     (name == ALL).then(|| format!("`{ALL}` means every row"))
 }
 
-/// The rows' names, as they stand in their file.
+/// The rows' names, in the order of their file.
 #[derive(Clone, Debug)]
 pub struct Names {
     path: PathBuf,
@@ -209,7 +210,7 @@ pub struct Names {
 }
 
 impl Names {
-    /// Reads a file; where there is none, no row is named yet.
+    /// Reads a file. If there is none, no row has a name yet.
     ///
     /// # Errors
     /// Names the file, the line, and what would be right.
