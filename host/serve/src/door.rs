@@ -16,24 +16,24 @@ const FORM: [&str; 4] = ["/", "/pair", "/pair.css", "/pair.js"];
 pub struct Door {
     /// From where they come.
     pub reach: Reach,
-    /// Its names, as a request has to write them.
+    /// The valid values of a request's `Host`.
     names: Vec<String>,
 }
 
-/// What the door has to know of a request. A header that stands there twice is there with both of its values.
+/// The parts of a request that the door checks. A header that occurs twice has both of its values here.
 #[derive(Clone, Copy, Debug)]
 pub struct Knock<'a> {
-    /// Whether it only looks, as GET and HEAD do.
+    /// Whether it changes nothing: GET and HEAD.
     pub only_looks: bool,
-    /// Where it wants to go: a path.
+    /// Its path.
     pub path: &'a str,
-    /// Whether the target names a host as well, as one for a proxy does.
+    /// Whether its target also names a host, as in a request to a proxy.
     pub is_for_proxy: bool,
     /// `Host`.
     pub hosts: &'a [&'a [u8]],
     /// `Origin`.
     pub origins: &'a [&'a [u8]],
-    /// `Sec-Fetch-Site`: from where a page asks, where the browser says so.
+    /// `Sec-Fetch-Site`: the origin of the request, if the browser sends it.
     pub sites: &'a [&'a [u8]],
     /// Whether its cookie belongs to a paired browser.
     pub is_paired: bool,
@@ -48,7 +48,7 @@ pub enum Denial {
     /// It comes from a page of another origin, or names no origin.
     #[error("this request comes from another page: open the address that `weeder serve` printed")]
     ForeignOrigin,
-    /// It has shown no code.
+    /// It has no valid token.
     #[error("this phone is not paired: open the address that `weeder serve` printed, and type its code")]
     NotPaired,
 }
@@ -79,7 +79,7 @@ impl Door {
     /// Lets a request in.
     ///
     /// # Errors
-    /// Why it stays out.
+    /// The reason for refusing it.
     pub fn admit(&self, knock: &Knock) -> Result<(), Denial> {
         let is_name = |host: &[u8]| self.names.iter().any(|name| name.as_bytes() == host);
         let host = match knock.hosts {
@@ -87,7 +87,7 @@ impl Door {
             _ => return Err(Denial::ForeignHost),
         };
         match knock.origins {
-            // A browser leaves it out where a page looks at something of its own.
+            // A browser omits the origin when a page reads from its own server.
             [] if knock.only_looks => {}
             [origin] if origin.strip_prefix(b"http://") == Some(host) => {}
             _ => return Err(Denial::ForeignOrigin),
@@ -106,7 +106,7 @@ impl Door {
     }
 }
 
-/// The names of a host at a port: browsers leave out the port where it is http's own.
+/// The names of a host at a port. Browsers omit http's default port.
 fn named(host: &str, port: u16) -> Vec<String> {
     let with_port = format!("{host}:{port}");
     if port == 80 { vec![with_port, host.to_owned()] } else { vec![with_port] }

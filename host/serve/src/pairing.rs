@@ -9,7 +9,7 @@ use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 use subtle::ConstantTimeEq;
 
-/// Characters of a code: no I, L, O and U, which are taken for others.
+/// Characters of a code. I, L, O and U are left out, because they are easily misread.
 const ALPHABET: &[u8; 32] = b"0123456789ABCDEFGHJKMNPQRSTVWXYZ";
 
 /// Characters in a code.
@@ -18,16 +18,16 @@ pub const CODE_LENGTH: usize = 8;
 /// Bytes in a token.
 pub const TOKEN_LENGTH: usize = 32;
 
-/// Wrong codes after which none is taken for a while.
+/// Wrong codes after which codes are refused for some time.
 const TRIES: u32 = 5;
 
-/// For how long none is taken then.
+/// How long codes are then refused.
 const LOCKED_FOR: Duration = Duration::from_secs(60);
 
-/// Phones that are paired at the most; where another comes, the one that came first has to pair again.
+/// Greatest number of paired phones. A further one replaces the oldest, which must pair again.
 const PHONES: usize = 32;
 
-/// What a browser shows once it is paired.
+/// The secret that a paired browser presents.
 pub type Token = [u8; TOKEN_LENGTH];
 
 /// A pairing code.
@@ -37,22 +37,23 @@ pub struct Code([u8; CODE_LENGTH]);
 impl Code {
     /// The code of some random bytes.
     pub fn new(random: [u8; CODE_LENGTH]) -> Self {
-        // 32 characters: each of them is as likely as the others.
+        // There are 32 characters, so all are equally likely.
         Self(random.map(|byte| ALPHABET[usize::from(byte) % ALPHABET.len()]))
     }
 
-    /// The code as it is put into an address.
+    /// The code for an address.
     pub fn text(&self) -> String {
         self.0.iter().copied().map(char::from).collect()
     }
 
-    /// The code as it is read out and typed: K7QM-2F9X.
+    /// The code for reading and typing: K7QM-2F9X.
     pub fn spelled(&self) -> String {
         let text = self.text();
         format!("{}-{}", &text[..CODE_LENGTH / 2], &text[CODE_LENGTH / 2..])
     }
 
-    /// Whether this was typed: letters of either size, with blanks and dashes, and what is easily taken for another.
+    /// Whether the typed text is this code. It accepts upper and lower case, blanks, dashes, and characters that are
+    /// easily confused.
     fn is(&self, typed: &str) -> bool {
         let mut characters =
             typed.bytes().filter(|byte| !matches!(byte, b' ' | b'-')).map(|byte| match byte.to_ascii_uppercase() {
@@ -66,26 +67,26 @@ impl Code {
     }
 }
 
-/// What came of a try.
+/// The result of a try.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Try {
     /// It was the code.
     Right,
-    /// It was not, and so many wrong ones may follow before codes are locked out; none: they are now.
+    /// It was wrong. `left` more wrong codes are allowed; after 0 codes are refused for some time.
     Wrong {
         /// Tries that are left.
         left: u32,
     },
-    /// No code is taken for so long.
+    /// Codes are refused for this time.
     Locked(Duration),
 }
 
-/// Who is paired, and who tries to be.
+/// The paired phones, and the count of wrong codes.
 pub struct Pairing {
     code: Code,
     wrong: u32,
     locked_until: Option<Instant>,
-    /// Their numbers, which are not used again, and their tokens as a cookie has them.
+    /// Their numbers, which are never reused, and their tokens in the form of the cookie.
     paired: VecDeque<(u64, String)>,
     next: u64,
 }
@@ -127,14 +128,14 @@ impl Pairing {
 
     /// The number of the phone with this token, in 64 hexadecimal digits, if it is paired.
     pub fn phone(&self, shown: &str) -> Option<u64> {
-        // All are compared, to the end.
+        // All are compared to the end, so that the time reveals nothing.
         self.paired.iter().fold(None, |found, (number, token)| {
             if bool::from(token.as_bytes().ct_eq(shown.as_bytes())) { Some(*number) } else { found }
         })
     }
 }
 
-/// A token as a cookie has it.
+/// A token in the form of the cookie.
 pub fn hexadecimal(token: &Token) -> String {
     token.iter().map(|byte| format!("{byte:02x}")).collect()
 }

@@ -16,17 +16,17 @@ pub enum Reach {
     Here,
     /// From the network.
     Lan {
-        /// Whether the operator allowed it to start the machine.
+        /// Whether the operator allowed start over the network.
         may_start: bool,
     },
 }
 
-/// What is to be done with a line.
+/// How to handle a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Order {
-    /// Hold, before all that waits.
+    /// Hold, before all waiting commands.
     Hold,
-    /// Type it when what was typed before is answered.
+    /// Type it after the previous commands have been answered.
     Type,
 }
 
@@ -36,7 +36,7 @@ pub enum Forbidden {
     /// It is none.
     #[error("that is no command: it has to be one line of 1 to {} printable ASCII characters", link::COMMAND_LENGTH)]
     NoLine,
-    /// It is none that is known here.
+    /// The command is unknown.
     #[error("`weeder serve` does not know that command, and passes on only those that it knows: `help` lists them")]
     Unknown,
     /// The operator has not allowed it.
@@ -47,25 +47,25 @@ pub enum Forbidden {
         "this takes the tool over ground that the beam has not seen, and is never allowed over the network: go to the machine"
     )]
     Unseen,
-    /// It moves the tool by hand.
+    /// It drives the tool directly.
     #[error(
         "this moves the tool, and is never allowed over the network: go to the computer that has the machine's port"
     )]
     MovesTool,
-    /// It changes what the machine knows.
+    /// It changes the machine's settings or examples.
     #[error("this changes the machine, and is never allowed over the network: go to the computer that has its port")]
     ChangesMachine,
-    /// It changes what all others hear.
+    /// It changes the output for all other clients.
     #[error(
         "this changes what everybody hears, and is never allowed over the network: go to the computer that has the port"
     )]
     ChangesWire,
 }
 
-/// Whether a line may be typed from there, and how.
+/// Decides whether and how a line may be typed from there.
 ///
 /// # Errors
-/// Why it may not, and where it may.
+/// Why it is not allowed, and where it is.
 pub fn allow(line: &str, reach: Reach) -> Result<Order, Forbidden> {
     // The machine does not answer a line without a word.
     if !link::is_command(line) || line.trim().is_empty() {
@@ -76,7 +76,7 @@ pub fn allow(line: &str, reach: Reach) -> Result<Order, Forbidden> {
         return Ok(Order::Hold);
     }
     match (reach, command) {
-        // The machine says by itself what is wrong with it.
+        // The machine itself reports errors in the line.
         (Reach::Here, _) => Ok(Order::Type),
         (Reach::Lan { .. }, Err(_)) => Err(Forbidden::Unknown),
         (Reach::Lan { may_start }, Ok(command)) => match why_not(command) {
@@ -87,7 +87,7 @@ pub fn allow(line: &str, reach: Reach) -> Result<Order, Forbidden> {
     }
 }
 
-/// Why a command may not be typed over the network, where nothing more is allowed; a new one has to be put here.
+/// Why a command is refused over the network. Every new command must be added here.
 fn why_not(command: Command) -> Option<Forbidden> {
     match command {
         Command::Help
@@ -131,7 +131,7 @@ mod tests {
     const WATCHING: Reach = Reach::Lan { may_start: false };
     const STARTING: Reach = Reach::Lan { may_start: true };
 
-    /// Every command, by the rule of the manual's table that it is under.
+    /// Every command, under its rule in the manual's table.
     const HARMLESS: [&str; 11] =
         ["help", "help k", "status", "get", "get k", "events on", "examples", "dump", "version", "  status ", "get  k"];
     const STARTS: [&str; 4] = ["start", "clear", " start", "clear  "];
@@ -223,7 +223,7 @@ mod tests {
             .filter(|cells: &Vec<&str>| cells.len() == 4)
             .collect();
         assert_eq!(rows.first().map(|cells| &cells[1..]), Some(&["at the computer", "paired phone", "others"][..]));
-        // `start now` stands elsewhere than `start`.
+        // The manual lists `start now` in another row than `start`.
         let of = |line: &str| {
             let words = rows.iter().flat_map(|cells| words(cells[0]).map(move |word| (cells, word)));
             let own = words.filter(|(_, word)| format!("{line} ").starts_with(&format!("{word} ")));

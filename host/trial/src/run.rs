@@ -1,8 +1,8 @@
 //! A row: the real firmware in the virtual Uno weeds it.
 //!
-//! The machine's motion does not depend on the firmware, so a [`Trial`] runs in one direction: motion and row give the levels
-//! on the firmware's inputs, the virtual Uno plays them, and its servo pulses tell what happened to the row
-//! ([`field::verdict`]). Before that the firmware is set up over its console, as an operator would: settings, then the
+//! The machine's motion does not depend on the firmware. So a [`Trial`] runs in one direction. Motion and row give the
+//! levels on the firmware's inputs, and the virtual Uno plays them. Its servo pulses give the result for the row
+//! ([`field::verdict`]). Before that, the firmware is set up over its console as by an operator: settings, then the
 //! start.
 
 use crate::console::{ConsoleError, Status, ask};
@@ -25,7 +25,7 @@ pub enum TrialError {
     /// The virtual Uno stopped.
     #[error(transparent)]
     Uno(#[from] UnoError),
-    /// The firmware's console did not answer as it should.
+    /// The console gave an unexpected answer.
     #[error(transparent)]
     Console(#[from] ConsoleError),
     /// The firmware restarted during the trial.
@@ -33,20 +33,20 @@ pub enum TrialError {
     Restarted(usize),
 }
 
-/// What came of a trial.
+/// The outcome of a trial.
 #[derive(Clone, Debug)]
 pub struct Outcome {
-    /// What happened to the row.
+    /// The result for the row.
     pub judgement: Judgement,
-    /// What the firmware said at the end.
+    /// The firmware's last status.
     pub status: Status,
-    /// Encoder counts, net, that a perfect counter would have at the end.
+    /// Net encoder counts of a perfect counter at the end.
     pub true_ticks: i64,
     /// Memory that the firmware takes.
     pub size: Size,
     /// The servo's pulses.
     pub pulses: Vec<Pulse>,
-    /// How many of them have no width that a servo knows.
+    /// Pulses with a width that no servo accepts.
     pub stray_pulses: usize,
     /// Every level on every pin, inputs first.
     pub changes: Vec<PinChange>,
@@ -60,7 +60,7 @@ const BOOT_CYCLES: u64 = 3 * CYCLES_PER_SECOND;
 /// Time for the firmware to see that a switch has stopped bouncing.
 const SWITCH_MS: u64 = 100;
 
-/// Time between the start and the first movement, and between the last one and the final question.
+/// Time between the start and the first movement, and between the last movement and the final question.
 const STILL_MS: u64 = 50;
 
 /// Simulated time between two reports of progress.

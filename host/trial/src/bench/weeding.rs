@@ -1,4 +1,4 @@
-//! The firmware at work: cycles of its interrupts and of its loop's turns, and the memory it takes, while it weeds a row.
+//! The firmware at work: cycles of its interrupts and of its loop's turns, and its memory, while it weeds a row.
 
 use super::error::BenchError;
 use super::load::Telemetry;
@@ -14,7 +14,7 @@ use uno::CYCLES_PER_SECOND;
 use uno::elf::Size;
 use uno::{InterruptStatistics, Turns};
 
-/// What the firmware costs while it works.
+/// The firmware's costs at work.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FirmwareCosts {
     /// Its interrupts.
