@@ -21,10 +21,10 @@ pub enum CaptureError {
     Read {
         /// The file.
         path: PathBuf,
-        /// What went wrong; for a file that is no VCD, with the line.
+        /// The error. For a file that is no VCD, it includes the line.
         source: std::io::Error,
     },
-    /// The file does not say what its times count.
+    /// The file has no time unit.
     #[error("{path} has no $timescale: export the recording as VCD once more")]
     NoTimescale {
         /// The file.
@@ -50,7 +50,7 @@ pub enum CaptureError {
         /// Their full names.
         known: Vec<String>,
     },
-    /// One channel was asked for twice.
+    /// A channel was chosen twice.
     #[error("channel `{name}` is given for two signals: each needs its own")]
     SharedChannel {
         /// The name.
@@ -86,7 +86,7 @@ pub enum CaptureError {
         /// Where.
         line: u64,
     },
-    /// The recording goes on for too long.
+    /// The recording is too long.
     #[error("{path} goes on beyond {MOST_HOURS} h at line {line}: cut the recording, or look at its $timescale")]
     TooLong {
         /// The file.
@@ -94,7 +94,7 @@ pub enum CaptureError {
         /// Where.
         line: u64,
     },
-    /// The channel has no level at all.
+    /// The channel has no level.
     #[error("{path} holds no samples of channel `{name}`")]
     NoSamples {
         /// The file.
@@ -107,7 +107,7 @@ pub enum CaptureError {
 /// Longest recording, in hours. Playing a longer one takes too long to be useful.
 const MOST_HOURS: u64 = 24;
 
-/// Most scopes within each other. An analyser makes one or two, and each takes of the reader's stack.
+/// Greatest nesting of scopes. An analyser writes one or two, and each uses the reader's stack.
 const MOST_SCOPES: usize = 50;
 
 /// Longest head of a file, in which its channels are declared.
@@ -116,8 +116,8 @@ const MOST_HEAD_BYTES: u64 = 1 << 20;
 /// A recording, as levels on the Uno's pins.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Capture {
-    /// The levels, sorted by cycle from the recording's time 0. Each channel's first is the level that it began with; from then
-    /// on each is an edge.
+    /// The levels, sorted by cycle from the recording's time 0. The first of each channel is its initial level, and the
+    /// others are edges.
     pub changes: Vec<PinChange>,
 }
 
@@ -204,7 +204,7 @@ impl Capture {
     }
 }
 
-/// The file's head, up to where its channels are declared.
+/// The file's head, up to the end of the channels' declarations.
 fn head(file: &mut impl BufRead) -> io::Result<io::Cursor<Vec<u8>>> {
     let wrong = |problem: String| Err(io::Error::new(ErrorKind::InvalidData, problem));
     let (mut head, mut scopes) = (Vec::new(), 0_usize);
@@ -227,7 +227,7 @@ fn head(file: &mut impl BufRead) -> io::Result<io::Cursor<Vec<u8>>> {
             }
         }
     }
-    // What is shorter is for the reader to judge.
+    // The reader reports an error in a shorter head.
     if rest.limit() == 0 {
         wrong("no $enddefinitions stands in its first MiB".to_owned())
     } else {
@@ -242,7 +242,7 @@ fn to_cycles(time: u64, (count, unit): (u32, TimescaleUnit)) -> u64 {
     u64::try_from((units + divisor / 2) / divisor).unwrap_or(u64::MAX)
 }
 
-/// Every channel with the scopes it stands in, as `scope.name`.
+/// Every channel with its scopes, as `scope.name`.
 fn list_channels<'a>(scope: &str, items: &'a [ScopeItem], known: &mut Vec<(String, &'a Var)>) {
     for item in items {
         match item {

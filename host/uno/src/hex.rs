@@ -1,8 +1,8 @@
-//! Intel HEX, the files that the Arduino tools take: the firmware as one, and a bootloader out of one, or compiled here.
+//! Intel HEX, the file format of the Arduino tools: writes the firmware, and reads a bootloader or compiles one.
 //!
-//! A bootloader stands at the end of the flash and is started first by every reset; it writes a new firmware where it is sent
-//! one in time, and otherwise starts the one that is there. Its place says how much flash is left for the firmware.
-//! Nothing here runs one: [`Uno`](crate::Uno) does.
+//! A bootloader is at the end of the flash, and every reset starts it. If it receives new firmware in time it writes
+//! that, otherwise it starts the present firmware. Its address limits the flash for the firmware. This module does not
+//! run a bootloader; [`Uno`](crate::Uno) does.
 
 use crate::elf::{FLASH_BYTES, Image, ImageError};
 use ihex::{Reader, ReaderError, Record};
@@ -11,19 +11,19 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use thiserror::Error;
 
-/// Sizes in bytes that the fuses can give the boot section (data sheet, boot size configuration).
+/// Sizes of the boot section in bytes, selected by the fuses (data sheet, boot size configuration).
 const BOOT_SECTION_BYTES: [usize; 4] = [512, 1024, 2048, 4096];
 
-/// Optiboot's source, as Debian's arduino-core-avr brings it along.
+/// Path of Optiboot's source in Debian's arduino-core-avr.
 const OPTIBOOT_SOURCE: &str = "/usr/share/arduino/hardware/arduino/avr/bootloaders/optiboot/optiboot.c";
 
-/// Where Optiboot begins: it has the smallest boot section.
+/// Start address of Optiboot, in the smallest boot section.
 const OPTIBOOT_START: u16 = 0x7E00;
 
-/// Bytes of data in a line, as most tools write them.
+/// Bytes of data in a line, as in the files of most tools.
 const LINE_BYTES: usize = 16;
 
-/// What is wrong with a file, or with a firmware beside a bootloader.
+/// An error in a file, or a firmware that does not fit beside a bootloader.
 #[derive(Debug, Error)]
 pub enum HexError {
     /// The file could not be read.
@@ -39,10 +39,10 @@ pub enum HexError {
     NotHex {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The error.
         reason: ReaderError,
     },
-    /// The file's data do not lie where a bootloader does.
+    /// The file's data are not at a bootloader's address.
     #[error(
         "{path} is no bootloader for the ATmega328P: it fills flash from {start:#06x} to {end:#06x}, and should begin at \
          0x7000, 0x7800, 0x7c00 or 0x7e00 and end by 0x8000"
@@ -63,10 +63,10 @@ pub enum HexError {
         "optiboot cannot be compiled ({0}): it takes avr-gcc and {OPTIBOOT_SOURCE}, which Debian has as gcc-avr and arduino-core-avr"
     )]
     NotCompiled(String),
-    /// What was compiled is no ELF that could be read.
+    /// The compiled bootloader is not a readable ELF.
     #[error(transparent)]
     Image(#[from] ImageError),
-    /// The firmware is too long to stand before the bootloader.
+    /// The firmware overlaps the bootloader.
     #[error("the firmware takes {bytes} bytes of flash: the bootloader leaves {available}")]
     NoRoom {
         /// The firmware's size.
@@ -128,7 +128,7 @@ impl Bootloader {
         Ok(Bootloader { start: OPTIBOOT_START, code })
     }
 
-    /// Address of its first byte in flash, from which a reset starts it: the number of bytes that it leaves to the firmware.
+    /// Address of its first byte in flash, where a reset starts it. It equals the number of bytes for the firmware.
     pub fn start(&self) -> u16 {
         self.start
     }
@@ -177,7 +177,7 @@ fn pieces(text: &str) -> Result<Vec<(usize, Vec<u8>)>, ReaderError> {
             Record::Data { offset, value } => pieces.push((base + usize::from(offset), value)),
             Record::ExtendedSegmentAddress(segment) => base = usize::from(segment) << 4,
             Record::ExtendedLinearAddress(upper) => base = usize::from(upper) << 16,
-            // Where a processor of Intel's would start.
+            // Start addresses are for Intel's processors.
             Record::StartSegmentAddress { .. } | Record::StartLinearAddress(_) | Record::EndOfFile => {}
         }
     }

@@ -49,13 +49,13 @@ pub struct Reset {
 /// A byte from the firmware.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ReceivedByte {
-    /// When the firmware handed it to the transmitter.
+    /// The time at which the firmware passed it to the transmitter.
     pub cycle: u64,
     /// The byte.
     pub byte: u8,
 }
 
-/// What simavr's callbacks have seen.
+/// The events from simavr's callbacks.
 pub(super) struct Recorder {
     pub(super) chip: *mut simavr::avr_t,
     pub(super) uart: *mut simavr::avr_uart_t,
@@ -81,7 +81,7 @@ pub(super) struct Recorder {
 }
 
 impl Recorder {
-    /// Records a level of an output pin, where it differs from the last one.
+    /// Records a level of an output pin, if it differs from the last one.
     pub(super) fn record_level(&mut self, pin: Pin, high: bool, cycle: u64) {
         let level = &mut self.driven_high[usize::from(pin.number())];
         if *level != high {
@@ -90,7 +90,7 @@ impl Recorder {
         }
     }
 
-    /// Records the levels of a port whose registers hold these values now.
+    /// Records the levels of a port, from the present values of its registers.
     ///
     /// # Safety
     ///
@@ -123,14 +123,15 @@ impl Recorder {
     }
 }
 
-/// When the peripheral that simavr is serving was due. It serves one at the end of the instruction in which it falls due, up
-/// to four cycles late; its slot still says when it was. Without one, an instruction is running, and it began at `cycle`.
+/// The due time of the peripheral that simavr is serving. simavr serves it at the end of the instruction in which it
+/// falls due, up to four cycles late; its slot still has the due time. If simavr serves none, an instruction is
+/// running, and it began at `cycle`.
 ///
 /// # Safety
 ///
 /// `avr` must be an initialised chip.
 unsafe fn due_cycle(avr: *mut simavr::avr_t) -> u64 {
-    // SAFETY: the caller vouches for `avr`. Both lists run through the pool's own slots and end in null. The slot being
+    // SAFETY: the caller guarantees `avr`. Both lists run through the pool's own slots and end in null. The slot being
     // served is in neither.
     unsafe {
         let pool = &raw const (*avr).cycle_timers;
@@ -150,9 +151,9 @@ unsafe fn due_cycle(avr: *mut simavr::avr_t) -> u64 {
     }
 }
 
-/// simavr's callback for a write of a port's register, behind the write.
+/// simavr's callback for a write of a port's register, after the write.
 pub(super) unsafe extern "C" fn on_port<const NAME: char>(_: *mut simavr::avr_irq_t, port: u32, recorder: *mut c_void) {
-    // SAFETY: `recorder` is what `Core::new` registered, alive and not borrowed (see the module's text).
+    // SAFETY: `recorder` is the one that `Core::new` registered, alive and not borrowed (see the module's text).
     unsafe {
         let recorder = &mut *recorder.cast::<Recorder>();
         let direction = Port::named(NAME).direction(recorder.chip);
@@ -174,7 +175,7 @@ pub(super) unsafe extern "C" fn on_direction<const NAME: char>(
     }
 }
 
-/// simavr's callback for a level that a timer puts on its output, by its index in [`TIMER_OUTPUTS`].
+/// simavr's callback for a new level of a timer's output, by its index in [`TIMER_OUTPUTS`].
 pub(super) unsafe extern "C" fn on_timer_output<const INDEX: usize>(
     _: *mut simavr::avr_irq_t,
     level: u32,
@@ -204,7 +205,7 @@ pub(super) unsafe extern "C" fn on_sample(_: *mut simavr::avr_irq_t, _: u32, rec
     }
 }
 
-/// simavr's callback for an interrupt handler that begins (1) or has returned (0).
+/// simavr's callback for the start (1) or return (0) of an interrupt handler.
 pub(super) unsafe extern "C" fn on_interrupt(irq: *mut simavr::avr_irq_t, begins: u32, recorder: *mut c_void) {
     // SAFETY: as in `on_output`. The chip's clock is simavr's to read only after this callback.
     unsafe {
@@ -221,7 +222,7 @@ pub(super) unsafe extern "C" fn on_interrupt(irq: *mut simavr::avr_irq_t, begins
     }
 }
 
-/// simavr's callback for a byte that the firmware hands to the transmitter, before simavr decides how long it takes.
+/// simavr's callback for a byte that the firmware passes to the transmitter, before simavr decides how long it takes.
 pub(super) unsafe extern "C" fn on_transmit(_: *mut simavr::avr_irq_t, byte: u32, recorder: *mut c_void) {
     // SAFETY: as in `on_output`; the UART is part of the chip.
     unsafe {

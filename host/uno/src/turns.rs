@@ -47,7 +47,7 @@ impl TurnRecorder {
         }
     }
 
-    /// A reset ends a turn that is not counted.
+    /// A reset ends a turn, which is not counted.
     pub(super) fn reset(&mut self) {
         self.begun = None;
     }

@@ -15,11 +15,11 @@ const UNITS: (u32, TimescaleUnit) = (100, TimescaleUnit::PS);
 /// Units of time a cycle.
 const UNITS_PER_CYCLE: u64 = 10_000_000_000 / CYCLES_PER_SECOND;
 
-/// Writes `changes`, in any order, as a VCD file. Each wire starts at rest; what changes on other pins is left out.
+/// Writes `changes`, in any order, as a VCD file. Each wire starts at rest. Changes on other pins are left out.
 ///
 /// # Errors
 ///
-/// Those of the writer.
+/// The errors of the writer.
 pub fn write(file: impl Write, wires: &[Wire], changes: impl IntoIterator<Item = PinChange>) -> io::Result<()> {
     let mut changes: Vec<PinChange> = changes.into_iter().collect();
     changes.sort_by_key(|change| change.cycle);

@@ -1,6 +1,6 @@
-//! The virtual Uno against small C programs, compiled here by avr-gcc, whose timing the data sheet tells.
+//! The virtual Uno with small C programs, compiled here by avr-gcc. The data sheet gives their timing.
 //!
-//! Each program stands in `fixtures/` and shows one thing; the firmware itself plays no part here. Faults are in
+//! Each program is in `fixtures/` and shows one behaviour. The weeder's firmware is not used here. Faults are in
 //! `virtual_uno_faults.rs`.
 
 mod common;
@@ -63,7 +63,7 @@ fn the_receiver_keeps_three_bytes_and_loses_the_fourth() {
     uno.send(b"12345");
     uno.run_for_ms(1).unwrap();
     assert_eq!(uno.lost_bytes(), 2);
-    // The switch on D4 tells the fixture to read at last; it adds whether the chip reported the loss.
+    // The switch on D4 makes the fixture read. Its output also says whether the chip reported the loss.
     uno.set(Pin::D4, false);
     assert_eq!(uno.run_until_serial("\n", 5 * MILLISECOND).unwrap(), "lost 123\n");
 }
@@ -376,7 +376,7 @@ fn an_elf_that_is_none_is_refused_by_name() {
 #[test]
 fn the_size_is_what_the_sections_add_up_to() {
     let mut uno = boot("memory");
-    // .noinit holds `kept`, .data `started`, whose first value takes flash as well.
+    // .noinit has `kept`. .data has `started`, whose initial value also takes flash.
     assert_eq!(uno.size().sram, 3);
     assert!((100..1000).contains(&uno.size().flash), "{:?}", uno.size());
     uno.run_for_ms(5).unwrap();
@@ -392,6 +392,6 @@ fn a_firmware_too_large_for_the_chip_is_measured_but_not_run() {
     let Err(UnoError::Image(ImageError::TooLarge { memory: "flash", end, .. })) = Uno::boot(&elf) else {
         panic!("40 kB do not fit into 32 KiB");
     };
-    // The first values of variables come behind the code, which is too large by itself.
+    // Initial values come after the code, which alone is too large.
     assert_eq!(end, flash - sram);
 }

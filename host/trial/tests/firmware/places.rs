@@ -64,8 +64,8 @@ impl Write for Clocked {
     }
 }
 
-/// The log of a machine with a receiver that weeds the row. `unplugged_s` is the time at which the receiver is
-/// unplugged, for some seconds.
+/// The log of a machine with a receiver that weeds the row. `unplugged_s` is the time in which the receiver is
+/// unplugged.
 fn recorded(
     row: &Row,
     motion: &Motion,
