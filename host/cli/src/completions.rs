@@ -1,14 +1,14 @@
-//! `weeder completions`: what a shell has to be told so that Tab completes the command's words.
+//! `weeder completions`: scripts that let a shell complete the command's words.
 //!
-//! The words are those of the arguments themselves, by clap_complete. Presets and what an axis can be are among them,
-//! ports and values of settings are not.
+//! clap_complete makes them from the arguments themselves. They include presets and the axes of sweeps, but neither
+//! ports nor values of settings.
 
 use crate::output;
 use anyhow::Result;
 use clap::Args;
 use clap_complete::Shell;
 
-/// What the user asks of the completions.
+/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:

@@ -12,7 +12,7 @@ use files::csv_table;
 use std::fs;
 use std::path::PathBuf;
 
-/// What the user asks of row and machine.
+/// The arguments.
 #[derive(Args)]
 pub struct CourseArguments {
     /// Speed in km/h, 0.1 to 10.
@@ -51,8 +51,8 @@ pub struct CourseArguments {
 /// The default number of tall weeds in a row. A row without room for them gets fewer.
 const WEEDS: usize = 5;
 
-/// Scatter of a grown row, as shares of the mean spacing and the mean canopy; never more than a quarter of the gap
-/// between two mean canopies each, so that the plants stay apart.
+/// Scatter of a random row, as shares of the mean spacing and the mean canopy. Each is at most a quarter of the gap
+/// between two mean canopies, so that the plants do not touch.
 const SPACING_SCATTER: f64 = 0.08;
 const CANOPY_SCATTER: f64 = 0.15;
 
@@ -65,7 +65,7 @@ impl CourseArguments {
         self.nth_row(0)
     }
 
-    /// A row beside that one: grown, it has plants of its own.
+    /// A neighbouring row. A random row has other plants.
     ///
     /// # Errors
     /// As [`CourseArguments::row`].
@@ -104,7 +104,7 @@ impl CourseArguments {
     pub fn conditions_of(&self, field: &str) -> Result<Conditions> {
         let mut conditions = Conditions::load(field, |file| fs::read_to_string(file))?;
         if let Some(beam_to_tool_mm) = self.beam_to_tool {
-            // A second beam stands no farther back, and not on a machine with a beam so far ahead.
+            // A second beam cannot be farther back, and a beam cannot be that far ahead on a machine with two.
             if conditions.machine.second_beam_mm > 0.0 && !(300..=1000).contains(&beam_to_tool_mm) {
                 conditions.set("machine.second_beam_mm", 0.0)?;
             }
@@ -113,7 +113,7 @@ impl CourseArguments {
         Ok(conditions)
     }
 
-    /// The machine in a field, which is one of all the possible ones as the row is.
+    /// The machine in a field. The row's seed selects its random deviations.
     pub fn machine(&self, conditions: &Conditions) -> Machine {
         conditions.machine(self.seed)
     }

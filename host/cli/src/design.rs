@@ -1,5 +1,5 @@
-//! `weeder design`: what a machine's engine, servo, shanks, chain, wheels and handle have to be like, and how its tool has to
-//! swing, as settings for the firmware.
+//! `weeder design`: the required engine, servo, shanks, chain, wheels and handle of a machine, and its tool's swing as
+//! settings for the firmware.
 
 use crate::output::{print, say};
 use crate::source;
@@ -12,7 +12,7 @@ use mechanics::{file, paper, report};
 use serde_json::json;
 use std::path::PathBuf;
 
-/// What the user asks of the design calculations.
+/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:

@@ -1,8 +1,8 @@
-//! `weeder figures`: the figures that stand in the manual, each from the command that stands above it.
+//! `weeder figures`: updates or checks the figures in the manual, each by the command above it.
 //!
-//! A figure is a fenced block right behind a comment that names its command, such as `<!-- figures: weeder trial --speeds 1,2 -->`.
-//! The command is run, and what it prints becomes the block: that is the same on every machine. How long it took is told on standard
-//! error, which is left out.
+//! A figure is a fenced block directly behind a comment that names its command, such as `<!-- figures: weeder trial
+//! --speeds 1,2 -->`. The command runs, and its output becomes the block. The output is the same on every machine: run
+//! times go to standard error, which is left out.
 
 use crate::finding::Finding;
 use crate::output::{say, tell};
@@ -14,7 +14,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-/// Which figures are to be written.
+/// The figures to update.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -30,7 +30,7 @@ pub struct Arguments {
     check: bool,
 }
 
-/// What stands in front of a figure's command.
+/// The text before a figure's command.
 const MARK: &str = "<!-- figures: ";
 
 /// Writes the figures, or compares them.
@@ -82,7 +82,7 @@ fn renew(page: &str, path: &Path) -> Result<String> {
     Ok(renewed)
 }
 
-/// What a command prints, which does not depend on the machine that it runs on.
+/// A command's output, which does not depend on the machine.
 fn print(command: &str) -> Result<String> {
     let words = shlex::split(command).with_context(|| format!("unbalanced quotes in `{command}`"))?;
     let [program, arguments @ ..] = words.as_slice() else { bail!("there is no command") };
@@ -90,7 +90,7 @@ fn print(command: &str) -> Result<String> {
     tell!("{command}");
     let weeder = env::current_exe().context("the running program cannot be found")?;
     let output = Command::new(weeder).args(arguments).stderr(Stdio::null()).output()?;
-    // Status 1 is a finding, such as a plant that was damaged.
+    // Status 1 is a finding, such as a damaged plant.
     ensure!(matches!(output.status.code(), Some(0 | 1)), "`{command}` fails: run it to see why");
     let printed = String::from_utf8(output.stdout).with_context(|| format!("`{command}` prints no text"))?;
     let lines = printed.lines().map(str::trim_end);

@@ -16,7 +16,7 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
-/// What the user asks for.
+/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -96,7 +96,7 @@ fn header(path: &Path) -> Result<Header, PartError> {
     shard::read_header(&name(path), &mut open(path)?)
 }
 
-/// All outcomes, in the order in which an undivided study has them.
+/// All outcomes, in the order of an undivided study.
 fn outcomes<T: DeserializeOwned>(parts: &[PathBuf]) -> Result<Vec<T>> {
     let read = |path: &PathBuf| {
         let mut file = open(path)?;

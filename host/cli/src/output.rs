@@ -11,12 +11,12 @@ use std::env;
 use std::fmt::Arguments;
 use std::io::{self, ErrorKind, Write};
 
-/// Prints a line of a result; takes what `println!` does, and returns what [`print()`] does.
+/// Prints a line of a result. Takes the arguments of `println!`, and returns the result of [`print()`].
 macro_rules! say {
     ($($words:tt)*) => { $crate::output::print(format_args!("{}\n", format_args!($($words)*))) };
 }
 
-/// Tells a line beside the result; takes what `eprintln!` does.
+/// Prints a message. Takes the arguments of `eprintln!`.
 macro_rules! tell {
     ($($words:tt)*) => { $crate::output::tell_line(format_args!($($words)*)) };
 }
@@ -35,7 +35,7 @@ pub fn print(text: Arguments) -> Result<()> {
     }
 }
 
-/// Tells a line beside the result, by [`tell!`].
+/// Prints a message, for [`tell!`].
 pub fn tell_line(line: Arguments) {
     // Standard error is closed: there is no other place for the message.
     let _ = writeln!(io::stderr(), "{}", in_a_line(&line.to_string()));

@@ -13,7 +13,7 @@ use std::fs;
 use std::path::Path;
 use std::time::Instant;
 
-/// A part that is to be written, to a file that could be written when it was checked.
+/// A part, and a file that was writable when it was checked.
 pub struct Part<'a> {
     shard: Shard,
     out: OutFile<'a>,

@@ -8,7 +8,7 @@ use clap::Args;
 use experiments::plan::Plan;
 use experiments::sweep::{SPACINGS_CM, SPEEDS_KM_H};
 
-/// What the user asks of a plan.
+/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:

@@ -1,4 +1,4 @@
-//! `weeder record`: what the machine does, in a file; of several rows a file for each.
+//! `weeder record`: logs the machine's output to a file, or each row's to its own file.
 
 use crate::destination::{FolderName, Replace};
 use crate::output::tell;
@@ -15,10 +15,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Time after which it looks again at whether to end.
+/// Time between two checks whether to end.
 const LOOK: Duration = Duration::from_millis(20);
 
-/// What the user asks of the recording.
+/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 It records plants, swings and alarms, and the status ten times a second, until Ctrl-C.\n\

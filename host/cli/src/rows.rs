@@ -8,7 +8,7 @@ use comfy_table::{Table, presets};
 use link::row_names::{Board, Names, Plugged, plugged};
 use serde_json::{Value, json};
 
-/// What the user asks of the rows.
+/// The arguments.
 #[derive(Args)]
 #[command(
     args_conflicts_with_subcommands = true,
@@ -113,7 +113,7 @@ fn list(names: &Names, json: bool) -> Result<()> {
     say!("The names are in {}", names.path().display())
 }
 
-/// The rows, then the Unos that are none.
+/// The rows, then the Unos without a row.
 fn lines(names: &Names, unos: &[Plugged], exists: impl Fn(&str) -> bool) -> Vec<Line> {
     let now = |board: &Board| match board {
         Board::Port(port) if exists(port) => Some(port.clone()),

@@ -22,7 +22,7 @@ use uno::PinChange;
 use uno::capture::Capture;
 use uno::waveform;
 
-/// What the user asks of a simulation.
+/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -154,7 +154,7 @@ fn write_waveform(arguments: &Arguments, vcd: Option<&OutFile>, changes: &[PinCh
     if arguments.json { Ok(()) } else { say!("Waveform    {}", vcd.path().display()) }
 }
 
-/// What happened to the row, with the names of the CSV tables.
+/// The result for the row, with the names of the CSV tables.
 fn in_json(arguments: &Arguments, trial: &Trial, outcome: &Outcome) -> Value {
     let judgement = &outcome.judgement;
     json!({

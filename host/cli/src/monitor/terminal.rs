@@ -48,7 +48,7 @@ fn watch(terminal: &mut DefaultTerminal, rows: &Rows, mut model: Model, logs: &m
     }
 }
 
-/// Rings the terminal's bell where the operator has to look: he watches the row, and not the screen.
+/// Rings the terminal's bell: the operator watches the row, not the screen.
 fn ring(model: &mut Model, mut terminal: impl Write) -> io::Result<()> {
     if model.take_ring() {
         terminal.write_all(b"\x07")?;
@@ -95,7 +95,7 @@ fn take_key(model: &mut Model, rows: &Rows, key: KeyEvent) {
     }
 }
 
-/// HOLD to all rows, those that are not there included.
+/// HOLD to all rows, also to those that are lost.
 fn hold_all(model: &mut Model, rows: &Rows) {
     let since = Instant::now();
     for row in 0..rows.count() {
@@ -136,7 +136,7 @@ mod tests {
             Some("HOLD 0 of 2; NOT THERE: left, right")
         );
         assert_eq!((model.line.text(), model.target), ("", Some(0)), "it does not stand before the next command");
-        // As does the word, typed to all.
+        // The word `hold`, typed to all rows, does the same.
         (model.hold, model.target) = (None, None);
         typed(&mut model, &rows, "hold");
         take_key(&mut model, &rows, KeyCode::Enter.into());
@@ -188,7 +188,7 @@ mod tests {
         assert_eq!(enter("all: hold"), said("row1 row2 row3", "> all: hold", true));
         let unknown = "-- there is no row row4: there are row1, row2, row3; nothing was sent";
         assert_eq!(enter("row4: start"), said("", unknown, false));
-        // Only what is typed to that row is not typed, as none is there.
+        // No row is connected, so each command is reported as not typed. The line for the unknown row4 was not sent.
         let mut not_typed = Vec::new();
         while not_typed.len() < 4 {
             let heard = rows.next(Duration::from_secs(20)).expect("each is told");
