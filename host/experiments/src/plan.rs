@@ -8,7 +8,7 @@ use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 use std::io;
 
-/// What a trial is to compare.
+/// The treatments of a trial.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
     /// Forward speeds, km/h.
@@ -17,11 +17,11 @@ pub struct Plan {
     pub spacings_cm: Vec<f64>,
     /// Blocks, each with every treatment once.
     pub blocks: u32,
-    /// Working width, m, and power, hp, where they are known: they go into the table.
+    /// Working width, m, and power, hp, if they are known: they go into the table.
     pub width_m: Option<f64>,
     /// See `width_m`.
     pub power_hp: Option<f64>,
-    /// Which of all the possible orders.
+    /// Selects the random order.
     pub seed: u64,
 }
 
@@ -56,10 +56,10 @@ impl Plan {
         drawn.map(planned).collect()
     }
 
-    /// Writes the table to be filled in, with `notes` above it, a line each. What is not known yet is left empty.
+    /// Writes the table to be filled in, with `notes` above it, one a line. Unknown values are left empty.
     ///
     /// # Errors
-    /// Those of the writer.
+    /// The errors of the writer.
     pub fn write_csv(&self, notes: &[String], mut to: impl io::Write) -> io::Result<()> {
         for note in notes {
             writeln!(to, "# {note}")?;

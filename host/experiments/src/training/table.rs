@@ -27,7 +27,7 @@ pub struct Recorded {
     pub kind: Option<Kind>,
 }
 
-/// Reads objects that may or may not have a label. At least one is there.
+/// Reads detections with or without labels, at least one.
 ///
 /// # Errors
 /// Names the file, the line and what would be right.
@@ -38,13 +38,13 @@ pub fn read(path: &Path) -> Result<Vec<Recorded>, FileError> {
 /// Objects to learn from.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Lesson {
-    /// Those with a label, of both classes.
+    /// The labelled ones, of both classes.
     pub objects: Vec<Labelled>,
-    /// How many there were without, which teach nothing.
+    /// The number of unlabelled ones, which are not used.
     pub unlabelled: usize,
 }
 
-/// Reads objects of both classes from files that together make one table.
+/// Reads detections of both classes from files that together make one table.
 ///
 /// # Errors
 /// Names the file, the line and what would be right.
