@@ -15,21 +15,22 @@ use serde::Serialize;
 use uom::si::f64::Torque;
 use uom::si::time::second;
 
-/// What a pulse and the gap behind it may add before a servo hears of a command, ms.
+/// The most that a pulse and the gap after it delay a command, ms.
 const PULSE_AND_GAP_MS: f64 = 6.0;
 
-/// Pulses are told in whole steps of this, us, rounded outwards.
+/// Pulses are whole steps of this, us, rounded outwards.
 const PULSE_STEP_US: f64 = 5.0;
 
-/// What a margin pays for beside the servo, mm: 2 % of slip over the 400 mm from beam to tool, and the firmware's own worst swing.
+/// The parts of a margin besides the servo, mm: 2 % of slip over the 400 mm from beam to tool, and the firmware's own
+/// worst swing.
 const SLIP_AND_FIRMWARE_MM: f64 = 8.0 + 5.0;
 
-/// A swing, as it has to be.
+/// The required swing.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Swing {
-    /// What is kept of a single plant along the row, mm; 0 for its canopy.
+    /// The zone of a single plant along the row, mm; 0 for its canopy.
     pub stem_zone_mm: u32,
-    /// The margin beside it until wheel and servo have been measured, mm.
+    /// The margin beside it before wheel and servo have been measured, mm.
     pub margin_mm: u32,
     /// Smallest angle at which the tool's edge has cleared the canopy or the protected width, degrees.
     pub angle_degrees: f64,
@@ -41,7 +42,7 @@ pub struct Swing {
     pub load: f64,
     /// Time for that angle without load, ms.
     pub unloaded_ms: f64,
-    /// Time for it against the soil, ms.
+    /// Its time against the soil, ms.
     pub loaded_ms: f64,
     /// Lead of the command to leave the row, ms.
     pub lead_out_ms: u32,
@@ -49,11 +50,11 @@ pub struct Swing {
     pub lead_in_ms: u32,
     /// Width on either side of the row that neither tool nor sweeps weed, mm.
     pub unweeded_strip_mm: f64,
-    /// Width of the tool that would fill it, mm.
+    /// Width of a tool that would fill it, mm.
     pub filling_tool_mm: f64,
 }
 
-/// Why a tool cannot swing as it has to.
+/// Why a tool cannot make the required swing.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum NoSwing {
     /// The arm is too short.
@@ -63,7 +64,7 @@ pub enum NoSwing {
     ShortArm {
         /// Its length.
         arm_mm: f64,
-        /// How far it has to bring the tool.
+        /// The required distance aside.
         aside_mm: f64,
     },
     /// The servo stalls.
@@ -144,7 +145,7 @@ impl Swing {
         lines
     }
 
-    /// What it is, in sentences. `torque` is what it was calculated with.
+    /// Its description, in sentences. `torque` is the one used in the calculation.
     pub fn sentences(&self, machine: &Machine, torque: Torque) -> Vec<String> {
         let mut said = vec![
             format!(
@@ -179,7 +180,7 @@ impl Swing {
     }
 }
 
-/// Width of what the tool has to clear.
+/// Width of the zone that the tool must clear.
 fn kept_mm(machine: &Machine) -> f64 {
     let SwingInputs { protected, widest_canopy, .. } = machine.swing;
     let protected_mm = MM.value(protected);
