@@ -10,11 +10,11 @@ use std::ops::{self, RangeInclusive};
 
 const SREG: u16 = 0x5F;
 
-/// A set of registers and flags: registers by their number, flags behind them by their bit in SREG.
+/// A set of registers and flags: registers by their number, then flags by their bit in SREG.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Registers(u64);
 
-/// How many registers there are; the flags come behind them.
+/// The number of registers; the flags follow them.
 const REGISTERS: usize = 32;
 
 impl Registers {
@@ -44,7 +44,7 @@ impl Registers {
         self.0 == 0
     }
 
-    /// Those of it that are registers or flags, one after the other.
+    /// Its registers and flags, one after the other.
     pub(crate) fn iter(self) -> impl Iterator<Item = usize> {
         (0..REGISTERS + 7).filter(move |&register| self.contains(register))
     }

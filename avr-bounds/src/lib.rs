@@ -77,15 +77,16 @@ use self::values::Interrupts;
 use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
-/// Cycles more that a response takes out of sleep (data sheets, interrupt response time), without the time that the oscillator needs.
+/// Additional cycles of a response in sleep (data sheets, interrupt response time), without the oscillator's start-up
+/// time.
 const WAKE_UP_CYCLES: u64 = 4;
 
 /// The most cycles from an edge at a pin to its interrupt request. An edge that comes up to this time before a read may
 /// also be missed by that read (data sheet, pin change interrupt timing, and reading the pin value).
 const SYNCHRONISER_CYCLES: u64 = 3;
 
-/// The instruction at an address of flash, as the proof takes it: its length in bytes and what a disassembler calls it. None where
-/// no instruction stands.
+/// The instruction at an address of flash, as the proof decodes it: its length in bytes and its disassembled name.
+/// `None` without an instruction.
 pub fn instruction_at(flash: &[u8], address: u32) -> Option<(u32, String)> {
     Instruction::at(flash, address).map(|found| (found.bytes(), found.mnemonic()))
 }
@@ -161,7 +162,7 @@ pub fn prove(elf: &Program, budgets: &Budgets) -> Result<Bounds, BoundsError> {
     })
 }
 
-/// What is said of loops.
+/// The stated loop bounds.
 fn passes(code: &Code, budgets: &Budgets) -> Passes {
     let loops = &budgets.loops;
     let functions = code.elf.functions.iter();
@@ -196,7 +197,7 @@ fn time_handlers(
             }
         })
         .collect();
-    // One that never returns lets no other wait: the program ends in it.
+    // A handler that never returns delays no other: the program ends in it.
     let time = |handler: &Handler| {
         if handler.without_bound.is_empty() { Some(handler.cycles.unwrap_or_default()) } else { None }
     };
@@ -216,7 +217,8 @@ fn time_handlers(
     timed
 }
 
-/// How long an edge of an input waits for a look, and how fast its edges may come. `of_handlers` are all handlers with their times.
+/// The longest wait of an input's edge for a read, and the highest rate of its edges. `of_handlers` are all handlers
+/// with their times.
 fn watch(
     input: &Input,
     code: &Code,
@@ -250,7 +252,8 @@ fn watch(
     Ok(EdgeBounds { wait_cycles, never_lost_per_s: input.edges_between_looks * input.clock_hz / wait_cycles })
 }
 
-/// The deepest stack: the main program where a handler comes in, and that handler, or with interrupts off the main program alone.
+/// The deepest stack: the main program plus a handler with interrupts on, or the main program alone with interrupts
+/// off.
 fn deepest<'a>(
     main: &Routine,
     handlers: impl Iterator<Item = &'a Rc<Routine>>,
@@ -311,15 +314,15 @@ fn indirect(code: &Code) -> Vec<Indirect> {
 }
 
 impl Time {
-    /// The time with the places that have no bound.
+    /// The time with its unbounded places.
     fn longest(&self, code: &Code) -> Longest {
         let without_bound = self.unbounded.iter().map(|&address| code.place(address)).collect();
         Longest { cycles: self.is_bound().then_some(self.cycles), without_bound }
     }
 }
 
-/// Where the handler of a vector is entered: at the vector itself. `None` where the vector's jumps lead to the reset, as
-/// they do for a vector that is not used.
+/// The entry of a vector's handler: the vector itself. `None` if the vector's jumps lead to the reset, as for unused
+/// vectors.
 fn handler_of(code: &Code, vector: u8) -> Result<Option<u32>, BoundsError> {
     let start = code.elf.start + u32::from(vector) * code.elf.chip.vector_bytes;
     let mut address = start;

@@ -34,18 +34,19 @@ const SECTION: &str = ".loop_bounds";
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LoopBound {
-    /// How often the program comes by the beginning of a loop at most, each time that the loop is come to: of the outermost, of those
-    /// within them, and so on; the last number is that of all that are deeper.
+    /// The most executions of a loop's head for each entry to the loop: of the outermost, of those within them, and so
+    /// on. The last number is valid for all deeper loops.
     #[serde(deserialize_with = "one_or_several")]
     pub passes: Vec<u64>,
-    /// Whether it is once for each byte of the length that the caller gives, and once more: where that is a constant, it stands for `passes`.
+    /// Whether the loop turns once for each byte of the caller's length, and once more. A constant length then replaces
+    /// `passes`.
     #[serde(default)]
     pub by_length: bool,
-    /// Why it does not do so more often.
+    /// The reason for the bound.
     pub because: String,
 }
 
-/// A number that holds at every depth may stand alone.
+/// A number that is valid at every depth may be written without a list.
 fn one_or_several<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Vec<u64>, D::Error> {
     #[derive(Deserialize)]
     #[serde(untagged, expecting = "a number, or one for each depth, the outermost loop's first")]
@@ -59,17 +60,17 @@ fn one_or_several<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<V
     }
 }
 
-/// Those of functions, by their paths without types.
+/// The bounds of functions, by their paths without types.
 pub type LoopBounds = BTreeMap<String, LoopBound>;
 
-/// The records of an ELF: an address, and how often the program comes by it at most each time that it comes to the loop around it.
+/// The records of an ELF: an address, and its most executions for each entry to the loop around it.
 pub(crate) fn records_of(file: &ElfFile32<LittleEndian>) -> Result<BTreeMap<u32, u64>, object::Error> {
     let Some(section) = file.section_by_name(SECTION) else { return Ok(BTreeMap::new()) };
     let mut turns = BTreeMap::new();
     for record in section.data()?.chunks_exact(8) {
         let word = |at: usize| record[at..].first_chunk().map_or(0, |bytes| u32::from_le_bytes(*bytes));
         let (address, stated) = (word(0), u64::from(word(4)));
-        // Of two for the same place the larger one holds for both.
+        // Of two records for the same place the larger one is valid for both.
         turns.entry(address).and_modify(|turns| *turns = stated.max(*turns)).or_insert(stated);
     }
     Ok(turns)

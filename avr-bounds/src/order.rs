@@ -14,16 +14,16 @@ use crate::elf::Program;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-/// How far the short forms reach from their own end (instruction set manual, RCALL and RJMP).
+/// Reach of the short forms from their own end (instruction set manual, RCALL and RJMP).
 const REACH: std::ops::RangeInclusive<i64> = -4096..=4094;
 
 /// Moves that are tried for each function.
 const TRIES: u32 = 2000;
 
-/// Long calls that a move may cost in the beginning, about.
+/// Long calls that an early move may cost, about.
 const HEAT: f64 = 3.0;
 
-/// A place in the program: which function, or none of those that can be moved, and the offset in it or the address.
+/// A place in the program: the function and the offset in it, or no movable function and the address.
 type Spot = (Option<usize>, i64);
 
 /// The functions that can be moved, and the calls and jumps between functions.
@@ -84,7 +84,7 @@ impl Graph {
     }
 }
 
-/// Numbers that look random (xorshift).
+/// Pseudo-random numbers (xorshift).
 struct Dice(u64);
 
 impl Dice {
@@ -96,10 +96,10 @@ impl Dice {
     }
 }
 
-/// The lines of a linker script that put the functions into an order with few long calls, and how many long calls there are before
-/// and behind.
+/// The lines of a linker script for an order of functions with few long calls, and the number of long calls before and
+/// after.
 ///
-/// The crates' numbers are left out of the names, since they differ from one compiler to the next.
+/// The crates' numbers are left out of the names, since they differ between compilers.
 pub fn order(elf: &Program) -> (String, usize, usize) {
     let graph = Graph::of(elf);
     let functions = graph.names.len();
@@ -121,7 +121,7 @@ pub fn order(elf: &Program) -> (String, usize, usize) {
         let mut next = now.clone();
         let moved = next.remove(dice.below(functions));
         let to = match partners[moved].as_slice() {
-            // Beside a function that calls it or that it calls, more often than anywhere.
+            // Most often a function moves next to a caller or a callee.
             [_, ..] if dice.below(5) < 3 => {
                 let partner = partners[moved][dice.below(partners[moved].len())];
                 next.iter().position(|&function| function == partner).map_or(0, |place| place + dice.below(2))

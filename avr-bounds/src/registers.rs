@@ -53,14 +53,14 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::RangeInclusive;
 use std::rc::Rc;
 
-/// The register that is zero between instructions that change it (AVR calling convention).
+/// The register that is zero except between instructions that change it (AVR calling convention).
 const ZERO: usize = 1;
 
 /// Registers that results are in: R18 to R25 (AVR calling conventions).
 const RESULTS: Registers = Registers::range(18..=25);
 
-/// Division, which uses what it gives back, and in which registers it gives it: quotient and remainder (GCC's AVR calling convention,
-/// exceptions).
+/// The division routines, which use their own results, and the registers of quotient and remainder (GCC's AVR calling
+/// convention, exceptions).
 const LIBRARY: [(&str, RangeInclusive<usize>); 3] =
     [("__udivmodqi4", 24..=25), ("__udivmodhi4", 22..=25), ("__udivmodsi4", 18..=25)];
 
@@ -68,24 +68,24 @@ const LIBRARY: [(&str, RangeInclusive<usize>); 3] =
 const GPIOR: [u16; 3] = [0x3E, 0x4A, 0x4B];
 const SPL: u16 = 0x5D;
 
-/// What a register holds, as far as it matters here.
+/// A register's content, as far as it matters here.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Content {
     Unknown,
     Zero,
-    /// What this register held at the entry.
+    /// The value of this register at the entry.
     Register(usize),
     /// The flags as they were at the entry.
     Flags,
 }
 
-/// What is held where at a place.
+/// The contents of registers and stack at a place.
 #[derive(Clone, Debug, PartialEq)]
 struct Preserved {
     registers: [Content; 32],
     /// The flags that still have their values from the entry.
     flags: Registers,
-    /// The register that has just been counted down, while the flag says whether it has come to zero.
+    /// The register that was just decremented, while the flag shows whether it is zero.
     counted: Option<usize>,
     /// The general purpose I/O registers, in which some handlers keep the flags.
     gpior: [Content; 3],
@@ -101,7 +101,7 @@ impl Preserved {
         Preserved { registers, flags: Registers::FLAGS, counted: None, gpior: [Content::Unknown; 3], stack: Vec::new() }
     }
 
-    /// Leaves what both know; whether that is less than before.
+    /// Keeps the facts that both have. Returns whether this has removed any.
     fn meet(&mut self, other: &Preserved) -> bool {
         let mut is_less =
             self.flags & other.flags != self.flags || self.counted.is_some() && self.counted != other.counted;
@@ -119,7 +119,7 @@ impl Preserved {
         is_less
     }
 
-    /// Carries an instruction out that calls nothing.
+    /// Executes an instruction that is no call.
     fn carry_out(&mut self, instruction: &Instruction) {
         let (d, r) = (instruction.destination(), instruction.source());
         let gpior = instruction.data_address().and_then(|address| GPIOR.iter().position(|gpior| *gpior == address));
@@ -169,7 +169,7 @@ impl Preserved {
         }
     }
 
-    /// Something else is in these now.
+    /// Marks these registers as changed.
     fn clobber(&mut self, changed: Registers) {
         for (register, held) in self.registers.iter_mut().enumerate() {
             if changed.contains(register) {
@@ -182,16 +182,16 @@ impl Preserved {
     }
 }
 
-/// What is needed at a place.
+/// The live registers at a place.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 struct LiveIn {
     registers: Registers,
-    /// Bytes of the stack, by how many lie below, that are put back into a register which is needed.
+    /// Bytes of the stack that are restored into a live register, by the number of bytes below them.
     stack: BTreeSet<usize>,
 }
 
 impl LiveIn {
-    /// Takes what else is needed; whether it is more than before.
+    /// Adds live registers. Returns whether there are new ones.
     fn join(&mut self, other: &LiveIn) -> bool {
         let before = (self.registers, self.stack.len());
         self.registers |= other.registers;
@@ -200,15 +200,15 @@ impl LiveIn {
     }
 }
 
-/// What is known of a routine whichever way it is called.
+/// The facts about a routine that are valid for all its callers.
 struct Summary {
-    /// Registers, and flags, that hold at every return what they held at the entry.
+    /// Registers and flags with the same value at every return as at the entry.
     keeps: Registers,
-    /// Registers in which something is given back.
+    /// Registers with a result.
     gives: Registers,
-    /// Those whose value at the entry is read.
+    /// Registers whose value at the entry is read.
     reads: Registers,
-    /// Those whose value at the entry is read on every path.
+    /// Registers whose value at the entry is read on every path.
     surely_reads: Registers,
     /// Whether R1 is zero at each place.
     zero: Vec<bool>,
@@ -217,13 +217,14 @@ struct Summary {
 /// Which needs are meant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum What {
-    /// What is needed behind the return, and lasts until there. Nothing that is read on the way.
+    /// Registers that are live after the return and preserved until there. Registers that are read on the way do not
+    /// count.
     Lasting,
-    /// What is read before it changes.
+    /// Registers that are read before they change.
     Needed,
 }
 
-/// Proves that in this program every value lasts. `main` and the handlers are where it is entered.
+/// Proves that every live value is preserved in this program. `main` and the handlers are its entries.
 pub(crate) fn prove<'a>(
     program: &Code,
     main: &Rc<Routine>,
@@ -245,7 +246,8 @@ fn is_preserved(register: usize) -> bool {
     matches!(register, 2..=17 | 28 | 29)
 }
 
-/// Proves that every function of this program keeps to the calling convention, and that handlers put back all registers and flags.
+/// Proves that every function of this program keeps the calling convention, and that handlers restore all registers and
+/// flags.
 pub(crate) fn prove_convention<'a>(
     program: &Code,
     handlers: impl Iterator<Item = (u8, &'a Rc<Routine>)>,
@@ -257,7 +259,7 @@ pub(crate) fn prove_convention<'a>(
                 is_preserved(register) && !routine.keeps[register] || register == ZERO && !routine.leaves_zero
             })
         };
-        // What it calls is named for itself.
+        // An error names the function itself, not its caller.
         let called = routine.nodes.iter().flat_map(called).filter(|called| !called.returns.is_empty());
         let broken = broken(routine) - called.fold(Registers::NONE, |all, called| all | broken(called));
         if !broken.is_empty() {
@@ -273,11 +275,11 @@ pub(crate) fn prove_convention<'a>(
     Ok(())
 }
 
-/// What is known of the routines of a program.
+/// The facts about the routines of a program.
 struct Survey<'a> {
     program: &'a Code<'a>,
     summaries: BTreeMap<*const Routine, Summary>,
-    /// Each routine behind those that it calls.
+    /// All routines, each after those that it calls.
     order: Vec<Rc<Routine>>,
 }
 
@@ -286,7 +288,7 @@ impl Survey<'_> {
         &self.summaries[&Rc::as_ptr(routine)]
     }
 
-    /// Works out what a routine keeps, and nothing else of it.
+    /// Finds the registers that a routine preserves, and no other facts.
     fn look_at(&mut self, routine: &Rc<Routine>) -> Result<(), BoundsError> {
         if self.summaries.contains_key(&Rc::as_ptr(routine)) {
             return Ok(());
@@ -303,10 +305,10 @@ impl Survey<'_> {
         Ok(())
     }
 
-    /// Holds that a handler leaves everything as it found it.
+    /// Checks that a handler changes no register and no flag.
     fn put_back(&self, vector: u8, handler: &Rc<Routine>) -> Result<(), BoundsError> {
         let clobbered = Registers::ALL - self.of(handler).keeps;
-        // What one leaves that never returns is read by none.
+        // A handler that never returns may change registers.
         if !clobbered.is_empty() && handler.nodes.iter().any(|node| node.returns.is_some()) {
             let function = self.program.name_of(handler.entry);
             return Err(BoundsError::HandlerSpoils { vector, function, registers: clobbered.to_string() });
@@ -325,7 +327,7 @@ impl Survey<'_> {
         let gives = self.gives(routine, keeps)?;
         let needs = self.needs(routine, gives, What::Needed)?;
         let reads = needs[0].registers;
-        // On a path that never ends, nothing is left that would not be read on it.
+        // On an endless path every register counts as read, so such paths restrict nothing.
         let surely_reads = self.sure_needs(routine, &needs)?[0] & reads;
         let summary = Summary { keeps, gives, reads, surely_reads, zero };
         self.summaries.insert(Rc::as_ptr(routine), summary);
@@ -333,7 +335,7 @@ impl Survey<'_> {
         Ok(())
     }
 
-    /// What holds at every return what it held at the entry, and where R1 is zero.
+    /// The registers that are preserved at every return, and the places where R1 is zero.
     fn keeps(&self, routine: &Routine) -> Result<(Registers, Vec<bool>), BoundsError> {
         let nodes = &routine.nodes;
         let mut known: Vec<Option<Preserved>> = vec![None; nodes.len()];
@@ -386,7 +388,7 @@ impl Survey<'_> {
         Ok((keeps, known.iter().map(is_zero).collect()))
     }
 
-    /// What is needed at each place, where so much is needed behind the return.
+    /// The live registers at each place, for these live registers after the return.
     fn needs(&self, routine: &Routine, behind: Registers, what: What) -> Result<Vec<LiveIn>, BoundsError> {
         let nodes = &routine.nodes;
         let from = leading_to(nodes);
@@ -403,7 +405,7 @@ impl Survey<'_> {
                     before.registers = before.registers - Registers::one(instruction.destination());
                     before.stack.extend(depth.checked_sub(1));
                 }
-                // What the stack pointer passes over has been put there to be read through a pointer.
+                // Bytes that the stack pointer moves past were written to be read through a pointer.
                 Out if what != What::Lasting && instruction.data_address() == Some(SPL) => {
                     let least = node.ways.iter().map(|way| nodes[way.to].place.depth).min();
                     before.stack.extend(least.unwrap_or(depth)..depth);
@@ -426,7 +428,7 @@ impl Survey<'_> {
         Ok(needs)
     }
 
-    /// What is needed in front of what is called at a place, behind the instruction itself.
+    /// The live registers before a call at a place, after the instruction itself.
     fn in_front(&self, node: &Node, needs: &[LiveIn], what: What) -> LiveIn {
         let mut all = LiveIn::default();
         for way in &node.ways {
@@ -442,7 +444,7 @@ impl Survey<'_> {
         all
     }
 
-    /// In which registers a routine that keeps so many gives something back.
+    /// The result registers of a routine that preserves these registers.
     fn gives(&self, routine: &Routine, keeps: Registers) -> Result<Registers, BoundsError> {
         let name = self.program.name_of(routine.entry);
         if let Some((_, gives)) = LIBRARY.iter().find(|(library, _)| *library == name) {
@@ -472,7 +474,7 @@ impl Survey<'_> {
         Ok(gives - keeps)
     }
 
-    /// What is read on every path from a place on, before it changes and in this routine.
+    /// Registers that are read on every path from a place, before they change and in this routine.
     fn sure_needs(&self, routine: &Routine, needs: &[LiveIn]) -> Result<Vec<Registers>, BoundsError> {
         let nodes = &routine.nodes;
         let from = leading_to(nodes);
@@ -497,7 +499,7 @@ impl Survey<'_> {
         Ok(sure)
     }
 
-    /// In which registers something has been put on every path to a place, and has not been read yet.
+    /// Registers that were written on every path to a place, and not read since.
     fn unread(&self, routine: &Routine) -> Result<Vec<Registers>, BoundsError> {
         let nodes = &routine.nodes;
         let mut unread = vec![Registers::ALL; nodes.len()];
@@ -524,7 +526,7 @@ impl Survey<'_> {
         Ok(unread)
     }
 
-    /// What has been clobbered by a call on every path to a place, and not been set since.
+    /// Registers that a call has clobbered on every path to a place, and that were not written since.
     fn clobbered(&self, routine: &Routine) -> Result<Vec<Registers>, BoundsError> {
         let nodes = &routine.nodes;
         let mut clobbered = vec![Registers::ALL; nodes.len()];
@@ -549,13 +551,13 @@ impl Survey<'_> {
         Ok(clobbered)
     }
 
-    /// Registers in which a routine gives nothing back and leaves something else than it found. R1 is looked at by itself.
+    /// Registers that a routine changes and that hold no result. R1 is checked separately.
     fn clobbers(&self, routine: &Rc<Routine>) -> Registers {
         let Summary { keeps, gives, .. } = *self.of(routine);
         Registers::ALL - keeps - gives - Registers::one(ZERO)
     }
 
-    /// Holds every call against what is needed behind it.
+    /// Checks every call against the registers that are live after it.
     fn hold(&self) -> Result<Lasting, BoundsError> {
         let mut needed_behind: BTreeMap<*const Routine, Registers> = BTreeMap::new();
         let mut found: BTreeMap<(u32, u32), Registers> = BTreeMap::new();
@@ -603,7 +605,7 @@ impl Survey<'_> {
         Err(BoundsError::Clobbered { all: found.into_iter().map(clobbered).collect() })
     }
 
-    /// The calls that have left in a register what is found there at a place: where they are, and what they call.
+    /// The calls that have clobbered a register at a place: their addresses, and the called functions.
     fn clobberers(
         &self,
         routine: &Routine,
@@ -629,19 +631,20 @@ impl Survey<'_> {
     }
 }
 
-/// What an instruction reads, where so much is needed behind it. What does nothing that is needed reads for nothing.
+/// The registers that an instruction reads, for these live registers after it. An instruction without a live effect
+/// reads nothing.
 fn reads(instruction: &Instruction, needed: Registers) -> Registers {
     let effects = instruction.effects();
     let has_purpose = effects.acts || !(effects.changes & needed).is_empty();
     if has_purpose { effects.reads } else { Registers::NONE }
 }
 
-/// The registers that are needed behind an instruction, and behind what it calls.
+/// The registers that are live after an instruction, and after its called function.
 fn behind(node: &Node, needs: &[LiveIn]) -> Registers {
     node.ways.iter().fold(Registers::NONE, |all, way| all | needs[way.to].registers)
 }
 
-/// The places in front of each place.
+/// The predecessors of each place.
 fn leading_to(nodes: &[Node]) -> Vec<Vec<usize>> {
     let mut from: Vec<Vec<usize>> = vec![Vec::new(); nodes.len()];
     for (number, node) in nodes.iter().enumerate() {
@@ -652,7 +655,7 @@ fn leading_to(nodes: &[Node]) -> Vec<Vec<usize>> {
     from
 }
 
-/// Whether a branch leads there where the last result was zero.
+/// Whether a branch leads there if the last result was zero.
 fn is_way_of_zero(branch: &Instruction, to: u32) -> bool {
     let is_of_zero = Registers::ZERO_FLAG == branch.effects().reads;
     match branch.operation {
@@ -662,7 +665,7 @@ fn is_way_of_zero(branch: &Instruction, to: u32) -> bool {
     }
 }
 
-/// The routines that are called from a place.
+/// The routines that a place calls.
 fn called(node: &Node) -> impl Iterator<Item = &Rc<Routine>> {
     node.ways.iter().filter_map(|way| way.through.as_ref()).chain(node.ends_in.iter().map(|(_, called)| called))
 }

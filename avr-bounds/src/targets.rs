@@ -27,21 +27,21 @@ use crate::proved::Found;
 use crate::values::{Deep, Known, Value};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Where an indirect call or jump leads.
+/// The targets of an indirect call or jump.
 #[derive(Clone, Debug)]
 pub(crate) struct Where {
     pub(crate) found: Found,
     pub(crate) addresses: BTreeSet<u32>,
 }
 
-/// What of a program tells where indirect calls lead.
+/// The data of a program that give the targets of indirect calls.
 pub(crate) struct Targets {
     /// Entries of libgcc's routines that jump through a table.
     table_jumps: BTreeSet<u32>,
-    /// Functions whose address is taken outside virtual tables, and whether these are all for sure.
+    /// Functions whose address is taken outside virtual tables, and whether this set is certain.
     taken: BTreeSet<u32>,
     is_exact: bool,
-    /// Virtual tables: in each, the words as functions, as far as they are some.
+    /// Virtual tables: for each, its words as functions, if they are some.
     virtual_tables: Vec<Vec<Option<u32>>>,
     /// By the caller's name.
     listed: BTreeMap<String, BTreeSet<u32>>,
@@ -79,12 +79,12 @@ impl Targets {
         })
     }
 
-    /// Whether a routine stands there that jumps through a table.
+    /// Whether a routine at this address jumps through a table.
     pub(crate) fn is_table_jump(&self, address: u32) -> bool {
         self.table_jumps.contains(&address)
     }
 
-    /// Where a call or jump at `at` of such a routine leads, and the cycles of the routine itself.
+    /// The targets of a call or jump at `at` to such a routine, and the cycles of the routine itself.
     pub(crate) fn of_table(&self, elf: &Program, at: u32, known: &Known) -> Option<(Where, u32)> {
         let label = |name: &str| elf.labels.get(name).copied();
         let call = Instruction::at(&elf.flash, at)?;
@@ -125,7 +125,7 @@ impl Targets {
         (!addresses.is_empty()).then_some((Where { found: Found::Table, addresses }, cycles))
     }
 
-    /// Where a call or jump by the pointer leads.
+    /// The targets of a call or jump by the pointer.
     pub(crate) fn of_pointer(
         &self,
         elf: &Program,
@@ -155,7 +155,7 @@ impl Targets {
         let mut addresses = self.taken.clone();
         for table in self.virtual_tables.iter().filter(|_| !is_variable) {
             match slot {
-                // A pointer to a table points behind two words that are no functions.
+                // A pointer to a table points after two words that are no functions.
                 Some(slot) => {
                     let is_start = |&start: &usize| table[start - 1].is_none() && table[start].is_some();
                     let starts = (1..table.len()).filter(is_start);
@@ -170,14 +170,14 @@ impl Targets {
     }
 }
 
-/// The function that begins at a word address, if one does.
+/// The function that begins at a word address, if there is one.
 fn function_at(elf: &Program, word: u16) -> Option<u32> {
     let address = beyond_trampoline(elf, u32::from(word) * 2);
     let is_function = elf.functions.contains_key(&address) && address >= elf.code_start;
     (is_function && word != 0).then_some(address)
 }
 
-/// Where a jump among the trampolines leads, which stand in for functions that a word cannot reach.
+/// The target of a jump in the trampolines, which stand for functions that a word address cannot reach.
 fn beyond_trampoline(elf: &Program, address: u32) -> u32 {
     let label = |name: &str| elf.labels.get(name).copied();
     let is_trampoline = label("__trampolines_start")
@@ -187,8 +187,8 @@ fn beyond_trampoline(elf: &Program, address: u32) -> u32 {
     if is_trampoline { target().unwrap_or(address) } else { address }
 }
 
-/// The functions whose address the program seems to take outside virtual tables: all that it does, and others whose address is by chance a
-/// number that it uses.
+/// The functions whose address the program seems to take outside virtual tables. This includes all real ones, and
+/// others whose address equals a number in the program.
 fn found_taken(elf: &Program) -> BTreeSet<u32> {
     let mut taken = BTreeSet::new();
     let word = |bytes: &[u8]| function_at(elf, u16::from_le_bytes([bytes[0], bytes[1]]));
@@ -198,7 +198,7 @@ fn found_taken(elf: &Program) -> BTreeSet<u32> {
             taken.extend(word(bytes));
         }
     }
-    // Constants in flash, in front of the code and between functions; the tables of constructors are called from start-up code alone.
+    // Constants in flash, before the code and between functions. Only start-up code calls the tables of constructors.
     let label = |name: &str| elf.labels.get(name).copied().unwrap_or_default();
     let constructors = label("__ctors_start")..label("__dtors_end").max(label("__ctors_end"));
     for address in elf.gaps().flatten() {
