@@ -12,7 +12,7 @@ use uno::{CYCLES_PER_SECOND, PinChange};
 const EVEN_PER_S: f64 = 255_000.0;
 const JITTERED_PER_S: f64 = 235_000.0;
 
-/// Turns the encoder forward and backward beside all the rest, by chance and at the worst moments.
+/// Turns the encoder forward and backward under full load, with random edges and with edges at the worst moments.
 #[track_caller]
 fn assert_no_count_is_lost(counts_per_s: f64, jitter: f64) {
     for direction in [Direction::Forward, Direction::Backward] {
