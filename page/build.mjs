@@ -20,7 +20,7 @@ process.chdir(here);
 
 const target = process.env.CARGO_TARGET_DIR ?? "../target";
 
-/** The firmware as a HEX file: `weeder hex` writes none whose bounds are not proved. */
+/** The firmware as a HEX file. `weeder hex` refuses a firmware with unproved bounds. */
 function firmware() {
     const elf = join(target, "avr-none/firmware/weeder-firmware.elf");
     if (!existsSync(elf)) {
@@ -42,21 +42,24 @@ function rust() {
     return join(target, "wasm32-unknown-unknown/page/page.wasm");
 }
 
-/** A file packed, as a file: src/unpack.ts unpacks it. */
+/** Compresses a file into a file; src/unpack.ts decompresses it. */
 function packed(/** @type {string} */ path) {
     const to = join("build", `${basename(path)}.deflated`);
     writeFileSync(to, deflateRawSync(readFileSync(path), { level: 9 }));
     return resolve(to);
 }
 
-/** The worker that reads logs, as a file: a page from the disk has no worker but one whose code is inside. */
+/**
+ * The worker that reads logs, as a file. A page opened from the disk can only start a worker whose code is inside the
+ * page.
+ */
 async function logWorker() {
     const outfile = resolve("build/log-worker.txt");
     await build({ entryPoints: ["src/record/worker.ts"], bundle: true, minify: true, target: "es2022", outfile });
     return outfile;
 }
 
-/** What the manual says of alarms and warnings, as a file: what to do in its table, and the causes in its lists. */
+/** The manual's alarms and warnings, as a file: the advice from its table, and the causes from its lists. */
 function faults() {
     const manual = readFileSync("../docs/faults.md", "utf8");
     const causes = new Map(
@@ -74,7 +77,7 @@ function faults() {
     return "build/faults.json";
 }
 
-/** Puts the page's texts in English into its HTML, which has their names behind `$`. */
+/** Replaces the names behind `$` in the page's HTML by the English texts. */
 async function english() {
     const { outputFiles } = await build({ entryPoints: ["src/words/en.ts"], format: "esm", write: false });
     const { en } = await import(`data:text/javascript,${encodeURIComponent(outputFiles[0]?.text ?? "")}`);

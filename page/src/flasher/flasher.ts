@@ -1,4 +1,4 @@
-// Flashing, as the operator sees it: a board, a button, how far it is, and what came of it.
+// Flashing, for the operator: a board, a button, the progress, and the result.
 
 import { download, Parts } from "../dom.ts";
 import { choosePort, PortError, SerialLine, whyNoSerial } from "../link/serial.ts";
@@ -120,7 +120,7 @@ export class Flasher {
     #say(kind: "done" | "failed" | "", text: () => string): void {
         const said = this.#parts.html("flash-said");
         said.className = kind;
-        // Commands stand between backticks where they are printed.
+        // Commands are printed between backticks.
         show(said, () => {
             const plain = text().replaceAll("`", "");
             return plain === "" ? "" : sentence(plain);
