@@ -24,11 +24,11 @@ const SLOWER: u8 = 115;
 /// Cycles between two counts at the rate that `weeder bounds` proves: 290,909 a second.
 pub const PROVED_CYCLES: u32 = 55;
 
-/// The most by which [`highest`] shortens them, in cycles. Every handler takes longer than the rest.
+/// Greatest shortening in [`highest`], in cycles. Every handler takes longer than the rest.
 const SHORTER_CYCLES: u32 = 42;
 
-/// Jitter: the share of the time between two edges by which an edge comes early or late. It stands for a worn or
-/// eccentric disc.
+/// Jitter: how early or late an edge comes, as a share of the time between two. It stands for a worn or eccentric
+/// disc.
 const JITTER: f64 = 0.3;
 
 /// Time in which the weeder answers the last question, in ms.

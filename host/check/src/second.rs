@@ -14,8 +14,7 @@ use uno::{Pin, PinChange, hex};
 /// Cycles of a turn: 0.1 ms.
 const TURN: u64 = 1600;
 
-/// The delay of its edges: a turn, and the most by which a turn can be longer. Both programs run on to the end of an
-/// instruction.
+/// The delay of its edges: a turn, and its greatest excess, since both programs run on to the end of an instruction.
 const DELAY: u64 = TURN + 64;
 
 /// The edges of a turn: cycle, number of the board's pin, level.

@@ -50,7 +50,7 @@ pub const US_A_DEGREE: f64 = 500.0 / OUT_DEGREES;
 /// Under the highest load the servo still turns at a twentieth of its speed.
 const GREATEST_LOAD: f64 = 0.95;
 
-/// The factor by which a load, as a share of the stall torque, lengthens the travel.
+/// The factor on the travel time under a load, which is a share of the stall torque.
 pub fn slowed(load: f64) -> f64 {
     1.0 / (1.0 - load.clamp(0.0, GREATEST_LOAD))
 }

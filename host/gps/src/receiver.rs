@@ -31,7 +31,7 @@ const DEVIATIONS: f64 = 8.0;
 /// Further distance of two fixes of the best receiver, such as by the antenna's swaying, in metres.
 const SWAY_M: f64 = 0.25;
 
-/// The factor by which the machine may travel farther than the wheel: it may skid.
+/// Greatest ratio of the machine's distance to the wheel's: the machine may skid.
 const SKIDDING: f64 = 1.1;
 
 /// The least delay is searched among the lines of this time and the one before, in ms of the log.

@@ -7,7 +7,7 @@
 //!
 //! The arm swings sideways about a pivot beside the row: at an angle the tool's middle is `arm * sin(angle)` from the
 //! row's line. A servo turns at full speed without load. Its speed falls in a straight line to zero at the stall
-//! torque. The load is the torque of the whole blade in the soil (above Eq. 10), by which the paper sizes its servo.
+//! torque. The load is the torque of the whole blade in the soil (above Eq. 10); the paper sizes its servo by it.
 
 use crate::machine::{Machine, SwingInputs};
 use crate::unit::{KG_CM, MM};

@@ -1,6 +1,6 @@
 //! The trained example table: scale, radius, k and examples, in millimetres and millimetres a second.
 //!
-//! Written by `weeder train --synthetic --seed 1 --max 64`. Do not edit it: train it anew.
+//! Written by `weeder train --synthetic --seed 1 --max 64`. Do not edit it: train it again.
 
 use crate::ground::class::label;
 use crate::ground::features::COUNT as FEATURES;

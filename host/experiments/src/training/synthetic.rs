@@ -121,7 +121,7 @@ const RUN_OUT_MM: f64 = 100.0;
 /// The speed of a pass, as a share of its class.
 const PACE: RangeInclusive<f64> = 0.9..=1.1;
 
-/// The share by which the wheel goes farther in a turn than its circumference; negative if it drags.
+/// Slip: the additional distance of the wheel in a turn, as a share of its circumference; negative if it drags.
 const SLIP: RangeInclusive<f64> = -0.03..=0.03;
 
 /// The machine rolls from the start: it reaches its speed within a fraction of a millisecond.

@@ -16,7 +16,7 @@ use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;
 use std::rc::Rc;
 
-/// The most by which the machine's own speed may differ from the log's speeds around it, in mm/s.
+/// Tolerance of the machine's own speed against the log's speeds around it, in mm/s.
 const SPEED_SLACK_MM_S: i32 = 25;
 
 /// Detections that a label may still refer to: as many as the firmware stores.
