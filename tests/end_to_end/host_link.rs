@@ -37,7 +37,7 @@ fn all_settings_are_read_and_are_the_table_s_defaults() {
 }
 
 #[test]
-fn settings_are_pushed_whatever_stands_in_each_other_s_way() {
+fn settings_are_pushed_even_if_their_ranges_block_each_other() {
     let mut link = link();
     link.ask("clear").expect("the firmware knows the command");
     // The pulses are exchanged, and only the beam's new position makes room for the margin.

@@ -17,13 +17,13 @@ use board::Board;
 use model_test::{Extent, drive::Drive, go_all, run};
 
 #[test]
-fn whatever_happens_to_the_firmware_the_tool_keeps_off_every_canopy_that_was_seen() {
+fn in_random_runs_of_the_firmware_the_tool_keeps_off_every_canopy_that_was_seen() {
     let extent = Extent { runs: 60, least_turns: 200_000, shrinkings: 300 };
     go_all(extent, &run::wild(14), Drive::<Board>::go);
 }
 
 #[test]
-fn whatever_either_beam_misses_and_the_wheel_slips_the_firmware_keeps_off_every_plant() {
+fn with_a_slipping_wheel_and_beams_that_miss_plants_the_firmware_keeps_off_every_plant() {
     let extent = Extent { runs: 24, least_turns: 150_000, shrinkings: 300 };
     go_all(extent, &run::beams(10), Drive::<Board>::go);
 }

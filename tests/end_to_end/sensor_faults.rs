@@ -109,7 +109,7 @@ fn an_encoder_that_stutters_at_a_crawl_costs_one_plant_at_most() {
 }
 
 #[test]
-fn an_encoder_of_which_one_edge_in_ten_does_not_come_costs_one_plant_at_most() {
+fn an_encoder_that_loses_one_edge_in_ten_costs_one_plant_at_most() {
     // A pin keeps its level if an edge is dropped.
     let lost = |time_s: f64| (time_s * CYCLES_PER_SECOND as f64) as u64 % 10 == 3;
     let mut run = losing_edges(plants(), 2.5, 500.0, 3500.0, lost);

@@ -140,7 +140,7 @@ fn under_way_after(commands: &[&str], plants: usize) -> Run {
 }
 
 #[test]
-fn no_turn_takes_more_than_a_millisecond_whatever_is_typed_and_told() {
+fn no_turn_takes_more_than_a_millisecond_for_all_commands_and_output() {
     let mut uno = woken_up();
     let mut worst = (0, String::new());
     for line in lines() {

@@ -269,7 +269,7 @@ fn plots_without_scatter_have_estimates_but_no_tests() {
 }
 
 #[test]
-fn whatever_was_left_of_a_trial_no_figure_is_infinite_or_none() {
+fn every_part_of_a_trial_gives_finite_figures() {
     let mut chance = ChaCha8Rng::seed_from_u64(1);
     let (mut modelled, mut analysed) = (0, 0);
     for _ in 0..5000 {

@@ -215,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn who_knows_everything_has_the_tool_out_over_whatever_zone_is_to_be_kept() {
+    fn the_ideal_controller_has_the_tool_out_over_every_zone() {
         for speed_km_h in [1.0, 1.5, 2.0, 2.5, 3.0] {
             let reached = |protected_mm: f64| {
                 let stems = PLACES.map(|along_mm| Stem { along_mm, across_mm: 0.0, protected_mm, is_seen: true });

@@ -79,7 +79,7 @@ mod tests {
         };
         // As good as standing still: the zone of 90 mm, but for its ends that the tool may touch.
         assert!((share(1.0) - (1.0 - 90.0 / 2000.0)).abs() < 0.002, "{}", share(1.0));
-        // At 500 mm/s the tool has to be 72.5 mm aside of the zone's middle: 12 degrees instead of 4.5, which takes 20
+        // At 500 mm/s the tool has to be 72.5 mm aside of the zone's middle: 12 degrees less 4.5. This takes 20
         // ms or 10 mm. Nearer to the zone's ends it needs less, but has less time: the stretch is a little wider than
         // the zone.
         let lost_mm = 2000.0 * (1.0 - share(500.0));

@@ -242,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn a_row_without_an_end_is_sown_in_order_and_apart_whatever_is_asked_of_it() {
+    fn a_row_without_an_end_is_sown_in_order_and_without_overlaps_for_all_parameters() {
         let tight = Planting {
             spacing_mm: 150.0,
             spacing_scatter_mm: 80.0,

@@ -300,7 +300,7 @@ mod tests {
     }
 
     #[test]
-    fn nobody_weeds_the_strip_between_tool_and_sweeps() {
+    fn no_tool_weeds_the_strip_between_tool_and_sweeps() {
         let mechanism = Mechanism::default();
         assert_eq!(unweeded_strip_mm(&Machine::default(), &mechanism), 22.5);
         let wide = Machine { tool_width_mm: 100.0, ..Machine::default() };

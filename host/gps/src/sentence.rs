@@ -212,7 +212,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_sentence_of_which_a_character_is_another_or_that_is_cut_is_damaged(
+        fn a_sentence_with_a_changed_character_or_without_its_end_is_damaged(
             which in 0..2_usize, at in 0..200_usize, by in 1..127_u8, cut in any::<bool>(),
         ) {
             let whole = sentence([GGA, RMC][which]);

@@ -287,7 +287,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn on_a_straight_row_a_place_is_where_it_is_whatever_the_direction_and_the_offset(
+        fn on_a_straight_row_positions_are_right_for_every_direction_and_offset(
             direction in 0.0..std::f64::consts::TAU, way_m in 0.1..29.4_f64, ahead_m in -3.0..3.0_f64, right_m in -3.0..3.0_f64,
         ) {
             let forward = Metres { east: direction.sin(), north: direction.cos() };

@@ -177,7 +177,7 @@ fn the_drawing_has_a_circle_for_each_plant_and_none_without_a_place() {
 }
 
 #[test]
-fn a_log_that_was_opened_again_and_an_uno_that_was_reset_begin_the_way_anew() {
+fn a_log_that_was_opened_again_and_an_uno_that_was_reset_restart_the_distance() {
     let job = Job::read(&[whole(), whole()].concat(), &Wanted::default());
     assert_eq!(job.things().filter(|thing| thing.found.is_ok()).count(), 2 * (PLANTS + SWINGS));
     assert_eq!(job.stretches.len(), 2);
@@ -197,7 +197,7 @@ fn a_log_that_was_opened_again_and_an_uno_that_was_reset_begin_the_way_anew() {
 }
 
 #[test]
-fn a_wheel_that_is_set_anew_begins_a_stretch_of_its_own() {
+fn a_change_of_the_wheel_begins_a_new_stretch() {
     let mut log = whole();
     let set = vec![
         (Kind::Command, "set ticks_per_m 1000"),
@@ -256,7 +256,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 64, ..ProptestConfig::default() })]
 
     #[test]
-    fn whatever_happens_to_the_receivers_lines_nothing_of_the_machine_is_lost(
+    fn faults_in_the_receivers_lines_lose_no_line_of_the_machine(
         hurt in prop::collection::vec((2..60_u64, 0..100_usize, any::<u8>(), 0..4_u8), 0..40),
     ) {
         let change = |second: u64, line: String| {

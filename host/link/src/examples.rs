@@ -213,7 +213,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_bytes_of_whatever_an_object_may_measure_come_back_from_the_millimetres() {
+    fn the_bytes_of_every_detection_come_back_from_its_millimetres() {
         for value in i16::MIN..=i16::MAX {
             let example = Example::new(SCALE.quantise(&[value.into(); COUNT]), label::WEED);
             let features = features_of(&example).expect("it is an object's");

@@ -383,7 +383,7 @@ mod tests {
     ];
 
     #[test]
-    fn a_machine_of_which_nothing_was_measured_is_left_alone() {
+    fn a_machine_without_measurements_is_left_alone() {
         let set_up = SetUp::of_lines(["> get", MEASURED[1], "slip permille=12"]);
         assert_eq!(set_up.next(&Settings::new()), None);
     }
@@ -469,7 +469,7 @@ mod tests {
     }
 
     #[test]
-    fn a_servo_that_somebody_has_looked_at_scatters_by_what_an_eye_can_tell() {
+    fn a_servo_that_was_timed_by_eye_scatters_by_the_error_of_the_eye() {
         let by_eye = "calibrated by=eye, set lead_out_ms and lead_in_ms to what you saw";
         let failed = "calibrated by=none, the end switch did not follow";
         let mut lines = vec![by_eye, failed, by_eye];

@@ -182,7 +182,7 @@ fn link_to_machine(typed: &[&str]) -> Link {
 }
 
 #[test]
-fn examples_are_taught_whatever_features_somebody_has_left_behind() {
+fn examples_are_taught_after_features_of_an_earlier_command() {
     let wanted = [examples::example_of(&Features::describe(278, 250, 20), label::PLANT)];
     for left in 0..=6 {
         let mut link = link_to_machine(&vec!["teach 7"; left]);

@@ -139,7 +139,7 @@ mod tests {
     }
 
     #[test]
-    fn another_host_stays_out_everywhere_whatever_else_is_right() {
+    fn another_host_is_refused_everywhere_even_if_all_else_is_right() {
         let hosts: [&[&[u8]]; 9] = [
             &[],
             &[b""],
@@ -205,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn at_the_computer_itself_nobody_needs_a_code_but_its_own_name_and_origin() {
+    fn at_the_computer_itself_the_name_and_the_origin_suffice_without_a_code() {
         let door = Door::here(8866);
         for host in ["127.0.0.1:8866", "localhost:8866"] {
             let origin = format!("http://{host}");

@@ -207,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn who_shows_a_token_is_paired_and_nobody_else() {
+    fn only_a_phone_with_a_token_is_paired() {
         let mut pairing = pairing();
         assert_eq!((pairing.phone(""), pairing.phone(&"0".repeat(64))), (None, None));
         assert_eq!((pairing.pair([1; TOKEN_LENGTH]), pairing.pair([2; TOKEN_LENGTH])), (1, 2));

@@ -191,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn a_phone_keeps_its_connection_whatever_another_opens() {
+    fn a_phone_keeps_its_connection_for_any_number_of_others() {
         for stage in [Stage::Asking, Stage::Listening, Stage::Holding] {
             let places = Places::default();
             let mut phone = take(&places, 1).enter(stage, Client::Phone(1));

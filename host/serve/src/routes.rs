@@ -407,7 +407,7 @@ mod tests {
     use tokio::runtime;
 
     #[test]
-    fn a_page_that_is_too_far_behind_is_told_so_at_the_end_and_may_listen_anew() {
+    fn a_page_that_is_too_far_behind_gets_a_last_message_and_may_connect_again() {
         let runtime = runtime::Builder::new_current_thread().enable_time().build().unwrap();
         runtime.block_on(async {
             let hub = Hub::new(1);

@@ -166,7 +166,7 @@ mod tests {
     ];
 
     #[test]
-    fn whoever_may_type_at_all_may_hold() {
+    fn every_client_that_may_type_may_hold() {
         for reach in [Reach::Here, WATCHING, STARTING] {
             for line in ["hold", " hold", "hold   "] {
                 assert_eq!(allow(line, reach), Ok(Order::Hold), "{line:?} from {reach:?}");
@@ -252,7 +252,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_that_is_none_or_two_is_passed_on_for_nobody() {
+    fn a_line_that_is_none_or_two_is_never_passed_on() {
         let long = "x".repeat(link::COMMAND_LENGTH + 1);
         for line in
             ["", "   ", "status\nstart", "status\rstart", "hold\u{8}\u{8}\u{8}\u{8}start", "\tstart", "grün", &long]

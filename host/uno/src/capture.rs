@@ -298,7 +298,7 @@ mod tests {
     }
 
     #[test]
-    fn times_become_cycles_whatever_the_unit() {
+    fn times_in_every_unit_become_cycles() {
         let (a, b) = (Pin::D2, Pin::D3);
         for (timescale, time) in [("1 us", 1000), ("10 us", 100), ("1 ms", 1), ("100 ps", 10_000_000)] {
             let file = recording(timescale, &format!("#0 0! 1\" #{time} 1! 1\" b101 # #{} 0\"", 3 * time));

@@ -177,7 +177,7 @@ fn pulses_since(uno: &Uno, cycle: u64) -> Vec<(u64, u64)> {
 }
 
 #[test]
-fn a_new_width_begins_with_the_next_frame_whenever_it_is_written() {
+fn a_new_width_begins_with_the_next_frame_at_any_time_of_its_write() {
     let mut uno = boot("pulses");
     uno.run_until(2 * FRAME_CYCLES).unwrap();
     let start = pulses_since(&uno, 1000)[0].0;
@@ -292,7 +292,7 @@ fn a_watchdog_reset_is_reported_and_the_firmware_goes_on() {
 }
 
 #[test]
-fn a_watchdog_that_nobody_turns_off_bites_again_after_sixteen_milliseconds() {
+fn a_watchdog_that_stays_on_bites_again_after_sixteen_milliseconds() {
     let mut uno = boot("careless");
     uno.run_for_ms(200).unwrap();
     let cycles: Vec<u64> = uno.resets().iter().map(|reset| reset.cycle).collect();

@@ -123,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn one_key_has_all_rows_hold_whatever_is_being_typed_and_whichever_row_is_chosen() {
+    fn one_key_holds_all_rows_during_typing_and_for_every_chosen_row() {
         let opener = || -> link::rows::Opener { Box::new(|| Err(LinkError::Absent("it".to_owned()))) };
         let (rows, _) = Rows::open(vec![opener(), opener()]);
         let mut model = Model::new(vec!["left".to_owned(), "right".to_owned()]);

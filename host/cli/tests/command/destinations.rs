@@ -100,7 +100,7 @@ fn a_folder_called_report_where_the_command_is_typed_keeps_it_from_nothing() {
 }
 
 #[test]
-fn the_table_is_printed_whatever_happens_to_the_file() {
+fn the_table_is_printed_even_if_the_file_cannot_be_written() {
     let folder = tempfile::tempdir().unwrap();
     let sweep = ["sweep", "--field", "small.toml", "--x", "k=1..3:2", "--out", "/dev/full"];
     let output = weeder(folder.path(), &sweep);

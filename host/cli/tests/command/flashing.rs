@@ -199,7 +199,7 @@ fn avrdude(folder: &Path, script: &str) {
 }
 
 #[test]
-fn an_elf_whose_bounds_are_not_proved_goes_nowhere_unless_somebody_insists() {
+fn an_elf_with_unproved_bounds_is_flashed_only_with_unproved() {
     let folder = tempfile::tempdir().unwrap();
     let pty = Pty::open().unwrap();
     let elf = elf_of(folder.path(), 100);

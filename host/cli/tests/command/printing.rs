@@ -39,7 +39,7 @@ fn weeder(arguments: &[&str], stdout: impl Into<Stdio>) -> Output {
 }
 
 #[test]
-fn whoever_closes_the_pipe_early_ends_no_command_badly() {
+fn a_pipe_that_is_closed_early_makes_no_command_fail() {
     for arguments in COMMANDS {
         let (reader, writer) = io::pipe().unwrap();
         drop(reader);

@@ -264,7 +264,7 @@ const PATHS: [(&str, &str); 10] = [
 ];
 
 #[test]
-fn without_the_code_nobody_sees_or_does_anything() {
+fn without_the_code_a_phone_sees_nothing_and_does_nothing() {
     let folder = folder();
     let (_uno, port) = uno(&folder, "uno", &["--stand"]);
     let served = serve(&folder, &[&port], &[]);

@@ -153,7 +153,7 @@ fn what_does_not_go_with_parts_is_refused() {
 }
 
 #[test]
-fn a_shard_that_is_killed_leaves_no_file_and_computes_the_same_when_it_starts_anew() {
+fn a_shard_that_is_killed_leaves_no_file_and_computes_the_same_when_it_is_restarted() {
     let folder = folder();
     let path = folder.path();
     let endless = ["soak", "--hours", "10000", "--uno-minutes", "0", "--shard", "1/2", "--out", "1.part"];

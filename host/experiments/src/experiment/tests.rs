@@ -25,7 +25,7 @@ fn the_result_does_not_depend_on_the_number_of_threads() {
 }
 
 #[test]
-fn a_controller_finds_the_same_field_whoever_else_takes_part() {
+fn a_controller_gets_the_same_field_with_and_without_others() {
     let all = experiment(&[1.5], "transplanted");
     let alone = Experiment { controllers: vec![Treatment::Firmware], ..all.clone() };
     assert_eq!(records(&run(&all), Treatment::Firmware), records(&run(&alone), Treatment::Firmware));
@@ -53,7 +53,7 @@ fn the_firmware_damages_no_plant_and_weeds_up_to_the_bound_where_the_papers_dama
 }
 
 #[test]
-fn whoever_knows_every_plant_damages_none_in_any_field_and_weeds_more_than_the_firmware() {
+fn the_ideal_controller_damages_no_plant_in_any_field_and_weeds_more_than_the_firmware() {
     // Without look-ahead, the firmware weeds more, but damages plants.
     for preset in presets().filter(|preset| *preset != "paper") {
         let totals = totals(&run(&experiment(&[1.0, 2.5], preset)));
@@ -67,7 +67,7 @@ fn whoever_knows_every_plant_damages_none_in_any_field_and_weeds_more_than_the_f
 }
 
 #[test]
-fn whoever_damages_no_plant_weeds_no_more_than_the_bound_in_any_field() {
+fn a_controller_that_damages_no_plant_weeds_no_more_than_the_bound_in_any_field() {
     for preset in presets() {
         for seed in 1..=3 {
             // A row for each plot: a plot with one damaged plant may weed more than its bound.

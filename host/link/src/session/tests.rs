@@ -113,7 +113,7 @@ fn commands_are_answered_one_after_the_other_beside_the_status() {
 }
 
 #[test]
-fn events_are_told_whatever_is_being_answered() {
+fn events_are_reported_during_every_answer() {
     let (mut session, _, says) = session();
     let now = Instant::now();
     second(&mut session, now);
@@ -123,7 +123,7 @@ fn events_are_told_whatever_is_being_answered() {
 }
 
 #[test]
-fn settings_are_asked_for_again_whatever_has_changed_them() {
+fn settings_are_asked_for_again_after_every_change() {
     let (mut session, _, says) = session();
     let mut now = Instant::now();
     second(&mut session, now);

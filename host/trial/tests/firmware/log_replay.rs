@@ -210,7 +210,7 @@ fn a_row_with_changes_of_speed_and_a_stop_is_decided_the_same_on_the_host() {
 /// sets off, while it accelerates, or while it rolls past plants. The operator types at random times, and every other
 /// PC is busy now and then.
 #[test]
-fn rows_by_chance_are_decided_the_same_on_the_host_whatever_is_typed_and_whenever_it_is_read() {
+fn random_rows_are_decided_the_same_on_the_host_for_all_commands_and_delays() {
     let rows = cases(20);
     let replayed: Vec<Replayed> = (0..rows)
         .into_par_iter()
