@@ -1,4 +1,4 @@
-//! Hands the memory budgets of memory.x to the linker, for the firmware alone.
+//! Passes memory.x to the linker, for the firmware only.
 
 use std::env;
 

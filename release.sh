@@ -1,31 +1,31 @@
 #!/usr/bin/env bash
-# Makes a release: a folder for users without Rust, with nothing of this machine.
+# Makes a release: a folder for users without Rust, independent of the build machine.
 #
 #     ./release.sh FOLDER
 #
 # weeder.hex          the firmware, for the page or avrdude to write
 # weeder-tester.hex   the firmware of a second Uno, which checks the first
-# firmware.txt        its size, and what it can need at most of stack and time
+# firmware.txt        its size, and its worst-case stack and time
 # page/               the page: open its index.html, or serve it to a phone with `weeder serve`
 # weeder              the host tools, for computers like this one, with the page inside
 # manual/             README.md and docs/, as Markdown; book/ is the same manual for a browser
 # sbom/               the parts as CycloneDX, for programs: packages, versions, licences
-# licences/           what is inside, its authors and licences, with the licences' texts
+# licences/           the parts, their authors and licences, with the licences' texts
 # SHA256SUMS          of each of these files: `sha256sum --check SHA256SUMS`
 #
 # Tools and firmware name their commit, with a `+` if the sources differ from it. Outside of a clone they name none.
 #
-# The same sources give the same weeder.hex, page and sbom on every machine and in every folder: .ci/from-nothing
-# compares them. `weeder` has its folders' names in it, and the system's libraries. FOLDER must not be there yet;
-# it is there when all of it is.
+# The same sources give the same weeder.hex, page and sbom on each machine and in each folder: .ci/from-nothing compares them.
+# `weeder` contains the names of its folders, and the system's libraries. FOLDER must not exist; it appears when the release is
+# complete.
 set -euo pipefail
 
 if [ $# -ne 1 ]; then
-    echo "release.sh: say the folder to make, as in \`./release.sh weeder-release\`." >&2
+    echo "release.sh: name the new folder, as in \`./release.sh weeder-release\`." >&2
     exit 1
 fi
 if [ -e "$1" ]; then
-    echo "release.sh: $1 is there already. Remove it, or name another folder." >&2
+    echo "release.sh: $1 exists. Remove it, or name another folder." >&2
     exit 1
 fi
 mkdir -p "$(dirname "$1")"
@@ -36,13 +36,13 @@ trap 'rm -rf "$folder"' EXIT
 chmod 755 "$folder"
 target=$(realpath -m "${CARGO_TARGET_DIR:-target}")
 
-# The host tools, for now without the page: it takes them to make that.
+# The host tools, first without the page: they build it.
 cargo build --locked --release --package weeder-cli
 cp "$target/release/weeder" "$folder/"
 WEEDER_COMMIT=$("$folder/weeder" --version | sed -n 's/.*(\(.*\))$/\1/p')
 export WEEDER_COMMIT
 
-# The firmware, whose bounds `weeder hex` proves before it writes it, and what it needs.
+# The firmware. `weeder hex` proves its bounds before it writes the file.
 cargo firmware --locked
 elf=$target/avr-none/firmware/weeder-firmware.elf
 "$folder/weeder" hex --elf "$elf" "$folder/weeder.hex"
@@ -52,7 +52,7 @@ elf=$target/avr-none/firmware/weeder-firmware.elf
     "$folder/weeder" bounds --elf "$elf"
 } >"$folder/firmware.txt"
 
-# The tester's.
+# The tester's firmware.
 "$folder/weeder" hex --tester "$folder/weeder-tester.hex"
 
 # The page.
@@ -62,13 +62,13 @@ cp -r page/dist "$folder/page"
 WEEDER_PAGE="$folder/page" cargo build --locked --release --package weeder-cli
 cp "$target/release/weeder" "$folder/"
 
-# The manual, with its links as they are. Those to sources lead nowhere here.
+# The manual, with its links unchanged. Links to sources do not work here.
 mkdir "$folder/manual"
 cp -r README.md CHANGELOG.md CONTRIBUTING.md docs "$folder/manual/"
 cargo install --quiet --locked mdbook --version 0.5.4 --no-default-features --features search --root "$target/mdbook"
 "$target/mdbook/bin/mdbook" build --dest-dir "$folder/book"
 
-# Licences. What runs only as it is built, and is not in what is built, is left out.
+# Licences. Tools that only run during the build are left out.
 mkdir -p "$folder/licences/texts"
 cp LICENSE-MIT LICENSE-APACHE "$folder/licences/"
 list=$folder/licences/LICENCES.txt
@@ -83,7 +83,7 @@ each licence's text where its author gives one.
 - book/ has mdBook's theme in it (MPL-2.0), with highlight.js (BSD-3-Clause) and fonts (OFL-1.1).
 
 END
-# Lines `NAME VERSION LICENCE` of the crates that a package of this repository is linked with.
+# Lines `NAME VERSION LICENCE` of the crates that a package of this repository links.
 crates() {
     cargo tree --locked --edges normal,no-proc-macro --no-dedupe --prefix none --format '{p}|{l}' "$@" |
         sed -e '/ (\//d' -e 's/ v\([0-9][^|]*\)|/ \1 /'
@@ -115,15 +115,15 @@ done | LC_ALL=C sort -u | while read -r name version _; do
 done
 install -D -m 644 page/node_modules/avr8js/LICENSE "$folder/licences/texts/avr8js/LICENSE"
 
-# SBOMs. cargo-cyclonedx writes one beside each Cargo.toml of the workspace. What differs from run to run and from folder to folder is
-# taken out, and the C code that is linked in is added. simavr-ffi carries its simavr without a version of its own.
+# SBOMs. cargo-cyclonedx writes one beside each Cargo.toml of the workspace. Parts that differ between runs and folders are removed,
+# and linked C code is added. simavr-ffi contains simavr without a version of its own.
 c_avr_libc="avr-libc|$(printf '#include <avr/version.h>\n__AVR_LIBC_VERSION_STRING__' | avr-gcc -E -P - | tail -1 | tr -d '"')|BSD-3-Clause"
 c_libgcc="libgcc|$(avr-gcc -dumpversion)|GPL-3.0-or-later WITH GCC-exception-3.1"
 c_simavr="simavr|in simavr-ffi $(sed -n '/^name = "simavr-ffi"$/{n;s/.*"\(.*\)"/\1/p}' Cargo.lock)|GPL-3.0-or-later"
 c_libelf="libelf|$(pkg-config --modversion libelf)|GPL-2.0-or-later OR LGPL-3.0-or-later"
 cargo install --quiet --locked --root "$target/tools" --version 0.5.9 cargo-cyclonedx
 mkdir "$folder/sbom"
-# An SBOM by its name, the folder of its package, what is added, up to `--`, and the options.
+# Arguments: the SBOM's name, its package's folder, parts to add up to `--`, and options.
 sbom() {
     local name=$1 package=$2 c=()
     shift 2

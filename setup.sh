@@ -1,16 +1,16 @@
 #!/usr/bin/env bash
-# Installs what a fresh machine needs to build, test, simulate and flash the weeder: packages of Debian or Ubuntu, and the
-# Rust toolchain that rust-toolchain.toml pins. Safe to run again; what is there already is left alone.
+# Installs what a new machine needs to build, test, simulate and flash the weeder: packages of Debian or Ubuntu, and the Rust
+# toolchain of rust-toolchain.toml. It can run again, and keeps what is installed.
 #
 #     ./setup.sh         all that cargo needs
-#     ./setup.sh page    and the page, built, with what it and its tests need: Node.js 18 or later with npm, Chromium
-#                        and Firefox ESR
-#     ./setup.sh slurm   and a Slurm on which a study in shards is tried; several words may be said at once
+#     ./setup.sh page    also builds the page, with all that it and its tests need: Node.js 18 or later with npm,
+#                        Chromium and Firefox ESR
+#     ./setup.sh slurm   also installs Slurm, to try an experiment in shards; several words are possible
 set -euo pipefail
 cd "$(dirname "$0")"
 
-# For the firmware: the AVR linker and C library, and the programmer; bootloaders, to try it on the virtual Uno.
-# For the virtual Uno (simavr): a C compiler, and what its Rust binding is generated and linked with.
+# For the firmware: the AVR linker and C library, and the programmer; bootloaders, to try it on the virtual Uno. For the virtual Uno
+# (simavr): a C compiler, and what its Rust binding needs to be generated and linked.
 packages=(
     gcc-avr binutils-avr avr-libc avrdude arduino-core-avr
     build-essential pkg-config clang libclang-dev libelf-dev zlib1g-dev libzstd-dev
@@ -21,7 +21,7 @@ for word in "$@"; do
     case "$word" in
         page)
             page=yes
-            # Whoever has a Node.js has it from somewhere else, mostly, and Debian's would not go beside it.
+            # An installed Node.js is often from another source, and conflicts with Debian's.
             if ! command -v npm >/dev/null; then packages+=(nodejs npm); fi
             if ! command -v chromium >/dev/null; then packages+=(chromium); fi
             if ! command -v firefox-esr >/dev/null; then packages+=(firefox-esr); fi
@@ -32,7 +32,7 @@ for word in "$@"; do
             packages+=(munge procps slurm-client slurmctld slurmd)
             ;;
         *)
-            echo "setup.sh: unknown word \`$word\`. Say nothing, page, slurm, or both." >&2
+            echo "setup.sh: unknown word \`$word\`. Use no word, page, slurm, or both." >&2
             exit 1
             ;;
     esac
@@ -45,13 +45,13 @@ if command -v dpkg-query >/dev/null; then
         [ "$state" = installed ] || missing+=("$package")
     done
     if [ ${#missing[@]} -eq 0 ]; then
-        echo "Packages: all there."
+        echo "Packages: all installed."
     else
         echo "Packages: installing ${missing[*]}"
         root=()
         if [ "$(id -u)" -ne 0 ]; then
             command -v sudo >/dev/null || {
-                echo "setup.sh: run it as root, or install sudo: packages are to be installed." >&2
+                echo "setup.sh: packages are missing. Run it as root, or install sudo." >&2
                 exit 1
             }
             root=(sudo)
@@ -60,12 +60,12 @@ if command -v dpkg-query >/dev/null; then
         "${root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends "${missing[@]}"
     fi
 else
-    echo "Packages: this is neither Debian nor Ubuntu. Install what your system calls these:"
+    echo "Packages: this is neither Debian nor Ubuntu. Install your system's versions of:"
     printf '    %s\n' "${packages[@]}"
 fi
 
 if ! command -v rustup >/dev/null; then
-    echo "setup.sh: rustup is missing. Install it as https://rustup.rs says, then run this again." >&2
+    echo "setup.sh: rustup is missing. Install it from https://rustup.rs says, then run this again." >&2
     exit 1
 fi
 channel=$(sed -n 's/^channel = "\(.*\)"$/\1/p' rust-toolchain.toml)
@@ -73,7 +73,7 @@ target=$(sed -n 's/^targets = \["\(.*\)"\]$/\1/p' rust-toolchain.toml)
 installed=$(rustup component list --installed --toolchain "$channel" 2>/dev/null || true)
 is_there() { grep -q "^$1" <<<"$installed"; }
 if is_there rust-src && is_there rustfmt && is_there clippy && is_there "rust-std-$target"; then
-    echo "Rust: $channel is there."
+    echo "Rust: $channel is installed."
 else
     echo "Rust: installing $channel"
     rustup toolchain install "$channel" --profile minimal --target "$target" \

@@ -1,6 +1,7 @@
-// Makes an SBOM the same in each run and each folder: `node sbom.mjs FROM TO [PACKAGE...]`. Number and time go, and the folder's name.
+// Makes an SBOM independent of run and folder: `node sbom.mjs FROM TO [PACKAGE...]`. It removes number, time and the folder's name.
 //
-// Each PACKAGE, as `NAME|VERSION|LICENCE`, is C code that is linked in. No package manager of Rust or Node.js knows it, so it is added here.
+// Each PACKAGE, as `NAME|VERSION|LICENCE`, is linked C code. The package managers of Rust and Node.js do not know it, so it is
+// added here.
 
 import { readFileSync, writeFileSync } from "node:fs";
 

@@ -1,81 +1,80 @@
-//! The beam across the row on D8, and a second one on D10: every edge with the encoder's position at which it came.
+//! The beam across the row on D8, and a second one on D10: each edge with the encoder's position at that moment.
 //!
-//! The pin-change interrupt PCINT0 stamps an edge and queues it; the loop takes it from there. A queue that is full loses
-//! the edge and says so. What the edges mean is not known here, nor which beam one is of: a stamp has both levels. Low = broken.
-//! This is the one file beside main.rs that looks into another peripheral's: what the handler stamps is the encoder's count.
+//! The pin-change interrupt PCINT0 stamps an edge and queues it; the loop takes it. A full queue drops the edge and reports that.
+//! This file does not interpret edges, or tell which beam one belongs to: a stamp has both levels. Low is broken. Apart from
+//! main.rs, this is the only file that uses another peripheral's data: the handler stamps the encoder's count.
 //!
-//! An edge is kept as the lower 14 bits of the count, and one for each level. The loop takes it long before the wheel has
-//! turned on by half of what 14 bits hold, 8192 ticks, and so knows the rest: that is a second and a half at 10 km/h, where
-//! a loop that hangs is reset after a quarter of one.
+//! A stamp has the lower 14 bits of the count, and one bit for each level. The loop restores the upper bits from the present count.
+//! This works until the wheel has turned by 8192 ticks, half the range of 14 bits: 1.5 s at 10 km/h. A stopped loop is reset after
+//! a quarter of a second.
 //!
-//! D10 may be left open where there is no second beam: then it asks for no interrupt, and its level means nothing.
+//! Without a second beam D10 may be open: its interrupt is then off, and its level is ignored.
 
 use crate::{
     encoder,
     handler::handler,
-    passes,
+    loop_bound,
     ring::Ring,
     shared::{Byte, Shared},
 };
 use avr_device::atmega328p::{EXINT, PORTB};
 use control::{measure::readings::Edge, units::Position};
 
-/// Edges that can wait for the loop, which a sensor with a response of 1 ms cannot make in less than 8 ms. No turn of the loop takes a
-/// tenth of that (tests/end_to_end/turns_of_the_loop.rs); the longest that can be proved has as many edges in it as can wait.
+/// Edges in the queue. A sensor with a response of 1 ms needs at least 8 ms for these. A turn of the loop takes less than a tenth
+/// of that (tests/end_to_end/turns_of_the_loop.rs). The longest proved turn sees as many edges as the queue holds.
 const SLOTS: usize = 8;
 
-/// Edges that wait for the loop: 14 bits of the count between the beams' levels, the first's below and the second's above them.
+/// The queue of stamps: the first beam's level in bit 0, 14 bits of the count, the second beam's level in bit 15.
 static EDGES: Ring<SLOTS> = Ring::new();
 static STAMPS: [Shared<u16>; SLOTS] = [const { Shared::new(0) }; SLOTS];
 
-/// Not 0 when an edge found no room.
+/// Not 0 after an edge was dropped.
 static LOST: Byte = Byte::new(0);
 
-/// The beam's bit, of port B and of a stamp.
+/// The first beam's bit, in port B and in a stamp.
 const BEAM: u8 = 1;
 
-/// The second beam's, of port B and of a stamp.
+/// The second beam's bit, in port B and in a stamp.
 const SECOND_BEAM: u8 = 1 << 2;
 const SECOND_STAMPED: u16 = 1 << 15;
 
-/// The beam, as the loop sees it.
+/// The loop's side of the beams.
 pub struct Beam<'a> {
     interrupts: &'a EXINT,
     port: &'a PORTB,
 }
 
 impl<'a> Beam<'a> {
-    /// Begins to watch the beam.
+    /// Turns on the first beam's interrupt.
     pub fn new(interrupts: &'a EXINT, port: &'a PORTB) -> Self {
         let beam = Self { interrupts, port };
         beam.watch_second(false);
-        // SAFETY: bit 0 is PCIE0, and no other group of pins is watched.
+        // SAFETY: bit 0 is PCIE0, and no other pin group's interrupt is used.
         interrupts.pcicr().write(|w| unsafe { w.pcie().bits(1) });
         beam
     }
 
-    /// Watches the second beam from now on, or no longer.
+    /// Turns the second beam's interrupt on or off.
     pub fn watch_second(&self, is_there: bool) {
         let beams = if is_there { BEAM | SECOND_BEAM } else { BEAM };
         // SAFETY: these are the mask bits of PCINT0 and PCINT2.
         self.interrupts.pcmsk0().write(|w| unsafe { w.pcint().bits(beams) });
     }
 
-    /// Whether the beam is broken now.
+    /// Whether the first beam is broken now.
     pub fn is_broken(&self) -> bool {
         self.port.pinb().read().bits() & BEAM == 0
     }
 
-    /// The edges that wait; behind them, that some found no room, if any did.
+    /// The queued edges, and then [`Edge::Lost`] if edges were dropped.
     pub fn edges(&mut self) -> impl Iterator<Item = Edge> {
-        // Asked before the edges are taken: all that waited at a loss is then taken, and none of it comes behind the level that is
-        // read.
+        // Read before the edges. Then all edges queued before the loss come first, and none follows the level read at the end.
         let mut lost = take_lost();
-        // No more edges than can wait: those that keep coming must not keep the loop from turning.
+        // At most as many as the queue holds, so that edges which keep coming cannot stop the loop.
         let mut left = SLOTS as u8;
         core::iter::from_fn(move || {
-            // The edges, that some were lost, and the end.
-            passes::at_most::<{ SLOTS as u8 + 2 }>();
+            // The edges, the loss, and the end.
+            loop_bound::at_most::<{ SLOTS as u8 + 2 }>();
             if left > 0 {
                 left -= 1;
                 if let Some(edge) = next_edge() {
@@ -88,22 +87,22 @@ impl<'a> Beam<'a> {
     }
 }
 
-/// The oldest edge that was not taken yet.
+/// The oldest queued edge.
 fn next_edge() -> Option<Edge> {
     let stamp = EDGES.take(|slot| STAMPS[slot].get())?;
     let now = encoder::position();
-    // Both in quarters of a tick, which leaves the sign to the machine.
+    // Both in quarters of a tick, so that the processor's sign bit is the count's.
     let rolled_since = ((now as u16) << 2).wrapping_sub(stamp << 1 & !3) as i16 >> 2;
     let position = Position::new(now.wrapping_sub(rolled_since.into()));
     let (broken, second_broken) = (stamp & u16::from(BEAM) == 0, stamp & SECOND_STAMPED == 0);
     Some(Edge::Seen { position, broken, second_broken })
 }
 
-/// Whether edges were lost since this was last asked.
+/// Whether edges were dropped since the last call.
 fn take_lost() -> bool {
     let lost = LOST.get() != 0;
     if lost {
-        // An edge that is lost right before this is among those that the answer tells of.
+        // An edge dropped just before this line belongs to the same loss.
         LOST.set(0);
     }
     lost
@@ -116,7 +115,7 @@ handler! {
         "push r31",
         "lds  r30, {edges}+{pushed}",
         "lds  r31, {edges}+{taken}",
-        "sub  r31, r30", // less as many as wait
+        "sub  r31, r30", // minus the number waiting
         "cpi  r31, -{slots}",
         "breq 3f",
         "inc  r30",
@@ -126,7 +125,7 @@ handler! {
         "ldi  r31, 0",
         "subi r30, lo8(-({stamps}))",
         "sbci r31, hi8(-({stamps}))",
-        // The stamp is twice the count and the level, which goes in from the carry; the second beam's takes the highest bit.
+        // The stamp is twice the count plus the first level, shifted in from the carry. The second level becomes the highest bit.
         "in   r24, 0x03", // PINB
         "bst  r24, 2",
         "lsr  r24",
@@ -157,5 +156,5 @@ handler! {
     lost = sym LOST,
 }
 
-// The handler takes the beam's bit for the lowest one, of the port and of a stamp, and the second's for these.
+// The handler's assembly relies on these bits.
 const _: () = assert!(BEAM == 1 && SECOND_BEAM == 1 << 2 && SECOND_STAMPED == 1 << 15);

@@ -1,7 +1,7 @@
-//! The pins that are read and set by the loop: work switch (D4), end switch (D5) and status LED (D13).
+//! The pins that the loop reads and sets: work switch (D4), end switch (D5) and status LED (D13).
 //!
-//! Encoder (D2, D3) and beam (D8) belong to their interrupts, D9 to the servo's timer, D0 and D1 to the USART. The
-//! encoder's and the beam's pull-ups stand outside, on the board; only the switches use those inside the chip.
+//! Encoder (D2, D3) and beams (D8, D10) belong to their interrupts. D9 is the servo timer's, D0 and D1 the USART's. Encoder and
+//! beams have external pull-ups; only the switches use internal ones.
 
 use avr_device::atmega328p::{PORTB, PORTD, portb};
 use core::convert::Infallible;
@@ -10,11 +10,11 @@ use embedded_hal::digital::{ErrorType, InputPin, OutputPin, PinState};
 /// The status LED on D13 (PB5), lit when high.
 pub struct Lamp<'a>(&'a portb::RegisterBlock);
 
-/// A switch that pulls its pin of port D to ground when it is closed. The type says which bit it is, and not a number in the loop's
-/// frame: the pin is then read in place.
+/// A switch that connects its pin of port D to ground when closed. The bit is part of the type, so it takes no room in the loop's
+/// stack frame.
 pub struct Switch<'a, const BIT: u8>(&'a PORTD);
 
-/// The pins, set up.
+/// The pins after setup.
 pub struct Pins<'a> {
     /// The status LED, dark.
     pub lamp: Lamp<'a>,

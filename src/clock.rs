@@ -1,7 +1,7 @@
-//! The clock: Timer0 in steps of 4 us, carried on to 32 bits by its overflow interrupt.
+//! The clock: Timer0 in steps of 4 us, extended to 32 bits by its overflow interrupt.
 //!
-//! Timer0 counts freely behind a prescaler of 64 (data sheet, 15.9) and runs over every 1.024 ms; the interrupt counts
-//! the overflows, and the loop's heartbeat down. The clock wraps after 4.77 hours, which `control` is made for.
+//! Timer0 counts freely with a prescaler of 64 (data sheet, 15.9) and overflows every 1.024 ms. The interrupt counts the overflows
+//! up and the heartbeat down. The clock wraps after 4.77 hours; `control` allows for that.
 
 use crate::{
     handler::handler,
@@ -32,15 +32,14 @@ impl Clock {
             (OVERFLOWS_HIGH.get(), OVERFLOWS_LOW.get(), self.0.tcnt0().read().bits(), self.0.tifr0().read())
         });
         let instant = u32::from(high) << 16 | u32::from(u16::from_le_bytes([steps, low]));
-        // An overflow that happened in there waits for its interrupt; it belongs to the count when the steps were read
-        // after it, which a small number tells.
+        // An overflow during these reads is still pending. It counts if the steps were read after it, which a small number shows.
         let is_pending = flags.tov0().bit_is_set() && steps < 128;
         Instant::new(if is_pending { instant.wrapping_add(1 << 8) } else { instant })
     }
 }
 
 handler! {
-    /// The clock's counter ran over: 28 cycles, up to 42 where the upper bytes change too, for a loop that turns.
+    /// Timer0 has overflowed: 28 cycles, up to 42 if the upper bytes change, while the loop runs.
     on_overflow = "__vector_16" {
         "lds  r24, {left}",
         "dec  r24",
@@ -53,12 +52,11 @@ handler! {
         "2:",
     }
     aside {
-        // The loop stands still. There is no way back from here, and none of what the code behind it takes for granted but
-        // a stack and a zero in r1.
+        // The loop has stopped. This branch never returns. The code that it jumps to needs only a stack, and a zero in r1.
         "3:",
         "clr  r1",
         "jmp  {stalled}",
-        // The lowest byte is 0 again: one more in the upper two.
+        // The lowest byte has wrapped: increment the upper two.
         "4:",
         "lds  r24, {high}",
         "inc  r24",

@@ -1,7 +1,7 @@
-//! The EEPROM, in two halves: one for the settings, one for the examples taught in the field.
+//! The EEPROM, in two halves: one for the settings, one for the field examples.
 //!
-//! A byte takes 3.4 ms to write (data sheet, 8.4.2), in which nothing can be read. Nobody waits for that but [`finish`], once and
-//! before the loop turns. What the bytes mean is not known here.
+//! A byte takes 3.4 ms to write (data sheet, 8.4.2), and during a write nothing can be read. Only [`finish`] waits for a write,
+//! once, before the loop starts. This file does not interpret the bytes.
 
 use avr_device::{
     atmega328p::{EEPROM, eeprom},
@@ -10,16 +10,16 @@ use avr_device::{
 use control::memory::{Memory, SIZE};
 use core::arch::asm;
 
-/// A half of the EEPROM: the one that begins at address `BASE`.
+/// The half of the EEPROM that begins at address `BASE`.
 pub struct Half<const BASE: u16>(());
 
 /// The half with the settings.
 pub type Lower = Half<0>;
 
-/// The half with the examples taught in the field.
+/// The half with the field examples.
 pub type Upper = Half<{ SIZE as u16 }>;
 
-/// Waits, 3.4 ms at the most, for the byte whose write a reset has come into: the chip finishes it (data sheet, 8.4.3).
+/// Waits at most 3.4 ms for a write that a reset interrupted: the chip completes it (data sheet, 8.4.3).
 pub fn finish(eeprom: &EEPROM) {
     while eeprom.eecr().read().eepe().bit_is_set() {}
 }
@@ -28,13 +28,13 @@ impl<const BASE: u16> Half<BASE> {
     /// The half.
     ///
     /// # Safety
-    /// To be had once for each `BASE`, by the loop alone, before anybody else uses the EEPROM.
+    /// The caller makes at most one for each `BASE`, and uses it from the loop only. No other code writes the EEPROM before.
     pub const unsafe fn new() -> Self {
         Self(())
     }
 
     fn registers(&self) -> &eeprom::RegisterBlock {
-        // SAFETY: who made the halves vouches that the loop alone uses the EEPROM.
+        // SAFETY: the caller of `new` guarantees that only the loop uses the EEPROM.
         unsafe { &*EEPROM::ptr() }
     }
 
@@ -58,8 +58,8 @@ impl<const BASE: u16> Memory for Half<BASE> {
         self.choose(address);
         self.registers().eedr().write(|w| w.set(byte));
         interrupt::free(|_| {
-            // SAFETY: EECR (0x1f) belongs to this file alone; EEPE is set right after EEMPE, within the four cycles that
-            // the chip allows, which no interrupt can stretch in here (8.6.3).
+            // SAFETY: only this file uses EECR (0x1f). EEPE is set right after EEMPE, within the four cycles that the chip allows.
+            // Interrupts are off, so none can delay it (8.6.3).
             unsafe { asm!("sbi 0x1f, 2", "sbi 0x1f, 1") };
         });
     }

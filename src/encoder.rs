@@ -1,14 +1,13 @@
 //! The wheel encoder on D2 and D3: four counts a cycle, signed, 32 bits.
 //!
-//! Both channels' interrupts, INT0 and INT1 (data sheet, 13.2.1), have one handler, which reads both levels at once. How
-//! often it can look decides how fast the wheel may turn: two edges between two looks are resolved by their direction,
-//! three are not. No interrupt goes before these two. The pins' other interrupt, PCINT2, is one for both, but the beam's
-//! PCINT0 goes before it: a look could then be held up by a handler that has just begun and by the beam's as well, where
-//! it is by one of the two here.
+//! INT0 and INT1 (data sheet, 13.2.1) share one handler, which samples both levels at once. The time between two samples limits the
+//! wheel's speed: two edges between samples are resolved by the last direction, three are not. No interrupt has a higher priority
+//! than these two. PCINT2 would serve both pins, but the beam's PCINT0 has a higher priority than it: a sample could then wait for
+//! a handler that has just begun and for the beam's. Now it waits for one of them only.
 //!
-//! The handler is written in assembly: it looks up in a table which way the step went, counts it, and goes on to the
-//! count's upper bytes only when they change. The table is the decoder of `control`, worked out by the compiler for
-//! every state and every pair of levels, so there is no second decoder that could differ from it.
+//! The handler is in assembly. It looks up the step in a table and counts it. It handles the count's upper bytes only if they
+//! change. The compiler makes the table from the decoder of `control`, for each state and each pair of levels. So there is no
+//! second decoder that could differ.
 
 use crate::{handler::handler, shared::Shared};
 use avr_device::{
@@ -17,48 +16,47 @@ use avr_device::{
 };
 use control::measure::quadrature::{Quadrature, Step};
 
-/// The count's lower half, which the beam's handler reads too, and its upper.
+/// The count's lower half, which the beam's handler reads too, and its upper half.
 pub static COUNT_LOW: Shared<u16> = Shared::new(0);
 static COUNT_HIGH: Shared<u16> = Shared::new(0);
-/// Ticks lost in jumps that nothing resolved.
+/// Ticks lost in jumps without a direction.
 static LOST: Shared<u16> = Shared::new(0);
-/// Jumps, resolved or not.
+/// All jumps.
 static JUMPS: Shared<u16> = Shared::new(0);
 
-/// What the encoder has counted since power-up.
+/// The encoder's counters since power-up.
 #[derive(Clone, Copy)]
 pub struct Counts {
-    /// Ticks forward less ticks backward.
+    /// Ticks forward minus ticks backward.
     pub position: i32,
-    /// Ticks lost in jumps of two that nothing resolved, modulo 65,536.
+    /// Ticks lost in jumps of two without a direction, modulo 65,536.
     pub lost: u16,
-    /// Jumps of two ticks, resolved or not, modulo 65,536. An encoder that is slow enough and whole makes none.
+    /// All jumps of two ticks, modulo 65,536. A sound encoder that is not too fast makes none.
     pub jumps: u16,
 }
 
-/// The decoder's memory, in GPIOR1, where the handler reaches it in a cycle: the channels' last levels in bits 0 (A) and
-/// 1 (B), the last step's direction in bits 4 and 5. The new levels come from the port in bits 2 and 3, right between,
-/// and all six together are the place in the table.
+/// The decoder's state, in GPIOR1, which the handler accesses in one cycle. Bits 0 (A) and 1 (B) are the last levels, bits 4 and 5
+/// the last direction. The port's new levels go into bits 2 and 3 between them. All six bits are the index into the table.
 mod state {
     pub const LEVELS: u8 = 0b11;
     pub const FORWARD: u8 = 1 << 4;
     pub const BACKWARD: u8 = 1 << 5;
-    /// Set in a table entry, never in the memory: both channels changed.
+    /// In table entries only: both channels changed.
     pub const JUMP: u8 = 1 << 6;
-    /// Set in a table entry, never in the memory: it is no step of one tick.
+    /// In table entries only: not a step of one tick.
     pub const NO_STEP: u8 = 1 << 7;
 }
 
-/// For each memory and each new pair of levels: the new memory. Its direction says which way the step or the jump went; a jump
-/// without one is one that nothing resolved.
+/// The new state for each state and each new pair of levels. Its direction is that of the step or jump; a jump without a direction
+/// is lost.
 ///
-/// None of it lies farther from its beginning than the lower byte of an address reaches.
+/// Aligned, so that all entries have the same upper address byte.
 #[repr(align(64))]
 struct Table(#[expect(dead_code, reason = "the handler's assembly reads it")] [u8; 64]);
 
-/// The table in flash, to be read by LPM alone.
+/// The table in flash, read with LPM only.
 #[unsafe(link_section = ".progmem.data")]
-// SAFETY: nothing but the handler's assembly refers to it, and that reads it from flash.
+// SAFETY: only the handler's assembly refers to it, and reads it from flash.
 static TABLE: Table = Table(table());
 
 const fn table() -> [u8; 64] {
@@ -79,7 +77,7 @@ const fn table() -> [u8; 64] {
             -1 => state::BACKWARD,
             _ => 0,
         };
-        // What the handler counts: as far as the marks say, and the way that the memory says.
+        // What the handler counts: the marks give the number of ticks, the state gives the direction.
         let (marks, ticks) = match step {
             Step::Ticks(ticks @ (1 | -1)) => (0, ticks),
             Step::Ticks(0) => (state::NO_STEP, 0),
@@ -93,12 +91,12 @@ const fn table() -> [u8; 64] {
     table
 }
 
-/// Levels with A in bit 0 and B in bit 1, as the port has them, as the decoder wants them.
+/// Levels from the port's order (A in bit 0, B in bit 1) to the decoder's.
 const fn channels(levels: u8) -> u8 {
     (levels & 1) << 1 | levels >> 1 & 1
 }
 
-/// Begins to count, from where the channels now stand.
+/// Starts counting from the channels' present levels.
 pub fn watch(interrupts: &EXINT, port: &PORTD, cpu: &CPU) {
     let levels = port.pind().read().bits() >> 2 & state::LEVELS;
     cpu.gpior1().write(|w| w.set(levels));
@@ -106,48 +104,47 @@ pub fn watch(interrupts: &EXINT, port: &PORTD, cpu: &CPU) {
     interrupts.eimsk().write(|w| w.int0().set_bit().int1().set_bit());
 }
 
-/// What was counted, from the loop.
+/// The counters, for the loop.
 pub fn counts() -> Counts {
     interrupt::free(|_| Counts { position: count(), lost: LOST.get(), jumps: JUMPS.get() })
 }
 
-/// The position, from the loop.
+/// The position, for the loop.
 pub fn position() -> i32 {
     interrupt::free(|_| count())
 }
 
-/// The whole count, with interrupts off.
+/// The whole count; the caller has turned interrupts off.
 #[inline(always)]
 fn count() -> i32 {
     i32::from(COUNT_HIGH.get() as i16) << 16 | i32::from(COUNT_LOW.get())
 }
 
 handler! {
-    /// The handler of INT0 and INT1: 46 cycles for a step forward and 48 for one back, more where upper bytes of the count change, and
-    /// for a jump.
+    /// The handler of INT0 and INT1: 46 cycles for a step forward, 48 for a step back. It takes more if upper bytes of the count
+    /// change, and for a jump.
     ///
-    /// It looks in the 12th. An edge that comes as another handler begins waits for it, for an instruction of the loop, for
-    /// a critical section if that instruction opens one, for the instruction behind it, and for these 12 cycles.
-    /// `weeder bounds` proves the longest wait, and with it the rate at which two counts never go by between two looks.
-    /// Edges that keep coming as fast as that leave the loop no time; so its need of time bounds the rate, and not
-    /// the wait.
+    /// It samples in its 12th cycle. An edge that comes when another handler begins waits for that handler, one instruction of the
+    /// loop, and these 12 cycles. If that instruction opens a critical section, the edge also waits for the section and the
+    /// instruction after it. `weeder bounds` proves the longest wait. This wait gives the rate up to which at most one edge is
+    /// missed between two samples. Edges that keep this rate leave the loop no time, so the loop's need of time is the real limit.
     on_change = "__vector_1" {
         ".globl __vector_2",
         ".set __vector_2, __vector_1",
-        // Both requests are met by what PIND shows now. The edge that asks comes through the same synchroniser, a
-        // cycle behind the level; one that comes later asks again.
+        // The sample of PIND answers both requests. A request's edge passes the same synchroniser, one cycle after the level. A
+        // later edge requests again.
         "ldi  r24, 3",
         "out  0x1c, r24", // EIFR
         "in   r24, 0x09", // PIND
         "push r30",
         "push r31",
-        // Z = TABLE + (memory | new levels)
+        // Z = TABLE + (state | new levels)
         "andi r24, 0x0c",
         "in   r30, 0x2a", // GPIOR1
         "or   r30, r24",
         "ldi  r31, hi8({table})",
         "subi r30, lo8(-({table}))",
-        "lpm  r24, Z", // the new memory
+        "lpm  r24, Z", // the new state
         "sbrc r24, 7",
         "rjmp 3f",
         "out  0x2a, r24",
@@ -167,7 +164,7 @@ handler! {
         "5:",
         "subi r30, 1",
         "brcc 4b",
-        // It took the lowest byte below 0: one less in the upper three.
+        // The lowest byte went below 0: decrement the upper three.
         "6:",
         "sts  {low}, r30",
         "lds  r30, {low}+1",
@@ -182,7 +179,7 @@ handler! {
         "subi r30, 1",
         "sts  {high}+1, r30",
         "rjmp 2b",
-        // A step forward took the lowest byte above 255: one more.
+        // A step forward: the lowest byte went above 255. Increment the next one.
         "1:",
         "sts  {low}, r30",
         "lds  r30, {low}+1",
@@ -197,7 +194,7 @@ handler! {
         "inc  r30",
         "sts  {high}+1, r30",
         "rjmp 2b",
-        // No step. Where it is no jump either, the memory is what it was.
+        // No step. Without a jump, the state is unchanged.
         "3:",
         "sbrs r24, 6",
         "rjmp 2b",
@@ -228,7 +225,7 @@ handler! {
         "rjmp 6b",
         "7:",
         "rjmp 4b",
-        // Nothing resolves it: its ticks are lost.
+        // No direction: the ticks are lost.
         "9:",
         "lds  r30, {lost}",
         "lds  r31, {lost}+1",
@@ -244,7 +241,7 @@ handler! {
     jumps = sym JUMPS,
 }
 
-// The handler takes these bits for what they are.
+// The handler's assembly relies on these bits.
 const _: () = {
     assert!(state::FORWARD == 1 << 4 && state::BACKWARD == 1 << 5);
     assert!(state::JUMP == 1 << 6 && state::NO_STEP == 1 << 7);

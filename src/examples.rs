@@ -1,22 +1,21 @@
-//! Examples in flash, and the loop that searches them and those in SRAM.
+//! Examples in flash, and the search through them and through those in SRAM.
 //!
-//! The search is most of what a classification costs, so it is written in assembly: the query stays in registers, LPM
-//! brings one feature after the other, and an example is left as soon as it is known to be too far. For that the sum
-//! does not begin at 0 but at 2^24 - 1 less the farthest neighbour's distance, so that the carry out of its 24 bits says that the
-//! example is beyond it. An example costs 7 cycles and 12 for each feature that is looked at: 19 to 67. One that is near enough
-//! moves those that are farther up by a place, 24 cycles each, and takes its own, some 50 cycles. Those that find no place although
-//! they are as far as the farthest are counted.
+//! The search is the largest part of a classification, so it is in assembly. The query stays in registers, and LPM loads one
+//! feature after the other. The search leaves an example once it is too far. For that the sum starts at 2^24 - 1 minus the farthest
+//! neighbour's distance. A carry out of its 24 bits then means "too far". An example costs 7 cycles and 12 for each feature loaded:
+//! 19 to 67. An example near enough moves each farther neighbour by one place, 24 cycles each. Taking its own place costs some 50
+//! cycles. Examples without a place that are as far as the farthest are counted.
 //!
-//! A table in flash is sorted by its first feature. The search begins at the query's own and goes on to the table's end, and then from
-//! there back to its beginning: the nearest come first, and where the first feature alone is too far, nothing nearer follows in that
-//! direction.
+//! A table in flash is sorted by its first feature. The search starts at the query's own value and runs to the table's end. Then it
+//! runs from the same start back to the table's beginning. So the nearest come first. Once the first feature alone is too far, that
+//! direction ends.
 
 use avr_progmem::{raw::read_byte, wrapper::ProgMem};
 use control::ground::{examples, features};
 use core::arch::asm;
 use knn::{Example, Examples, Nearest, Neighbour, VACANT};
 
-/// An example as it lies in flash: its features, then its label.
+/// An example in flash: its features, then its label.
 pub type Row = [u8; features::COUNT + 1];
 
 avr_progmem::progmem! {
@@ -27,7 +26,7 @@ avr_progmem::progmem! {
 pub struct BuiltIn;
 
 impl BuiltIn {
-    /// Where they lie.
+    /// The table.
     pub fn table() -> InFlash {
         InFlash::new(&BUILT_IN)
     }
@@ -42,7 +41,7 @@ impl Examples<{ features::COUNT }> for BuiltIn {
         Self::table().example(index)
     }
 
-    // Out of line, as an object is classified in one go, for a label, and in several.
+    // Out of line, because classifying in one call (for a label) and in several both use it.
     #[inline(never)]
     fn keep_nearest<const CLASSES: usize>(&self, query: &[u8; features::COUNT], nearest: &mut Nearest<CLASSES>) {
         Self::table().keep_nearest(query, nearest);
@@ -59,7 +58,7 @@ impl Examples<{ features::COUNT }> for BuiltIn {
     }
 }
 
-/// Examples as rows, for a table in flash. Those that are not sorted by their first feature do not compile.
+/// Examples as rows of a table in flash. An unsorted table does not compile.
 pub const fn rows<const N: usize>(examples: &[Example<{ features::COUNT }>; N]) -> [Row; N] {
     let mut rows = [[0; features::COUNT + 1]; N];
     let mut index = 0;
@@ -73,7 +72,7 @@ pub const fn rows<const N: usize>(examples: &[Example<{ features::COUNT }>; N]) 
     rows
 }
 
-/// A feature: its difference, squared, joins the sum. Out of reach, the search goes on elsewhere.
+/// Adds one feature's squared difference to the sum. Jumps to `$out_of_reach` if the sum is too far.
 macro_rules! feature {
     ($load:literal, $query:literal, $out_of_reach:literal) => {
         concat!(
@@ -95,13 +94,13 @@ macro_rules! feature {
     };
 }
 
-/// Has rows join the nearest: so many from an address on, and then so many before it, the last one first. They lie where an instruction
-/// loads a byte from. One whose first feature alone is out of reach is passed over, `2b`, or ends its direction, `3b`. A line of
-/// assembly passes over a row that is none, whose label is known there.
+/// Adds rows to the nearest: `$count` rows from an address on, then `$before` rows before it in reverse order. `$load` is the
+/// instruction that loads a byte from them. If the first feature alone is too far, `2b` skips the row and `3b` ends the direction.
+/// `$vacant` is assembly that skips a row without an example; the label is loaded at that point.
 ///
 /// # Safety
 ///
-/// So many rows lie there, 254 at most on either side of the address, where the instruction loads from.
+/// The rows exist at the address, at most 254 on either side, in the memory that `$load` reads.
 macro_rules! keep_nearest {
     ($nearest:ident, $query:ident, $rows:expr, $count:expr, $before:expr, $load:literal, $first_is_out:literal, $vacant:literal) => {{
         let (places, free) = $nearest.places();
@@ -113,10 +112,10 @@ macro_rules! keep_nearest {
         let mut front = first + (free * size_of::<Neighbour>()) as u16;
         let (level, ones): (u8, u8);
         asm!(
-            // The sum has its upper bytes in R17 and R16, what it begins with in R19 and R18, and the next row is at R25 and R24: MOVW
-            // wants pairs that begin with an even register, which the compiler's own choice of a pair need not be.
-            // R1, which is 0 elsewhere, takes the products: the carry is added by a register of its own.
-            // The stack keeps where the other direction begins and how many rows it has, and one more.
+            // R17 and R16 are the sum's upper bytes, R19 and R18 those of its start. R25:R24 is the next row's address. MOVW needs
+            // pairs with an even first register, which the compiler's choice does not guarantee. R1, elsewhere 0, takes the
+            // products, so another register is the zero for the carry. The stack holds the second direction's start and its number
+            // of rows plus one.
             "push r24",
             "push r25",
             "push {byte}",
@@ -127,12 +126,12 @@ macro_rules! keep_nearest {
             "ld   {e}, Z+",
             "clr  {zero}",
             "clr  {ones}",
-            // A sum begins with the complement of how far the farthest is, or with 0 while places are free. T says that none is.
+            // A sum starts at the complement of the farthest distance, or at 0 while places are free. T: no place is free.
             "clr  {start_low}",
             "clr  r18",
             "clr  r19",
             "clt",
-            // As long as places are free, no example is level, and the register tells the first place.
+            // While places are free, no example is level, and this register holds the first place's address.
             "cp   r26, {level}",
             "brne 2f",
             "rjmp 22f",
@@ -151,20 +150,20 @@ macro_rules! keep_nearest {
             feature!($load, "c", "2b"),
             feature!($load, "d", "2b"),
             feature!($load, "e", "2b"),
-            // Within reach. The distance is what the sum has grown by.
+            // Near enough. The distance is the growth of the sum.
             "sub  {low}, {start_low}",
             "sbc  r16, r18",
             "sbc  r17, r19",
             concat!($load, " {label}, Z"),
             $vacant,
-            // Where places are free, the one in front is taken, and nobody loses his.
+            // If places are free, take the one in front; no neighbour is replaced.
             "brts 3f",
             "sbiw r26, {place}",
             "3:",
             "movw r30, r26",
-            // The farthest loses its place. Its label is kept.
+            // The farthest is replaced. Keep its label.
             "ld   r0, Z",
-            // Those that are farther than the example move up.
+            // Move up the neighbours that are farther than the example.
             "cp   r30, {last}",
             "breq 7f",
             "26:",
@@ -188,7 +187,7 @@ macro_rules! keep_nearest {
             "std  Z+1, {low}",
             "std  Z+2, r16",
             "std  Z+3, r17",
-            // Where no place is free any more, the reach is where the farthest is now.
+            // If no place is free any more, the limit is the farthest neighbour's distance.
             "brts 7f",
             "cp   r26, {level}",
             "brne 8f",
@@ -211,7 +210,8 @@ macro_rules! keep_nearest {
             "clr  {level}",
             "clr  {ones}",
             "rjmp 2b",
-            // The reach has not changed: the one that lost its place is level. Of two that are as far, the smaller label has the place.
+            // The limit has not changed: the replaced neighbour is level. Of two at the same distance, the smaller label keeps the
+            // place.
             "4:",
             "ld   {label}, Z",
             "cp   r0, {label}",
@@ -223,7 +223,7 @@ macro_rules! keep_nearest {
             "add  {ones}, r0",
             "8:",
             "rjmp 2b",
-            // A direction is done. Rows are passed downwards in the second one.
+            // A direction is finished. The second one runs downwards.
             "9:",
             "sbrc {step:h}, 7",
             "rjmp 9f",
@@ -278,9 +278,9 @@ macro_rules! keep_nearest {
     }};
 }
 
-/// Examples in flash, 254 at most.
+/// Examples in flash, at most 254.
 pub struct InFlash {
-    /// Its rows, of which there are so many, sorted by their first feature.
+    /// The rows, sorted by their first feature, and their number.
     rows: *const Row,
     count: u8,
 }
@@ -292,12 +292,12 @@ impl InFlash {
         Self { rows: table.as_ptr().cast(), count: N as u8 }
     }
 
-    /// The first row whose first feature is that, or more, and how many rows there are from it on.
+    /// The first row whose first feature is at least `first`, and the number of rows from it on.
     #[inline(always)]
     fn from(&self, first: u8) -> (*const Row, u8) {
-        /// Rows that are passed at once, as long as there are so many.
+        /// Rows skipped at once, while there are as many.
         const STEP: u8 = 8;
-        // SAFETY: the row is one of the table's, so it lies in flash.
+        // SAFETY: the row belongs to the table, so it is in flash.
         let is_less = |row: *const Row| unsafe { read_byte(row.cast()) } < first;
         let (mut rows, mut count) = (self.rows, self.count);
         while count >= STEP && is_less(rows.wrapping_add(usize::from(STEP) - 1)) {
@@ -317,7 +317,7 @@ impl Examples<{ features::COUNT }> for InFlash {
 
     fn example(&self, index: usize) -> Option<Example<{ features::COUNT }>> {
         (index < self.len()).then(|| {
-            // SAFETY: the row lies in flash, as it is one of the table's.
+            // SAFETY: the row belongs to the table, so it is in flash.
             let [a, b, c, d, e, label] = unsafe { ProgMem::new(self.rows.wrapping_add(index)) }.load();
             Example::new([a, b, c, d, e], label)
         })
@@ -326,11 +326,10 @@ impl Examples<{ features::COUNT }> for InFlash {
     #[inline(always)]
     fn keep_nearest<const CLASSES: usize>(&self, query: &[u8; features::COUNT], nearest: &mut Nearest<CLASSES>) {
         let (rows, count) = self.from(query[0]);
-        // SAFETY: the loop reads flash from a row of the table on, as many rows as there are from there and before it, and nothing
-        // else. Of SRAM it reads the query and reads and writes the places, of which there is a first one: it begins at one of them
-        // or, where some are free, behind one, and stops at the last. An address's lower byte tells the last, and the
-        // first, as none is met twice before. It takes from the stack what it has put there. R0 is
-        // free for use, and R1 is 0 again at the end.
+        // SAFETY: in flash, the loop reads only rows of this table: `count` from the address on, and the others before it. In SRAM,
+        // it reads the query, and reads and writes the places, at least one. It starts at a place, or behind one if some are free,
+        // and stops at the last. The lower address byte identifies the first and the last place, because none occurs twice before.
+        // It pops only what it pushed. R0 is free for use, and R1 is 0 again at the end.
         unsafe { keep_nearest!(nearest, query, rows, count, self.count - count, "lpm", "3b", "") };
     }
 
@@ -342,9 +341,9 @@ impl Examples<{ features::COUNT }> for InFlash {
         nearest: &mut Nearest<CLASSES>,
     ) {
         const { assert!(VACANT & 1 << 7 != 0 && size_of::<Example<{ features::COUNT }>>() == size_of::<Row>()) };
-        // A byte counts them, and one more.
+        // A byte holds the count plus one.
         let count = others.len().min(usize::from(u8::MAX) - 1) as u8;
-        // SAFETY: as above, but for the rows, which are examples in SRAM: their features, and then the label.
+        // SAFETY: as above, but the rows are examples in SRAM: features, then the label.
         unsafe { keep_nearest!(nearest, query, others.as_ptr(), count, 0_u8, "ld", "2b", "sbrc {label}, 7\nrjmp 2b") };
     }
 }

@@ -1,17 +1,16 @@
-//! What every interrupt handler has in common: the way in, the way out, and the registers that it may use.
+//! The entry, exit and register use that all interrupt handlers share.
 //!
-//! The handlers are written in assembly, because the encoder waits for each of them: their longest, together with the
-//! longest critical section, decides how fast the wheel may turn (see `encoder`). None turns interrupts on, so one runs at a
-//! time, and all share what would be too little for two: SREG waits in GPIOR0 and r24 in GPIOR2, where a byte is put
-//! away and fetched in a cycle each; the stack takes two. GPIOR1 is the encoder's. Whoever needs a pointer pushes Z by
-//! himself, and nobody touches another register: not r1 either, which need not be 0 in here.
+//! The handlers are in assembly because the encoder waits for each of them. The longest handler and the longest critical section
+//! limit the wheel's speed (see `encoder`). No handler turns interrupts on, so only one runs at a time and all share the same save
+//! locations: SREG in GPIOR0, r24 in GPIOR2. Each takes one cycle to save and one to restore; the stack takes two. GPIOR1 is the
+//! encoder's. A handler that needs a pointer pushes Z itself. No handler uses any other register, not even r1, which need not be 0
+//! here.
 //!
-//! A handler's budget counts from the interrupt's response to the end of its `reti`. Four cycles of it are the response, two
-//! the vector's jump, and ten this file's. What a handler stores and the loop reads is in `shared` and `ring`.
+//! A handler's budget runs from the interrupt's response to the end of `reti`. Four cycles are the response, two the vector's jump,
+//! and ten this file's. `shared` and `ring` hold the data that handlers share with the loop.
 
-/// Defines the handler of an interrupt vector, by the vector's symbol, from the lines of its assembly and their operands. It has
-/// r24 and the flags to itself, and returns behind its last line. Lines that run seldom stand aside, behind the return,
-/// and jump back.
+/// Defines the handler of an interrupt vector from the vector's symbol, its assembly and the operands. The handler may use r24 and
+/// the flags. It returns after the last line. Rarely used lines go `aside`, after the return, and jump back.
 macro_rules! handler {
     (
         $(#[$about:meta])*
@@ -22,12 +21,11 @@ macro_rules! handler {
         ///
         /// # Safety
         ///
-        /// To be called by the chip, through its vector table, alone.
+        /// Only the chip calls it, through the vector table.
         #[unsafe(naked)]
-        // SAFETY: the symbol is that of this interrupt's vector (data sheet, table 12-6), and nobody else defines it.
+        // SAFETY: the symbol is this interrupt's vector (data sheet, table 12-6), and no other code defines it.
         #[unsafe(export_name = $vector)]
-        // The first section behind the vectors in avr-gcc's linker script: they reach it by the short jump, however much
-        // else there is.
+        // Placed right after the vectors (memory.x), so that their short jump always reaches it.
         #[unsafe(link_section = ".progmem.gcc_handlers")]
         unsafe extern "C" fn $name() {
             core::arch::naked_asm!(

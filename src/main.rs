@@ -1,8 +1,7 @@
-//! The weeder's firmware: wiring, and the loop that reads, decides and applies.
+//! The weeder's firmware: setup, and the loop that reads, decides and applies.
 //!
-//! The crate `control` decides, and each file beside this one knows one peripheral with its interrupt, which only counts,
-//! stamps or moves bytes. This is the only file that knows them all. The loop never waits for the serial line or the
-//! field, nor for a byte on its way into the EEPROM.
+//! The crate `control` decides. Each file beside this one drives one peripheral and its interrupt; interrupts only count, stamp or
+//! move bytes. Only this file uses them all. The loop never waits for the serial line, the field, or an EEPROM write.
 
 #![no_std]
 #![no_main]
@@ -17,7 +16,7 @@ mod encoder;
 mod examples;
 mod handler;
 mod heartbeat;
-mod passes;
+mod loop_bound;
 mod reset;
 mod ring;
 mod serial;
@@ -38,43 +37,43 @@ use embedded_hal::digital::{InputPin, OutputPin};
 use embedded_hal_nb::serial::Read;
 use ufmt::uWrite;
 
-/// The decisions, with the memories of this machine.
+/// The decisions, with this machine's classifier and memories.
 type Weeder = Controller<Nearest<examples::BuiltIn, eeprom::Upper>, eeprom::Lower>;
 type UninitWeeder = Uninit<Nearest<examples::BuiltIn, eeprom::Upper>, eeprom::Lower>;
 
-/// Bytes that a turn of the loop reads or writes at most: more than the line carries meanwhile.
+/// Most bytes that a turn reads or writes: more than the line carries in that time.
 const CONSOLE_BYTES: u8 = 8;
 
 #[avr_device::entry]
 fn main() -> ! {
-    let (console, asleep) = (&raw mut CONSOLE, &raw mut ASLEEP);
-    // SAFETY: nothing else names these statics, and the entry point runs once.
-    let (console, asleep) = unsafe { (&mut *console, &mut *asleep) };
-    // In a frame of its own: a byte that lies farther than 63 from a frame's end takes five more instructions to reach.
-    run(&mut LineBuffer::new(), console, asleep)
+    let (console, uninit) = (&raw mut CONSOLE, &raw mut UNINIT);
+    // SAFETY: no other code names these statics, and the entry point runs once.
+    let (console, uninit) = unsafe { (&mut *console, &mut *uninit) };
+    // In a stack frame of its own: bytes more than 63 from a frame's end take five more instructions to access.
+    run(&mut LineBuffer::new(), console, uninit)
 }
 
 static mut CONSOLE: Console = Console::new();
 
-static mut ASLEEP: UninitWeeder = {
-    // SAFETY: these are the only halves, and what holds them is taken once, by the entry point.
+static mut UNINIT: UninitWeeder = {
+    // SAFETY: these are the only halves, and only the entry point takes the static, once.
     let (settings, examples) = unsafe { (eeprom::Lower::new(), eeprom::Upper::new()) };
     Uninit::new(Nearest::asleep(examples::BuiltIn, examples), settings)
 };
 
-/// Sets everything up, and turns the loop.
+/// Sets up the peripherals and runs the loop.
 #[inline(never)]
-fn run(typed: &mut LineBuffer, console: &mut Console, asleep: &mut UninitWeeder) -> ! {
-    // SAFETY: the entry point is the first code to run and runs once, as this does, so nobody else holds the peripherals.
+fn run(typed: &mut LineBuffer, console: &mut Console, uninit: &mut UninitWeeder) -> ! {
+    // SAFETY: the entry point is the first code to run, and runs once, so no other code holds the peripherals.
     let peripherals = unsafe { Peripherals::steal() };
-    // Before the first interrupt: their handlers use the register that told it.
+    // Before the first interrupt, because the handlers overwrite GPIOR2.
     let cause = reset::cause(&peripherals.CPU);
     let board::Pins { mut lamp, mut work_switch, mut end_switch } = board::pins(&peripherals.PORTB, &peripherals.PORTD);
     let clock = clock::Clock::new(peripherals.TC0);
     encoder::watch(&peripherals.EXINT, &peripherals.PORTD, &peripherals.CPU);
     let mut beam = beam::Beam::new(&peripherals.EXINT, &peripherals.PORTB);
     let mut serial = serial::Serial::new(peripherals.USART0);
-    // SAFETY: every interrupt's peripheral is set up, and no critical section is open.
+    // SAFETY: each interrupt's peripheral is set up, and no critical section is open.
     unsafe { interrupt::enable() };
     watchdog::start();
 
@@ -87,13 +86,13 @@ fn run(typed: &mut LineBuffer, console: &mut Console, asleep: &mut UninitWeeder)
         Readings { now, position: Position::new(position), switch_on, lost, jumps, end_switch_on, stack_free }
     };
     eeprom::finish(&peripherals.EEPROM);
-    let controller = init(asleep, Startup { readings: read(), beam_broken: beam.is_broken(), cause });
-    // The settings say which pulse has the tool out, so there is none before they are loaded.
+    let controller = init(uninit, Startup { readings: read(), beam_broken: beam.is_broken(), cause });
+    // The pulse for "tool out" is a setting, so the servo starts after the settings are loaded.
     let mut servo = servo::Servo::new(peripherals.TC1, &peripherals.PORTB, controller.orders().pulse);
 
     loop {
         watchdog::feed();
-        // The readings come first: an edge that is still in the queue is then never farther than the next readings.
+        // Read first: an edge that is still queued then has no later position than the next readings.
         let readings = read();
         beam.watch_second(controller.has_second_beam());
         let orders = controller.turn(readings, beam.edges());
@@ -103,22 +102,21 @@ fn run(typed: &mut LineBuffer, console: &mut Console, asleep: &mut UninitWeeder)
         servo.command(orders.pulse, orders.gap_ms);
         let Ok(()) = lamp.set_state(controller.lamp_is_lit().into());
 
-        // A turn has little time for the console: some bytes, or one thing that takes longer than a byte does. One that
-        // has done enough has none.
+        // A turn has little time for the console: some bytes, or one longer step. After other long work there is none.
         let bytes = if orders.turn_spent { 0 } else { CONSOLE_BYTES };
         for _ in 0..bytes {
-            passes::at_most::<CONSOLE_BYTES>();
+            loop_bound::at_most::<CONSOLE_BYTES>();
             if serial.room() > 0
                 && let Some(byte) = console.next_byte()
             {
-                // There is room, as was just seen.
+                // The room was just checked.
                 let _ = serial.write_char(byte.into());
             } else if console.listens()
                 && let Ok(byte) = serial.read()
             {
                 if typed.collect(byte) {
-                    if let Some(said) = typed.read() {
-                        console.take(said);
+                    if let Some(line) = typed.read() {
+                        console.take(line);
                     }
                     break;
                 }
@@ -130,9 +128,8 @@ fn run(typed: &mut LineBuffer, console: &mut Console, asleep: &mut UninitWeeder)
     }
 }
 
-/// Wakes the decisions up, with what the EEPROM holds. A function of its own, so that the loop's stack does not hold for
-/// ever what only this needs.
+/// Starts the controller with the EEPROM's contents. A separate function, so that its stack frame is not part of the loop's.
 #[inline(never)]
-fn init(asleep: &mut UninitWeeder, startup: Startup) -> &mut Weeder {
-    asleep.init(startup)
+fn init(uninit: &mut UninitWeeder, startup: Startup) -> &mut Weeder {
+    uninit.init(startup)
 }

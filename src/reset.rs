@@ -1,21 +1,21 @@
-//! Why the machine started: MCUSR, kept by the start-up code, and a mark that one run leaves for the next.
+//! The cause of a start: MCUSR, saved by the start-up code, and a mark from the previous run.
 //!
-//! The mark lies in SRAM that the start-up code leaves alone. What both mean is worked out in `control`.
+//! The mark is in SRAM that the start-up code does not clear. `control` interprets both.
 
 use crate::shared::Shared;
 use avr_device::atmega328p::CPU;
 use control::measure::reset::{Cause, mark};
 
 #[unsafe(link_section = ".noinit")]
-// SAFETY: at power-up it holds any two bytes, which are a number.
+// SAFETY: at power-up it holds two random bytes, which are a valid number.
 static MARK: Shared<u16> = Shared::new(mark::NONE);
 
-/// What started the machine; to be asked once, because it takes the mark away, and with interrupts off, because their handlers use
-/// GPIOR2 for something else.
+/// The cause of this start. Called once, because it clears the mark, and with interrupts off, because the handlers overwrite
+/// GPIOR2.
 pub fn cause(cpu: &CPU) -> Cause {
     let left = MARK.get();
     leave_mark(mark::NONE);
-    // GPIOR2, where the start-up code has put MCUSR before it cleared it.
+    // GPIOR2 holds MCUSR: the start-up code saved it before clearing it.
     Cause::of(cpu.gpior2().read().bits(), left)
 }
 

@@ -1,25 +1,24 @@
-//! The indices of a queue between an interrupt handler and the loop, which neither has to lock.
+//! The indices of a lock-free queue between an interrupt handler and the loop.
 //!
-//! One side only pushes and one side only takes. Each has an index of its own, which the other reads and never writes:
-//! a slot is filled before the index passes it on, and emptied before it is given back. The indices count on past the
-//! last slot and wrap with their byte, so that their difference is the queue's length and every slot can be used. An item lies
-//! in the slot that the index behind it names, which is what a handler has at hand once it has counted on. The slots belong
-//! to the user, who knows what is in one.
+//! One side only pushes and the other only takes. Each has its own index, which the other side reads and never writes. A slot is
+//! filled before its index passes it on, and read before its index frees it. The indices wrap as bytes, not at the last slot. So
+//! their difference is the queue's length, and all slots can be used. An item is in the slot that the incremented index names,
+//! which is what a handler has in its register. The user of the queue owns the slots.
 //!
-//! The loop's side of a queue is here. The handlers' sides are a few lines of assembly each, beside their slots; of a queue
-//! they know [`Ring::PUSHED`], [`Ring::TAKEN`] and [`Ring::MASK`].
+//! This file is the loop's side. A handler's side is a few lines of assembly beside its slots, with [`Ring::PUSHED`],
+//! [`Ring::TAKEN`] and [`Ring::MASK`].
 
 use crate::shared::Byte;
 use core::mem::offset_of;
 
 /// The indices of a queue of `SLOTS` items, a power of two up to 128.
 ///
-/// Used from two sides otherwise than described above, it gives the wrong slot; it never gives one that is not there.
+/// Wrong use gives a wrong slot, but never a slot outside the queue.
 #[repr(C)]
 pub struct Ring<const SLOTS: usize> {
-    /// Items pushed since power-up, modulo 256; written where items come in.
+    /// Items pushed since power-up, modulo 256; only the pushing side writes it.
     pushed: Byte,
-    /// Items taken since power-up, modulo 256; written where items go out.
+    /// Items taken since power-up, modulo 256; only the taking side writes it.
     taken: Byte,
 }
 
@@ -29,11 +28,11 @@ impl<const SLOTS: usize> Ring<SLOTS> {
         SLOTS as u8
     };
 
-    /// Where in the memory of a queue the index lies that counts on where items come in.
+    /// Offset of the pushing side's index.
     pub const PUSHED: usize = offset_of!(Self, pushed);
-    /// And the one that counts on where items go out.
+    /// Offset of the taking side's index.
     pub const TAKEN: usize = offset_of!(Self, taken);
-    /// The bits of an index that name a slot.
+    /// The bits of an index that select a slot.
     pub const MASK: u8 = Self::LENGTH - 1;
 
     /// The indices of an empty queue.
@@ -41,19 +40,19 @@ impl<const SLOTS: usize> Ring<SLOTS> {
         Self { pushed: Byte::new(0), taken: Byte::new(0) }
     }
 
-    /// Items that can be pushed now, or more if some are taken meanwhile.
+    /// Items that can be pushed now; more once the other side takes some.
     #[inline(always)]
     pub fn room(&self) -> u8 {
         Self::LENGTH - self.pushed.get().wrapping_sub(self.taken.get())
     }
 
-    /// Whether no item waits.
+    /// Whether the queue is empty.
     #[inline(always)]
     pub fn is_empty(&self) -> bool {
         self.pushed.get() == self.taken.get()
     }
 
-    /// Has `fill` fill the next slot and passes it on. Returns whether there was room.
+    /// Lets `fill` fill the next slot, and passes it on. Returns whether there was room.
     #[inline(always)]
     #[must_use]
     pub fn push(&self, fill: impl FnOnce(usize)) -> bool {
@@ -66,7 +65,7 @@ impl<const SLOTS: usize> Ring<SLOTS> {
         true
     }
 
-    /// Has `empty` read the oldest item's slot and gives it back.
+    /// Lets `empty` read the oldest item's slot, and frees the slot.
     #[inline(always)]
     pub fn take<Item>(&self, empty: impl FnOnce(usize) -> Item) -> Option<Item> {
         if self.is_empty() {
@@ -78,7 +77,7 @@ impl<const SLOTS: usize> Ring<SLOTS> {
         Some(item)
     }
 
-    /// The slot of the item that this index comes behind.
+    /// The slot of the item at this index.
     #[inline(always)]
     fn slot(index: u8) -> usize {
         usize::from(index & Self::MASK)

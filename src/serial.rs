@@ -1,9 +1,8 @@
-//! The serial line on D0 and D1: 115200 baud, 8N1, moved by interrupts in both directions.
+//! The serial line on D0 and D1: 115200 baud, 8N1, driven by interrupts in both directions.
 //!
-//! Received bytes wait in one queue for the loop, bytes to send in another for the line. Nothing here ever waits: what
-//! cannot be read or written at once is `WouldBlock`. A byte that comes in while its queue is full is lost, and
-//! [`GAP_MARK`] stands where the first such byte would have been, so that a line with a hole in it is never taken for a
-//! whole one.
+//! One queue holds received bytes, another the bytes to send. No call waits: a full or empty queue returns `WouldBlock`. If the
+//! receive queue is full, bytes are lost, and [`GAP_MARK`] takes the place of the first lost byte. So a line with lost bytes is
+//! never taken for a complete one.
 
 use crate::{handler::handler, ring::Ring, shared::Byte};
 use avr_device::atmega328p::USART0;
@@ -11,31 +10,30 @@ use control::say::command::GAP_MARK;
 use core::convert::Infallible;
 use embedded_hal_nb::serial::{ErrorType, Read, Write};
 
-/// Divisor for 115200 baud at double speed; off by 2.1 %, as on every Uno (data sheet, table 20-6).
+/// Divisor for 115200 baud at double speed; 2.1 % off, as on every Uno (data sheet, table 20-6).
 const BAUD_DIVISOR: u16 = 16;
 
-/// Bytes received and not yet read: 5 ms of a full line. The last slot is kept for a mark.
+/// Received bytes: 5 ms of a full line. The last slot is kept for a mark.
 static RECEIVED: Ring<RECEIVED_SLOTS> = Ring::new();
 static RECEIVED_BYTES: [Byte; RECEIVED_SLOTS] = [const { Byte::new(0) }; RECEIVED_SLOTS];
 const RECEIVED_SLOTS: usize = 64;
 
-/// Bytes to be sent: 2.8 ms of a full line, in which the loop turns some times.
+/// Bytes to send: 2.8 ms of a full line, several turns of the loop.
 static TO_SEND: Ring<TO_SEND_SLOTS> = Ring::new();
 static TO_SEND_BYTES: [Byte; TO_SEND_SLOTS] = [const { Byte::new(0) }; TO_SEND_SLOTS];
 const TO_SEND_SLOTS: usize = 32;
 
-/// The two values of UCSR0B, each of which is written whole, so that loop and handler never spoil each other's: both
-/// directions on, with the interrupt for what is received alone, and with the one for a free transmitter as well.
+/// The two values of UCSR0B, always written whole, so that loop and handler cannot overwrite each other's bits. Both have the
+/// receive interrupt; the second also has the interrupt for a free transmitter.
 ///
-/// That one is on only while a byte waits to be sent. The chip would call its handler again and again for an empty queue;
-/// simulators that take the request back when the handler is entered would never call it again. So the handler turns it
-/// off with the last byte that it takes, and the loop turns it on behind a byte that it has pushed. In between the
-/// handler could come in, take that byte and leave; the loop would then turn it on for nothing. So the loop turns it
-/// off before.
+/// That interrupt is on only while bytes wait. On an empty queue the chip would call the handler again and again. Some simulators
+/// clear the request at its first call, and would never call it again. So the handler turns it off with the last byte, and the loop
+/// turns it on after each push. In between, the handler could take that byte and turn it off. The loop would then turn it on for an
+/// empty queue. So the loop turns it off before the push.
 const RECEIVING: u8 = 0b1001_1000; // RXCIE0, RXEN0, TXEN0
 const SENDING: u8 = RECEIVING | 1 << 5; // UDRIE0
 
-/// The serial line, as the loop sees it.
+/// The loop's side of the serial line.
 pub struct Serial {
     usart: USART0,
 }
@@ -52,7 +50,7 @@ impl Serial {
     }
 
     fn control(&self, bits: u8) {
-        // SAFETY: the two values switch the line and its interrupts alone, whose handlers are below.
+        // SAFETY: both values only switch the line and its interrupts, and their handlers are below.
         self.usart.ucsr0b().write(|w| unsafe { w.bits(bits) });
     }
 
@@ -76,7 +74,7 @@ impl Write for Serial {
     fn write(&mut self, byte: u8) -> nb::Result<(), Infallible> {
         self.control(RECEIVING);
         let kept = TO_SEND.push(|slot| TO_SEND_BYTES[slot].set(byte));
-        // One that was not kept met a full queue.
+        // A byte that was not pushed met a full queue, so bytes wait in any case.
         self.control(SENDING);
         if kept { Ok(()) } else { Err(nb::Error::WouldBlock) }
     }
@@ -86,7 +84,7 @@ impl Write for Serial {
     }
 }
 
-/// Text, a character at a time: one for which there is no room is refused, as nothing here waits.
+/// Text, a character at a time. A character without room is an error, because no call waits.
 impl ufmt::uWrite for Serial {
     type Error = nb::Error<Infallible>;
 
@@ -95,25 +93,25 @@ impl ufmt::uWrite for Serial {
     }
 
     fn write_char(&mut self, character: char) -> Result<(), Self::Error> {
-        // The console speaks ASCII.
+        // The console's text is ASCII.
         self.write(character as u8)
     }
 }
 
 handler! {
-    /// A byte has come in: 46 cycles, 51 where it finds one slot left and becomes the mark.
+    /// A byte was received: 46 cycles, 51 if one slot is left and the byte becomes the mark.
     on_received = "__vector_18" {
         "push r30",
         "push r31",
-        // An overrun of the hardware's own two bytes shows until UDR0 is read. The byte is then not the next one of its
-        // line, and a mark in its place tells so as well as one before it.
+        // The flag of a hardware overrun stands until UDR0 is read. Then bytes before this one are lost, and the mark replaces this
+        // byte.
         "lds  r31, 0xc0", // UCSR0A
         "lds  r24, 0xc6", // UDR0
         "sbrc r31, 3",    // DOR0
         "ldi  r24, {mark}",
         "lds  r30, {queue}+{pushed}",
         "lds  r31, {queue}+{taken}",
-        "sub  r31, r30", // less as many as wait
+        "sub  r31, r30", // minus the number waiting
         "cpi  r31, 2-{slots}",
         "brlt 3f",
         "1:",
@@ -129,7 +127,7 @@ handler! {
         "pop  r30",
     }
     aside {
-        // One slot is left, for a mark, or none: what finds none is behind a mark already.
+        // One slot is left, for a mark, or none: then a mark is already queued.
         "3:",
         "ldi  r24, {mark}",
         "cpi  r31, 1-{slots}",
@@ -146,7 +144,7 @@ handler! {
 }
 
 handler! {
-    /// The line can take a byte, and one waits: 42 cycles, 44 for the last.
+    /// The transmitter is free, and a byte waits: 42 cycles, 44 for the last.
     on_free_to_send = "__vector_19" {
         "push r30",
         "push r31",

@@ -1,11 +1,11 @@
-//! The servo on D9: Timer1 in mode 14, pulses without jitter, in steps of 0.5 us.
+//! The servo on D9: Timer1 in mode 14, in steps of 0.5 us, with pulses free of jitter.
 //!
-//! The timer counts to ICR1 and starts anew, sets the pin at the bottom and clears it at OCR1A (data sheet, 16.9.3); no
-//! code runs for a pulse. OCR1A takes effect at the next bottom. To bring a command to the servo at once, the counter is
-//! put just below the top as soon as the line has been low for the gap that the servo needs. A running pulse is left alone.
+//! The timer counts up to ICR1 and restarts. It sets the pin at 0 and clears it at OCR1A (data sheet, 16.9.3). No code runs for a
+//! pulse. A new OCR1A takes effect at the next 0. For an immediate pulse the loop sets the counter just below ICR1, once the line
+//! was low for the servo's gap. A running pulse is never changed.
 //!
-//! Timer1's 16-bit registers share a byte of temporary storage (16.3): no interrupt may touch them, but one that never
-//! returns ([`end_with`]).
+//! Timer1's 16-bit registers share a temporary byte (16.3). So no interrupt may access them, except one that never returns
+//! ([`end_with`]).
 
 use avr_device::{
     atmega328p::{PORTB, TC1},
@@ -15,23 +15,23 @@ use control::operate::servo::{self, Action, FRAME, HalfMicros};
 use core::convert::Infallible;
 use embedded_hal::pwm::{ErrorType, SetDutyCycle};
 
-/// So close to its end a frame ends by itself: 5 us, more than setting the counter takes from reading it. A width that is written then
-/// may come behind the bottom, and would not be on the line before the next.
+/// From here on, 5 us before its end, a frame ends by itself. This is longer than the time from reading the counter to setting it.
+/// A width written later could miss the restart, and appear one frame later.
 const TOO_LATE: HalfMicros = FRAME - 10;
 
 /// The servo's signal.
 pub struct Servo {
     timer: TC1,
-    /// The width that the running frame shows.
+    /// The pulse width of the running frame.
     width: HalfMicros,
 }
 
 impl Servo {
     /// Starts the signal with pulses of `width`.
     pub fn new(timer: TC1, port: &PORTB, width: HalfMicros) -> Self {
-        // The pin before the timer: the first pulse is whole then.
+        // The pin before the timer, so that the first pulse is complete.
         port.ddrb().modify(|_, w| w.pb1().set_bit());
-        // ICR1 before the mode: the counter never runs without a top.
+        // ICR1 before the mode, so that the counter always has a top.
         timer.icr1().write(|w| w.set(FRAME - 1));
         timer.ocr1a().write(|w| w.set(compare(width)));
         timer.tcnt1().write(|w| w.set(FRAME - 2));
@@ -42,8 +42,8 @@ impl Servo {
         Self { timer, width }
     }
 
-    /// Commands a pulse width, to be called each turn of the loop: a command that comes during a pulse or its gap waits
-    /// until `gap_ms` allow it a frame of its own; with a gap of 0, until the running frame's end.
+    /// Commands a pulse width. The loop calls it each turn: during a pulse or its gap the command waits until `gap_ms` allows a new
+    /// frame. With a gap of 0 it waits for the running frame's end.
     pub fn command(&mut self, width: HalfMicros, gap_ms: u8) {
         if width == self.width {
             return;
@@ -60,16 +60,15 @@ impl Servo {
     }
 }
 
-/// Has the timer compare with another value from the frame's end on, and has the frame end at once where it is to start anew.
-/// Returns whether it did: not where `left` has passed since `since_rise` was read. The frame has ended then, or is about to, and
-/// the command waits for the next pulse.
+/// Sets the compare value for the next frame, and ends the running frame now if `restart`. Returns false if `left` has passed since
+/// `since_rise` was read: the frame has then ended or is about to, and the command waits for the next pulse.
 ///
-/// No interrupt may come between reading the counter and setting it. The encoder waits for that, so it is a function of its own:
-/// what it is given was worked out before. At most 22 cycles are without interrupts.
+/// No interrupt may come between reading and setting the counter. The encoder waits for that, so its arguments are calculated
+/// before. At most 22 cycles run without interrupts.
 #[inline(never)]
 fn change(timer: &TC1, since_rise: HalfMicros, left: HalfMicros, compare: u16, restart: bool) -> bool {
     interrupt::free(|_| {
-        // A new frame counts from 0: less than the last one had by far.
+        // In a new frame the counter is much smaller, so this difference wraps to a large number.
         if timer.tcnt1().read().bits().wrapping_sub(since_rise) >= left {
             return false;
         }
@@ -81,27 +80,28 @@ fn change(timer: &TC1, since_rise: HalfMicros, left: HalfMicros, compare: u16, r
     })
 }
 
-/// Shows a pulse or two of `width` and then no more: the signal ends with a whole pulse, within three frames.
+/// Sends one or two pulses of `width`, then stops the signal after a complete pulse, within three frames.
 ///
 /// # Safety
 ///
-/// To be called with interrupts off, where the loop never goes on: it may stand between two halves of a register of Timer1.
+/// The caller has turned interrupts off, and the loop never continues: it may have been interrupted inside an access to a 16-bit
+/// register of Timer1. The timer must run.
 /// The timer must run.
 pub unsafe fn end_with(width: HalfMicros) {
-    // SAFETY: the caller vouches that nobody else uses the timer any more.
+    // SAFETY: the caller guarantees that no other code uses the timer any more.
     let timer = unsafe { &*TC1::ptr() };
     timer.ocr1a().write(|w| w.set(compare(width)));
     let since_rise = || timer.tcnt1().read().bits();
-    // The pulse that is on the line, or else the next one, may be the first of this width.
+    // The running pulse, or the next one, may be the first of this width.
     for _ in 0..2 {
         while since_rise() >= width {}
         while since_rise() < width {}
     }
-    // SAFETY: without a clock, the timer and the pin stay as they are.
+    // SAFETY: without a clock, timer and pin keep their state.
     timer.tccr1b().write(|w| unsafe { w.bits(0) });
 }
 
-/// OCR1A for a pulse of `width`: the pin is high from 0 up to and with the match.
+/// OCR1A for a pulse of `width`: the pin is high from 0 through the match.
 const fn compare(width: HalfMicros) -> u16 {
     width.saturating_sub(1)
 }
@@ -111,12 +111,12 @@ impl ErrorType for Servo {
 }
 
 impl SetDutyCycle for Servo {
-    /// A frame in steps of 0.5 us.
+    /// A frame's length in steps of 0.5 us.
     fn max_duty_cycle(&self) -> u16 {
         FRAME
     }
 
-    /// Commands a pulse width that waits for the running frame's end.
+    /// Commands a pulse width for the next frame.
     fn set_duty_cycle(&mut self, duty: u16) -> Result<(), Infallible> {
         self.command(duty, 0);
         Ok(())

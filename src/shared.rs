@@ -1,17 +1,16 @@
 //! A number that an interrupt handler and the loop share.
 //!
-//! A byte is read or written by one instruction, so nothing can come in between, and no interrupt has to be held off. The
-//! core library's atomic byte would do the same, but on this chip it turns interrupts off around every access. A longer
-//! number is read byte by byte: where the other side could come in between and change it, its reader turns interrupts off.
-//! All accesses are volatile, so they stay in the order in which they are written.
+//! One instruction reads or writes a byte, so access needs no critical section. The core library's atomic byte turns interrupts off
+//! around each access on this chip. A longer number is read byte by byte: if the other side may change it, the reader turns
+//! interrupts off. All accesses are volatile, so they keep their order.
 
 use core::cell::UnsafeCell;
 
-/// A type all of whose patterns of bits are values.
+/// A type for which every bit pattern is a value.
 ///
 /// # Safety
 ///
-/// That, and nothing that has to be dropped.
+/// The implementer guarantees that, and that the type needs no drop.
 pub unsafe trait AnyBits: Copy {}
 
 // SAFETY: every pattern of bits is a number.
@@ -19,19 +18,19 @@ unsafe impl AnyBits for u8 {}
 // SAFETY: every pattern of bits is a number.
 unsafe impl AnyBits for u16 {}
 
-/// A number, from either side.
+/// A shared number.
 #[repr(transparent)]
 pub struct Shared<T>(UnsafeCell<T>);
 
-/// A byte, from either side: always whole.
+/// A shared byte; each access is atomic.
 pub type Byte = Shared<u8>;
 
-// SAFETY: the chip has one core. A handler that comes into an access can leave half of an old number and half of a new one
-// there, which is a number all the same.
+// SAFETY: the chip has one core. A handler that interrupts an access can leave half of an old and half of a new number. That is a
+// valid number too.
 unsafe impl<T: AnyBits> Sync for Shared<T> {}
 
 impl<T: AnyBits> Shared<T> {
-    /// A number with a first value.
+    /// A number with this value.
     pub const fn new(value: T) -> Self {
         Self(UnsafeCell::new(value))
     }
@@ -43,7 +42,7 @@ impl<T: AnyBits> Shared<T> {
         unsafe { self.0.get().read_volatile() }
     }
 
-    /// Gives it a new value.
+    /// Sets the value.
     #[inline(always)]
     pub fn set(&self, value: T) {
         // SAFETY: as in `get`.

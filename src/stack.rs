@@ -1,28 +1,27 @@
-//! What the stack has left: SRAM is painted before `main`, and the loop looks how far the paint is still whole.
+//! The free stack: start-up code paints SRAM, and the loop checks how much of the paint is left.
 //!
-//! The stack grows down towards the static data and wipes the paint off. A look at all of it would take the loop a
-//! millisecond, so it looks at one byte a turn, from the lowest one known to be used downwards and round again. A byte
-//! that the stack holds may have the paint's colour by chance; the one beyond it has not, and tells a round later at
-//! the latest.
+//! The stack grows down towards the static data and overwrites the paint. A full check would take the loop a millisecond, so each
+//! turn checks one byte: downwards from the lowest byte known as used, and then again from there. A used byte may have the paint's
+//! value by chance. The next used byte below it then shows the use, at most one round later.
 
 use core::{arch::naked_asm, ptr};
 
-/// The paint, which is also what the virtual Uno fills SRAM with at power-up.
+/// The paint. The virtual Uno fills SRAM with the same value at power-up.
 const PAINT: u8 = 0xC5;
 
 unsafe extern "C" {
-    /// The end of all static data, .noinit included; from avr-gcc's linker script.
+    /// The end of all static data with .noinit, from memory.x.
     static _end: u8;
 }
 
-/// The stack pointer behind the start-up code: the last byte of SRAM (RAMEND).
+/// The stack pointer after start-up: the last byte of SRAM (RAMEND).
 const SRAM_LAST: usize = 0x08FF;
 
-/// Paints all SRAM behind the static data in the start-up code: the stack is empty then.
+/// Paints all SRAM after the static data during start-up, while the stack is empty.
 #[unsafe(naked)]
 #[unsafe(no_mangle)]
-// SAFETY: .init8 is run through, not called; the code falls into .init9, which calls `main`. The stack is empty, so no byte
-// of it matters, and the registers that it changes are nobody's before `main`.
+// SAFETY: execution runs through .init8 into .init9, which calls `main`; it is not called. The stack is empty, so it overwrites
+// nothing, and no code uses its registers before `main`.
 #[unsafe(link_section = ".init8")]
 unsafe extern "C" fn paint_stack() {
     naked_asm!(
@@ -40,22 +39,22 @@ unsafe extern "C" fn paint_stack() {
     )
 }
 
-/// What is known of the stack's paint. Both are bytes counted from the static data's end.
+/// The known use of the stack, in bytes from the end of the static data.
 pub struct Stack {
-    /// Below it, no byte was found used.
+    /// No byte below this one is known as used.
     free: u16,
-    /// Where the next look goes is the byte below.
+    /// The next check reads the byte below this one.
     probe: u16,
 }
 
 impl Stack {
-    /// The stack, of which nothing is known yet; it is after as many calls of [`free`](Self::free) as it has bytes.
+    /// A stack before its first check. A complete round takes as many calls of [`free`](Self::free) as it has bytes.
     pub fn new() -> Self {
         let free = (SRAM_LAST + 1 - start()) as u16;
         Self { free, probe: free }
     }
 
-    /// Looks at one more byte and tells how many were never used, as far as is known.
+    /// Checks one more byte. Returns the number of bytes never used, as far as is known.
     pub fn free(&mut self) -> u16 {
         if self.probe == 0 {
             self.probe = self.free;
@@ -63,8 +62,7 @@ impl Stack {
         if let Some(probe) = self.probe.checked_sub(1) {
             self.probe = probe;
             let place = ptr::with_exposed_provenance::<u8>(start() + usize::from(probe));
-            // SAFETY: the byte lies between the static data and the end of SRAM. It is read and nothing else, by one
-            // instruction, and any value will do.
+            // SAFETY: the byte lies between the static data and the end of SRAM. One instruction reads it, and any value is valid.
             let byte = unsafe { place.read_volatile() };
             if byte != PAINT {
                 self.free = probe;
@@ -74,7 +72,7 @@ impl Stack {
     }
 }
 
-/// The address of the first byte behind the static data.
+/// The address of the first byte after the static data.
 fn start() -> usize {
     (&raw const _end).expose_provenance()
 }

@@ -1,28 +1,28 @@
-//! The watchdog: resets a machine whose loop no longer turns, which then wakes up in HOLD with the tool out.
+//! The watchdog: resets a machine whose loop has stopped. The machine then starts in HOLD with the tool out.
 //!
-//! After a watchdog reset the watchdog stays on, at its shortest period (data sheet, 11.8): it must be switched off before
-//! anything that takes time, or the machine, or an old bootloader, resets for ever.
+//! After a watchdog reset the watchdog stays on with its shortest period (data sheet, 11.8). Start-up code must switch it off at
+//! once, or the machine, or an old bootloader, resets for ever.
 
 use avr_device::interrupt;
 use core::arch::{asm, naked_asm};
 
-/// WDTCSR: allow a change within the next four cycles.
+/// WDTCSR: allows a change within the next four cycles.
 const ALLOW_CHANGE: u8 = 0x18;
 
 /// WDTCSR: reset after 16 ms.
 const RESET_SOON: u8 = 0x08;
 
-/// WDTCSR: reset after 250 ms, many times the loop's longest turn.
+/// WDTCSR: reset after 250 ms, much longer than any turn of the loop.
 const RESET_LATER: u8 = 0x0C;
 
-/// Switches the watchdog off in the start-up code, before SRAM is cleared and long before `main`.
+/// Switches the watchdog off during start-up, before SRAM is cleared.
 ///
-/// MCUSR is cleared first: while it tells of a watchdog reset, the watchdog cannot go off. GPIOR2 keeps what it told
-/// until `reset::cause` has read it, before the first interrupt.
+/// MCUSR is cleared first, because its watchdog flag keeps the watchdog on. GPIOR2 keeps its value for `reset::cause`, until the
+/// first interrupt.
 #[unsafe(naked)]
 #[unsafe(no_mangle)]
-// SAFETY: .init3 is run through, not called; the code falls into the next start-up section and changes r24 alone,
-// which nobody uses that early; r1 is 0 since .init2.
+// SAFETY: execution runs through .init3 into the next start-up section; it is not called. It changes r24 only, which no code uses
+// that early. r1 is 0 since .init2.
 #[unsafe(link_section = ".init3")]
 unsafe extern "C" fn switch_watchdog_off() {
     naked_asm!(
@@ -36,14 +36,14 @@ unsafe extern "C" fn switch_watchdog_off() {
     )
 }
 
-/// Starts the watchdog: from here on it must be fed every 250 ms.
+/// Starts the watchdog: the loop must feed it every 250 ms.
 pub fn start() {
     set(RESET_LATER);
 }
 
-/// Tells the watchdog that the loop turns.
+/// Restarts the watchdog's time.
 pub fn feed() {
-    // SAFETY: the instruction touches nothing but the watchdog's counter.
+    // SAFETY: the instruction changes only the watchdog's counter.
     unsafe { asm!("wdr") };
 }
 
@@ -51,7 +51,7 @@ pub fn feed() {
 pub fn reset() -> ! {
     interrupt::disable();
     set(RESET_SOON);
-    // The new time counts from here, whatever had passed of the old one.
+    // Restarts the time, so that the new period counts from here.
     feed();
     loop {
         core::hint::spin_loop();
@@ -60,8 +60,8 @@ pub fn reset() -> ! {
 
 fn set(control: u8) {
     interrupt::free(|_| {
-        // SAFETY: WDTCSR (0x60) belongs to this file alone; the two writes follow each other within four cycles, which
-        // no interrupt can stretch in here (11.9.2).
+        // SAFETY: only this file uses WDTCSR (0x60). The two writes are within four cycles. Interrupts are off, so none can delay
+        // the second (11.9.2).
         unsafe {
             asm!(
                 "wdr",

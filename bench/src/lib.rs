@@ -1,7 +1,7 @@
-//! What the bench measures, known to the chip's side and to the host's.
+//! The benchmark's tasks, for the chip and for the host.
 //!
-//! The chip's side (`main.rs`) raises D13 before each measured call and lowers it behind; the host reads the cycles off
-//! the edges, in the order of [`Task::ALL`], [`QUERIES`] of each.
+//! The chip (`main.rs`) raises D13 before each measured call and lowers it after. The host counts the cycles between the edges, in
+//! the order of [`Task::ALL`], with [`QUERIES`] for each.
 
 #![no_std]
 #![forbid(unsafe_code)]
@@ -18,19 +18,19 @@ pub const K: u8 = 3;
 /// Classes among the examples.
 pub const CLASSES: usize = 2;
 
-/// What is measured.
+/// A measured task.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Task {
     /// `Scale::quantise`: the five features to bytes.
     Quantise,
-    /// A search and its vote among so many random examples in flash.
+    /// A search and its vote among this many random examples in flash.
     Classify(u8),
-    /// The same for objects of a row among the firmware's own examples.
+    /// The same for detections of a row among the firmware's own examples.
     ClassifyObjects,
 }
 
 impl Task {
-    /// All of them, in the order in which the chip runs them.
+    /// All tasks, in the order in which the chip runs them.
     pub const ALL: [Self; 7] = [
         Self::Quantise,
         Self::Classify(8),
@@ -42,7 +42,7 @@ impl Task {
     ];
 }
 
-/// Random bytes by a 32-bit xorshift: the same on the chip and on the host, and in constants.
+/// Random bytes from a 32-bit xorshift: the same on the chip, on the host, and in constants.
 #[derive(Clone, Debug)]
 pub struct Random(u32);
 
@@ -61,13 +61,13 @@ impl Random {
         (self.0 >> 24) as u8
     }
 
-    /// Features of which each byte is as likely as any other.
+    /// Features of uniformly distributed bytes.
     pub const fn features(&mut self) -> [u8; features::COUNT] {
         [self.byte(), self.byte(), self.byte(), self.byte(), self.byte()]
     }
 }
 
-/// `N` random examples of two classes, in the order in which they lie in flash.
+/// `N` random examples of two classes, in the order of a table in flash.
 #[must_use]
 pub const fn examples<const N: usize>() -> [Example<{ features::COUNT }>; N] {
     let mut random = Random::new(0x9E37_79B9 ^ N as u32);

@@ -1,9 +1,8 @@
-//! The bench on the chip: runs the tasks of `Task::ALL` and shows each call on D13.
+//! The benchmark on the chip: runs the tasks of `Task::ALL`, and shows each call on D13.
 //!
-//! It runs the firmware's own search of examples in flash, compiled by the firmware's own profile. When all is measured
-//! it classifies the same queries again, now by the plain search of the crate `knn`, and counts the answers that differ, those
-//! of a search of examples in SRAM too.
-//! It prints nothing: `cargo bench-uno` reads the pin and the variables.
+//! It runs the firmware's own search of examples in flash, in the firmware's own profile. Then it repeats the queries with the
+//! plain search of the crate `knn`, and counts different answers. It does the same for examples in SRAM. It prints nothing: `cargo
+//! bench-uno` reads the pin and the variables.
 
 #![no_std]
 #![no_main]
@@ -30,11 +29,11 @@ progmem! {
     static progmem RANDOM_128: [Row; 128] = rows(&knn_bench::examples());
 }
 
-/// Where the stack stood at the first call: what lies below it is the classifier's.
+/// The stack pointer at the first call. The stack below it is the classifier's.
 #[unsafe(no_mangle)]
 static mut STACK_POINTER: u16 = 0;
 
-/// Answers that differ from the plain search's, and 0xFFFF until all are compared.
+/// The number of answers that differ from the plain search; 0xFFFF until all are compared.
 #[unsafe(no_mangle)]
 static mut DIFFERENT_ANSWERS: u16 = u16::MAX;
 
@@ -43,9 +42,9 @@ type Result = core::result::Result<Answer<CLASSES>, ClassifyError>;
 
 #[avr_device::entry]
 fn main() -> ! {
-    // SAFETY: bit 5 of DDRB makes D13 an output, which nobody else uses.
+    // SAFETY: bit 5 of DDRB makes D13 an output, and no other code uses it.
     unsafe { asm!("sbi 0x04, 5") };
-    // SAFETY: no interrupt is on, so that nobody else refers to the variable; SP is at 0x3D and 0x3E.
+    // SAFETY: no interrupt is on, so no other code accesses the variable; SP is at 0x3D and 0x3E.
     unsafe { asm!("in {0:l}, 0x3d", "in {0:h}, 0x3e", out(reg_pair) STACK_POINTER) };
     let found: &mut Nearest<CLASSES> = &mut Nearest::<CLASSES, _>::new([Neighbour::NONE; MAX_K as usize]);
     for task in Task::ALL {
@@ -88,7 +87,7 @@ fn main() -> ! {
     }
     let mut taught = InMemory { places: [Example::new([0; features::COUNT], VACANT); TAUGHT], is_plain: false };
     for (number, place) in taught.places.iter_mut().enumerate() {
-        // Some places stay vacant.
+        // Some places stay empty.
         if let Some(example) = random(TAUGHT as u8).example(number).filter(|_| number % 5 > 0) {
             *place = example;
         }
@@ -109,10 +108,10 @@ fn main() -> ! {
     }
 }
 
-/// Shows on D13 how long this takes: the pin is high for the call's cycles and the two of `sbi`.
+/// Shows the call's duration on D13: the pin is high for the call's cycles and the two of `sbi`.
 #[inline(always)]
 fn measured<T>(task: impl FnOnce() -> T) -> T {
-    // SAFETY: bit 5 of PORTB is D13, which nobody else uses.
+    // SAFETY: bit 5 of PORTB is D13, and no other code uses it.
     unsafe { asm!("sbi 0x05, 5") };
     let result = task();
     // SAFETY: as above.
@@ -124,7 +123,7 @@ fn measured_search(found: &mut Nearest<CLASSES>, examples: &InFlash, query: &Que
     measured(|| search(found, examples, query))
 }
 
-/// As the firmware searches: it keeps the places.
+/// As the firmware searches: with places that are kept.
 #[inline(never)]
 fn search(found: &mut Nearest<CLASSES>, examples: &InFlash, query: &Query) -> Result {
     found.begin(black_box(K))?;
@@ -137,7 +136,7 @@ fn plain_search(examples: &InFlash, query: &Query) -> Result {
     classify(&OneByOne(examples), query, black_box(K), RADIUS)
 }
 
-/// Hands examples out one by one, for the crate's plain search.
+/// Returns examples one by one, for the crate's plain search.
 struct OneByOne<'a>(&'a InFlash);
 
 impl Examples<{ features::COUNT }> for OneByOne<'_> {
@@ -150,10 +149,10 @@ impl Examples<{ features::COUNT }> for OneByOne<'_> {
     }
 }
 
-/// Examples in SRAM.
+/// The number of examples in SRAM.
 const TAUGHT: usize = 32;
 
-/// They, and whether the crate's plain search goes over them.
+/// Examples in SRAM, and whether the crate's plain search searches them.
 struct InMemory {
     places: [Example<{ features::COUNT }>; TAUGHT],
     is_plain: bool,
@@ -189,7 +188,7 @@ fn search_taught(examples: &InMemory, query: &Query, k: u8) -> Result {
     classify(examples, query, black_box(k), RADIUS)
 }
 
-/// So many random examples: 8, 16, 32, 64 or 128.
+/// Random examples: 8, 16, 32, 64 or 128.
 fn random(count: u8) -> InFlash {
     match count {
         8 => InFlash::new(&RANDOM_8),
@@ -206,7 +205,7 @@ fn queries() -> impl Iterator<Item = Query> {
     (0..QUERIES).map(move |_| random.features())
 }
 
-/// Objects as they come along a row: plants and tall weeds, half each, at the paper's four speeds.
+/// Detections along a row: plants and tall weeds, half each, at the paper's four speeds.
 fn objects() -> impl Iterator<Item = Features> {
     let mut random = Random::new(0x0123_4567);
     (0..QUERIES).map(move |_| {

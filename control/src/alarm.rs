@@ -1,56 +1,56 @@
-//! Alarms and warnings: faults after which the machine no longer knows enough to have its tool in the row, and what it
-//! can live with but the operator should know.
+//! Alarms and warnings. An alarm is a fault after which the tool must not enter the row. After a warning the machine continues, and
+//! the operator should look.
 //!
-//! An alarm puts the tool out, empties the schedule and stays until the operator clears it. Its code has two digits, which
-//! the status LED blinks one after the other: the first says where to look, the second which fault it is. Its name is
-//! what the console says. A warning is counted and told, and changes nothing else.
+//! An alarm puts the tool out, forgets the ground, and stays until the operator clears it. The status LED blinks its code, one
+//! digit after the other: the first says where to look, the second which fault it is. The console shows its name. A warning is
+//! counted and reported, and has no other effect.
 
-/// A latched fault, in the order of the codes.
+/// A latched alarm, in the order of the codes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Alarm {
-    /// The beam was broken over more ground than any plant covers: something hangs in it, or it is out of line.
+    /// The beam was broken over more ground than any plant covers: an object hangs in it, or it is out of line.
     BeamBlocked,
-    /// The beam breaks and clears more often than plants and their leaves can make it: dust, or a loose wire.
+    /// The beam changes more often than plants and leaves can cause: dust, or a loose wire.
     BeamFlickers,
-    /// Edges of the beam came faster than they could be taken.
+    /// Edges of the beam came faster than the loop could take them.
     BeamEdgesLost,
-    /// The second beam sees what the first does not: a torn wire, or a dirty lens.
+    /// The first beam misses what the second sees: a torn wire, or a dirty lens.
     BeamBlind,
-    /// The first beam sees what the second does not.
+    /// The second beam misses what the first sees.
     SecondBeamBlind,
-    /// Plants pass the beam, and the encoder says that the machine stands.
+    /// Plants pass the beam while the encoder stands still.
     EncoderSilent,
-    /// Edges without progress: only one of the encoder's channels is alive.
+    /// Edges without progress: only one of the encoder's channels works.
     EncoderChannelDead,
-    /// Both channels keep changing at once, which a turning wheel does not do.
+    /// Both channels often change at once, which a turning wheel does not cause.
     EncoderJumps,
-    /// The machine works faster than its settings allow.
+    /// The machine is faster than `top_speed_mm_s`.
     TooFast,
-    /// The tool was rolled back to ground that has been forgotten.
+    /// The tool was rolled back to ground that has been dropped.
     RolledBackTooFar,
-    /// More plants stand between beam and tool than the schedule can hold.
+    /// More canopies stand between beam and tool than can be remembered.
     ScheduleFull,
-    /// Detection after detection was as narrow as a weed, and none was taken for a plant: the examples may not know this crop.
+    /// Too many consecutive detections were as narrow as a weed, and none was a plant: the examples may not know this crop.
     CropUnknown,
-    /// The end switch does not say what the tool was told.
+    /// The end switch contradicts the tool's command.
     ToolStuck,
-    /// No copy of the settings in the EEPROM is whole and of this firmware: the defaults are in use.
+    /// No valid copy of the settings in the EEPROM: the defaults are in use.
     SettingsLost,
-    /// The saved settings cannot be right together.
+    /// The saved settings contradict each other.
     SettingsContradict,
-    /// The stack has come too near to the variables.
+    /// Too little stack is free.
     StackLow,
 }
 
 impl Alarm {
-    /// Whether beam or encoder shows it.
+    /// Whether it comes from the beam or the encoder.
     pub const fn is_of_a_sensor(self) -> bool {
         (self as u8) < Self::TooFast as u8
     }
 
-    /// The code that the LED blinks, as its two digits. The first: 1 beam, 2 encoder, 3 driving and the row, 4 tool, 5 settings, 6
-    /// the controller itself. Wherever an alarm is named, they stand before its name: `3-1 too_fast`.
+    /// The two digits that the LED blinks. The first: 1 beam, 2 encoder, 3 driving and the row, 4 tool, 5 settings, 6 the
+    /// controller. Texts show them before the name: `3-1 too_fast`.
     #[cfg_attr(target_arch = "avr", inline(never))]
     pub const fn code(self) -> (u8, u8) {
         // The first alarm of each digit. A list of codes would cost SRAM.
@@ -66,15 +66,15 @@ impl Alarm {
     }
 }
 
-/// Something that the operator should know of.
+/// A warning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Warning {
-    /// The tool was told to leave the row later than it needed: the speed jumped, or a plant came up too near.
+    /// The tool was commanded out too late: the speed jumped, or a plant came up too near.
     LateCommand,
-    /// The machine has worked for a long way without the beam being broken: it may be blind, or too high.
+    /// The machine has worked over a long distance without a plant: the beam may be blind, or too high.
     NoPlants,
-    /// Too many detections running have not told the slip: the stand is denser than the two beams can tell apart, or they see differently.
+    /// Too many consecutive detections gave no slip: the stand is too dense for two beams, or the beams see differently.
     SlipUnknown,
 }
 
@@ -85,7 +85,7 @@ mod tests {
     use std::vec::Vec;
 
     #[test]
-    fn codes_rise_with_the_order_and_have_digits_that_can_be_counted() {
+    fn codes_rise_in_order_with_digits_that_can_be_counted() {
         let codes: Vec<u8> =
             (0..).map_while(Alarm::from_index).map(Alarm::code).map(|(first, second)| 10 * first + second).collect();
         assert_eq!(codes, [11, 12, 13, 14, 15, 21, 22, 23, 31, 32, 33, 34, 41, 51, 52, 61]);

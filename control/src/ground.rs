@@ -1,14 +1,13 @@
-//! The ground: what the beam has seen of it, and the one question whether the tool may work on it.
+//! The ground: what the beam has seen of it, and whether the tool may work there.
 //!
-//! [`detector`] makes detections of the beam's edges, [`keep_out`] remembers the canopies among them, and [`reach`] knows how far
-//! ahead the servo has to be told. [`guard`] knows where a plant is due. [`Ground`] holds them together, so that none of them can
-//! forget by itself: whatever the reason, [`Ground::forget`] closes all that was seen, what is open at the frontier becomes the
-//! rest of something, and no plant is due.
+//! [`detector`] turns beam edges into detections. [`class`] says plant or weed: [`nearest`] compares a detection's [`features`]
+//! with built-in [`examples`] and with [those taught in the field](field_examples). [`keep_out`] remembers the canopies. [`guard`]
+//! adds expected plants. [`reach`] calculates the lead that the servo needs.
 //!
-//! Places have 16 bits, so ground is left behind before the counter could come round: see [`Ground::roll_to`].
+//! [`Ground`] owns all of them, so they are forgotten together. [`Ground::forget`] closes all ground seen so far, expects no more
+//! plants, and marks an open detection as cut.
 //!
-//! What an [`detection`] is, plant or weed, the ground is told: that is a [`class`], by the detection's [`features`] the vote of the
-//! [`nearest`] of built-in [`examples`] and [those taught in the field](field_examples).
+//! Positions on the ground have 16 bits. [`Ground::roll_to`] drops old ground before that counter wraps.
 
 pub mod class;
 pub mod detection;
@@ -38,60 +37,69 @@ use crate::{
     units::{Length, Position, Ticks, TicksPerSecond, Wheel, WrappedPosition},
 };
 
-/// What is known of the ground around the machine.
+/// The known ground around the machine.
 #[derive(Clone, Debug)]
 pub struct Ground {
     geometry: Geometry,
     leads: Leads,
-    /// The ground that the beam is at.
+    /// The beam's position.
     beam: WrappedPosition,
     detector: Detector,
     keep_out: KeepOut,
     guard: Guard,
     second_beam: SecondBeam,
-    /// The slip by which the geometry goes, and what was believed last.
+    /// The slip that the distances use now, and the last slip that was trusted.
     corrected_by: (i8, i8),
-    /// The last plant's leading edge, or where watching began; no farther behind than is remembered.
+    /// The last plant's leading edge, or where detection began. At most the memory length behind the frontier.
     last_plant: WrappedPosition,
     unclassified: Unclassified,
-    /// Whether the tool has just come to ground that had to be left behind.
+    /// Whether the tool has just reached ground that was dropped for its distance or for lack of room.
     rolled_back_too_far: bool,
 }
 
-/// Why the tool may or may not work where it is: for a study of where the row's ground goes. The machine asks only whether it may.
+/// Why the tool may or may not work at its position. Only experiments read the reason; the machine needs yes or no.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AtTool {
-    /// Nothing is kept here.
+    /// No keep-out zone is here.
     Open,
     /// The ground is unknown.
     Unknown,
-    /// A zone is kept here, or its margin.
+    /// The tool is in a keep-out zone or its margin.
     Kept {
-        /// Where the tool is, as what the odometer shows when the beam is there.
+        /// The odometer's position when the beam was where the tool is now.
         tool: Position,
-        /// Where the zone begins behind its margin.
+        /// Where the zone begins, without its margin.
         begin: Position,
-        /// Where it ends ahead of its margin.
+        /// Where the zone ends, without its margin.
         end: Position,
     },
 }
 
-/// The detection that was seen in full, and of which nobody knows yet what it is.
-///
-/// With its kind in front and none of them as 0, ground of which nobody knows anything is all zeros, which takes no flash.
+/// The complete detection that is being classified, if any.
 #[derive(Clone, Copy, Debug)]
-#[repr(u8)]
-enum Unclassified {
-    /// There is none.
-    None,
-    /// Where it stands is forgotten.
-    Forgotten,
-    /// As far as both beams have seen it.
-    Seen(Canopy),
+pub struct Unclassified {
+    /// The detection.
+    pub detection: Detection,
+    /// What both beams have seen of it so far.
+    canopy: Canopy,
+    /// Whether the second beam reports it. The first beam may have reported it already.
+    pub of_second: bool,
+    known: Known,
+}
+
+/// What is known of a detection without a class. `Nothing` is 0, so [`Ground::NONE`] is all zeros and needs no copy in flash.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Known {
+    /// There is no detection.
+    Nothing,
+    /// Its ground is forgotten.
+    Detection,
+    /// Its ground is known.
+    Canopy,
 }
 
 impl Ground {
-    /// Ground on which nobody has begun to watch.
+    /// Ground before [`begin`](Self::begin).
     pub const NONE: Self = Self {
         geometry: Geometry::NONE,
         leads: Leads::NONE,
@@ -102,11 +110,16 @@ impl Ground {
         second_beam: SecondBeam::NONE,
         corrected_by: (0, 0),
         last_plant: WrappedPosition::new(0),
-        unclassified: Unclassified::None,
+        unclassified: Unclassified {
+            detection: Detection::NONE,
+            canopy: Canopy::NONE,
+            of_second: false,
+            known: Known::Nothing,
+        },
         rolled_back_too_far: false,
     };
 
-    /// Begins to watch ground of which nothing has been seen, with the beam at a position, broken or not.
+    /// Starts detection on unknown ground. The beam is at `position`; `broken` is its level.
     pub fn begin(&mut self, settings: &Settings, position: Position, broken: bool) {
         self.correct(settings);
         self.beam = self.geometry.scale.place(position);
@@ -116,7 +129,7 @@ impl Ground {
         self.second_beam.begin(self.beam);
     }
 
-    /// Works out what follows from other settings. With another scale, what was seen means nothing any more.
+    /// Recalculates after a change of settings. A new scale makes all positions invalid, so the ground is then forgotten.
     pub fn follow(&mut self, settings: &Settings, position: Position, speed: TicksPerSecond) {
         let scale = self.geometry.scale;
         let guard_spacing = self.geometry.guard_spacing;
@@ -131,40 +144,40 @@ impl Ground {
         }
     }
 
-    /// Whether another slip was measured than the distances are corrected by.
+    /// Whether the measured slip differs from the slip that the distances use.
     #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn is_to_be_corrected(&self) -> bool {
         self.corrected_by != self.second_beam.slip().believed()
     }
 
-    /// Works out what follows from the slip that was measured.
+    /// Recalculates the distances with the measured slip.
     pub fn correct(&mut self, settings: &Settings) {
         self.corrected_by = self.second_beam.slip().believed();
         let (excess, believed) = self.corrected_by;
         self.geometry.follow(settings, excess);
-        // What was believed until it became doubtful may be right: the tool keeps off where that has it as well.
+        // A slip that is no longer trusted may still be right. The margin grows so that the zones hold for both values.
         let doubted = u32::from(self.geometry.beam_to_tool.0 as u16) * u32::from(excess.abs_diff(believed));
         self.geometry.margin = self.geometry.margin + Length((doubted >> 8) as i16);
     }
 
-    /// Forgets what the second beam has measured: the wheel, or where the beams stand, may be another. It has nothing to tell of what
-    /// the first has seen before.
+    /// Forgets the second beam's measurements: the wheel or the beams' distance may have changed. The second beam ignores earlier
+    /// detections of the first.
     pub fn forget_slip(&mut self) {
         self.second_beam.begin(self.detector.frontier());
     }
 
-    /// Works out what follows from another speed.
+    /// Recalculates the leads for another speed.
     pub fn lead(&mut self, settings: &Settings, speed: TicksPerSecond) {
         self.leads = Leads::at(speed, settings, self.geometry.scale);
     }
 
-    /// Takes an edge of the beam, with the position at which it came; returns the detection that was complete before it.
+    /// Takes a beam edge and its position. Returns the detection that was complete before this edge.
     pub fn edge(&mut self, position: Position, broken: bool) -> Option<Detection> {
         let place = self.geometry.scale.place(position) - self.leads.response;
         self.detector.edge(place, broken, self.geometry.merge_gap)
     }
 
-    /// The second beam is at a position of the machine, broken or not; returns what it has seen, unless all is known of that.
+    /// Takes the second beam's level at a position of the machine. Returns its detection, unless a known canopy explains it.
     pub fn match_second_beam(&mut self, position: Position, broken: bool) -> Option<Detection> {
         let Geometry { scale, second_beam: apart, merge_gap, .. } = self.geometry;
         let least = self.geometry.least_seen();
@@ -173,41 +186,41 @@ impl Ground {
             self.widen(place, place, self.second_beam.end(place));
         }
         let mut detection = self.second_beam.look(place, broken, apart, merge_gap, least)?;
-        // Behind the last plant its spacing is not known, and what it is neither.
+        // A detection behind the last plant has no spacing, so it cannot be classified.
         detection.cut |= !detection.leading.is_ahead_of(self.last_plant);
         if self.widen(detection.leading, detection.trailing, End::None) {
             return None;
         }
-        // One beam alone cannot tell a single plant.
+        // Only one beam saw this, so it is not certain to be a single plant.
         self.detector.doubt();
         Some(detection)
     }
 
-    /// The beam that is blind, if one is.
+    /// The beam that is blind, if any.
     #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn blind(&self) -> Option<Blind> {
         self.second_beam.blind()
     }
 
-    /// The first beam has seen a detection, which is to come to the second, if there is one.
+    /// Announces a detection of the first beam to the second.
     pub fn await_detection(&mut self, detection: Detection) {
         self.second_beam.await_detection(detection, self.geometry.least_seen());
     }
 
-    /// The machine has rolled to a position; returns the detection that this completes.
+    /// Moves the machine to a position. Returns the detection that this completes.
     #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn roll_to(&mut self, position: Position) -> Option<Detection> {
         let had_left = self.has_left();
         self.beam = self.geometry.scale.place(position);
         let memory = self.geometry.memory;
-        // Ground ahead of the beam that lies so far ahead is seen anew when the machine comes back to it.
+        // After rolling back this far, the beam sees the same ground again.
         let is_beyond_memory = self.detector.frontier() - self.beam > memory;
         if is_beyond_memory {
             self.begin_here();
         }
         let complete = self.detector.roll_to(self.beam - self.leads.response, self.geometry.merge_gap);
-        // Counted from the frontier, as the beam is never more than the memory behind it: counted from the tool, it could be
-        // farther from what is known than a place can tell.
+        // Counted from the frontier: the beam is at most the memory behind it. From the tool, the distance could exceed the range
+        // of a position.
         let farthest = self.detector.frontier() - memory;
         self.keep_out.leave(farthest - self.geometry.beam_to_tool);
         if farthest.is_ahead_of(self.last_plant) {
@@ -217,111 +230,122 @@ impl Ground {
         complete
     }
 
-    /// Whether the tool is at ground that had to be left behind.
+    /// Whether the tool is on ground that was dropped.
     #[cfg_attr(target_arch = "avr", inline(never))]
     fn has_left(&self) -> bool {
         self.keep_out.has_left(self.tool())
     }
 
-    /// Forgets everything: none of what was seen is to be relied on, and the tool keeps off it.
+    /// Forgets everything seen so far. The tool stays out of that ground.
     #[cfg_attr(target_arch = "avr", inline(never))]
     pub fn forget(&mut self) {
         self.detector.forget();
-        if let Unclassified::Seen(_) = self.unclassified {
-            self.unclassified = Unclassified::Forgotten;
+        if self.unclassified.known == Known::Canopy {
+            self.unclassified.known = Known::Detection;
         }
         self.guard = Guard::NONE;
         self.forget_slip();
         self.keep_out.spoil(self.detector.frontier());
     }
 
-    /// Edges of the beam were lost, and with them what stood there; its level is now `broken`.
+    /// Edges of the beam were lost, so this ground is unknown. The beam's level is now `broken`.
     pub fn lose_edges(&mut self, broken: bool) {
         self.detector.lose_edges(broken);
         self.forget();
     }
 
-    /// Forgets everything, and begins to watch where the beam is.
+    /// Forgets everything, and starts detection at the beam's position.
     fn begin_here(&mut self) {
         self.detector.begin(self.beam, self.detector.is_broken());
         self.last_plant = self.beam;
         self.forget();
-        self.unclassified = Unclassified::None;
+        self.unclassified.known = Known::Nothing;
     }
 
-    /// Takes the operator's word that no plant stands under the tool and ahead of it where nothing is known, if the tool is there.
+    /// The operator confirms that no plant stands on the unknown ground at the tool and ahead of it. Does nothing on known ground.
     pub fn trust(&mut self) {
         if self.is_unseen() {
-            // A margin behind the tool as well, so that it does not stand on the border of what is known.
+            // A margin behind the tool too, so that it does not stand on the border of the known ground.
             self.keep_out.trust_from(self.tool() - self.geometry.margin);
         }
     }
 
-    /// A detection is being classified: until that is done, the ground is closed from where it begins, as by one that is still being seen.
-    pub fn await_class(&mut self, detection: Detection) {
+    /// Closes the ground from the start of a detection until it is classified.
+    pub fn await_class(&mut self, detection: Detection, of_second: bool) {
         let zone = if self.detector.is_parted() { Length::ZERO } else { self.geometry.stem_zone };
-        self.unclassified = Unclassified::Seen(Canopy::of(&detection, zone));
-        // A wide one has come to the second beam before its end was seen by the first.
+        self.unclassified =
+            Unclassified { detection, canopy: Canopy::of(&detection, zone), of_second, known: Known::Canopy };
+        // A wide detection reaches the second beam before the first has seen its end.
         if let Some(begin) = self.second_beam.open() {
             self.widen(begin, begin, End::Leading);
         }
     }
 
-    /// The detection is classified, and if it is a plant it is remembered.
+    /// The detection that is being classified.
+    #[cfg_attr(not(target_arch = "avr"), inline)]
+    pub fn unclassified(&self) -> Option<&Unclassified> {
+        Some(&self.unclassified).filter(|unclassified| unclassified.known != Known::Nothing)
+    }
+
+    /// Takes the class of that detection, and remembers a plant or an unknown.
     ///
     /// # Errors
-    /// [`ScheduleFull`] when more plants stand between beam and tool than can be remembered.
-    pub fn classified(&mut self, detection: Detection, class: Class) -> Result<(), ScheduleFull> {
-        let unclassified = core::mem::replace(&mut self.unclassified, Unclassified::None);
-        if class == Class::Weed || matches!(unclassified, Unclassified::None) {
+    /// [`ScheduleFull`] if more canopies stand between beam and tool than can be remembered.
+    pub fn classified(&mut self, class: Class) -> Result<(), ScheduleFull> {
+        let Unclassified { detection, canopy, known, .. } = &mut self.unclassified;
+        let was_known = core::mem::replace(known, Known::Nothing);
+        if class == Class::Weed || was_known == Known::Nothing {
             return Ok(());
         }
         if detection.leading.is_ahead_of(self.last_plant) {
             self.last_plant = detection.leading;
         }
-        let Unclassified::Seen(mut plant) = unclassified else { return Ok(()) };
-        // What it is may be anything, or several of it.
-        if class != Class::Plant {
-            plant.trim = 0;
+        if was_known != Known::Canopy {
+            return Ok(());
         }
-        self.guard.see(&detection, &self.geometry);
-        self.keep_out.push(plant, self.tool(), self.geometry.margin)
+        // An unknown detection may be several plants: it keeps its full width.
+        if class != Class::Plant {
+            canopy.trim = 0;
+        }
+        self.guard.see(detection, &self.geometry);
+        let canopy = *canopy;
+        self.keep_out.push(canopy, self.tool(), self.geometry.margin)
     }
 
-    /// What the second beam sees a part of, from one place to another, goes that far; whether that is a canopy's.
+    /// Widens a canopy to the stretch that the second beam sees. Returns whether a canopy is there.
     fn widen(&mut self, from: WrappedPosition, to: WrappedPosition, end: End) -> bool {
         let within = Length(self.geometry.second_beam.0 >> 2);
-        if let Unclassified::Seen(canopy) = &mut self.unclassified {
-            canopy.widen(from, to, within, within, end);
+        if self.unclassified.known == Known::Canopy {
+            self.unclassified.canopy.widen(from, to, within, within, end);
         }
         self.keep_out.widen(from, to, within, end)
     }
 
-    /// Guards the ground where a plant was due, once the beam has seen that none stands there; returns its middle.
+    /// Guards the ground of an expected plant once the beam has passed it and seen none. Returns the middle of that ground.
     ///
     /// # Errors
-    /// [`ScheduleFull`], as for a plant that was seen.
+    /// [`ScheduleFull`], as for a plant.
     #[cfg_attr(target_arch = "avr", inline(never))]
     #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn guard(&mut self) -> Option<Result<WrappedPosition, ScheduleFull>> {
-        // What is in the beam, or being classified, may be the plant.
+        // A detection in the beam, or one that is being classified, may be the expected plant.
         let seen_to = self.open().unwrap_or(self.detector.frontier());
         let guarded = self.guard.pass(seen_to, &self.geometry)?;
         let pushed = self.keep_out.push(guarded, self.tool(), self.geometry.margin);
         Some(pushed.map(|()| guarded.leading + self.geometry.guarded))
     }
 
-    /// From the last plant's leading edge, or where watching began, to that of a detection; what is remembered, at the most.
+    /// From the last plant's leading edge, or from where detection began, to the detection's. At most the memory length.
     pub fn spacing(&self, detection: &Detection) -> Ticks {
         self.ticks(detection.leading - self.last_plant)
     }
 
-    /// The paper's schedule of a detection.
+    /// The paper's schedule for a detection.
     pub fn plan(&self, detection: &Detection) -> Plan {
         Plan::new(&self.geometry, detection.width())
     }
 
-    /// The ground wheel, as the settings give it.
+    /// The ground wheel from the settings.
     pub fn wheel(&self) -> Wheel {
         self.geometry.wheel
     }
@@ -336,7 +360,7 @@ impl Ground {
         self.geometry.scale.ticks(length)
     }
 
-    /// What the odometer shows at a place, if it shows `position` where the beam is.
+    /// The odometer's position at a place, if `position` is the beam's.
     pub fn position_of(&self, place: WrappedPosition, position: Position) -> Position {
         position + self.ticks(place - self.beam)
     }
@@ -347,54 +371,54 @@ impl Ground {
         self.geometry.second_beam > Length::ZERO
     }
 
-    /// Whether the second beam is broken, as far as is known.
+    /// The second beam's last known level.
     #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn second_is_broken(&self) -> bool {
         self.second_beam.is_broken()
     }
 
-    /// What has become of the slip since it was last asked for.
+    /// What has changed about the slip since the last call.
     pub fn take_news(&mut self) -> News {
         self.second_beam.take_news()
     }
 
-    /// The wheel's slip in thousandths; none where nothing has told it.
+    /// The wheel's slip in thousandths; `None` if it is unknown.
     pub fn slip_permille(&self) -> Option<i16> {
         self.second_beam.slip().permille()
     }
 
-    /// Whether the beam has been broken over more ground than a canopy covers.
+    /// Whether the beam has been broken for longer than the widest canopy.
     #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn is_blocked(&self) -> bool {
         let too_wide = |leading| self.detector.frontier() - leading > self.geometry.max_width;
         self.detector.is_broken() && self.detector.open().is_some_and(too_wide)
     }
 
-    /// Whether the tool has just come to ground that had to be left behind.
+    /// Whether the tool has just reached dropped ground.
     #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn rolled_back_too_far(&self) -> bool {
         self.rolled_back_too_far
     }
 
-    /// Whether the tool is on ground that the beam has not seen.
+    /// Whether the tool is on unseen ground.
     pub fn is_unseen(&self) -> bool {
         self.keep_out.known_from().is_ahead_of(self.tool())
     }
 
-    /// How far the machine has to roll until ground that the beam has seen reaches the tool.
+    /// The distance until seen ground reaches the tool.
     pub fn unseen(&self) -> Ticks {
         self.ticks((self.keep_out.known_from() - self.tool()).max(Length::ZERO))
     }
 
-    /// Keep-out zones at the tool or ahead of it, those that are still being seen or classified included.
+    /// The number of keep-out zones at the tool or ahead of it, with an open detection and an unclassified one.
     pub fn zones(&self) -> u8 {
-        let unclassified = matches!(self.unclassified, Unclassified::Seen(_));
+        let unclassified = self.unclassified.known == Known::Canopy;
         self.keep_out.ahead(self.tool(), self.geometry.margin)
             + u8::from(unclassified)
             + u8::from(self.detector.open().is_some())
     }
 
-    /// Whether closed ground comes up before the tool could be out of the row, or in its place again.
+    /// Whether the tool must be out: closed ground comes within the leads, or the machine is too fast.
     #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn must_be_out(&self, tool_out: bool) -> bool {
         let (from, to) = self.leads.stretch(tool_out);
@@ -407,7 +431,7 @@ impl Ground {
         self.is_closed(Length::ZERO, Length::ZERO)
     }
 
-    /// What keeps the tool out where it is, with the odometer at `position`.
+    /// Why the tool is in or out at its position, if the odometer shows `position`.
     pub fn at_tool(&self, position: Position) -> AtTool {
         let of = |place| self.position_of(place, position);
         match self.keep_out.zone_at(self.tool(), self.geometry.margin) {
@@ -417,17 +441,17 @@ impl Ground {
         }
     }
 
-    /// Whether the machine is so fast that a plant just behind the beam would be reached before the tool is out.
+    /// Whether the machine is so fast that a plant just behind the beam reaches the tool before the tool is out.
     #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn outruns_the_beam(&self, tool_out: bool) -> bool {
         let out = self.leads.out;
-        // Slowing down by an eighth is what it takes to be trusted again.
+        // Hysteresis: the machine has to slow down by an eighth.
         let lead = if tool_out { out + Length(out.0 / 8) } else { out };
         (self.tool() + lead) - self.detector.frontier() >= -self.geometry.margin
     }
 
-    /// Whether any of the ground between two distances from the tool is closed: unknown, or within the margin of a canopy, the
-    /// one that is still being seen or classified and the one that is due included.
+    /// Whether any ground between two distances from the tool is closed: unknown, or within the margin of a canopy. An open
+    /// detection, an unclassified one and an expected plant count as canopies.
     #[cfg_attr(not(target_arch = "avr"), inline)]
     fn is_closed(&self, one: Length, other: Length) -> bool {
         let margin = self.geometry.margin;
@@ -439,17 +463,14 @@ impl Ground {
             || self.second_beam.open_alone().is_some_and(reaches)
     }
 
-    /// Where the first detection begins of which it is not known yet where it ends, or what it is.
+    /// Where the first detection begins that has no end yet, or no class.
     #[cfg_attr(not(target_arch = "avr"), inline)]
     fn open(&self) -> Option<WrappedPosition> {
-        if let Unclassified::Seen(detection) = self.unclassified {
-            Some(detection.leading)
-        } else {
-            self.detector.open()
-        }
+        let Unclassified { canopy, known, .. } = &self.unclassified;
+        if *known == Known::Canopy { Some(canopy.leading) } else { self.detector.open() }
     }
 
-    /// The ground that the tool works on.
+    /// The tool's position.
     fn tool(&self) -> WrappedPosition {
         self.beam - self.geometry.beam_to_tool
     }
@@ -462,13 +483,13 @@ mod tests {
 
     const SPEED: TicksPerSecond = TicksPerSecond(1000);
 
-    /// A canopy is classified to be one.
+    /// Classifies a detection as a plant.
     fn keep(ground: &mut Ground, canopy: Detection) -> Result<(), ScheduleFull> {
-        ground.await_class(canopy);
-        ground.classified(canopy, Class::Plant)
+        ground.await_class(canopy, false);
+        ground.classified(Class::Plant)
     }
 
-    /// Ground that the beam has seen from 0 to 3000, with a canopy from 1000 to 1300, without leads.
+    /// Ground seen from 0 to 3000, with a canopy from 1000 to 1300, without leads.
     fn ground() -> (Ground, Settings) {
         let mut settings = Settings::new();
         for setting in [Setting::LeadOutMs, Setting::LeadInMs, Setting::BeamResponseMs] {
@@ -485,7 +506,7 @@ mod tests {
         (ground, settings)
     }
 
-    /// The first place from one on where the tool may be in, with the beam at the place and the tool behind it.
+    /// The first tool position from `from` on where the ground is open.
     fn opens(ground: &mut Ground, from: i32) -> i32 {
         let beam_to_tool = i32::from(ground.geometry.beam_to_tool.0);
         (from..from + 5000)
@@ -502,12 +523,15 @@ mod tests {
             let (mut ground, mut settings) = ground();
             settings.set(Setting::StemZoneMm, 100).expect("within its range");
             ground.follow(&settings, Position::new(1400), SPEED);
-            ground.await_class(Detection {
-                leading: WrappedPosition::new(1500),
-                trailing: WrappedPosition::new(1800),
-                ..Detection::NONE
-            });
-            ground.classified(Detection::NONE, class).expect("there is room");
+            ground.await_class(
+                Detection {
+                    leading: WrappedPosition::new(1500),
+                    trailing: WrappedPosition::new(1800),
+                    ..Detection::NONE
+                },
+                false,
+            );
+            ground.classified(class).expect("there is room");
             assert_eq!(opens(&mut ground, 1500), 1800 - trim + 95 + 1, "{class:?}");
         }
     }

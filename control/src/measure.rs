@@ -1,5 +1,5 @@
-//! What is measured: place and speed by the encoder, the switches, why the machine was reset, and whether encoder and beam can be
-//! believed. What any of it means for the tool is decided elsewhere.
+//! Measurement: position and speed from the encoder, the switches, the cause of a reset, and faults of encoder and beam. The
+//! consequences for the tool are decided elsewhere.
 
 pub mod monitor;
 pub mod quadrature;

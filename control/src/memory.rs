@@ -1,17 +1,17 @@
-//! Memory that outlives the power, a byte at a time, and the check on what it keeps.
+//! Memory that keeps bytes without power, and the CRC for its contents.
 //!
-//! The EEPROM takes 3.4 ms to write a byte. So whoever keeps something there writes one byte whenever the memory can take
-//! one, and nothing waits. What the bytes mean is the business of [`saved`](crate::operate::saved) and [`field_examples`](crate::ground::field_examples),
-//! each of which has a memory of [`SIZE`] bytes to itself.
+//! The EEPROM takes 3.4 ms to write a byte. So its users write one byte each time the memory is ready, and nothing waits. The
+//! contents belong to [`saved`](crate::operate::saved) and [`field_examples`](crate::ground::field_examples); each has [`SIZE`]
+//! bytes to itself.
 
-/// Bytes of a memory: half an ATmega328P's EEPROM.
+/// Bytes of a memory: half of an ATmega328P's EEPROM.
 pub const SIZE: usize = 512;
 
-/// What erased memory reads as.
+/// The value of an erased byte.
 pub const ERASED: u8 = 0xFF;
 
-/// The CRC over what is kept, CRC-16/IBM-SDLC: a byte at a time, and without a table, which would cost flash. A library's would do it bit by
-/// bit, in 13,000 cycles for the settings, which are saved within a turn of the loop.
+/// CRC-16/IBM-SDLC, a byte at a time and without a table, which would cost flash. A library's, bit by bit, takes 13,000 cycles for
+/// the settings. That is too long, because a save computes it within a turn.
 pub(crate) const fn checksum(mut bytes: &[u8]) -> u16 {
     let mut crc = u16::MAX;
     while let Some((&byte, rest)) = bytes.split_first() {
@@ -25,20 +25,20 @@ pub(crate) const fn checksum(mut bytes: &[u8]) -> u16 {
 
 /// Memory that keeps bytes without power.
 pub trait Memory {
-    /// The byte at an address; only when [`is_ready`](Self::is_ready), as nothing can be read while a byte is being written.
+    /// The byte at an address. Only if [`is_ready`](Self::is_ready): during a write nothing can be read.
     fn read(&self, address: u16) -> u8;
 
-    /// Whether bytes can be read and one be written now.
+    /// Whether the memory can read, and start a write.
     fn is_ready(&self) -> bool;
 
-    /// Begins to write a byte; only when [`is_ready`](Self::is_ready).
+    /// Starts to write a byte. Only if [`is_ready`](Self::is_ready).
     fn write(&mut self, address: u16, byte: u8);
 }
 
-/// A memory for the host, which forgets with the program, and whose power can be made to fail.
+/// A memory for the host, in RAM. A test can make its power fail.
 #[derive(Clone, Debug)]
 pub struct Volatile {
-    /// What it holds.
+    /// The contents.
     pub bytes: [u8; SIZE],
     /// Bytes that can be written until the power fails.
     power: usize,
@@ -55,12 +55,12 @@ impl Volatile {
         Self { bytes, power: usize::MAX }
     }
 
-    /// Takes the power away after so many more bytes: what is written then is lost.
+    /// Makes the power fail after this many more bytes: later writes are lost.
     pub const fn lose_power_after(&mut self, bytes: usize) {
         self.power = bytes;
     }
 
-    /// The memory as it is found when the power is back.
+    /// The memory after the power is back.
     pub const fn with_power(self) -> Self {
         Self::holding(self.bytes)
     }
@@ -94,7 +94,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_checksum_is_that_of_its_catalogue() {
+    fn the_checksum_matches_the_crc_catalogue() {
         let catalogue = crc::Crc::<u16>::new(&crc::CRC_16_IBM_SDLC);
         let mut bytes = [0_u8; 600];
         let mut number = 1_u32;

@@ -1,8 +1,13 @@
-//! What the operator does with the machine, and what shows it: [`state`] and lamp, the settings, how they are saved and what follows
-//! from them ([`configuration`], [`saved`], [`limits`]), what is tried by hand ([`mod@bench`], [`calibration`], [`dry_run`]) and what is
-//! taught by it ([`example_entry`]), the [`tool`] and its [`servo`], what looks as if the machine had left its crop ([`plant_timeout`],
-//! [`unknown_run`]), and what waits to be told or looked at ([`event`], [`plot`], [`detections`]). Each keeps its own;
-//! [`weeder`](crate::weeder) has them work together.
+//! The operator's and the servo's part of the machine.
+//!
+//! - [`state`], [`lamp`]: HOLD, WORK or alarm, and the LED that shows it.
+//! - [`configuration`], [`saved`], [`limits`]: the settings, their EEPROM copies, and limits calculated from them.
+//! - [`mod@bench`], [`calibration`], [`dry_run`], [`example_entry`]: manual tests, and entering examples.
+//! - [`tool`], [`servo`]: the tool's commands, and the servo's pulse.
+//! - [`plant_timeout`], [`unknown_run`]: signs that the machine has left its crop.
+//! - [`event`], [`plot`], [`detections`]: output that waits for the console.
+//!
+//! Each module keeps its own data; [`weeder`](crate::weeder) connects them.
 
 pub mod bench;
 pub mod calibration;

@@ -1,14 +1,13 @@
-//! The console: what is typed, and what the machine says.
+//! The console: commands in, answers and events out.
 //!
-//! Bytes become lines and lines become a [`command`], which a turn of the loop carries out and others answer. An answer can be
-//! longer than the serial line's buffer, and nothing here may wait for it to drain. So an [`Answer`] is a place in a text that puts
-//! its next [`Line`] together whenever the one before it has gone out. [`Console`] has all of it happen in turns of the main
-//! loop, each of which does little: it reads or writes a few characters, or puts one line together, or carries one command
-//! out. Whatever is typed, the loop turns on.
+//! Bytes become lines, and a line becomes a [`command`]. One turn of the loop runs it, and later turns answer it. An answer can be
+//! longer than the serial buffer, and no call may wait. So an [`Answer`] remembers how far it has been written. It builds its next
+//! [`Line`] once the last one is sent. [`Console`] does one small step in each turn: it reads or writes a few characters, builds a
+//! line, or runs a command. No input can stop the loop.
 //!
-//! All that is said lies in flash ([`packed`]), the words for alarms, settings and the like among it. Nothing below imports
-//! any of this, and here imports run `words` -> `texts` -> `packed` -> `names`, `line` -> [`command`], and the lines that are
-//! put together -> `answer` -> `execute` -> this file.
+//! All texts are in flash ([`packed`]), with the names of alarms and settings. No module below imports this one. Inside it imports
+//! run `words` -> `texts` -> `packed` -> `names`, `line` -> [`command`], and the modules that build lines -> `answer` -> `execute`
+//! -> this file.
 
 mod answer;
 pub mod command;
@@ -32,10 +31,10 @@ use self::{
 };
 use crate::{ground::class::Classifier, memory::Memory, weeder::Controller};
 
-/// Characters that a line has at most, its end included.
+/// Most characters of a line, its end included.
 pub const LINE: usize = 140;
 
-/// The console's answers: what answers the line that was typed last, and the line that is being written.
+/// The answer in progress, and the line that is being sent.
 #[derive(Clone, Debug, Default)]
 pub struct Console {
     answer: Answer,
@@ -43,30 +42,30 @@ pub struct Console {
 }
 
 impl Console {
-    /// A console that greets after a reset.
+    /// A console that sends the greeting first.
     pub const fn new() -> Self {
         Self { answer: Answer::Greeting, line: Line::new() }
     }
 
-    /// Whether a line can be taken: one is read only when the one before it has been answered in full; until then the bytes wait.
+    /// Whether the console takes a line: only once the last one is answered in full. Until then the bytes wait.
     pub fn listens(&self) -> bool {
         self.answer.is_done() && self.line.is_done()
     }
 
-    /// Takes a line that was typed, to carry it out in a later turn.
+    /// Takes a line; a later turn runs it.
     pub fn take(&mut self, line: Result<Command, ParseError>) {
         self.answer = Answer::Typed(line);
     }
 
-    /// The next byte of the line that is being written.
+    /// The next byte to send.
     pub fn next_byte(&mut self) -> Option<u8> {
         self.line.next()
     }
 
-    /// Does the next thing for which a turn of the loop is long enough: has a byte kept for good, carries out what was typed, or
-    /// puts the next line together. An answer comes in one piece, then what there is to tell, then the curves.
+    /// Runs one step that fits a turn: writes a byte to the EEPROM, runs a command, or builds the next line. An answer is never
+    /// interrupted; events come after it, and curves last.
     pub fn carry_on<C: Classifier, M: Memory>(&mut self, controller: &mut Controller<C, M>) {
-        // An answer waits for what its command wrote to the EEPROM: `ok` means that it is there.
+        // An answer waits for its command's EEPROM writes: `ok` means that they are done.
         if !self.line.is_done() || !controller.carry_on() {
             return;
         }

@@ -1,27 +1,27 @@
 //! The settings: one table of name, unit, range, default and help, and the values in use.
 //!
-//! The console reads this table from flash; a test holds the manual to it. Every value is a whole number in 16 bits whose
-//! name carries its unit.
+//! The console reads the table from flash. A test compares the manual with it. Each value is a whole number of 16 bits, and its
+//! name carries the unit.
 
 use crate::{
     memory::checksum,
     units::{Ticks, TicksPerSecond, Wheel},
 };
 
-/// The numbers that the table gives for a setting.
+/// A setting's numbers in the table.
 #[derive(Clone, Copy)]
 pub struct Description {
     /// Least value.
     pub least: u16,
     /// Greatest value.
     pub greatest: u16,
-    /// The value before anything is set.
+    /// Factory setting.
     pub default: u16,
-    /// Whether it changes where the tool is, so that it is not to be set while the machine works.
+    /// Whether it changes where the tool is. Then it can be set in HOLD only.
     pub hold_only: bool,
 }
 
-/// The one table from which everything else about the settings is made.
+/// The one table. Everything else about the settings comes from it.
 macro_rules! settings {
     ($($(#[$doc:meta])* $Variant:ident $name:literal $(in $unit:literal)?: $least:literal to $greatest:literal, $default:literal, $hold_only:literal, $help:literal;)*) => {
         /// A setting.
@@ -35,10 +35,10 @@ macro_rules! settings {
             /// The names, in the table's order.
             pub(crate) const WORDS: &[&str] = &[$($name),*];
 
-            /// How many there are.
+            /// The number of settings.
             pub const COUNT: u8 = Self::WORDS.len() as u8;
 
-            /// The one at a place in the table.
+            /// The setting at an index of the table.
             pub const fn from_index(index: u8) -> Option<Self> {
                 match index {
                     $(index if index == Self::$Variant as u8 => Some(Self::$Variant),)*
@@ -64,32 +64,32 @@ macro_rules! settings {
 }
 
 settings! {
-    /// Encoder counts in a turn of the ground wheel.
+    /// Encoder counts a turn of the ground wheel.
     TicksPerRev "ticks_per_rev": 600 to 10000, 2400, true,
         "encoder counts a wheel turn";
     /// Diameter of the ground wheel.
     WheelMm "wheel_mm" in "mm": 200 to 800, 400, true,
         "wheel diameter";
-    /// Encoder counts a metre, measured.
+    /// Encoder counts a metre, from calibration; 0 before it.
     TicksPerM "ticks_per_m": 0 to 20000, 0, true,
         "encoder counts a metre, calibrated; 0 not yet";
-    /// X: how far the beam stands ahead of the tool.
+    /// X: distance from the tool to the beam.
     BeamToToolMm "beam_to_tool_mm" in "mm": 100 to 2000, 400, true,
         "X, from the tool to the beam";
-    /// How far a second beam stands behind the first.
+    /// Distance from the first beam to a second one behind it; 0 for none.
     SecondBeamMm "second_beam_mm" in "mm": 0 to 900, 0, true,
         "from the beam to a second beam; 0 none";
-    /// Ground kept free of the tool on both sides of a canopy.
+    /// Ground kept clear of the tool on both sides of a canopy.
     MarginMm "margin_mm" in "mm": 0 to 200, 50, true,
         "kept on both sides of a canopy";
-    /// What is kept of a single plant, around the middle of its canopy.
+    /// Width kept around the middle of a single plant's canopy; 0 for the whole canopy.
     StemZoneMm "stem_zone_mm" in "mm": 0 to 300, 0, true,
         "kept round a stem; 0 the canopy";
-    /// Time from the command to the tool being out. The default is the slowest swing of the default servo over its default stroke: 80 ms
-    /// of dead time, 144 ms for 45 degrees against the soil, and 6 ms for the pulse that is on the line.
+    /// Longest time from the command until the tool is out. The default is the default servo's slowest swing over the default
+    /// stroke. It has 80 ms dead time, 144 ms for 45 degrees against the soil, and 6 ms for the running pulse.
     LeadOutMs "lead_out_ms" in "ms": 0 to 500, 230, false,
         "longest time until the tool is out";
-    /// Shortest time from the command to the tool beginning to come back.
+    /// Shortest time from the command until the tool begins to come back.
     LeadInMs "lead_in_ms" in "ms": 0 to 500, 40, false,
         "shortest time until the tool starts back";
     /// Pulse for the tool in the row.
@@ -104,40 +104,39 @@ settings! {
     /// Examples that vote.
     K "k": 1 to 15, 3, false,
         "nearest examples that vote";
-    /// Width below which an object is dust.
+    /// Narrower detections are dust; 0 for none.
     MinWidthMm "min_width_mm" in "mm": 0 to 100, 0, false,
         "narrower objects are dust; 0 none";
-    /// Narrow objects in a row, none of them a plant, that are an alarm.
+    /// Consecutive narrow detections without a plant that raise an alarm; 0 for never.
     MisfitAfter "misfit_after": 0 to 100, 5, false,
         "alarm at so many narrow objects in a row; 0 never";
-    /// Ground over which the beam may be broken before that is an alarm.
+    /// Longest stretch with a broken beam before an alarm.
     MaxWidthMm "max_width_mm" in "mm": 20 to 1500, 400, false,
         "alarm where an object is wider";
-    /// Gaps in a canopy shorter than this belong to it.
+    /// Shorter gaps belong to the canopy.
     MergeGapMm "merge_gap_mm" in "mm": 0 to 1000, 21, false,
         "shorter gaps belong to the canopy";
-    /// Distance at which the crop is set, so that plants that are not seen can be guarded.
+    /// Planting distance, for guarding missed plants; 0 turns it off.
     GuardSpacingMm "guard_spacing_mm" in "mm": 0 to 2000, 0, false,
         "planting distance, keeps unseen plants; 0 off";
-    /// How far off its place a guarded plant may stand.
+    /// How far a missed plant may stand from its expected place.
     GuardScatterMm "guard_scatter_mm" in "mm": 0 to 200, 30, false,
         "how far off it an unseen plant may stand";
     /// The sensor's response time.
     BeamResponseMs "beam_response_ms" in "ms": 0 to 50, 1, false,
         "time the beam takes to answer";
-    /// Speed above which the machine must not work. With the default lead and margin, the default beam allows 1330 mm/s.
+    /// Highest speed for work. With the default lead and margin, the default beam allows 1330 mm/s.
     TopSpeedMmS "top_speed_mm_s" in "mm/s": 100 to 3000, 1300, false,
         "alarm where work is faster";
-    /// Ground without a plant that is worth a warning.
+    /// Distance without a plant before a warning; 0 for never.
     NoPlantM "no_plant_m" in "m": 0 to 100, 10, false,
         "warning after so far without a plant; 0 never";
-    /// Whether an end switch tells that the tool is out.
+    /// Whether an end switch on D5 closes with the tool out.
     EndSwitch "end_switch": 0 to 1, 0, false,
         "switch on D5 closes with the tool out";
 }
 
-/// Stands for this table wherever values are kept without their names: the CRC-16 of the names in their
-/// order, each behind its length.
+/// Identifies this table where values are stored without names: a CRC-16 of the names in order, each preceded by its length.
 pub const TABLE_MARK: u16 = {
     let (mut bytes, mut end, mut place) = ([0; 512], 0, 0);
     while place < Setting::WORDS.len() {
@@ -151,31 +150,31 @@ pub const TABLE_MARK: u16 = {
     checksum(bytes.split_at(end).0)
 };
 
-/// The second beam stands no nearer to the first: with the coarsest encoder that may work that is 64 ticks, and a tick is a 64th of
-/// the slip then. It stands no nearer to the tool: where a weed is expected, the ground is closed only behind what is as wide as that.
+/// Least distance of the second beam from the first, and from the tool. From the first: it is 64 ticks with the coarsest encoder,
+/// so a tick is a 64th of the slip. From the tool: at an expected weed, the ground is closed only after a detection of that width.
 pub const SECOND_BEAM_LEAST_MM: u16 = 72;
 const _: () = assert!(SECOND_BEAM_LEAST_MM as u32 * TICKS_PER_M_LEAST as u32 >= 64 * 1000);
 
-/// With a second beam, X is no longer: what slip makes of it has to fit into what is remembered.
+/// Largest X with a second beam: with slip, X still has to fit the range of a [`Length`](crate::units::Length).
 pub const SLIPPING_BEAM_TO_TOOL_MM: u16 = 1000;
 
-/// The coarsest wheel with which a failing encoder is found in time, from 0.5 km/h on: four ticks then come within
-/// [32 ms](crate::measure::monitor), and what may be lost unnoticed, 48 ticks, is about the usual margin.
+/// The coarsest wheel with which an encoder fault is found in time, from 0.5 km/h on. Then four ticks come within 32 ms, see
+/// [`monitor`](crate::measure::monitor). The largest unnoticed loss, 48 ticks, is about the usual margin.
 pub const TICKS_PER_M_LEAST: u16 = 900;
 
-/// Settings that cannot be right together.
+/// Settings that contradict each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Contradiction {
-    /// The beam stands so near that a plant could reach the tool's margin before the tool is out of the row.
+    /// The beam is so near that a plant could reach the tool's margin before the tool is out.
     BeamTooNear {
         /// The least X for margin, lead and top speed.
         needed_mm: u16,
     },
-    /// Both pulses are the same: the tool would not move.
+    /// Both pulses are equal: the tool would not move.
     PulsesEqual,
-    /// The second beam stands too near to the first or to the tool, or X is too long for it.
+    /// The second beam is too near to the first or to the tool, or X is too long.
     SecondBeamAstray,
-    /// The wheel, as it is given or as it was measured, counts fewer than [`TICKS_PER_M_LEAST`].
+    /// The wheel, nominal or calibrated, counts fewer than [`TICKS_PER_M_LEAST`].
     EncoderTooCoarse,
 }
 
@@ -185,17 +184,17 @@ impl Setting {
         (0..).map_while(Self::from_index)
     }
 
-    /// Whether it is switched on and off, as 1 and 0.
+    /// Whether it is a switch: 0 is off, 1 is on.
     pub fn is_switched(self) -> bool {
         self.greatest() == 1
     }
 
-    /// Whether another value means another wheel or encoder: one whose `ticks_per_m` nobody has measured.
+    /// Whether it describes wheel or encoder. A new value needs a new calibration of `ticks_per_m`.
     pub const fn is_of_the_wheel(self) -> bool {
         matches!(self, Self::WheelMm | Self::TicksPerRev)
     }
 
-    /// The numbers that the table gives for it.
+    /// Its numbers in the table.
     pub fn description(self) -> Description {
         let (least, greatest, default) = (self.least(), self.greatest(), self.default());
         Description { least, greatest, default, hold_only: self.is_hold_only() }
@@ -217,17 +216,17 @@ impl Setting {
         self.least() <= value && value <= self.greatest()
     }
 
-    /// The value before anything is set.
+    /// Its factory setting.
     pub fn default(self) -> u16 {
         self.number(2)
     }
 
-    /// Whether it changes where the tool is.
+    /// Whether it can be set in HOLD only.
     pub fn is_hold_only(self) -> bool {
         self.number(1) & HOLD_ONLY != 0
     }
 
-    /// One of its numbers in flash.
+    /// One of its numbers, from flash.
     #[inline(never)]
     fn number(self, which: u8) -> u16 {
         let place = 6 * usize::from(self as u8) + 2 * usize::from(which);
@@ -235,7 +234,7 @@ impl Setting {
     }
 }
 
-/// The bit of the greatest value that tells whether a setting is for hold only: a structure with a flag takes a frame wherever it is read.
+/// Marks a setting for HOLD only, in its greatest value: a structure with a flag would take a stack frame in each reader.
 const HOLD_ONLY: u16 = 1 << 15;
 
 avr_progmem::progmem! {
@@ -267,17 +266,17 @@ pub struct Settings {
 pub struct OutOfRange;
 
 impl Settings {
-    /// No settings: values that are yet to be given.
+    /// Zeros, before the values are loaded.
     pub const NONE: Self = Self { values: [0; Setting::COUNT as usize] };
 
-    /// The defaults.
+    /// The factory settings.
     pub fn new() -> Self {
         let mut settings = Self::NONE;
         settings.take_defaults();
         settings
     }
 
-    /// Goes back to the defaults.
+    /// Restores factory settings.
     #[cfg_attr(target_arch = "avr", inline(never))]
     pub fn take_defaults(&mut self) {
         for (value, setting) in self.values.iter_mut().zip(Setting::all()) {
@@ -285,7 +284,7 @@ impl Settings {
         }
     }
 
-    /// A setting's value, in the unit that its name carries.
+    /// A setting's value, in its name's unit.
     pub fn get(&self, setting: Setting) -> u16 {
         self.values[setting as usize]
     }
@@ -293,7 +292,7 @@ impl Settings {
     /// Sets a value.
     ///
     /// # Errors
-    /// [`OutOfRange`] when the table does not allow it; the old value then stays.
+    /// [`OutOfRange`] if the value is outside the table's range. The old value stays.
     pub fn set(&mut self, setting: Setting, value: u16) -> Result<(), OutOfRange> {
         if !setting.allows(value) {
             return Err(OutOfRange);
@@ -302,16 +301,16 @@ impl Settings {
         Ok(())
     }
 
-    /// What cannot be right together, if anything.
+    /// The first contradiction between settings, if any.
     ///
-    /// At the top speed the machine rolls the lead, an eighth of it for the speed's wavering, and what the sensor takes to
-    /// answer, before a plant that the beam has just seen may come to the tool's margin.
+    /// At top speed, a plant just behind the beam must not reach the tool's margin before the tool is out. This takes the lead, an
+    /// eighth more for variation of the speed, and the sensor's response.
     #[inline(never)]
     pub fn contradiction(&self) -> Option<Contradiction> {
         if self.get(Setting::ServoInUs) == self.get(Setting::ServoOutUs) {
             return Some(Contradiction::PulsesEqual);
         }
-        // Both: a wheel that is given anew is one that was not measured.
+        // Both, because a change of the nominal wheel clears the calibration.
         let measured = self.get(Setting::TicksPerM);
         if self.nominal_ticks_per_m() < TICKS_PER_M_LEAST || (1..TICKS_PER_M_LEAST).contains(&measured) {
             return Some(Contradiction::EncoderTooCoarse);
@@ -330,7 +329,7 @@ impl Settings {
         is_astray.then_some(Contradiction::SecondBeamAstray)
     }
 
-    /// The ground wheel with its encoder.
+    /// The ground wheel and its encoder.
     pub fn wheel(&self) -> Wheel {
         Wheel::of_tick(match self.get(Setting::TicksPerM) {
             0 => self.nominal_tick(),
@@ -338,12 +337,12 @@ impl Settings {
         })
     }
 
-    /// A tick of the ground wheel as its diameter and its encoder give it, whatever was measured.
+    /// A tick of the wheel from its diameter and encoder counts, without calibration.
     fn nominal_tick(&self) -> u32 {
         Wheel::tick_of_diameter(self.get(Setting::TicksPerRev), self.get(Setting::WheelMm))
     }
 
-    /// Ticks a metre of that wheel.
+    /// Ticks a metre of the wheel without calibration.
     #[inline(never)]
     pub fn nominal_ticks_per_m(&self) -> u16 {
         Wheel::ticks_of(self.nominal_tick(), 1000).0 as u16

@@ -1,82 +1,81 @@
-//! Place, time and speed as the machine counts them, each a type of its own so that none passes for another.
+//! Position, time and speed as the machine counts them. Each has its own type, so the compiler finds a mix-up.
 //!
-//! Place is counted in encoder ticks, time in steps of 4 µs (Timer0 behind its prescaler of 64). A point and a distance
-//! between two points are different types, and all arithmetic wraps: a counter that runs over its end changes nothing,
-//! as long as two points that are compared lie within half the counter's range.
+//! Positions are in encoder ticks, times in steps of 4 µs (Timer0 with a prescaler of 64). Points and distances between points are
+//! different types. All arithmetic wraps: this is harmless if two compared points lie within half of the counter's range.
 //!
-//! There are two counters of the way. The odometer, [`Position`] and [`Ticks`], has 32 bits: what the operator reads, and
-//! what is measured over a long stretch. The ground that is remembered around the tool, [`WrappedPosition`] and [`Length`], has 16,
-//! which the chip compares in half the time and half the code; [`LengthScale`] leads from the one to the other.
+//! There are two counters of distance. The odometer ([`Position`], [`Ticks`]) has 32 bits, for the operator and for long distances.
+//! Remembered ground ([`WrappedPosition`], [`Length`]) has 16 bits, which the chip compares in half the time and code.
+//! [`LengthScale`] converts.
 
 use core::ops::{Add, Neg, Sub};
 
-/// A place on the ground: ticks counted forward since power-up, wrapping.
+/// A position on the ground: ticks forward since power-up, wrapping.
 ///
-/// Places are ordered by the distance between them, never by their number, so there is no `Ord`.
+/// No `Ord`: the sign of the distance between two positions gives their order.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Position(i32);
 
 impl Position {
-    /// The place that the encoder's counter stands for.
+    /// The position at a count of the encoder.
     pub const fn new(count: i32) -> Self {
         Self(count)
     }
 
-    /// The encoder's counter at this place.
+    /// The encoder's count at this position.
     pub const fn count(self) -> i32 {
         self.0
     }
 
-    /// Whether this place lies ahead of `other`.
+    /// Whether this position lies ahead of `other`.
     #[cfg_attr(target_arch = "avr", inline(never))]
     pub fn is_ahead_of(self, other: Self) -> bool {
         (self - other).0 > 0
     }
 }
 
-/// A distance that the odometer has counted, in ticks, positive forward.
+/// A distance of the odometer in ticks, positive forward.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Ticks(pub i32);
 
 impl Ticks {
-    /// No distance at all.
+    /// No distance.
     pub const ZERO: Self = Self(0);
 }
 
-/// A place on the ground that is remembered, in units of a [`LengthScale`], wrapping.
+/// A position on remembered ground, in units of a [`LengthScale`], wrapping.
 ///
-/// Places are ordered by the distance between them, never by their number, so there is no `Ord`.
+/// No `Ord`: the sign of the distance between two positions gives their order.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct WrappedPosition(i16);
 
 impl WrappedPosition {
-    /// The place that a counter of units stands for.
+    /// The position at a count of units.
     pub const fn new(count: i16) -> Self {
         Self(count)
     }
 
-    /// The counter at this place.
+    /// The count at this position.
     pub const fn count(self) -> i16 {
         self.0
     }
 
-    /// Whether this place lies ahead of `other`.
+    /// Whether this position lies ahead of `other`.
     #[cfg_attr(target_arch = "avr", inline(never))]
     pub fn is_ahead_of(self, other: Self) -> bool {
         (self - other).0 > 0
     }
 }
 
-/// A distance along the ground that is remembered, in units of a [`LengthScale`], positive forward.
+/// A distance on remembered ground, in units of a [`LengthScale`], positive forward.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Length(pub i16);
 
 impl Length {
-    /// No distance at all.
+    /// No distance.
     pub const ZERO: Self = Self(0);
 }
 
-/// A point and the distance between two: their differences and sums, all of which wrap.
+/// Wrapping sums and differences of a point type and its distance type.
 macro_rules! points_and_distances {
     ($($Point:ident $Distance:ident;)*) => {$(
         impl Sub for $Point {
@@ -128,21 +127,20 @@ points_and_distances! {
     WrappedPosition Length;
 }
 
-/// How many ticks make a unit of the ground that is remembered: a power of two, 1 for any wheel of up to [`LengthScale::FINEST`]
-/// ticks a metre.
+/// Ticks in a unit of remembered ground, a power of two: 1 for a wheel of up to [`LengthScale::FINEST`] ticks a metre.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LengthScale {
     shift: u8,
 }
 
 impl LengthScale {
-    /// A tick is a unit.
+    /// A unit is a tick.
     pub const TICK: Self = Self { shift: 0 };
 
-    /// Units that a metre has at the most, 0.42 mm each: 13 m are within half of 16 bits.
+    /// Most units in a metre, 0.42 mm each: 13 m fit half of 16 bits.
     pub const FINEST: i32 = 2400;
 
-    /// The scale for a wheel of so many ticks a metre.
+    /// The scale for a wheel with these ticks a metre.
     pub const fn of(ticks_per_m: Ticks) -> Self {
         let (mut shift, mut units) = (0, ticks_per_m.0);
         while units > Self::FINEST {
@@ -151,39 +149,39 @@ impl LengthScale {
         Self { shift }
     }
 
-    /// The place at which the odometer has counted so far.
+    /// Converts an odometer position.
     #[cfg_attr(target_arch = "avr", inline(never))]
     pub const fn place(self, position: Position) -> WrappedPosition {
         WrappedPosition((position.0 >> self.shift) as i16)
     }
 
-    /// A distance in units, which is to be less than 13 m.
+    /// Converts a distance to units. It must be less than 13 m.
     #[cfg_attr(target_arch = "avr", inline(never))]
     pub const fn length(self, distance: Ticks) -> Length {
         Length((distance.0 >> self.shift) as i16)
     }
 
-    /// A distance in ticks.
+    /// Converts a distance to ticks.
     #[cfg_attr(target_arch = "avr", inline(never))]
     pub const fn ticks(self, length: Length) -> Ticks {
         Ticks((length.0 as i32) << self.shift)
     }
 }
 
-/// A moment: steps of 4 µs since power-up, wrapping after 4.77 hours.
+/// A moment in steps of 4 µs since power-up, wrapping after 4.77 hours.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Instant(u32);
 
 impl Instant {
-    /// The first moment of all.
+    /// Power-up.
     pub const ZERO: Self = Self(0);
 
-    /// The moment that the clock's counter stands for.
+    /// The moment at a count of the clock.
     pub const fn new(steps: u32) -> Self {
         Self(steps)
     }
 
-    /// The clock's counter at this moment.
+    /// The clock's count at this moment.
     pub const fn steps(self) -> u32 {
         self.0
     }
@@ -195,29 +193,29 @@ impl Instant {
     }
 }
 
-/// A moment in steps of 64 µs, wrapping after 4.2 seconds: half an [`Instant`], for what is looked at much more often.
+/// A moment in steps of 64 µs, wrapping after 4.2 seconds: half the size of an [`Instant`], for checks in each turn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Coarse(u16);
 
 impl Coarse {
-    /// The first moment of all.
+    /// Power-up.
     pub const ZERO: Self = Self(0);
 
     /// Steps in a second.
     pub const STEPS_PER_SECOND: u32 = Interval::STEPS_PER_SECOND >> 4;
 
-    /// So many milliseconds, at most 4193 of them, in steps.
+    /// Milliseconds, at most 4193, in steps.
     pub const fn steps_in_ms(milliseconds: u16) -> u16 {
         (milliseconds as u32 * Self::STEPS_PER_SECOND / 1000) as u16
     }
 
-    /// Steps since an earlier moment, less than 4.2 seconds ago.
+    /// Steps since an earlier moment, which must be less than 4.2 seconds ago.
     pub const fn since(self, earlier: Self) -> u16 {
         self.0.wrapping_sub(earlier.0)
     }
 }
 
-/// A stretch of time in steps of 4 µs.
+/// A duration in steps of 4 µs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Interval(u32);
 
@@ -225,17 +223,17 @@ impl Interval {
     /// Steps of the clock in a second.
     pub const STEPS_PER_SECOND: u32 = 250_000;
 
-    /// An interval of so many steps of 4 µs.
+    /// A duration of this many steps of 4 µs.
     pub const fn from_steps(steps: u32) -> Self {
         Self(steps)
     }
 
-    /// An interval of so many milliseconds, at most 17 million of them.
+    /// A duration in milliseconds, at most 17 million.
     pub const fn from_ms(milliseconds: u32) -> Self {
         Self(milliseconds * (Self::STEPS_PER_SECOND / 1000))
     }
 
-    /// The interval in steps of 4 µs.
+    /// The duration in steps of 4 µs.
     pub const fn steps(self) -> u32 {
         self.0
     }
@@ -260,90 +258,90 @@ impl Add<Interval> for Instant {
 pub struct TicksPerSecond(pub i32);
 
 impl TicksPerSecond {
-    /// Whether the machine rolls faster than that many ticks a second, forward or back.
+    /// Whether the machine is faster than `limit` ticks a second, forward or back.
     #[cfg_attr(target_arch = "avr", inline(never))]
     pub fn is_beyond(self, limit: u16) -> bool {
         self.0.unsigned_abs() > limit.into()
     }
 
-    /// How far the machine rolls at this speed, in so many milliseconds.
+    /// The distance rolled at this speed in this many milliseconds.
     ///
-    /// Right while speed times milliseconds stays below 2^31: up to 2.1 million ticks a second over a whole second.
+    /// Valid if speed times milliseconds is below 2^31: up to 2.1 million ticks a second over one second.
     #[cfg_attr(target_arch = "avr", inline(never))]
     pub fn distance_in_ms(self, milliseconds: u16) -> Ticks {
-        // Divided without its sign: the chip has one division routine then, the shorter.
+        // Divided without its sign, so that the chip needs one division routine only, the shorter.
         let magnitude = (self.0.unsigned_abs().wrapping_mul(u32::from(milliseconds)) / 1000) as i32;
         Ticks(if self.0 < 0 { -magnitude } else { magnitude })
     }
 }
 
-/// The ground wheel with its encoder: what a tick is in millimetres.
+/// The ground wheel and its encoder: converts between ticks and millimetres.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Wheel {
     /// A tick in 2^-20 mm: 52,429 with 20,000 ticks a metre, 26 million with 40.
     tick: u32,
-    /// Ticks from which on 16 bits do not hold the millimetres: worked out once, as a division takes long.
+    /// From this many ticks on, millimetres exceed 16 bits. Calculated once, because a division takes long.
     too_far: u32,
 }
 
 impl Wheel {
-    /// pi as a fraction that is right to 8.5e-8, far below a tick over any distance the machine knows.
+    /// pi as a fraction with an error of 8.5e-8, far below a tick over any distance here.
     const PI_NUMERATOR: u32 = 355;
     const PI_DENOMINATOR: u32 = 113;
 
-    /// A wheel that is yet to be measured, and that measures nothing.
+    /// A wheel before the settings are loaded.
     pub const NONE: Self = Self { tick: 0, too_far: 0 };
 
-    /// A wheel by its encoder's counts a turn, 100 to 10,000, and its diameter, 200 to 800 mm.
+    /// A wheel from its encoder's counts a turn, 100 to 10,000, and its diameter, 200 to 800 mm.
     pub const fn of_diameter(ticks_per_rev: u16, diameter_mm: u16) -> Self {
         Self::of_tick(Self::tick_of_diameter(ticks_per_rev, diameter_mm))
     }
 
-    /// A tick of such a wheel in 2^-20 mm.
+    /// That wheel's tick in 2^-20 mm.
     pub(crate) const fn tick_of_diameter(ticks_per_rev: u16, diameter_mm: u16) -> u32 {
         let circumference = (((Self::PI_NUMERATOR * diameter_mm as u32) << 12) / Self::PI_DENOMINATOR) << 8;
         circumference / ticks_per_rev as u32
     }
 
-    /// A wheel by its counts a metre, as measured, 1 to 20,000.
+    /// A wheel from its calibrated counts a metre, 1 to 20,000.
     pub const fn measured(ticks_per_m: u16) -> Self {
         Self::of_tick(Self::tick_measured(ticks_per_m))
     }
 
-    /// A tick of such a wheel in 2^-20 mm.
+    /// That wheel's tick in 2^-20 mm.
     pub(crate) const fn tick_measured(ticks_per_m: u16) -> u32 {
         (1000 << 20) / ticks_per_m as u32
     }
 
-    /// A wheel by its tick in 2^-20 mm.
+    /// A wheel from its tick in 2^-20 mm.
     pub(crate) const fn of_tick(tick: u32) -> Self {
         Self { tick, too_far: ((i16::MAX as u32) << 16) / (tick >> 4) }
     }
 
-    /// A distance in ticks, rounded to the nearest: `mm * ticks_per_rev / (pi * diameter)`, the paper's Eq. 1 and 2, or by
-    /// what was measured. Right to a tick up to 4 m.
+    /// Millimetres in ticks, rounded to the nearest: `mm * ticks_per_rev / (pi * diameter)`, the paper's Eq. 1 and 2, or the
+    /// calibrated value. Right to a tick up to 4 m.
     pub const fn ticks(self, millimetres: u16) -> Ticks {
         Self::ticks_of(self.tick, millimetres)
     }
 
-    /// A distance in ticks of so many 2^-20 mm.
+    /// Millimetres in ticks of `tick` 2^-20 mm.
     #[cfg_attr(target_arch = "avr", inline(never))]
     pub(crate) const fn ticks_of(tick: u32, millimetres: u16) -> Ticks {
         Ticks((((millimetres as u32) << 20) + tick / 2).wrapping_div(tick) as i32)
     }
 
-    /// A distance in millimetres, rounded toward zero and limited to what 16 bits hold; right to 1 mm and 0.02 %.
+    /// Ticks in millimetres, rounded toward zero, limited to 16 bits; right to 1 mm and 0.02 %.
     #[cfg_attr(target_arch = "avr", inline(never))]
     pub const fn millimetres(self, distance: Ticks) -> i16 {
         let magnitude = distance.0.unsigned_abs();
-        // What is not too far keeps the product in 32 bits.
+        // Below `too_far` the product fits 32 bits.
         let millimetres =
             if magnitude >= self.too_far { i16::MAX } else { ((magnitude * (self.tick >> 4)) >> 16) as i16 };
         if distance.0 < 0 { -millimetres } else { millimetres }
     }
 }
 
-/// Counts one more, as far as 16 bits go.
+/// Adds one, and stops at 65,535.
 #[expect(
     clippy::implicit_saturating_add,
     reason = "the compiler makes twice the code of `saturating_add` on this chip"

@@ -1,9 +1,8 @@
-//! The front door: edges, readings and commands go in, the tool's place and the lamp come out.
+//! The controller: beam edges, readings and commands go in, a servo pulse width comes out.
 //!
-//! One [`Controller::turn`] a turn of the main loop: take the edges of the beam that the machine has rolled past, measure the
-//! speed, roll the watched ground on, ask the schedule whether the tool may be in the row. Nothing in here waits,
-//! and nothing remembers a time at which something ought to happen: the answer is worked out anew each time, from where
-//! the machine is and how fast it rolls.
+//! The main loop calls [`Controller::turn`] once a turn. The controller takes the new beam edges, measures the speed, and advances
+//! the ground. It then asks the ground whether the tool may be in the row. No call waits. No call stores a time for a later action:
+//! each turn decides from the position and the speed of that turn.
 
 mod bench;
 mod commands;
@@ -13,7 +12,7 @@ mod shown;
 use crate::{
     alarm::{Alarm, Warning},
     ground::{
-        Ground,
+        Ground, Unclassified,
         class::{Classifier, Vote},
         detection::Detection,
         features,
@@ -46,20 +45,21 @@ use crate::{
     units::{Position, count},
 };
 
-/// What the machine is to do after a turn.
+/// The output of a turn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Orders {
     /// The servo's pulse width.
     pub pulse: HalfMicros,
-    /// The pulse width that has the tool out, for an emergency in which nobody can be asked.
+    /// The pulse width for "tool out", for an interrupt that finds the loop stopped.
     pub pulse_out: HalfMicros,
     /// The shortest gap between servo pulses in milliseconds; 0 for fixed frames.
     pub gap_ms: u8,
-    /// Whether a detection was classified, or another speed or other settings were followed: that is enough for a turn of the loop.
+    /// Whether this turn did long work: a classification step, or new leads, slip or settings. The loop then skips the console in
+    /// this turn.
     pub turn_spent: bool,
 }
 
-/// The machine's decisions and all that they rest on.
+/// The machine's decisions and their state.
 #[derive(Clone, Debug)]
 pub struct Controller<C, M> {
     classifier: C,
@@ -72,21 +72,16 @@ pub struct Controller<C, M> {
     distance: Distance,
     state: State,
     tool: Tool,
-    /// Whether the speed is another than the one by which the ground leads.
+    /// Whether the speed has changed since the leads were calculated.
     leads_are_old: bool,
-    /// Whether this turn has done what takes long.
+    /// Whether this turn has already done long work.
     turn_spent: bool,
-    /// Whether the machine waits for the watchdog to reset it.
+    /// Whether the machine waits for a watchdog reset: `test watchdog`.
     tests_watchdog: bool,
-    /// Lines that were not understood, or came with a hole in them.
+    /// Console lines with an error, or with lost bytes.
     mistakes: u16,
-    /// Detections that were narrower than any plant or weed.
+    /// Detections narrower than `min_width_mm`: dust.
     dust: u16,
-    /// The detection that is being classified, if one is.
-    classifying: Detection,
-    is_classifying: bool,
-    /// Whether that is what the second beam has seen, and the first may have told already.
-    is_of_second: bool,
     plant_timeout: PlantTimeout,
     unknown_run: UnknownRun,
     told: ExampleEntry,
@@ -95,13 +90,13 @@ pub struct Controller<C, M> {
     telemetry: Telemetry,
 }
 
-/// A controller before the machine has woken up: nothing but zeros and what it is made of, so that a `static` can hold it
-/// without a copy in flash, and it is woken up where it lies.
+/// A controller before [`init`](Self::init). It is all zeros apart from its parts, so a `static` holds it without a copy in flash.
+/// `init` works in place.
 #[derive(Debug)]
 pub struct Uninit<C, M>(Controller<C, M>);
 
 impl<C: Classifier, M: Memory> Uninit<C, M> {
-    /// A controller with a classifier and a memory of which nobody has read anything.
+    /// A controller with a classifier and a memory that have not been read yet.
     pub const fn new(classifier: C, memory: M) -> Self {
         Self(Controller {
             classifier,
@@ -119,9 +114,6 @@ impl<C: Classifier, M: Memory> Uninit<C, M> {
             tests_watchdog: false,
             mistakes: 0,
             dust: 0,
-            classifying: Detection::NONE,
-            is_classifying: false,
-            is_of_second: false,
             plant_timeout: PlantTimeout::since(Position::new(0)),
             unknown_run: UnknownRun::NONE,
             told: ExampleEntry::NONE,
@@ -131,8 +123,7 @@ impl<C: Classifier, M: Memory> Uninit<C, M> {
         })
     }
 
-    /// Wakes the machine up: in HOLD, with the tool out, and with no ground known. Where the memory holds no settings, or some
-    /// that cannot be right, that is an alarm.
+    /// Starts in HOLD, with the tool out and no known ground. Raises an alarm if the memory holds no settings, or invalid ones.
     pub fn init(&mut self, startup: Startup) -> &mut Controller<C, M> {
         let Startup { readings: Readings { now, position, .. }, beam_broken, cause } = startup;
         let controller = &mut self.0;
@@ -150,22 +141,22 @@ impl<C: Classifier, M: Memory> Uninit<C, M> {
 }
 
 impl<C: Classifier, M: Memory> Controller<C, M> {
-    /// A controller for a machine that just woke up, see [`Uninit::init`].
+    /// A controller right after power-up, see [`Uninit::init`].
     pub fn new(classifier: C, memory: M, startup: Startup) -> Self {
         let mut uninit = Uninit::new(classifier, memory);
         uninit.init(startup);
         uninit.0
     }
 
-    /// A turn of the loop: takes what came from the beam since the last one, in its order, then the machine's readings, and decides
-    /// where the tool is to be. No edge is farther than the readings of the next turn.
+    /// Runs one turn of the loop. Takes the beam edges since the last turn in their order, then the readings, and returns the
+    /// orders. No edge may have a later position than the next turn's readings.
     #[inline(always)]
     pub fn turn(&mut self, readings: Readings, edges: impl IntoIterator<Item = Edge>) -> Orders {
         edges.into_iter().for_each(|edge| self.take_edge(edge));
         self.step(readings)
     }
 
-    /// The first part of a [`turn`](Self::turn), for a test that looks in between.
+    /// The first part of a [`turn`](Self::turn), for a test that checks the state in between.
     #[inline(always)]
     pub fn take_edge(&mut self, edge: Edge) {
         match edge {
@@ -185,7 +176,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         }
     }
 
-    /// Takes an edge of the beam, with the position at which it came.
+    /// Takes an edge of the first beam, and the position at which it came.
     fn beam_edge(&mut self, position: Position, broken: bool) {
         self.sensors.beam_broken = broken;
         if broken
@@ -199,7 +190,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         }
     }
 
-    /// The second beam is broken or not, with the machine at a position.
+    /// Passes the second beam's level at this position to the ground.
     #[cfg_attr(target_arch = "avr", inline(never))]
     fn match_second_beam(&mut self, position: Position, broken: bool) {
         let seen = self.ground.match_second_beam(position, broken);
@@ -216,20 +207,20 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         });
     }
 
-    /// The first beam has seen a detection in full.
+    /// Takes a complete detection of the first beam.
     fn see(&mut self, detection: Detection) {
         self.ground.await_detection(detection);
         self.classify(detection, false);
     }
 
-    /// Edges of the beam were lost: what stood there is not known, and neither is the beam's level, which is now `broken`.
+    /// Edges of the beam were lost. The ground that they covered is unknown. The beam's level is now `broken`.
     fn beam_edges_lost(&mut self, broken: bool) {
         self.sensors.beam_broken = broken;
         self.ground.lose_edges(broken);
         self.raise(Alarm::BeamEdgesLost);
     }
 
-    /// The last part of a [`turn`](Self::turn), for a test that looks in between.
+    /// The last part of a [`turn`](Self::turn), for a test that checks the state in between.
     pub fn step(&mut self, readings: Readings) -> Orders {
         self.sensors.readings = readings;
         let doubted = self.sensors.odometer.read(readings.position, readings.jumps, self.believes_jumps());
@@ -237,7 +228,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         self.sensors.readings.position = position;
         self.leads_are_old |= self.sensors.meter.read(readings.now, position).is_some();
         match self.sensors.switch.read(readings.now, readings.switch_on) {
-            // An alarm wants to be cleared first, if by nothing else then by the switch going off.
+            // The operator clears an alarm first: with `clear`, or by turning the switch off.
             Some(true) if matches!(self.state, State::Hold) => self.go_to_work(),
             Some(false) => self.enter(State::Hold),
             _ => {}
@@ -253,7 +244,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             Some(Err(ScheduleFull)) => self.raise(Alarm::ScheduleFull),
             None => {}
         }
-        // Each of these takes a good part of what a turn may take: a turn does one of them.
+        // Each of these uses a large part of a turn's cycle budget, so a turn does only one of them.
         if !self.turn_spent {
             if self.configuration.has_changed() {
                 self.follow_settings();
@@ -263,8 +254,8 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             } else if self.leads_are_old {
                 self.ground.lead(self.configuration.settings(), self.sensors.meter.speed());
                 (self.leads_are_old, self.turn_spent) = (false, true);
-            } else if self.is_classifying {
-                // The last of them, as one detection may come after the other.
+            } else if self.ground.unclassified().is_some() {
+                // Last, because one detection can follow right after another.
                 self.go_on_classifying();
             }
         }
@@ -283,7 +274,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         orders
     }
 
-    /// What the machine is to do as of the last turn.
+    /// The orders after the last turn.
     pub fn orders(&self) -> Orders {
         let pulse = if self.tool.is_out() { Setting::ServoOutUs } else { Setting::ServoInUs };
         let pulse_of = |setting| servo::from_us(self.configuration.get(setting));
@@ -295,13 +286,13 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         }
     }
 
-    /// Whether the encoder's silence or the ground keeps the tool out of the row.
+    /// Whether the ground or a silent encoder keeps the tool out of the row.
     fn must_be_out(&self) -> bool {
         let out = self.tool.is_out();
         self.sensors.encoder.is_doubtful() || out && self.sensors.encoder.is_quiet() || self.ground.must_be_out(out)
     }
 
-    /// Begins to classify a complete detection, which takes some turns more. What is dust is only counted.
+    /// Starts to classify a complete detection. Classification takes several turns. Dust is only counted.
     fn classify(&mut self, detection: Detection, is_of_second: bool) {
         self.turn_spent = true;
         let width_mm = self.ground.millimetres(self.ground.ticks(detection.width()));
@@ -309,20 +300,16 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             count(&mut self.dust);
             return;
         }
-        // The one before it, a few millimetres off, is not classified yet. Like all of which nobody knows what it is, it is kept.
-        if self.is_classifying {
-            self.decide(Some(Vote::UNKNOWN));
-        }
-        self.is_of_second = is_of_second;
+        // The previous detection, a few millimetres back, is still being classified. Unclassified detections count as plants.
+        self.decide(Some(Vote::UNKNOWN));
         let position = self.sensors.readings.position;
         let spacing_mm = self.ground.millimetres(self.ground.spacing(&detection));
         let speed_class_mm_s = features::speed_class(self.speed_mm_s());
         self.plant_timeout = PlantTimeout::since(position);
         let classified = Classified { speed_class_mm_s, spacing_mm, width_mm, vote: Vote::UNKNOWN, label: None };
         self.detections.remember(classified);
-        self.ground.await_class(detection);
-        (self.classifying, self.is_classifying) = (detection, true);
-        // What is left of a detection whose beginning was not seen may be as narrow as a weed.
+        self.ground.await_class(detection, is_of_second);
+        // A detection without a seen beginning may be the rest of a plant, as narrow as a weed. It stays unknown.
         let vote = if detection.cut {
             Some(Vote::UNKNOWN)
         } else {
@@ -331,7 +318,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         self.decide(vote);
     }
 
-    /// Classifies on.
+    /// Runs one more step of the classification.
     #[cfg_attr(target_arch = "avr", inline(never))]
     fn go_on_classifying(&mut self) {
         self.turn_spent = true;
@@ -339,24 +326,27 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         self.decide(vote);
     }
 
-    /// Tells of the detection that is being classified, once there is a vote, and keeps it unless it is a weed.
+    /// Once there is a vote: reports the detection, and keeps its ground unless it is a weed.
     #[cfg_attr(target_arch = "avr", inline(never))]
     fn decide(&mut self, vote: Option<Vote>) {
-        let (Some(vote), Some(classified)) = (vote, self.detections.newest()) else { return };
+        let (Some(vote), Some(Unclassified { detection, of_second, .. }), Some(classified)) =
+            (vote, self.ground.unclassified(), self.detections.newest())
+        else {
+            return;
+        };
         classified.vote = vote;
-        let (detection, width_mm) = (self.classifying, classified.width_mm);
-        self.is_classifying = false;
+        let width_mm = if *of_second { 0 } else { classified.width_mm };
         let leading = self.ground.position_of(detection.leading, self.sensors.readings.position);
-        let (spacing, plan) = (self.ground.spacing(&detection), self.ground.plan(&detection));
+        let (spacing, plan) = (self.ground.spacing(detection), self.ground.plan(detection));
         self.events.add(Event::Detection { vote, leading, spacing, plan });
-        if self.ground.classified(detection, vote.class).is_err() {
+        if self.ground.classified(vote.class).is_err() {
             self.raise(Alarm::ScheduleFull);
         }
-        // What is told twice counts once.
-        self.count_misfit(vote.class, if self.is_of_second { 0 } else { width_mm });
+        // The first beam may have reported the same detection: the two count once.
+        self.count_misfit(vote.class, width_mm);
     }
 
-    /// Latches an alarm. What was seen can no longer be trusted.
+    /// Latches an alarm, and forgets the ground, because its detections are no longer trustworthy.
     fn raise(&mut self, alarm: Alarm) {
         self.ground.forget();
         let nobody_asks = alarm.is_of_a_sensor() && self.bench.needs_no_sensor();
@@ -382,7 +372,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     }
 
     fn enter(&mut self, state: State) {
-        // What is tried ends by `hold` as well, and by the switch going off.
+        // `hold` and the switch also end a manual test.
         self.bench = Bench::Idle;
         if state != self.state {
             self.state = state;

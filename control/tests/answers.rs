@@ -1,4 +1,4 @@
-//! What the console answers, word for word, and that every line fits the serial line's buffer.
+//! The console's answers, word for word; each line fits the serial buffer.
 
 mod common;
 
@@ -30,14 +30,14 @@ use control::{
     weeder::Controller,
 };
 
-/// The text of a line, which is one that fits.
+/// A line's text; checks its length.
 fn said(line: Line) -> String {
     let said: String = line.map(char::from).collect();
     assert!(said.len() <= LINE, "{} characters: {said}", said.len());
     said
 }
 
-/// Types a line and returns the answer's lines.
+/// Enters a line and returns the answer's lines.
 fn ask(machine: &mut Machine, line: &str) -> Vec<String> {
     let mut buffer = LineBuffer::new();
     let command = line.bytes().chain(*b"\n").find_map(|byte| buffer.take(byte)).expect("a line that says something");
@@ -104,7 +104,7 @@ fn a_setting_takes_every_value_of_its_range_and_no_other() {
         let name = String::from_utf8(setting.text().bytes().collect()).unwrap();
         let description = setting.description();
         let mut machine = machine();
-        // Nothing of this contradicts any value of another setting.
+        // These values contradict no value of another setting.
         for line in ["set lead_out_ms 0", "set margin_mm 0", "set beam_to_tool_mm 1000", "set wheel_mm 200"] {
             assert_eq!(ask(&mut machine, line), ["ok"]);
         }
@@ -135,7 +135,7 @@ fn a_setting_takes_every_value_of_its_range_and_no_other() {
 }
 
 #[test]
-fn what_changes_where_the_tool_is_is_not_set_while_the_machine_works() {
+fn settings_that_move_the_tool_are_refused_at_work() {
     let mut machine = machine();
     assert_eq!(ask(&mut machine, "start"), ["ok"]);
     let refusal = "error: wheel_mm changes where the tool is, hold first";
@@ -160,7 +160,7 @@ fn an_alarm_is_named_and_keeps_the_machine_from_starting_until_it_is_cleared() {
 }
 
 #[test]
-fn status_says_how_far_the_ground_that_was_seen_still_is() {
+fn status_shows_the_distance_to_seen_ground() {
     let mut machine = machine();
     assert_eq!(
         ask(&mut machine, "status"),
@@ -212,7 +212,7 @@ fn every_event_fits_on_a_line() {
 }
 
 #[test]
-fn an_alarm_is_not_cleared_by_throwing_the_switch_on() {
+fn an_alarm_is_not_cleared_by_the_switch_going_on() {
     let mut machine = machine();
     ask(&mut machine, "start");
     machine.turn(readings(0, 0), [Edge::Lost { broken: false }]);
@@ -228,7 +228,7 @@ fn an_alarm_is_not_cleared_by_throwing_the_switch_on() {
 }
 
 #[test]
-fn after_lost_edges_the_beam_is_what_it_is_now_and_not_what_the_last_edge_said() {
+fn after_lost_edges_the_present_level_of_the_beam_counts() {
     for broken in [false, true] {
         let mut machine = machine();
         machine.turn(readings(1000, 0), [Edge::Lost { broken }]);
@@ -237,7 +237,7 @@ fn after_lost_edges_the_beam_is_what_it_is_now_and_not_what_the_last_edge_said()
 }
 
 #[test]
-fn settings_that_contradict_each_other_are_refused_with_what_would_be_right() {
+fn contradicting_settings_are_refused_with_the_allowed_value() {
     let mut machine = machine();
     let refusal = "error: margin, leads and top speed would need beam_to_tool_mm 389 or more, change one of them first";
     assert_eq!(ask(&mut machine, "set beam_to_tool_mm 388"), [refusal]);
@@ -252,7 +252,7 @@ fn settings_that_contradict_each_other_are_refused_with_what_would_be_right() {
 }
 
 #[test]
-fn a_wheel_that_counts_too_rarely_is_refused_with_what_would_be_right() {
+fn a_wheel_with_too_few_counts_is_refused_with_the_allowed_value() {
     let mut machine = machine();
     let refusal = "error: a wheel gives 900 ticks a metre or more, take a finer encoder";
     for (too_few, enough) in [
@@ -280,7 +280,7 @@ fn settings_are_saved_in_hold_only() {
 }
 
 #[test]
-fn a_machine_without_saved_settings_says_so_and_does_not_start_until_that_is_cleared() {
+fn a_machine_without_saved_settings_raises_an_alarm_and_does_not_start_until_it_is_cleared() {
     let mut machine = Controller::new(ByWidth::late_by(0), Volatile::new(), woken_up(Cause::BrownOut));
     assert_eq!(machine.state(), State::Alarm(Alarm::SettingsLost));
     assert_eq!(ask(&mut machine, "start"), ["error: an alarm is latched, see status, then clear it"]);
@@ -289,7 +289,7 @@ fn a_machine_without_saved_settings_says_so_and_does_not_start_until_that_is_cle
 }
 
 #[test]
-fn lines_that_are_not_understood_are_counted() {
+fn lines_with_an_error_are_counted() {
     let mut machine = machine();
     for line in ["nonsense", "set", "\u{7}"] {
         ask(&mut machine, line);
@@ -314,7 +314,7 @@ fn the_table_of_faults_names_every_alarm_with_its_code_and_every_warning_and_cau
 }
 
 #[test]
-fn get_and_help_tell_the_unit_as_a_word_of_its_own() {
+fn get_and_help_show_the_unit_as_a_separate_word() {
     for command in ["get", "help"] {
         let tells = |setting: &str, shown: &str| {
             let answer = ask(&mut machine(), &format!("{command} {setting}"));
@@ -328,7 +328,7 @@ fn get_and_help_tell_the_unit_as_a_word_of_its_own() {
 }
 
 #[test]
-fn get_tells_what_is_saved_where_that_differs() {
+fn get_shows_the_saved_value_if_it_differs() {
     let mut machine = machine();
     assert_eq!(ask(&mut machine, "get k")[0], "k=3 from 1 to 15, default 3, not saved");
     assert_eq!(ask(&mut machine, "save"), ["ok"]);
@@ -341,7 +341,7 @@ fn get_tells_what_is_saved_where_that_differs() {
 }
 
 #[test]
-fn a_calibration_is_answered_by_what_it_gave_or_by_what_would_be_right() {
+fn a_calibration_answers_its_result_or_what_is_allowed() {
     let mut machine = machine();
     assert_eq!(ask(&mut machine, "calibrate 10000"), ["error: calibrate start first, then roll"]);
     assert_eq!(ask(&mut machine, "calibrate start"), ["ok"]);
@@ -355,7 +355,7 @@ fn a_calibration_is_answered_by_what_it_gave_or_by_what_would_be_right() {
 }
 
 #[test]
-fn what_is_tried_on_the_bench_is_refused_at_work_with_what_would_be_right() {
+fn manual_tests_are_refused_at_work_with_what_to_do() {
     let mut machine = machine();
     let speed = "error: test row takes a speed in mm/s from 100 to 1300";
     assert_eq!(ask(&mut machine, "test row 1401"), [speed]);
@@ -378,7 +378,7 @@ fn what_is_tried_on_the_bench_is_refused_at_work_with_what_would_be_right() {
 }
 
 #[test]
-fn curves_are_labels_and_values_and_nothing_else() {
+fn plot_lines_contain_only_labels_and_values() {
     let machine = machine();
     for (plot, expected) in [
         (Plot::Arduino, "speed_mm_s:0,tool_deg:45,beam_broken:0,windows:0\r\n"),
@@ -391,7 +391,7 @@ fn curves_are_labels_and_values_and_nothing_else() {
 }
 
 #[test]
-fn curves_and_status_show_how_fast_the_machine_rolls_and_the_beam_whether_it_is_broken() {
+fn curves_show_speed_and_beam_and_status_shows_the_speed() {
     let mut machine = machine();
     for (direction, broken) in [(1, true), (-1, false)] {
         let edge = Edge::Seen { position: Position::new(0), broken, second_broken: false };
@@ -411,7 +411,7 @@ fn curves_and_status_show_how_fast_the_machine_rolls_and_the_beam_whether_it_is_
 }
 
 #[test]
-fn status_counts_the_events_that_found_no_room_to_wait() {
+fn status_counts_dropped_events() {
     let mut machine = machine();
     machine.tell_events(true);
     for _ in 0..5 {
@@ -451,7 +451,7 @@ fn events_and_curves_wait_until_an_answer_is_complete() {
     }
     for line in ["help", "nonsense", "get", "version"] {
         let answer = ask(&mut machine, line).join("\r\n") + "\r\n";
-        assert_eq!(said.matches(&answer).count(), 1, "{line} is answered once and in one piece: {said}");
+        assert_eq!(said.matches(&answer).count(), 1, "{line} is answered once and without interruption: {said}");
     }
     assert_eq!(said.lines().filter(|line| *line == "ok" || line.starts_with("error: ")).count(), 4);
     assert!(said.starts_with("weeder "), "it greets: {said}");

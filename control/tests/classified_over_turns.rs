@@ -1,13 +1,13 @@
-//! A detection whose class takes some turns of the loop: until it is known, the ground is closed from where it begins.
+//! Classification over several turns: until the class is known, the ground is closed from the detection's beginning on.
 //!
-//! A machine that classifies at once goes the same way beside one that takes its time. The second is never in the row where the first is
-//! out, tells of the same detections, and knows the same plants in the end.
+//! A machine that classifies at once and one that takes several turns go the same way. The second is never in the row while the
+//! first is out. It reports the same detections, and knows the same plants in the end.
 
 mod common;
 #[path = "common/rolling.rs"]
 mod rolling;
 
-use common::{ByWidth, machine_that_judges};
+use common::{ByWidth, machine_with};
 use control::{
     alarm::Alarm,
     ground::class::{Class, Vote},
@@ -18,35 +18,35 @@ use control::{
 use proptest::prelude::*;
 use rolling::{BEAM_TO_TOOL_MM, MARGIN_MM, Rolling, SECOND_BEAM_MM};
 
-/// What is wider is a plant.
+/// Wider detections are plants.
 const LEAST_PLANT_MM: f64 = 65.0;
 
-/// The tool is told so long before it may be back in the row: the fastest machine here rolls 30 mm in that, of a margin of 50.
+/// The command to come back leads by this time. The fastest machine here rolls 30 mm in it, of a margin of 50.
 const LEAD_IN_MS: u16 = 20;
 
-/// What is told of a detection, but for the plan, which goes by what is known of the slip when it is told.
+/// An event's detection, without the plan, which depends on the slip known at that moment.
 fn detection(event: Event) -> Option<(Vote, Position, Ticks)> {
     if let Event::Detection { vote, leading, spacing, .. } = event { Some((vote, leading, spacing)) } else { None }
 }
 
-/// A machine that classifies so many turns late, with a second beam or without.
+/// A machine that classifies this many turns late, with or without a second beam.
 fn rolling(turns: u16, seen_mm: &[(f64, f64)], unseen: usize, settings: &[(Setting, u16)]) -> Rolling {
     // The first beam misses one of them.
     let first_mm = seen_mm.iter().enumerate().filter(|&(number, _)| number != unseen).map(|(_, &thing)| thing);
     let (first_mm, second_mm) = (first_mm.collect(), seen_mm.to_vec());
     match turns {
         0 => Rolling::along(first_mm, second_mm, settings),
-        _ => Rolling::with(machine_that_judges(ByWidth::late_by(turns)), first_mm, second_mm, settings),
+        _ => Rolling::with(machine_with(ByWidth::late_by(turns)), first_mm, second_mm, settings),
     }
 }
 
 #[test]
-fn what_is_being_judged_is_closed_from_where_it_begins_and_a_weed_is_open_afterwards() {
+fn an_unclassified_detection_is_closed_from_its_beginning_and_a_weed_is_open_afterwards() {
     let weed_mm = (600.0, 620.0);
     let mut late = rolling(2000, &[weed_mm], usize::MAX, &[]);
-    // So near that the servo would have to be told.
+    // So near that the servo needs its command.
     late.roll_to(weed_mm.0 + BEAM_TO_TOOL_MM - MARGIN_MM, 500.0);
-    assert!(late.machine.tool_out(), "nobody knows yet that it is a weed");
+    assert!(late.machine.tool_out(), "it is not yet classified as a weed");
     assert_eq!((late.told_of(detection).len(), late.machine.zones()), (0, 1));
     late.roll_to(weed_mm.0 + BEAM_TO_TOOL_MM, 100.0);
     assert!(!late.machine.tool_out());
@@ -54,7 +54,7 @@ fn what_is_being_judged_is_closed_from_where_it_begins_and_a_weed_is_open_afterw
 }
 
 #[test]
-fn an_object_that_is_forgotten_while_it_is_being_judged_is_told_and_not_kept() {
+fn a_detection_forgotten_during_classification_is_reported_and_not_kept() {
     let mut late = rolling(20, &[(600.0, 700.0)], usize::MAX, &[]);
     late.roll_to(725.0, 500.0);
     assert_eq!((late.told_of(detection).len(), late.machine.zones()), (0, 1));
@@ -66,7 +66,7 @@ fn an_object_that_is_forgotten_while_it_is_being_judged_is_told_and_not_kept() {
 }
 
 #[test]
-fn what_is_still_being_judged_when_the_next_object_comes_is_kept() {
+fn a_detection_still_unclassified_when_the_next_comes_is_kept() {
     let mut late = rolling(u16::MAX, &[(600.0, 620.0), (660.0, 680.0)], usize::MAX, &[]);
     late.roll_to(690.0, 1000.0);
     assert_eq!((late.told_of(detection).len(), late.machine.zones()), (0, 2));
@@ -76,7 +76,7 @@ fn what_is_still_being_judged_when_the_next_object_comes_is_kept() {
 }
 
 #[test]
-fn dust_leaves_what_is_being_judged_alone() {
+fn dust_does_not_end_a_classification() {
     let settings = [(Setting::MinWidthMm, 5)];
     let mut late = rolling(100, &[(600.0, 620.0), (660.0, 663.0)], usize::MAX, &settings);
     late.roll_to(800.0, 1000.0);
@@ -88,7 +88,7 @@ proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn whoever_takes_his_time_is_out_wherever_whoever_judges_at_once_is_and_knows_as_much_in_the_end(
+    fn a_late_classifier_is_out_as_often_as_a_quick_one_and_knows_the_same_in_the_end(
         turns in 1_u16..8,
         things in prop::collection::vec((3.0..400.0, prop_oneof![5.0..40.0, 70.0..200.0]), 1..12),
         legs in prop::collection::vec((50.0..1500.0, prop_oneof![4 => 20.0..900.0, 1 => -200.0..-10.0]), 1..12),
@@ -107,9 +107,10 @@ proptest! {
             })
             .collect();
         let settings = [
-            // An alarm for weeds that are none comes with the last one's class.
+            // An alarm for unknown crop comes with the last weed's class.
             (Setting::MisfitAfter, 0),
-            // A second beam tells the slip, and where a plant is due goes by what is known of it when the one before is classified.
+            // The second beam gives the slip, and an expected plant's position depends on the slip at the last plant's
+            // classification.
             (Setting::GuardSpacingMm, if second { 0 } else { guard_mm }),
             (Setting::MergeGapMm, merge_gap_mm),
             (Setting::LeadInMs, LEAD_IN_MS),
@@ -125,12 +126,12 @@ proptest! {
                 let next_mm = quick.place_mm + step_mm;
                 quick.roll_to(next_mm, speed_mm_s);
                 late.roll_to(next_mm, speed_mm_s);
-                // Of two detections that the beams tell in the same turn the quick one keeps one for which it has no time, and the late
-                // one the other.
+                // The beams may report two detections in the same turn. The quick machine then keeps the one that it has no time
+                // for, and the late machine the other.
                 let keeps_unknown = second && quick.told_of(detection).iter().any(|&(vote, ..)| vote == Vote::UNKNOWN);
                 prop_assert!(
                     keeps_unknown || late.machine.tool_out() || !quick.machine.tool_out(),
-                    "in the row at {next_mm} mm, where the other is out"
+                    "in the row at {next_mm} mm, but the other is out"
                 );
             }
         }
@@ -140,12 +141,12 @@ proptest! {
                 prop_assert_eq!(over_it_mm, None, "in the row over the plant from {} to {} mm", from_mm, to_mm);
             }
         }
-        // To rest, for as long as it takes.
+        // Both stop, and get all the time that they need.
         for _ in 0..turns {
             quick.turn(0.0);
             late.turn(0.0);
         }
-        // What the second beam alone has seen may come while another is being classified.
+        // The second beam may report a detection while another is being classified.
         if !second {
             prop_assert_eq!(quick.told_of(detection), late.told_of(detection));
             prop_assert_eq!(quick.machine.zones(), late.machine.zones());

@@ -1,12 +1,11 @@
-//! What becomes of a row when the encoder fails in small ways: silences, spikes on both channels, edges that do not come.
+//! A row with small encoder faults: silences, spikes on both channels, missing edges.
 //!
-//! The machine rolls past a row of plants at a steady speed. Each edge of the encoder comes at its time, unevenly by a third as
-//! encoders give them, goes through the fault, and is decoded by the firmware's decoder; the controller turns as the firmware's
-//! loop does, with now and then a long turn. The tool follows as a servo does. A plant is hit where the tool is not fully out
-//! over its canopy.
+//! The machine rolls past plants at a constant speed. The encoder's edges are uneven by a third, like real ones. They go through
+//! the fault into the firmware's decoder. The controller turns like the firmware's loop, with some long turns. The tool follows
+//! like a servo. A plant is hit if the tool is not fully out over its canopy.
 //!
-//! What is held: every canopy is kept, or the alarm comes before a second one is hit. The manual's page of faults has the table;
-//! `UPDATE_EXPECT=1 cargo test -p control --test encoder_faults` writes it anew.
+//! The test checks that each canopy is kept, or that the alarm comes before a second one is hit. The manual's page of faults has
+//! the table; `UPDATE_EXPECT=1 cargo test -p control --test encoder_faults` writes it.
 
 use control::{
     alarm::Alarm,
@@ -32,7 +31,7 @@ use std::ops::Range;
 /// A tick of a wheel of 400 mm with 2400 counts.
 const TICK_MM: f64 = std::f64::consts::PI * 400.0 / 2400.0;
 
-/// The row: plants half a metre apart, with canopies of 150 mm, the first so far from where the machine starts.
+/// The row: plants half a metre apart, canopies of 150 mm. The first is this far from the machine's start.
 const PLANTS: usize = 8;
 const FIRST_MM: f64 = 1000.0;
 const SPACING_MM: f64 = 500.0;
@@ -41,34 +40,34 @@ const CANOPY_MM: f64 = 150.0;
 const BEAM_TO_TOOL_MM: f64 = 400.0;
 const MARGIN_MM: f64 = 50.0;
 
-/// A margin that is short by less than this still counts as kept, as everywhere in this project.
+/// A margin that is short by less than this counts as kept, as everywhere in this project.
 const TOLERANCE_MM: f64 = 10.0;
 
-/// The machine gains its speed with 1 m/s2.
+/// The machine accelerates with 1 m/s2.
 const ACCELERATION_MM_S2: f64 = 1000.0;
 
-/// The beam's sensor answers a millisecond late.
+/// The beam's sensor responds after a millisecond.
 const RESPONSE_S: f64 = 0.001;
 
-/// The servo: dead time, and until the tool is out.
+/// The servo: dead time, and time until the tool is out.
 const DEAD_S: f64 = 0.060;
 const SWING_S: f64 = 0.180;
 
-/// How long a spike lasts: longer than the interrupt takes to answer.
+/// Duration of a spike: longer than the interrupt's response.
 const SPIKE_S: f64 = 0.000_1;
 
 const SPEEDS_KM_H: [f64; 7] = [0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0];
 
-/// What is wrong with the encoder.
+/// The encoder's fault.
 #[derive(Clone, Copy, Debug)]
 enum Fault {
-    /// No edge comes for so long, once or time and again.
+    /// No edge for this time, once or repeatedly.
     Silence { length_ms: u32, every_ms: Option<u32> },
-    /// Both channels change for a moment, so often a second.
+    /// Both channels change for a moment, this often a second.
     Spikes { a_second: u32 },
-    /// So many of a thousand edges do not come: the channel stays where it is until its next edge but one.
+    /// This many of a thousand edges are missing: the channel keeps its level until its second next edge.
     LostEdges { in_1000: u32 },
-    /// One channel drops out for so many ticks, time and again.
+    /// One channel stops for this many ticks, repeatedly.
     Dropouts { ticks: u32, every_mm: u32 },
 }
 
@@ -86,18 +85,18 @@ impl fmt::Display for Fault {
     }
 }
 
-/// What became of the row, the best first.
+/// The result of a run, best first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Outcome {
-    /// Every canopy and every margin was kept.
+    /// All canopies and margins were kept.
     Kept,
-    /// A margin was cut.
+    /// A margin was not kept.
     MarginCut,
-    /// An alarm came, and no plant was hit.
+    /// An alarm, and no plant hit.
     Alarm,
-    /// One plant was hit, and an alarm came.
+    /// One plant hit, and an alarm.
     OneHit,
-    /// Plants were hit without an alarm, or more than one before it.
+    /// Plants hit without an alarm, or more than one before it.
     Failed,
 }
 
@@ -113,7 +112,7 @@ impl fmt::Display for Outcome {
     }
 }
 
-/// A run: the fault is there from a place on.
+/// A run: the fault begins at a place.
 #[derive(Clone, Copy, Debug)]
 struct Run {
     fault: Fault,
@@ -123,13 +122,13 @@ struct Run {
     tick_mm: f64,
 }
 
-/// What a run showed.
+/// The data of a run.
 #[derive(Debug)]
 struct Shown {
     hit: usize,
     cut: usize,
     alarm: Option<Alarm>,
-    /// Ticks that the machine has rolled, and those that the controller believes.
+    /// Ticks rolled, and ticks by the controller.
     rolled: i64,
     counted: i64,
 }
@@ -146,14 +145,14 @@ impl Shown {
     }
 }
 
-/// The machine's way.
+/// The machine's motion.
 #[derive(Clone, Copy)]
 struct Way {
     speed_mm_s: f64,
 }
 
 impl Way {
-    /// When it is at a place.
+    /// The time at a place.
     fn time_s(self, place_mm: f64) -> f64 {
         let gaining_mm = self.speed_mm_s.powi(2) / (2.0 * ACCELERATION_MM_S2);
         if place_mm < gaining_mm {
@@ -163,7 +162,7 @@ impl Way {
         }
     }
 
-    /// Where it is at a time.
+    /// The place at a time.
     fn place_mm(self, time_s: f64) -> f64 {
         let gaining_s = self.speed_mm_s / ACCELERATION_MM_S2;
         if time_s < gaining_s {
@@ -174,7 +173,7 @@ impl Way {
     }
 }
 
-/// The encoder's wires, with the fault on them.
+/// The encoder's wires, with the fault.
 struct Wires {
     way: Way,
     fault: Fault,
@@ -185,7 +184,7 @@ struct Wires {
     /// The number of the next edge, and its time.
     edge: i64,
     edge_s: f64,
-    /// Levels without spikes.
+    /// The levels without spikes.
     levels: u8,
     spike_s: f64,
     spiked: bool,
@@ -224,19 +223,19 @@ impl Wires {
 
     fn next_edge(&mut self) {
         self.edge += 1;
-        // The edges of one channel come late by a third of the distance between two.
+        // One channel's edges are late by a third of the distance between two edges.
         let late = if self.edge % 2 == 0 { 1.0 / 3.0 } else { 0.0 };
         self.edge_s = self.way.time_s((self.edge as f64 + late) * self.tick_mm);
     }
 
-    /// Rolls on to a time.
+    /// Rolls on until a time.
     fn roll_to(&mut self, time_s: f64) {
         while self.edge_s.min(self.spike_s) <= time_s {
             if self.spike_s < self.edge_s {
                 self.spiked = !self.spiked;
                 self.spike_s += match self.fault {
                     Fault::Spikes { a_second } if !self.spiked => {
-                        // Not in step with anything.
+                        // Not synchronous with anything else.
                         (1.0 / f64::from(a_second) - SPIKE_S) * self.rng.random_range(0.5..1.5)
                     }
                     _ => SPIKE_S,
@@ -285,7 +284,7 @@ fn canopies_mm() -> impl Iterator<Item = Range<f64>> {
     })
 }
 
-/// Rolls past the row, to its end or to an alarm and the swing after it.
+/// Rolls past the row, until its end or until the swing after an alarm.
 fn roll(run: Run) -> Shown {
     let way = Way { speed_mm_s: run.speed_km_h / 0.0036 };
     let mut wires = Wires::new(way, run);
@@ -299,7 +298,7 @@ fn roll(run: Run) -> Shown {
     if run.tick_mm != TICK_MM {
         weeder.set(Setting::TicksPerM, (1000.0 / run.tick_mm).round() as u16).expect("fine enough");
     }
-    // As quick as this servo is, the machine may work at 5 km/h.
+    // This servo is so fast that the machine may work at 5 km/h.
     for (setting, value) in [(Setting::LeadOutMs, (SWING_S * 1000.0) as u16), (Setting::TopSpeedMmS, 1400)] {
         weeder.set(setting, value).expect("within its range");
     }
@@ -312,14 +311,14 @@ fn roll(run: Run) -> Shown {
         .peekable();
     let canopies: Vec<Range<f64>> = canopies_mm().collect();
     let (mut hit, mut cut) = ([false; PLANTS], [false; PLANTS]);
-    // Since when the tool was told where it is, and whether it was clear of the row then.
+    // Since when the tool has its command, and whether it was clear of the row then.
     let (mut out, mut told_s, mut was_clear) = (true, f64::NEG_INFINITY, true);
     let end_s = way.time_s(canopies[PLANTS - 1].end + BEAM_TO_TOOL_MM + MARGIN_MM);
     let (mut time_s, mut turn, mut alarm) = (0.0, 0_u32, None);
     let mut edges = Vec::new();
     while time_s < alarm.map_or(end_s, |(_, at_s): (Alarm, f64)| f64::min(at_s + 2.0 * SWING_S, end_s)) {
         turn += 1;
-        // The loop's turns as they are while it weeds and its status is asked for.
+        // The loop's turns while it weeds and the operator requests the status.
         time_s += match turn {
             turn if turn % 503 == 0 => 0.003_8,
             turn if turn % 11 == 0 => 0.000_7,
@@ -359,12 +358,12 @@ fn roll(run: Run) -> Shown {
     }
 }
 
-/// The worst that a fault does at a speed, wherever it begins between two plants.
+/// The worst result of a fault at a speed, for all begins between two plants.
 fn worst(fault: Fault, speed_km_h: f64) -> (Outcome, Run) {
     let places: u32 = if matches!(fault, Fault::Silence { every_ms: None, .. }) { 25 } else { 4 };
     (0..places)
         .map(|place| {
-            // The tool is at work between the first plants.
+            // The tool works between the first plants.
             let from_mm = 1800.0 + SPACING_MM * f64::from(place) / f64::from(places);
             let run = Run { fault, speed_km_h, from_mm, seed: place.into(), tick_mm: TICK_MM };
             (roll(run).outcome(), run)
@@ -388,14 +387,14 @@ fn table(faults: &[Fault], failed: &mut Vec<String>) -> String {
         faults.par_iter().map(|&fault| (fault, SPEEDS_KM_H.map(|speed_km_h| worst(fault, speed_km_h)))).collect();
     let mut table = "| the encoder |".to_owned();
     for speed_km_h in SPEEDS_KM_H {
-        write!(table, " {speed_km_h} km/h |").expect("a string takes everything");
+        write!(table, " {speed_km_h} km/h |").expect("a string has room");
     }
     table += "\n|";
     table += &" --- |".repeat(1 + SPEEDS_KM_H.len());
     for (fault, worst) in outcomes {
-        write!(table, "\n| {fault} |").expect("a string takes everything");
+        write!(table, "\n| {fault} |").expect("a string has room");
         for (outcome, run) in worst {
-            write!(table, " {outcome} |").expect("a string takes everything");
+            write!(table, " {outcome} |").expect("a string has room");
             if outcome == Outcome::Failed {
                 failed.push(format!("{run:?}: {:?}", roll(run)));
             }
@@ -404,7 +403,7 @@ fn table(faults: &[Fault], failed: &mut Vec<String>) -> String {
     table + "\n"
 }
 
-/// The page with the part between `<!-- name -->` and `<!-- name end -->` replaced.
+/// The page with a new part between `<!-- name -->` and `<!-- name end -->`.
 fn with_part(page: &ExpectFile, name: &str, part: &str) -> String {
     let (begin, end) = (format!("<!-- {name} -->\n"), format!("<!-- {name} end -->"));
     let text = page.data();
@@ -414,7 +413,7 @@ fn with_part(page: &ExpectFile, name: &str, part: &str) -> String {
 }
 
 #[test]
-fn whatever_ails_the_encoder_every_canopy_is_kept_or_the_alarm_comes_before_a_second_is_hit() {
+fn no_encoder_fault_hits_a_second_canopy_before_the_alarm() {
     let spikes = [1, 2, 5, 10, 17, 20, 50, 100].map(|a_second| Fault::Spikes { a_second });
     let lost = [1, 2, 5, 10, 20, 50, 100, 200].map(|in_1000| Fault::LostEdges { in_1000 });
     let faults: Vec<Fault> = silences().into_iter().chain(spikes).chain(lost).collect();
@@ -437,8 +436,7 @@ fn spikes_on_both_channels_are_not_counted() {
 }
 
 #[test]
-fn a_channel_that_drops_out_now_and_then_costs_a_plant_at_the_most_with_the_coarsest_encoder_from_half_a_kilometre_an_hour_on()
- {
+fn dropouts_of_a_channel_cost_at_most_one_plant_with_the_coarsest_encoder_from_half_a_kilometre_an_hour() {
     let tick_mm = 1000.0 / f64::from(TICKS_PER_M_LEAST);
     let runs: Vec<Run> = [tick_mm, 1.0, TICK_MM]
         .into_iter()

@@ -1,7 +1,7 @@
-//! Whatever comes along the serial line, and whatever the EEPROM holds: targets for a fuzzer.
+//! Fuzz targets: any bytes on the serial line, and any contents of the EEPROM.
 //!
-//! `cargo test` runs each on some thousand inputs by chance; `cargo bolero test -p control --release TARGET` has libFuzzer
-//! look for others until it is stopped, and keeps what it finds for `cargo test`.
+//! `cargo test` runs each with some thousand random inputs. `cargo bolero test -p control --release TARGET` lets libFuzzer search
+//! more until it is stopped, and keeps its findings for `cargo test`.
 
 use bolero::{TypeGenerator, check};
 use control::{
@@ -26,14 +26,14 @@ use control::{
     weeder::Controller,
 };
 
-/// The machine as the firmware has it, with these contents of its EEPROM's halves.
+/// The firmware's machine, with these contents of the EEPROM's halves.
 fn machine(for_settings: Volatile, for_examples: Volatile) -> Controller<impl Classifier, impl Memory> {
     let readings = Readings::new(Instant::new(0), Position::new(0));
     let startup = Startup { readings, beam_broken: false, cause: Cause::PowerOn };
     Controller::new(Nearest::new(&EXAMPLES[..], for_examples), for_settings, startup)
 }
 
-/// Something that may come along the line: bytes by chance seldom make a command.
+/// Input on the serial line. Random bytes alone seldom make a command.
 #[derive(Clone, Debug, TypeGenerator)]
 enum Typed {
     Bytes(Vec<u8>),
@@ -66,7 +66,7 @@ impl Typed {
 }
 
 #[test]
-fn every_line_that_comes_is_answered_by_lines_that_fit_and_one_verdict() {
+fn every_line_is_answered_by_lines_that_fit_and_one_verdict() {
     check!().with_type::<Vec<Typed>>().with_iterations(1500).for_each(|typed| {
         let mut bytes = Vec::new();
         typed.iter().for_each(|typed| typed.write_to(&mut bytes));
@@ -80,7 +80,7 @@ fn every_line_that_comes_is_answered_by_lines_that_fit_and_one_verdict() {
             while !machine.carry_on() {}
             let mut verdicts = 0;
             while !answer.is_done() {
-                assert_eq!(verdicts, 0, "{command:?} has an answer behind its verdict");
+                assert_eq!(verdicts, 0, "{command:?} has lines after its verdict");
                 let mut out = Line::new();
                 answer.write_line(&machine, &mut out);
                 let out: Vec<u8> = out.collect();
@@ -100,18 +100,17 @@ fn every_line_that_comes_is_answered_by_lines_that_fit_and_one_verdict() {
     });
 }
 
-/// An EEPROM's content: what was saved, one after the other, and the bytes that were spoiled since. Bytes by chance alone
-/// would never have the right CRC.
+/// An EEPROM's contents: saves in order, and later corrupted bytes. Random bytes alone would never have a right CRC.
 #[derive(Clone, Debug, TypeGenerator)]
 struct Eeprom {
     filled_with: Option<Vec<u8>>,
     saved: Vec<Vec<(u8, u16)>>,
     spoiled: Vec<(u16, u8)>,
-    /// Bytes of the last save that are written before the power goes.
+    /// Bytes of the last save before the power fails.
     power: u8,
 }
 
-/// The defaults, changed: within each value's range, but free to contradict each other.
+/// The defaults with changes: within each range, but possibly contradicting each other.
 fn settings(changes: &[(u8, u16)]) -> Settings {
     let mut settings = Settings::new();
     for &(place, value) in changes {
@@ -137,7 +136,7 @@ fn load(memory: &Volatile) -> Option<Settings> {
 }
 
 #[test]
-fn whatever_the_eeprom_holds_the_machine_wakes_up_with_whole_settings_or_none_and_says_so() {
+fn with_any_eeprom_the_machine_starts_with_valid_settings_or_an_alarm() {
     check!().with_type::<Eeprom>().with_iterations(5000).for_each(|eeprom| {
         let fill = eeprom.filled_with.as_deref().filter(|fill| !fill.is_empty()).unwrap_or(&[ERASED]);
         let mut content = [0; 2 * SIZE];
@@ -171,7 +170,7 @@ fn whatever_the_eeprom_holds_the_machine_wakes_up_with_whole_settings_or_none_an
         if eeprom.spoiled.is_empty()
             && let Some(last) = eeprom.saved.last()
         {
-            assert_eq!(found, Some(settings(last)), "what was saved last is not there");
+            assert_eq!(found, Some(settings(last)), "the last save is missing");
         }
         assert!(machine.classifier().spoiled() <= field_examples::CAPACITY);
         let mut place = 0;
@@ -180,17 +179,17 @@ fn whatever_the_eeprom_holds_the_machine_wakes_up_with_whole_settings_or_none_an
             place = next;
         }
 
-        // A save on top of all that, and the power goes.
+        // Another save, and a power failure during it.
         // A save writes the first byte twice.
         let power = usize::from(eeprom.power) % (COPY + 2);
         let new = settings(&[(0, 1), (10, eeprom.power.into())]);
         let mut failing = memory;
         failing.lose_power_after(power);
         let after = load(&save(failing, &new).with_power());
-        // A byte that was spoiled may become right again by being written: then a save of before is whole again.
+        // Writing a corrupted byte may correct it. Then an earlier save is valid again.
         let once_saved = eeprom.saved.iter().any(|changes| after == Some(settings(changes)));
         let filled = eeprom.filled_with.is_some();
         assert!(after == found || after.as_ref() == Some(&new) || once_saved || filled, "{power} bytes: {after:?}");
-        assert!(power <= COPY || after == Some(new), "nothing was lost");
+        assert!(power <= COPY || after == Some(new), "the save was complete");
     });
 }

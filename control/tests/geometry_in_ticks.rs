@@ -1,4 +1,4 @@
-//! The paper's Eq. 1 to 3 in integers, over every machine that the settings allow.
+//! The paper's Eq. 1 to 3 in integers, for each machine that the settings allow.
 
 use control::{
     ground::{keep_out::Plan, reach::Geometry},
@@ -8,7 +8,7 @@ use control::{
 use proptest::prelude::*;
 use std::f64::consts::PI;
 
-/// Settings of any wheel, by its diameter or measured, and X.
+/// Settings of any wheel, nominal or calibrated, and X.
 fn machines() -> impl Strategy<Value = Settings> {
     let ticks_per_m = prop_oneof![Just(0), 40_u16..=20_000];
     (600_u16..=10_000, 200_u16..=800, ticks_per_m, 100_u16..=2000).prop_map(
@@ -46,7 +46,7 @@ proptest! {
         let scale = ticks_a_metre(&settings);
         let delay = (f64::from(settings.get(Setting::BeamToToolMm)) / 1000.0 - 0.05) * scale;
         let hold = f64::from(width) * unit + 0.1 * scale;
-        // Each distance is rounded to a tick, which is known to 2^-20 mm, and down to a unit where that is coarser.
+        // Each distance is rounded to a tick, known to 2^-20 mm, and down to a unit if that is coarser.
         let most = if unit > 1.0 { 2.0 * unit } else { 1.0 } + 0.05;
         prop_assert!((f64::from(plan.delay.0) - delay).abs() <= most, "Y is {:?}, not {delay}", plan.delay);
         prop_assert!((f64::from(plan.hold.0) - hold).abs() <= most, "Z is {:?}, not {hold}", plan.hold);
@@ -58,7 +58,7 @@ proptest! {
     fn millimetres_become_the_nearest_tick(settings in machines(), millimetres in 0_u16..=4000) {
         let exact = f64::from(millimetres) / 1000.0 * ticks_a_metre(&settings);
         let ticks = f64::from(settings.wheel().ticks(millimetres).0);
-        // What a tick measures is known to 2^-20 mm, 1 in 50,000 of the finest.
+        // A tick's length is known to 2^-20 mm, 1 in 50,000 for the finest.
         prop_assert!((ticks - exact).abs() <= 0.51 + exact / 50_000.0, "{ticks} is not {exact}");
     }
 
@@ -72,7 +72,7 @@ proptest! {
 
 #[test]
 fn the_default_machine_has_the_papers_figures() {
-    // (0.4 m - 0.05 m) * 1909.86; 0.1 m * 1909.86 on top of the canopy; each within a tick.
+    // (0.4 m - 0.05 m) * 1909.86; 0.1 m * 1909.86 plus the canopy; each within a tick.
     let plan = Plan::new(&Geometry::of(&Settings::new(), 0), Length(286));
     assert_eq!((plan.delay, plan.hold, plan.actuation()), (Ticks(669), Ticks(476), Ticks(1145)));
 }

@@ -1,4 +1,4 @@
-//! Plants that the beam has not seen, in a crop at even distances: the ground where they are due is kept as if they had been.
+//! Missed plants in a crop at even distances: the ground of an expected plant is kept as if the beam had seen it.
 
 mod common;
 #[path = "common/rolling.rs"]
@@ -11,16 +11,16 @@ use rolling::{BEAM_TO_TOOL_MM, MARGIN_MM, Rolling, TICKS_A_MM};
 const SPACING_MM: f64 = 500.0;
 const CANOPY_MM: f64 = 150.0;
 
-/// What a place may be off by: two ticks, and what is rolled in a turn and a lead that wavers.
+/// Tolerance of a position: two ticks, a turn, and variation of a lead.
 const TOLERANCE_MM: f64 = 8.0;
 
-/// A machine at work along canopies, from and to, with its guard set for this spacing and this scatter.
+/// A machine at work along canopies, from and to, with this spacing and scatter.
 fn guarding(seen_mm: Vec<(f64, f64)>, settings: &[(Setting, u16)]) -> Rolling {
     let guard = [(Setting::GuardSpacingMm, SPACING_MM as u16), (Setting::GuardScatterMm, 30), (Setting::LeadInMs, 0)];
     Rolling::along(seen_mm, Vec::new(), &[&guard, settings].concat())
 }
 
-/// Plants that stand at their places, in the middle, of which the beam sees these.
+/// Plants at their positions, in the middle; `seen` tells which of them the beam sees.
 fn with_plants(seen: &[bool]) -> Rolling {
     let places = (1..).map(|place| f64::from(place) * SPACING_MM);
     let seen_mm = places.zip(seen).filter(|(_, seen)| **seen).map(|(place, _)| canopy(place)).collect();
@@ -28,7 +28,7 @@ fn with_plants(seen: &[bool]) -> Rolling {
 }
 
 impl Rolling {
-    /// Where the machine said that it guards a plant.
+    /// Positions of the `guarded` events.
     fn guarded_mm(&self) -> Vec<f64> {
         self.told_of(|event| match event {
             Event::Guarded(place) => Some(f64::from(place.count()) / TICKS_A_MM),
@@ -36,12 +36,12 @@ impl Rolling {
         })
     }
 
-    /// Whether the tool was in the row somewhere from one place to another.
+    /// Whether the tool was in the row between two positions.
     fn has_weeded(&self, from_mm: f64, to_mm: f64) -> bool {
         self.weeded_mm.iter().any(|place| (from_mm..to_mm).contains(place))
     }
 
-    /// Whether all ground that is kept for a plant in this middle was left alone.
+    /// Whether all ground kept for a plant with this middle stayed clear.
     fn has_kept(&self, middle_mm: f64) -> bool {
         let half_mm = 30.0 + MARGIN_MM - TOLERANCE_MM;
         !self.has_weeded(middle_mm - half_mm, middle_mm + half_mm)
@@ -61,7 +61,7 @@ fn canopy(middle_mm: f64) -> (f64, f64) {
 }
 
 #[test]
-fn a_plant_that_was_not_seen_is_kept_with_a_swing_of_its_own() {
+fn a_missed_plant_is_kept_with_its_own_swing() {
     let mut rolling = with_plants(&[true, true, false, true, false, false, true]);
     rolling.roll_to(3600.0, 400.0);
     rolling.assert_guarded(&[1500.0, 2500.0, 3000.0]);
@@ -73,7 +73,7 @@ fn a_plant_that_was_not_seen_is_kept_with_a_swing_of_its_own() {
 }
 
 #[test]
-fn a_stem_zone_is_kept_beside_the_scatter_of_a_plant_that_was_not_seen() {
+fn a_missed_plant_keeps_its_stem_zone_and_the_scatter() {
     for zone_mm in [0.0, 100.0] {
         let seen_mm = [500.0, 1000.0, 2000.0].map(canopy).to_vec();
         let mut rolling = guarding(seen_mm, &[(Setting::StemZoneMm, zone_mm as u16)]);
@@ -86,7 +86,7 @@ fn a_stem_zone_is_kept_beside_the_scatter_of_a_plant_that_was_not_seen() {
 }
 
 #[test]
-fn behind_three_unseen_plants_the_row_is_at_its_end_until_a_plant_is_seen() {
+fn after_three_missed_plants_the_row_has_ended_until_a_plant_is_seen() {
     let mut seen = vec![true, true];
     seen.extend([false; 8]);
     seen.extend([true, false, true]);
@@ -97,7 +97,7 @@ fn behind_three_unseen_plants_the_row_is_at_its_end_until_a_plant_is_seen() {
 }
 
 #[test]
-fn nothing_is_guarded_before_a_plant_was_seen_and_nothing_where_no_spacing_is_set() {
+fn nothing_is_guarded_before_a_plant_is_seen_or_without_a_spacing() {
     let mut rolling = with_plants(&[]);
     rolling.roll_to(6000.0, 500.0);
     rolling.assert_guarded(&[]);
@@ -109,7 +109,7 @@ fn nothing_is_guarded_before_a_plant_was_seen_and_nothing_where_no_spacing_is_se
 }
 
 #[test]
-fn a_plant_early_or_late_by_the_scatter_is_no_unseen_one_and_the_next_is_counted_from_it() {
+fn a_plant_early_or_late_by_the_scatter_is_not_missed_and_the_next_is_counted_from_it() {
     for off_mm in [-90.0, -30.0, 30.0, 90.0] {
         let middles_mm = [500.0, 1000.0, 1500.0 + off_mm];
         let mut rolling = guarding(middles_mm.map(canopy).to_vec(), &[]);
@@ -119,7 +119,7 @@ fn a_plant_early_or_late_by_the_scatter_is_no_unseen_one_and_the_next_is_counted
 }
 
 #[test]
-fn a_double_or_a_weed_like_a_plant_between_two_places_changes_nothing() {
+fn a_double_or_a_weed_like_a_plant_between_two_expected_plants_changes_nothing() {
     let between_mm = [(620.0, 700.0), (1700.0, 1790.0)];
     let mut seen_mm = [500.0, 1000.0, 1500.0].map(canopy).to_vec();
     seen_mm.extend(between_mm);
@@ -129,7 +129,7 @@ fn a_double_or_a_weed_like_a_plant_between_two_places_changes_nothing() {
 }
 
 #[test]
-fn a_weed_where_a_plant_is_due_does_not_stand_for_it() {
+fn a_weed_at_an_expected_plant_does_not_replace_it() {
     let mut seen_mm = [500.0, 1000.0].map(canopy).to_vec();
     seen_mm.push((1495.0, 1510.0));
     let mut rolling = guarding(seen_mm, &[]);
@@ -139,7 +139,7 @@ fn a_weed_where_a_plant_is_due_does_not_stand_for_it() {
 }
 
 #[test]
-fn ground_that_is_guarded_is_told_once_and_kept_however_often_it_is_rolled_over() {
+fn guarded_ground_is_reported_once_and_kept_when_rolled_over_again() {
     let mut rolling = with_plants(&[true, false, true]);
     for (there_mm, back_mm) in [(1040.0, 900.0), (1100.0, 600.0), (2000.0, 400.0), (1990.0, 1000.0)] {
         rolling.roll_to(there_mm, 300.0);
@@ -151,7 +151,7 @@ fn ground_that_is_guarded_is_told_once_and_kept_however_often_it_is_rolled_over(
 }
 
 #[test]
-fn an_alarm_ends_what_is_due_until_a_plant_is_seen() {
+fn after_an_alarm_no_plant_is_expected_until_one_is_seen() {
     let mut rolling = with_plants(&[true, true, false, false, true, false]);
     rolling.roll_to(1200.0, 400.0);
     rolling.lose_edges();
@@ -163,8 +163,8 @@ fn an_alarm_ends_what_is_due_until_a_plant_is_seen() {
 }
 
 #[test]
-fn a_plant_that_is_due_keeps_the_tool_out_before_it_is_clear_whether_it_is_seen() {
-    // The tool is so near that it comes to the ground before the beam has seen all of it.
+fn an_expected_plant_keeps_the_tool_out_until_its_ground_is_seen() {
+    // The tool is so near that it reaches the ground before the beam has seen all of it.
     let settings = [
         (Setting::TopSpeedMmS, 100),
         (Setting::LeadOutMs, 100),
@@ -181,7 +181,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 100, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn every_unseen_plant_of_an_even_stand_is_kept_at_every_speed(
+    fn every_missed_plant_of_an_even_stand_is_kept_at_every_speed(
         seen in prop::collection::vec(prop::bool::weighted(0.7), 4..12),
         off_mm in prop::collection::vec(-14.0..14.0, 12),
         speed_mm_s in 100.0..900.0,

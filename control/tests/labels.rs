@@ -1,4 +1,4 @@
-//! What the operator says of the last detection, against what the built-in examples say.
+//! The operator's labels and entered examples, compared with the built-in examples.
 
 #[path = "common/readings.rs"]
 mod readings;
@@ -29,7 +29,7 @@ struct Rolling {
     count: i32,
     /// Where the last detection began.
     leading: i32,
-    /// What came from the beam since the last turn.
+    /// Beam edges since the last turn.
     edges: Vec<Edge>,
 }
 
@@ -41,7 +41,7 @@ impl Rolling {
         Self { machine, count: 0, leading: 0, edges: Vec::new() }
     }
 
-    /// Rolls past an object so far behind the leading edge of the one before it; returns what it is taken for.
+    /// Rolls past a detection, `spacing_mm` behind the last one's leading edge. Returns its class.
     fn past(&mut self, spacing_mm: u16, width_mm: u16) -> Class {
         let wheel = self.machine.settings().wheel();
         let leading = self.leading + wheel.ticks(spacing_mm).0;
@@ -62,7 +62,7 @@ impl Rolling {
         }
     }
 
-    /// Types a line; returns the last line of its answer.
+    /// Enters a line. Returns the last line of its answer.
     fn ask(&mut self, line: &str) -> String {
         let mut typed = LineBuffer::new();
         let said = line.bytes().chain(*b"\n").find_map(|byte| typed.take(byte)).expect("a line that says something");
@@ -99,7 +99,7 @@ fn a_label_that_the_built_in_examples_contradict_is_refused_and_can_be_forced() 
 fn two_wrong_labels_do_not_make_weeds_of_the_plants_that_follow() {
     for k in [1, 3] {
         let mut rolling = Rolling::new();
-        rolling.machine.set(Setting::K, k).expect("it may be");
+        rolling.machine.set(Setting::K, k).expect("within its range");
         for _ in 0..2 {
             rolling.past(540, 150);
             assert!(rolling.ask("label weed").starts_with("error: "));
@@ -109,17 +109,17 @@ fn two_wrong_labels_do_not_make_weeds_of_the_plants_that_follow() {
 }
 
 #[test]
-fn what_has_been_taught_does_not_make_the_built_in_examples_less_sure() {
+fn field_examples_do_not_change_the_built_in_class() {
     let mut rolling = Rolling::new();
-    rolling.machine.set(Setting::K, 1).expect("it may be");
+    rolling.machine.set(Setting::K, 1).expect("within its range");
     assert_eq!(rolling.past(540, 150), Class::Plant);
     assert_eq!(rolling.ask("label weed force"), "ok");
-    assert_eq!(rolling.past(540, 150), Class::Weed, "it was insisted on");
+    assert_eq!(rolling.past(540, 150), Class::Weed, "the label was forced");
     assert!(rolling.ask("label weed").starts_with("error: the built-in examples say plant"));
 }
 
 #[test]
-fn what_the_built_in_examples_do_not_know_is_taught_at_the_first_word() {
+fn a_detection_unknown_to_the_built_in_examples_is_taught_without_force() {
     for label in ["plant", "weed"] {
         let mut rolling = Rolling::new();
         assert_eq!(rolling.past(540, 55), Class::Unknown);
@@ -128,21 +128,21 @@ fn what_the_built_in_examples_do_not_know_is_taught_at_the_first_word() {
 }
 
 #[test]
-fn what_was_taught_by_mistake_is_forgotten_by_its_number_or_with_all_others() {
+fn a_wrong_example_is_forgotten_by_its_number_or_with_all_others() {
     for command in ["forget 0", "forget all"] {
         let mut rolling = Rolling::new();
-        rolling.machine.set(Setting::K, 1).expect("it may be");
+        rolling.machine.set(Setting::K, 1).expect("within its range");
         rolling.past(540, 150);
         assert_eq!(rolling.ask("label weed force"), "ok");
         assert_eq!(rolling.ask(command), "ok");
         assert_eq!(rolling.past(540, 150), Class::Plant, "{command}");
         let refusal = rolling.ask("forget 0");
-        assert!(refusal.starts_with("error: "), "it is forgotten already: {refusal}");
+        assert!(refusal.starts_with("error: "), "it is already forgotten: {refusal}");
     }
 }
 
 #[test]
-fn an_example_that_is_told_feature_by_feature_is_known_as_one_that_was_labelled_is() {
+fn an_example_entered_by_its_features_equals_a_labelled_one() {
     let mut rolling = Rolling::new();
     rolling.past(540, 150);
     rolling.past(540, 55);
@@ -160,7 +160,7 @@ fn an_example_that_is_told_feature_by_feature_is_known_as_one_that_was_labelled_
 }
 
 #[test]
-fn an_example_with_too_few_or_too_many_features_is_refused_and_the_next_one_begins_anew() {
+fn an_example_with_too_few_or_too_many_features_is_refused_and_the_next_one_starts_empty() {
     for features in (0..20).filter(|&features| features != 5).chain([255, 256, 261, 600]) {
         let mut rolling = Rolling::new();
         for feature in 0..features {
@@ -175,7 +175,7 @@ fn an_example_with_too_few_or_too_many_features_is_refused_and_the_next_one_begi
 }
 
 #[test]
-fn examples_are_told_in_hold_alone() {
+fn examples_are_entered_in_hold_only() {
     let mut rolling = Rolling::new();
     for feature in 0..5 {
         assert_eq!(rolling.ask(&format!("teach {feature}")), "ok");

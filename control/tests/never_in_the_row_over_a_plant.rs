@@ -1,7 +1,7 @@
-//! The one thing that must not happen, over random rows and random ways of rolling past them: stops, reversals, speeds
-//! from a crawl to 10 km/h, plants closer than the beam's distance and farther.
+//! The tool is never in the row over a plant. Rows and motion are random, with stops, reversals, and speeds from a crawl to 10
+//! km/h. Plants stand closer than the beam's distance, and farther.
 //!
-//! The reference is slow and obvious: it knows where every plant stands and how fast the machine really rolls.
+//! The reference is slow and simple: it knows each plant's position and the real speed.
 
 mod common;
 
@@ -20,7 +20,7 @@ const TICKS_A_METRE: f64 = 1909.86;
 /// A turn of the main loop.
 const TURN_US: u64 = 500;
 
-/// The tool's command may be this far off where the true speed would have it, in ticks: the measured speed lags behind.
+/// Tolerance of the command in ticks, because the measured speed lags.
 const TOLERANCE: f64 = 12.0;
 
 #[derive(Clone, Debug)]
@@ -38,18 +38,18 @@ fn legs() -> impl Strategy<Value = Vec<Leg>> {
     prop::collection::vec(leg.prop_map(|(speed_mm_s, length_mm)| Leg { speed_mm_s, length_mm }), 1..12)
 }
 
-/// Gaps in front of each plant and canopies, in millimetres.
+/// Gaps before each plant and canopies, in mm.
 fn plants() -> impl Strategy<Value = Vec<(f64, f64)>> {
     prop::collection::vec((60.0..900.0, 65.0..300.0), 1..20)
 }
 
-/// What a run showed.
+/// The data of a run.
 struct Run {
     plants_told: usize,
     plants_seen: usize,
 }
 
-/// Rolls past the plants and checks each order against them.
+/// Rolls past the plants, and checks each order.
 fn roll(distance_mm: u16, plants: &[(f64, f64)], legs: &[Leg], paper: bool) -> Result<Run, TestCaseError> {
     let mut place = 700.0 + f64::from(distance_mm);
     let canopies: Vec<(f64, f64)> = plants
@@ -64,13 +64,13 @@ fn roll(distance_mm: u16, plants: &[(f64, f64)], legs: &[Leg], paper: bool) -> R
 
     let mut machine = machine();
     let (lead_out_s, lead_in_s) = if paper { (0.0, 0.0) } else { (0.180, 0.040) };
-    // As fast as the beam's distance allows.
+    // The speed that the beam's distance allows.
     let notice_s = lead_out_s * 9.0 / 8.0 + 0.001;
     let top_speed_mm_s = ((f64::from(distance_mm) - 52.0) / notice_s).min(3000.0).floor();
     for (setting, value) in [
         (Setting::TopSpeedMmS, 100),
         (Setting::BeamToToolMm, distance_mm),
-        // The beam of this test answers at once.
+        // The beam of this test responds at once.
         (Setting::BeamResponseMs, 0),
         (Setting::MaxWidthMm, 1500),
         (Setting::LeadOutMs, (lead_out_s * 1000.0) as u16),
@@ -91,7 +91,7 @@ fn roll(distance_mm: u16, plants: &[(f64, f64)], legs: &[Leg], paper: bool) -> R
     let mut out_since_us = None;
     let mut edges = Vec::new();
     for leg in legs {
-        // Rolling back too fast is an alarm as well.
+        // Rolling back too fast is an alarm too.
         let most_mm_s = 0.95 * top_speed_mm_s;
         let target = leg.speed_mm_s.clamp(-most_mm_s, most_mm_s) * TICKS_A_METRE / 1000.0;
         let mut left = leg.length_mm * TICKS_A_METRE / 1000.0;
@@ -104,7 +104,7 @@ fn roll(distance_mm: u16, plants: &[(f64, f64)], legs: &[Leg], paper: bool) -> R
             position += rolled;
             left -= rolled.abs().max(0.01);
             time_us += TURN_US;
-            // Every count that was passed, with the beam's edges at theirs.
+            // Each count passed, with the beam's edges at their positions.
             let reached = position.floor() as i32;
             while count != reached {
                 count += (reached - count).signum();
@@ -120,19 +120,19 @@ fn roll(distance_mm: u16, plants: &[(f64, f64)], legs: &[Leg], paper: bool) -> R
             }
             let tool = f64::from(count) - distance;
             if orders.pulse != tool_in {
-                // The servo needs its lead to be out: over a canopy it must have had it.
+                // Over a canopy, the servo must have had its lead to swing out.
                 let over_a_canopy = canopies.iter().any(|&(from, to)| (from..to).contains(&tool));
                 let out_for_s = (time_us - *out_since_us.get_or_insert(time_us)) as f64 / 1e6;
                 prop_assert!(
                     !over_a_canopy || out_for_s + TURN_US as f64 / 1e6 >= lead_out_s,
-                    "the tool was told to leave only {out_for_s} s ago, at {tool}, at {speed} ticks/s"
+                    "the tool was commanded out only {out_for_s} s ago, at {tool}, at {speed} ticks/s"
                 );
                 continue;
             }
             out_since_us = None;
             for &(leading, trailing) in &canopies {
                 let (from, to) = (leading - margin, trailing + margin);
-                // Until the tool begins to move it stays out for the lead: it may be told to come back that much early.
+                // The tool stays out for the lead before it moves, so its command may come that much early.
                 let early = (speed * lead_in_s).abs() * 1.5 + TOLERANCE;
                 let (from, to) = if speed >= 0.0 { (from, to - early) } else { (from + early, to) };
                 prop_assert!(
@@ -146,12 +146,12 @@ fn roll(distance_mm: u16, plants: &[(f64, f64)], legs: &[Leg], paper: bool) -> R
     Ok(run)
 }
 
-/// Plants whose canopies stand closer than the merging gap would be one object; these stand at least 60 mm apart.
+/// Canopies closer than the merging gap would be one detection; these are at least 60 mm apart.
 fn check(distance_mm: u16, plants: &[(f64, f64)], legs: &[Leg], paper: bool) -> Result<(), TestCaseError> {
     let run = roll(distance_mm, plants, legs, paper)?;
     prop_assert!(
         (run.plants_seen..=run.plants_seen + 1).contains(&run.plants_told),
-        "{} of {} plants were told",
+        "{} of {} plants were reported",
         run.plants_told,
         run.plants_seen
     );
@@ -162,7 +162,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn the_tool_is_never_in_the_row_over_a_plant_and_every_plant_is_told_once(
+    fn the_tool_is_never_in_the_row_over_a_plant_and_every_plant_is_reported_once(
         distance_mm in 150_u16..=2000,
         plants in plants(),
         legs in legs(),
@@ -177,7 +177,7 @@ proptest! {
 }
 
 #[test]
-fn the_tool_is_in_the_row_wherever_nothing_keeps_it_out() {
+fn the_tool_is_in_the_row_if_nothing_keeps_it_out() {
     let mut machine = machine();
     machine.start(false).unwrap();
     let mut orders = machine.turn(readings(0, 0), []);
@@ -187,7 +187,7 @@ fn the_tool_is_in_the_row_wherever_nothing_keeps_it_out() {
         let count = millisecond as i32;
         orders = machine.turn(readings(millisecond * 1000, count), []);
         let seen = Ticks(count) - machine.settings().ticks(Setting::BeamToToolMm);
-        // 40 ticks are what the lead of 40 ms is at this speed.
+        // The lead of 40 ms is 40 ticks at this speed.
         if seen > Ticks(5) {
             assert_ne!(orders.pulse, out, "at {count}");
         }

@@ -1,4 +1,4 @@
-//! What is tried on the bench: the tool by hand, calibration, the swings of a row, and settings taken back.
+//! Manual tests: the servo driven directly, calibration, the swings of a row, and reloading settings.
 
 mod common;
 
@@ -19,7 +19,7 @@ use control::{
     weeder::Orders,
 };
 
-/// Steps the machine, standing at a count, through so many milliseconds; returns the last orders.
+/// Runs the machine at a standstill for this time. Returns the last orders.
 fn stand(machine: &mut Machine, from_ms: u64, duration_ms: u64, count: i32) -> Orders {
     let mut orders = machine.orders();
     for now in from_ms..from_ms + duration_ms {
@@ -29,7 +29,7 @@ fn stand(machine: &mut Machine, from_ms: u64, duration_ms: u64, count: i32) -> O
 }
 
 #[test]
-fn the_tool_moves_by_hand_in_hold_only_and_is_out_again_when_the_machine_starts() {
+fn the_servo_is_driven_directly_in_hold_only_and_the_tool_is_out_again_at_work() {
     let mut machine = machine();
     machine.servo_in().unwrap();
     assert_eq!(stand(&mut machine, 0, 10, 0).pulse, servo::from_us(1500));
@@ -43,14 +43,14 @@ fn the_tool_moves_by_hand_in_hold_only_and_is_out_again_when_the_machine_starts(
 
     machine.servo_in().unwrap();
     machine.start(false).unwrap();
-    assert_eq!(stand(&mut machine, 30, 10, 0).pulse, servo::from_us(2000), "the ground is not known");
+    assert_eq!(stand(&mut machine, 30, 10, 0).pulse, servo::from_us(2000), "the ground is unknown");
     assert_eq!(machine.servo_in(), Err(CommandError::NotInHold));
     machine.turn(readings(40_000, 0), [Edge::Lost { broken: false }]);
     assert_eq!(machine.servo_in(), Err(CommandError::AlarmLatched));
 }
 
 #[test]
-fn the_lamp_tells_hold_while_nothing_swings() {
+fn the_lamp_shows_hold_while_the_tool_does_not_swing() {
     let mut machine = machine();
     let lit_ms = |machine: &mut Machine, from_ms: u64| {
         (from_ms..from_ms + 2000)
@@ -62,11 +62,11 @@ fn the_lamp_tells_hold_while_nothing_swings() {
     };
     assert!((200..300).contains(&lit_ms(&mut machine, 0)), "a short flash a second");
     machine.servo_by_hand(2000).unwrap();
-    assert!((200..300).contains(&lit_ms(&mut machine, 2000)), "by hand as well");
+    assert!((200..300).contains(&lit_ms(&mut machine, 2000)), "also while the servo is driven directly");
 }
 
 #[test]
-fn hold_and_the_switch_going_off_end_what_is_done_by_hand() {
+fn hold_and_the_switch_going_off_end_a_manual_test() {
     let out = servo::from_us(2000);
     let mut machine = machine();
     machine.servo_in().unwrap();
@@ -93,7 +93,7 @@ fn hold_and_the_switch_going_off_end_what_is_done_by_hand() {
 }
 
 #[test]
-fn what_moves_the_tool_in_hold_needs_a_machine_that_stands_and_ends_when_it_rolls() {
+fn manual_tests_need_a_standing_machine_and_end_when_it_rolls() {
     type Command = fn(&mut Machine) -> Result<(), CommandError>;
     let moves: [Command; 4] = [
         Machine::servo_in,
@@ -102,7 +102,7 @@ fn what_moves_the_tool_in_hold_needs_a_machine_that_stands_and_ends_when_it_roll
         |machine| machine.test_row(500),
     ];
     let out = servo::from_us(2000);
-    // 2.5 km/h forward, and half of a kilometre an hour back.
+    // 2.5 km/h forward, and 0.5 km/h back.
     for ticks_a_second in [1326, -265] {
         for (number, moves) in moves.iter().enumerate() {
             let mut machine = machine();
@@ -115,7 +115,7 @@ fn what_moves_the_tool_in_hold_needs_a_machine_that_stands_and_ends_when_it_roll
             };
             let count = roll(&mut machine, 0, 500, 0);
             assert_eq!(moves(&mut machine), Err(CommandError::Rolls), "{number}");
-            assert_eq!(machine.servo_out(), Ok(()), "out is safe");
+            assert_eq!(machine.servo_out(), Ok(()), "out is always allowed");
             assert_eq!(stand(&mut machine, 500, 200, count).pulse, out);
             assert_eq!(moves(&mut machine), Ok(()), "{number}");
             assert_ne!(stand(&mut machine, 700, 200, count).pulse, out, "{number}");
@@ -129,7 +129,7 @@ fn what_moves_the_tool_in_hold_needs_a_machine_that_stands_and_ends_when_it_roll
 }
 
 #[test]
-fn an_alarm_ends_what_is_done_by_hand() {
+fn an_alarm_ends_a_manual_test() {
     let mut machine = machine();
     machine.servo_in().unwrap();
     machine.turn(readings(0, 0), [Edge::Lost { broken: false }]);
@@ -138,7 +138,7 @@ fn an_alarm_ends_what_is_done_by_hand() {
 }
 
 #[test]
-fn a_distance_that_was_rolled_sets_the_wheel() {
+fn a_rolled_distance_calibrates_the_wheel() {
     let mut machine = machine();
     machine.set(Setting::WheelMm, 410).unwrap();
     stand(&mut machine, 0, 1, 0);
@@ -147,18 +147,18 @@ fn a_distance_that_was_rolled_sets_the_wheel() {
     stand(&mut machine, 1, 1, 18_500);
     assert_eq!(machine.calibrate(999, false), Err(CommandError::TooShort));
     assert_eq!((machine.calibrate(5000, false), machine.distance().counted()), (Err(CommandError::WheelDiffers), 3700));
-    assert_eq!(machine.settings().get(Setting::TicksPerM), 0, "nothing was changed");
+    assert_eq!(machine.settings().get(Setting::TicksPerM), 0, "not changed");
     assert_eq!(machine.calibrate(10_000, false), Ok(()));
     assert_eq!(machine.settings().get(Setting::TicksPerM), 1850);
     assert_eq!(machine.settings().ticks(Setting::BeamToToolMm).0, 740);
-    // Another wheel has not been measured.
+    // Another wheel has no calibration.
     machine.set(Setting::WheelMm, 400).unwrap();
     assert_eq!(machine.settings().get(Setting::TicksPerM), 0);
     machine.start(false).unwrap();
     assert_eq!(machine.calibrate(10_000, false), Err(CommandError::NotInHold));
 }
 
-/// Has the servo timed, with a tool that is out so long after it was told to, and leaves that long after.
+/// Times the servo, with a tool that is out this long after its command, and leaves this long after it.
 fn swings(machine: &mut Machine, out_ms: u64, in_ms: u64) -> Vec<Event> {
     for now in 0..1_000 {
         machine.turn(Readings { end_switch_on: true, ..readings(now * 1000, 0) }, []);
@@ -172,7 +172,7 @@ fn swings(machine: &mut Machine, out_ms: u64, in_ms: u64) -> Vec<Event> {
         if machine.tool_out() != told_out {
             (told_out, told_at) = (machine.tool_out(), now);
         }
-        assert!(now >= 9_990 || machine.lamp_is_lit() == machine.tool_out(), "the LED marks the commands");
+        assert!(now >= 9_990 || machine.lamp_is_lit() == machine.tool_out(), "the LED shows the commands");
     }
     std::iter::from_fn(|| machine.next_event()).collect()
 }
@@ -189,10 +189,10 @@ fn the_end_switch_times_the_servo() {
 }
 
 #[test]
-fn leads_that_do_not_fit_are_told_and_not_set() {
+fn leads_that_do_not_fit_are_reported_and_not_set() {
     let mut machine = machine();
     machine.set(Setting::EndSwitch, 1).unwrap();
-    // 400 ms at the top speed of 1.3 m/s are more than the beam's distance.
+    // 400 ms at the top speed of 1.3 m/s exceed the beam's distance.
     let events = swings(&mut machine, 400, 55);
     assert!(matches!(events[..], [Event::Calibrated { outcome: Outcome::Measured(_), fits: false }]), "{events:?}");
     assert_eq!(machine.settings().get(Setting::LeadOutMs), Setting::LeadOutMs.description().default);
@@ -207,7 +207,7 @@ fn without_an_end_switch_the_swings_are_shown() {
 }
 
 #[test]
-fn swings_can_be_ended() {
+fn timed_swings_can_be_ended() {
     let mut machine = machine();
     machine.calibrate_servo().unwrap();
     assert_eq!(stand(&mut machine, 0, 100, 0).pulse, servo::from_us(1500));
@@ -216,14 +216,14 @@ fn swings_can_be_ended() {
 }
 
 #[test]
-fn the_tool_swings_as_for_a_row_whatever_the_sensors_say() {
+fn a_dry_run_ignores_the_sensors() {
     let mut machine = machine();
     stand(&mut machine, 0, 300, 77);
     machine.test_row(500).unwrap();
     machine.tell_events(true);
     let mut swings = Vec::new();
     for now in 300..10_000 {
-        // Nothing is wired: the beam flickers faster than anybody can count, and the encoder's contacts pick up hum.
+        // Nothing is wired: the open beam flickers very fast, and the encoder's contacts pick up hum.
         let broken = now % 2 == 0;
         let seen = Edge::Seen { position: Position::new(77), broken, second_broken: false };
         let lost = (now % 5 == 0).then_some(Edge::Lost { broken });
@@ -233,7 +233,7 @@ fn the_tool_swings_as_for_a_row_whatever_the_sensors_say() {
         if swings.len() == 14 {
             break;
         }
-        assert_eq!(machine.lamp_is_lit(), machine.tool_out(), "the LED marks the commands");
+        assert_eq!(machine.lamp_is_lit(), machine.tool_out(), "the LED shows the commands");
     }
     let position = readings(0, 77).position;
     let expected: Vec<_> = (0..14).map(|swing| Event::Swing { out: swing % 2 == 1, position }).collect();
@@ -241,8 +241,8 @@ fn the_tool_swings_as_for_a_row_whatever_the_sensors_say() {
 }
 
 #[test]
-fn a_row_that_is_played_leaves_what_is_known_of_the_ground_alone() {
-    // A canopy is known, another stands in the beam, and a row is played.
+fn a_dry_run_does_not_change_the_known_ground() {
+    // A canopy is known, another is in the beam, and a dry run starts.
     let row = |played: bool| {
         let mut machine = machine();
         let mut milliseconds = 0;
@@ -262,7 +262,7 @@ fn a_row_that_is_played_leaves_what_is_known_of_the_ground_alone() {
         stand(&mut machine, milliseconds + 200, 8800, 1999);
         let played_on = format!("{:?} {:?} {}", machine.zones(), machine.unseen_mm(), machine.detections().len());
         machine.start(false).unwrap();
-        // Which way the tool goes, millisecond for millisecond, over both canopies.
+        // The tool's command over both canopies, each millisecond.
         let mut tool = Vec::new();
         for count in 2000..4500 {
             milliseconds += 1;
@@ -280,7 +280,7 @@ fn a_row_that_is_played_leaves_what_is_known_of_the_ground_alone() {
 }
 
 #[test]
-fn whatever_comes_in_the_turn_in_which_a_row_ends_the_next_real_plant_keeps_the_tool_out() {
+fn any_command_in_the_last_turn_of_a_dry_run_leaves_the_next_real_plant_its_zone() {
     type Command = fn(&mut Machine) -> Result<(), CommandError>;
     let commands: [Command; 7] = [
         |_| Ok(()),
@@ -315,7 +315,7 @@ fn whatever_comes_in_the_turn_in_which_a_row_ends_the_next_real_plant_keeps_the_
                 machine.turn(readings(milliseconds * 1000, count), edge);
                 let window = (1010..2150).contains(&count);
                 assert!(!window || machine.zones() == 1, "command {number}, {count}");
-                // What the command leads by, on its way in.
+                // The lead of the command to come in.
                 let tool = count - 764 + 42;
                 let over = (1000 - 95 + 42..=1300 + 95).contains(&tool) || tool < 0;
                 assert!(machine.tool_out() || !over, "command {number} at {at_ms} ms: in at {tool}");
@@ -326,7 +326,7 @@ fn whatever_comes_in_the_turn_in_which_a_row_ends_the_next_real_plant_keeps_the_
 }
 
 #[test]
-fn a_row_that_is_played_can_be_ended() {
+fn a_dry_run_can_be_ended() {
     let mut machine = machine();
     machine.test_row(1000).unwrap();
     stand(&mut machine, 0, 100, 0);
@@ -339,7 +339,7 @@ fn a_row_that_is_played_can_be_ended() {
 }
 
 #[test]
-fn a_row_is_played_at_working_speeds_and_in_hold_only() {
+fn a_dry_run_needs_a_working_speed_and_hold() {
     let mut machine = machine();
     for wrong_mm_s in [0, 99, 1401, u16::MAX] {
         assert_eq!(machine.test_row(wrong_mm_s), Err(CommandError::TestSpeed));
@@ -349,7 +349,7 @@ fn a_row_is_played_at_working_speeds_and_in_hold_only() {
 }
 
 #[test]
-fn settings_are_taken_back_from_the_memory_or_from_the_table() {
+fn settings_are_reloaded_from_the_memory_or_from_the_table() {
     let mut machine = machine();
     assert_eq!(machine.take_saved(), Err(CommandError::NothingSaved));
     assert_eq!(machine.saved(Setting::K), None);

@@ -1,10 +1,10 @@
-//! A second beam: a wheel that slips, a wire that is torn, and what only one of the beams has seen.
+//! A second beam: wheel slip, a torn wire, and detections of one beam only.
 
 mod common;
 #[path = "common/rolling.rs"]
 mod rolling;
 
-use common::{ByWidth, machine, machine_that_judges};
+use common::{ByWidth, machine, machine_with};
 use control::{
     alarm::{Alarm, Warning},
     operate::{command_error::CommandError, event::Event, state::State},
@@ -13,7 +13,7 @@ use control::{
 use proptest::prelude::*;
 use rolling::{MARGIN_MM, Rolling, SECOND_BEAM_MM};
 
-/// A machine at work along plants, from and to, that both beams see.
+/// A machine at work along plants, from and to, seen by both beams.
 fn along(plants_mm: &[(f64, f64)]) -> Rolling {
     with_beams(plants_mm.to_vec(), plants_mm.to_vec())
 }
@@ -23,13 +23,13 @@ fn with_beams(first_mm: Vec<(f64, f64)>, second_mm: Vec<(f64, f64)>) -> Rolling 
 }
 
 impl Rolling {
-    /// Rolls on with a wheel that slips by so many percent.
+    /// The wheel slips by this percentage from here on.
     fn slipping(mut self, percent: f64) -> Self {
         self.turns = 1.0 / (1.0 - percent / 100.0);
         self
     }
 
-    /// The alarms, and the ground below the first beam when each came.
+    /// The alarms, and the first beam's position at each.
     fn alarms(&self) -> Vec<(Alarm, f64)> {
         let alarm = |&(event, place_mm): &(Event, f64)| match event {
             Event::Alarm { alarm, .. } => Some((alarm, place_mm)),
@@ -38,7 +38,7 @@ impl Rolling {
         self.told.iter().filter_map(alarm).collect()
     }
 
-    /// The slips that were told, in thousandths.
+    /// The reported slips, in thousandths.
     fn slips(&self) -> Vec<i16> {
         self.told_of(|event| match event {
             Event::Slip { permille } => Some(permille),
@@ -46,7 +46,7 @@ impl Rolling {
         })
     }
 
-    /// By how much of its margin each of these plants was left alone, on both sides.
+    /// The least ground kept clear beside any of these plants.
     fn least_margin_mm(&self, plants_mm: &[(f64, f64)]) -> f64 {
         let off = |place: f64, (from, to): (f64, f64)| if place < from { from - place } else { (place - to).max(0.0) };
         let all = plants_mm.iter().flat_map(|&plant| self.weeded_mm.iter().map(move |&place| off(place, plant)));
@@ -59,20 +59,20 @@ fn plants(count: usize) -> Vec<(f64, f64)> {
 }
 
 #[test]
-fn a_wheel_that_slips_costs_no_margin_behind_the_second_plant() {
+fn a_slipping_wheel_costs_no_margin_after_the_second_plant() {
     for percent in [-30.0, -10.0, 5.0, 10.0, 30.0] {
         let plants = plants(12);
         let mut rolling = along(&plants).slipping(percent);
         rolling.roll_to(7000.0, 500.0);
         assert_eq!((&rolling.alarms()[..], rolling.machine.state()), (&[][..], State::Work), "{percent} %");
-        let slip = rolling.machine.slip_permille().expect("plants have told it");
+        let slip = rolling.machine.slip_permille().expect("plants have given it");
         assert!((f64::from(slip) - 10.0 * percent).abs() < 6.0, "{slip} for {percent} %");
         let before = plants[3..].iter().map(|&(from, _)| {
             let nearest =
                 rolling.weeded_mm.iter().filter(|&&place| place < from).fold(f64::MIN, |most, &place| most.max(place));
             from - nearest
         });
-        // Leads are times, and what is rolled in them is measured by the wheel.
+        // Leads are times, and the wheel measures the distance rolled in them.
         let expected_mm = MARGIN_MM + 500.0 * 0.231;
         for led_mm in before {
             assert!((led_mm - expected_mm).abs() < 8.0, "{percent} %: out {led_mm} mm before the plant");
@@ -97,18 +97,18 @@ fn a_torn_wire_of_the_second_beam_is_an_alarm_within_three_plants() {
     let mut rolling = with_beams(plants.clone(), plants[..5].to_vec());
     rolling.roll_to(6000.0, 500.0);
     let &[(Alarm::SecondBeamBlind, place_mm)] = &rolling.alarms()[..] else { panic!("{:?}", rolling.told) };
-    // The third plant that it missed has passed it, and the next one has not come to the first.
+    // The third missed plant has passed the second beam, and the next has not reached the first.
     assert!(plants[7].1 + SECOND_BEAM_MM < place_mm && place_mm < plants[8].0 + SECOND_BEAM_MM, "{place_mm}");
 }
 
 #[test]
-fn a_torn_wire_of_the_first_beam_is_an_alarm_within_three_plants_and_costs_none() {
+fn a_torn_wire_of_the_first_beam_is_an_alarm_within_three_plants_and_costs_no_plant() {
     let plants = plants(12);
     let mut rolling = with_beams(plants[..5].to_vec(), plants.clone());
     rolling.roll_to(6000.0, 500.0);
     let &[(Alarm::BeamBlind, place_mm)] = &rolling.alarms()[..] else { panic!("{:?}", rolling.told) };
     assert!(plants[7].1 + SECOND_BEAM_MM < place_mm && place_mm < plants[8].0 + SECOND_BEAM_MM, "{place_mm}");
-    assert!(rolling.least_margin_mm(&plants[..8]) > 0.0, "the second beam's sight keeps them");
+    assert!(rolling.least_margin_mm(&plants[..8]) > 0.0, "the second beam's detections keep them");
     assert!(rolling.weeded_mm.iter().any(|&place| place > plants[6].1), "and the tool works in between");
 }
 
@@ -126,7 +126,7 @@ fn an_insect_in_one_beam_is_no_alarm_and_half_a_plant_moves_nothing() {
 }
 
 #[test]
-fn an_alarm_drops_what_was_measured_and_two_plants_tell_it_again() {
+fn an_alarm_resets_the_slip_and_two_plants_give_it_again() {
     let mut rolling = along(&plants(12)).slipping(10.0);
     rolling.roll_to(2500.0, 500.0);
     assert!(rolling.machine.slip_permille().is_some());
@@ -140,7 +140,7 @@ fn an_alarm_drops_what_was_measured_and_two_plants_tell_it_again() {
 }
 
 #[test]
-fn another_wheel_or_another_place_of_a_beam_drops_what_was_measured_while_the_machine_holds() {
+fn another_wheel_or_beam_position_set_in_hold_resets_the_slip() {
     for (setting, value) in [(Setting::TicksPerM, 2100), (Setting::SecondBeamMm, 180), (Setting::BeamToToolMm, 420)] {
         let mut rolling = along(&plants(12)).slipping(10.0);
         rolling.roll_to(2500.0, 500.0);
@@ -152,7 +152,7 @@ fn another_wheel_or_another_place_of_a_beam_drops_what_was_measured_while_the_ma
 }
 
 #[test]
-fn rolling_back_over_plants_measures_nothing_twice_and_is_no_alarm() {
+fn rolling_back_over_plants_measures_no_plant_twice_and_is_no_alarm() {
     let mut rolling = along(&plants(8));
     rolling.roll_to(2600.0, 500.0);
     let told = rolling.slips().len();
@@ -166,8 +166,8 @@ fn rolling_back_over_plants_measures_nothing_twice_and_is_no_alarm() {
     assert!(rolling.slips().len() > told);
 }
 
-/// A machine at work, by X, the second beam and the margin in mm, that takes everything for a plant; a stand at even distances, of which
-/// each beam misses what is said.
+/// A machine at work, by X, the second beam and the margin in mm, that classifies all as plants; a stand at even distances, with
+/// the plants that each beam misses.
 fn stand(
     [beam_to_tool_mm, second_beam_mm, margin_mm]: [u16; 3],
     [width_mm, spacing_mm]: [f64; 2],
@@ -186,11 +186,11 @@ fn stand(
         (Setting::LeadOutMs, 60),
         (Setting::LeadInMs, 0),
     ];
-    (Rolling::with(machine_that_judges(ByWidth::of_stalks()), first, second, &settings), plants)
+    (Rolling::with(machine_with(ByWidth::of_stalks()), first, second, &settings), plants)
 }
 
 #[test]
-fn what_either_beam_misses_in_a_stand_costs_no_plant_however_dense_it_is() {
+fn plants_missed_by_one_beam_are_kept_in_a_stand_of_any_density() {
     for (machine, stand_mm, mm_s, missed) in [
         ([400, 300, 13], [12.0, 120.0], 139.0, [&[][..], &[12][..]]),
         ([1000, 700, 50], [40.0, 300.0], 278.0, [&[], &[12]]),
@@ -198,7 +198,7 @@ fn what_either_beam_misses_in_a_stand_costs_no_plant_however_dense_it_is() {
         ([1000, 700, 50], [40.0, 150.0], 278.0, [&[], &[]]),
         ([400, 200, 13], [12.0, 80.0], 139.0, [&[12], &[]]),
         ([400, 300, 13], [80.0, 250.0], 139.0, [&[12], &[]]),
-        // Each beam its own, over and over.
+        // Each beam has its own pattern, repeated.
         ([400, 300, 13], [12.0, 120.0], 278.0, [&[5, 11, 17, 23], &[8, 14, 20, 26]]),
         ([400, 200, 20], [40.0, 400.0], 278.0, [&[5, 11, 17, 23], &[8, 14, 20, 26]]),
         ([1000, 900, 50], [40.0, 90.0], 278.0, [&[7, 22], &[13, 14, 30]]),
@@ -212,7 +212,7 @@ fn what_either_beam_misses_in_a_stand_costs_no_plant_however_dense_it_is() {
 }
 
 #[test]
-fn a_plant_that_the_first_beam_misses_is_not_taken_for_what_stands_behind_it() {
+fn a_plant_missed_by_the_first_beam_is_not_mixed_up_with_the_next() {
     for behind_mm in [50.0, 70.0, 80.0, 95.0, 120.0, 160.0] {
         let plants: Vec<_> = (1..=12).map(|plant| f64::from(plant) * 400.0).map(|from| (from, from + 40.0)).collect();
         let weed = (plants[8].0 + behind_mm, plants[8].0 + behind_mm + 40.0);
@@ -221,7 +221,7 @@ fn a_plant_that_the_first_beam_misses_is_not_taken_for_what_stands_behind_it() {
         let mut first = both.clone();
         first.remove(8);
         let settings = [(Setting::MarginMm, 20), (Setting::SecondBeamMm, 200), (Setting::LeadInMs, 0)];
-        let mut rolling = Rolling::with(machine_that_judges(ByWidth::of_stalks()), first, both.clone(), &settings);
+        let mut rolling = Rolling::with(machine_with(ByWidth::of_stalks()), first, both.clone(), &settings);
         rolling.roll_to(6000.0, 500.0);
         assert_eq!(rolling.alarms(), []);
         assert!(rolling.least_margin_mm(&both) > 0.0, "{behind_mm} mm: {}", rolling.least_margin_mm(&both));
@@ -229,7 +229,7 @@ fn a_plant_that_the_first_beam_misses_is_not_taken_for_what_stands_behind_it() {
 }
 
 #[test]
-fn a_stand_that_becomes_too_dense_for_the_beams_switches_the_slip_off_and_says_so() {
+fn a_stand_too_dense_for_the_beams_makes_the_slip_unknown_with_a_warning() {
     let sparse = (1..=8).map(|plant| f64::from(plant) * 500.0);
     let dense = (1..=50).map(|plant| 4000.0 + f64::from(plant) * 90.0);
     let plants: Vec<_> = sparse.chain(dense).map(|from| (from, from + 62.0)).collect();
@@ -243,15 +243,15 @@ fn a_stand_that_becomes_too_dense_for_the_beams_switches_the_slip_off_and_says_s
     assert_eq!((rolling.machine.slip_permille(), &rolling.alarms()[..]), (None, &[][..]));
     let warnings = rolling.told_of(|event| matches!(event, Event::Warning(Warning::SlipUnknown)).then_some(()));
     assert_eq!(warnings.len(), 1);
-    assert!(rolling.least_margin_mm(&plants[3..]) > 0.0, "what was believed last and what is without it are both kept");
+    assert!(rolling.least_margin_mm(&plants[3..]) > 0.0, "the zones with the last slip and without it are both kept");
     assert!(rolling.slips().iter().all(|slip| (75..=85).contains(slip)), "{:?}", rolling.slips());
 }
 
 #[test]
-fn weeds_that_both_beams_tell_count_once_toward_an_unknown_crop() {
+fn weeds_reported_by_both_beams_count_once_toward_an_unknown_crop() {
     let enough = Settings::new().get(Setting::MisfitAfter);
     for count in [enough - 1, enough] {
-        // Too dense for the beams to tell apart, so that the second tells each of them again.
+        // Too dense for the beams, so the second beam reports each of them again.
         let weeds: Vec<_> =
             (0..count).map(|weed| 600.0 + 60.0 * f64::from(weed)).map(|from| (from, from + 20.0)).collect();
         let mut rolling = along(&weeds);
@@ -264,7 +264,7 @@ fn weeds_that_both_beams_tell_count_once_toward_an_unknown_crop() {
 }
 
 #[test]
-fn slip_that_jumps_farther_than_ground_makes_it_waits_for_a_third_plant() {
+fn an_implausible_jump_of_slip_needs_a_third_plant() {
     for (percent, told_behind) in [(8.0, 2), (20.0, 3), (-25.0, 3)] {
         let plants = plants(12);
         let mut rolling = along(&plants).slipping(percent);
@@ -277,11 +277,11 @@ fn slip_that_jumps_farther_than_ground_makes_it_waits_for_a_third_plant() {
 }
 
 #[test]
-fn plants_of_nine_millimetres_are_compared_whatever_the_encoder_counts() {
+fn plants_of_nine_millimetres_are_compared_with_every_encoder() {
     for (ticks_per_m, is_told) in [(900, true), (1910, true), (8000, true)] {
         let plants: Vec<_> = (1..=10).map(|plant| f64::from(plant) * 400.0).map(|from| (from, from + 10.0)).collect();
         let settings = [(Setting::TicksPerM, ticks_per_m), (Setting::SecondBeamMm, 200)];
-        let machine = machine_that_judges(ByWidth::of_stalks());
+        let machine = machine_with(ByWidth::of_stalks());
         let mut rolling = Rolling::with(machine, plants.clone(), plants, &settings);
         rolling.turns = f64::from(ticks_per_m) / (1000.0 * rolling::TICKS_A_MM);
         rolling.roll_to(4000.0, 500.0);
@@ -300,7 +300,7 @@ fn fewer_than_64_ticks_between_the_beams_are_refused_with_any_encoder_that_may_w
 }
 
 #[test]
-fn a_second_beam_that_cannot_stand_where_it_is_said_to_is_refused() {
+fn an_impossible_position_of_the_second_beam_is_refused() {
     for (beam_to_tool_mm, second_mm, can_stand) in
         [(400, 71, false), (400, 72, true), (400, 328, true), (400, 329, false), (1000, 900, true), (1001, 500, false)]
     {
@@ -317,7 +317,7 @@ fn a_second_beam_that_cannot_stand_where_it_is_said_to_is_refused() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
-    /// Whatever the wheel slips and however much that changes within metres, the tool keeps off every canopy behind the second plant.
+    /// With any slip, and any change of it within metres, the tool keeps off each canopy after the second plant.
     #[test]
     fn slip_that_changes_by_five_percent_reaches_no_canopy(
         mean in -12.0..15.0_f64,

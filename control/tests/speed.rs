@@ -1,4 +1,4 @@
-//! The speed from readings as the main loop makes them: now and then, and not in step with the encoder.
+//! The speed from readings like the main loop's: irregular, and not synchronous with the encoder.
 
 use control::{
     measure::speed::SpeedMeter,
@@ -6,7 +6,7 @@ use control::{
 };
 use proptest::prelude::*;
 
-/// A machine whose position is any function of time, read every `turn_us`.
+/// A machine whose position is a function of time, read every `turn_us`.
 struct Run {
     meter: SpeedMeter,
     time_us: u64,
@@ -22,7 +22,7 @@ impl Run {
         Self { meter: SpeedMeter::new(Position::new(count), start), time_us: 0, start: (start, count) }
     }
 
-    /// Rolls for `duration_ms`; `ticks` says how far since the start at a time in seconds.
+    /// Rolls for `duration_ms`; `ticks` gives the distance since the start at a time in seconds.
     fn roll(&mut self, duration_ms: u64, turn_us: u64, ticks: impl Fn(f64) -> f64) -> &mut Self {
         let end = self.time_us + duration_ms * 1000;
         while self.time_us < end {
@@ -73,7 +73,7 @@ proptest! {
 }
 
 #[test]
-fn a_stop_is_felt_within_tens_of_milliseconds() {
+fn a_stop_shows_within_tens_of_milliseconds() {
     let mut run = Run::new();
     run.roll(500, 200, |time| 1326.0 * time);
     run.roll(50, 200, |_| 663.0);
@@ -81,7 +81,7 @@ fn a_stop_is_felt_within_tens_of_milliseconds() {
 }
 
 #[test]
-fn a_start_from_standstill_is_not_held_back_by_the_time_it_stood() {
+fn a_start_from_standstill_is_not_delayed_by_the_time_of_standing() {
     let mut run = Run::new();
     run.roll(5000, 200, |_| 0.0);
     run.roll(100, 200, |time| 1326.0 * (time - 5.0));
@@ -104,7 +104,7 @@ fn a_machine_that_trembles_on_an_edge_stands() {
 }
 
 #[test]
-fn one_tick_backwards_moves_the_answer_by_its_share() {
+fn one_tick_backwards_changes_the_speed_by_its_share() {
     let mut run = Run::new();
     run.roll(500, 200, |time| 1326.0 * time);
     run.roll(20, 200, |time| 1326.0 * time - if time < 0.505 { 1.5 } else { 0.0 });
@@ -112,11 +112,11 @@ fn one_tick_backwards_moves_the_answer_by_its_share() {
 }
 
 #[test]
-fn a_speed_is_told_when_it_has_changed_and_only_then() {
+fn the_speed_is_returned_only_when_it_has_changed() {
     let mut meter = SpeedMeter::new(Position::new(0), Instant::default());
     let mut known = meter.speed();
     for milliseconds in 0..2000_u32 {
-        // It gains speed, rolls steadily and stands.
+        // It accelerates, rolls at constant speed and stands.
         let count = (milliseconds * milliseconds / 500).min(milliseconds).min(1000);
         let now = Instant::default() + Interval::from_ms(milliseconds);
         let told = meter.read(now, Position::new(count as i32));
@@ -127,8 +127,8 @@ fn a_speed_is_told_when_it_has_changed_and_only_then() {
 }
 
 #[test]
-fn a_creeping_wheel_whose_edges_come_unevenly_is_not_taken_to_falter() {
-    // Every other edge comes late by a third of the way between two, as encoders give them.
+fn uneven_edges_do_not_make_a_creeping_wheel_falter() {
+    // Each second edge is late by a third of the distance between two, as with real encoders.
     let ticks = |time: f64| {
         let place = 60.0 * time;
         let is_yet_to_come = (place as u32).is_multiple_of(2) && place.fract() < 1.0 / 3.0;
@@ -143,21 +143,21 @@ fn a_creeping_wheel_whose_edges_come_unevenly_is_not_taken_to_falter() {
 }
 
 #[test]
-fn a_silent_wheel_is_slower_than_a_tick_in_its_silence_whichever_way_it_turned() {
+fn a_silent_wheel_is_slower_than_a_tick_in_its_silence_in_both_directions() {
     for direction in [1.0, -1.0] {
         let mut run = Run::new();
         run.roll(500, 200, |time| direction * 1000.0 * time);
         for silence_ms in 1..500 {
             run.roll(1, 200, |_| direction * 500.0);
             let speed = direction * run.speed();
-            // The last tick may have come up to a millisecond sooner, and the meter looks at the silence whenever an eighth more of it
-            // has gone by.
+            // The last tick may have come up to a millisecond earlier. The meter checks the silence only after each further eighth
+            // of it.
             let [least, most] = [silence_ms + 1, silence_ms].map(|ms| 1000.0 / f64::from(ms));
             let is_of_the_silence = (least - 1.0..=most * 9.0 / 8.0 + 1.0).contains(&speed);
             assert!(silence_ms < 12 || is_of_the_silence, "{speed} after {silence_ms} ms");
         }
     }
-    // What was slower already is no faster for it.
+    // A speed that was lower already does not rise.
     let mut run = Run::new();
     run.roll(2000, 200, |time| 10.0 * time);
     for _ in 0..200 {
@@ -167,7 +167,7 @@ fn a_silent_wheel_is_slower_than_a_tick_in_its_silence_whichever_way_it_turned()
 }
 
 #[test]
-fn a_wheel_that_falls_silent_has_its_speed_told_anew_for_each_eighth_of_the_silence_and_not_every_turn() {
+fn the_speed_of_a_silent_wheel_is_updated_at_each_eighth_of_the_silence_and_not_every_turn() {
     let mut run = Run::new();
     run.roll(500, 200, |time| 1000.0 * time);
     let (mut known, mut told) = (run.speed(), 0);
@@ -176,6 +176,6 @@ fn a_wheel_that_falls_silent_has_its_speed_told_anew_for_each_eighth_of_the_sile
         told += u32::from(run.speed() != known);
         known = run.speed();
     }
-    // From 10 to 500 ms there are 34 eighths, the last of which are less than a tick a second apart.
+    // From 10 to 500 ms there are 34 eighths; the last ones differ by less than a tick a second.
     assert!((20..=34).contains(&told), "{told} times");
 }

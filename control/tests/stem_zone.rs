@@ -1,10 +1,10 @@
-//! A stem's zone: of a single plant that was seen whole, the tool keeps off the middle alone, and of anything else off all of it.
+//! Stem zones: of a single plant seen whole, the middle is kept, and of any other detection the full width.
 
 mod common;
 #[path = "common/rolling.rs"]
 mod rolling;
 
-use common::{ByWidth, machine_that_judges};
+use common::{ByWidth, machine_with};
 use control::settings::Setting;
 use proptest::prelude::*;
 use rolling::{BEAM_TO_TOOL_MM, Rolling, SECOND_BEAM_MM};
@@ -12,13 +12,13 @@ use rolling::{BEAM_TO_TOOL_MM, Rolling, SECOND_BEAM_MM};
 const ZONE_MM: f64 = 96.0;
 const MARGIN_MM: f64 = 10.0;
 
-/// So much of either side is given up at the most.
+/// Most that is cut off either side.
 const MOST_MM: f64 = ZONE_MM * 13.0 / 64.0;
 
-/// Two ticks at either end, what is rolled in a turn, and the answer that comes a turn later.
+/// Tolerance: two ticks at either end, a turn's distance, and the command of the next turn.
 const TOLERANCE_MM: f64 = 2.5;
 
-/// A tool that swings in no time, and so tells where the ground is kept.
+/// A tool without swing time, so that it shows where the ground is closed.
 const SETTINGS: [(Setting, u16); 4] = [
     (Setting::StemZoneMm, ZONE_MM as u16),
     (Setting::MarginMm, MARGIN_MM as u16),
@@ -36,7 +36,7 @@ fn with_beams(first_mm: Vec<(f64, f64)>, second_mm: Vec<(f64, f64)>) -> Rolling 
 }
 
 impl Rolling {
-    /// The ground that was left alone around a place, less the margins.
+    /// The ground kept around a place, without the margins.
     fn kept_mm(&self, place_mm: f64) -> (f64, f64) {
         let before = self.weeded_mm.iter().copied().filter(|&mm| mm < place_mm).fold(f64::MIN, f64::max);
         let behind = self.weeded_mm.iter().copied().filter(|&mm| mm > place_mm).fold(f64::MAX, f64::min);
@@ -52,7 +52,7 @@ impl Rolling {
 }
 
 #[test]
-fn the_tool_works_under_the_leaves_of_a_single_plant_by_a_part_of_the_zone_at_the_most() {
+fn the_tool_works_under_the_leaves_of_a_single_plant_by_at_most_a_part_of_the_zone() {
     for width_mm in [70.0, 96.0, 110.0, 132.0, 150.0, 190.0, 300.0] {
         let mut rolling = along(vec![(600.0 - width_mm / 2.0, 600.0 + width_mm / 2.0)]);
         rolling.roll_to(1400.0, 300.0);
@@ -69,7 +69,7 @@ fn without_a_zone_the_canopy_is_kept_from_end_to_end() {
 }
 
 #[test]
-fn leaves_are_a_plants_and_parts_that_stand_farther_from_each_other_are_kept_from_end_to_end() {
+fn narrow_gaps_belong_to_a_plant_and_wide_gaps_keep_the_full_width() {
     for (gap_mm, is_one) in [(2.0, true), (9.0, true), (12.0, false), (18.0, false)] {
         let mut rolling = along(vec![(520.0, 590.0), (590.0 + gap_mm, 680.0)]);
         rolling.roll_to(1400.0, 300.0);
@@ -79,16 +79,16 @@ fn leaves_are_a_plants_and_parts_that_stand_farther_from_each_other_are_kept_fro
 }
 
 #[test]
-fn the_rest_of_something_is_kept_from_end_to_end() {
+fn a_cut_detection_is_kept_from_end_to_end() {
     let mut rolling = along(vec![(-50.0, 100.0)]);
     rolling.roll_to(1400.0, 300.0);
     assert!((rolling.kept_mm(0.0).1 - 100.0).abs() < TOLERANCE_MM, "{:?}", rolling.kept_mm(0.0));
 }
 
 #[test]
-fn what_is_not_known_before_the_next_one_comes_is_kept_from_end_to_end() {
+fn a_detection_unclassified_before_the_next_is_kept_from_end_to_end() {
     let plants = vec![(500.0, 650.0), (680.0, 830.0)];
-    let machine = machine_that_judges(ByWidth::late_by(1250));
+    let machine = machine_with(ByWidth::late_by(1250));
     let mut rolling = Rolling::with(machine, plants, Vec::new(), &SETTINGS);
     rolling.roll_to(1600.0, 300.0);
     rolling.assert_kept(500.0, 650.0);
@@ -96,7 +96,7 @@ fn what_is_not_known_before_the_next_one_comes_is_kept_from_end_to_end() {
 }
 
 #[test]
-fn the_second_beam_has_the_last_word_on_where_a_plant_ends() {
+fn the_second_beam_decides_where_a_plant_ends() {
     for off_mm in [-8.0, 8.0] {
         let plant = (500.0, 650.0);
         let mut rolling = with_beams(vec![plant], vec![(plant.0 + off_mm, plant.1 + off_mm)]);
@@ -106,7 +106,7 @@ fn the_second_beam_has_the_last_word_on_where_a_plant_ends() {
 }
 
 #[test]
-fn a_leaf_near_the_end_moves_nothing_however_often_it_is_passed() {
+fn a_leaf_near_the_end_changes_nothing_when_passed_again() {
     let leaves = vec![(500.0, 509.0), (514.0, 520.0), (525.0, 630.0), (634.0, 639.0), (643.0, 650.0)];
     let mut rolling = with_beams(leaves.clone(), leaves);
     rolling.roll_to(880.0, 300.0);
@@ -119,14 +119,14 @@ fn a_leaf_near_the_end_moves_nothing_however_often_it_is_passed() {
 }
 
 #[test]
-fn a_plant_that_the_second_beam_sees_go_on_is_kept_from_end_to_end() {
+fn a_plant_longer_in_the_second_beam_is_kept_from_end_to_end() {
     let mut rolling = with_beams(vec![(500.0, 650.0)], vec![(500.0, 680.0)]);
     rolling.roll_to(1400.0, 300.0);
     rolling.assert_kept(500.0, 680.0);
 }
 
 #[test]
-fn what_only_the_second_beam_sees_is_kept_from_end_to_end() {
+fn a_detection_of_the_second_beam_alone_is_kept_from_end_to_end() {
     let mut rolling = with_beams(vec![(500.0, 650.0)], vec![(500.0, 650.0), (1000.0, 1150.0)]);
     rolling.roll_to(1800.0, 300.0);
     rolling.assert_kept(1000.0, 1150.0);
@@ -135,10 +135,10 @@ fn what_only_the_second_beam_sees_is_kept_from_end_to_end() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(200))]
 
-    /// Plants that have grown together, ragged ones, and weeds that touch: nowhere does the tool come nearer to a stem than what a single
-    /// plant gives up on either side, wherever in its own canopy that stem stands.
+    /// Plants that have grown together, ragged plants, and weeds that touch. The tool never comes nearer to a stem than a single
+    /// plant's trim allows, at each position of the stem in its canopy.
     #[test]
-    fn no_stem_is_nearer_to_the_tool_than_its_own_leaves_reach_less_what_one_side_gives_up(
+    fn no_stem_is_nearer_to_the_tool_than_a_single_plants_trim_allows(
         plants in prop::collection::vec((70.0..200.0_f64, prop::option::of((20.0..120.0_f64, 70.0..200.0_f64)), 150.0..400.0_f64), 1..8),
         speed_mm_s in 100.0..900.0_f64,
     ) {

@@ -1,21 +1,21 @@
-//! A byte of a table that lies in flash.
+//! Reads a byte of a table in flash.
 //!
-//! [`avr_progmem`] reads values of any size, by a loop that copies them to the stack: 50 cycles for a single byte, where the chip's
-//! instruction takes 3. Who reads byte after byte, as the console does its texts, reads them by [`byte`]. Off the chip a table
-//! lies where everything does.
+//! [`avr_progmem`] reads values of any size with a loop that copies to the stack: 50 cycles for a byte. The chip's instruction
+//! takes 3. Code that reads many single bytes, such as the console's texts, uses [`byte`]. On the host the table is in ordinary
+//! memory.
 
 #![no_std]
 
 use avr_progmem::{raw::read_byte, wrapper::ProgMem};
 
-/// The byte at a place of a table, from 0 to `LENGTH` - 1.
+/// The byte at an index of a table, from 0 to `LENGTH` - 1.
 ///
 /// # Panics
-/// Behind the table's end.
+/// If `place` is beyond the table.
 #[inline(always)]
 pub fn byte<const LENGTH: usize>(table: &ProgMem<[u8; LENGTH]>, place: usize) -> u8 {
     assert!(place < LENGTH);
-    // SAFETY: a `ProgMem` points to a table that lies in flash, as whoever makes one vouches for, and the place is within it.
+    // SAFETY: the maker of a `ProgMem` guarantees that it points to a table in flash, and `place` is within it.
     unsafe { read_byte(table.as_ptr().cast::<u8>().add(place)) }
 }
 
@@ -26,14 +26,14 @@ mod tests {
     }
 
     #[test]
-    fn each_byte_is_read_from_its_place() {
+    fn each_byte_is_read_by_its_index() {
         let read: [u8; 4] = core::array::from_fn(|place| super::byte(&TABLE, place));
         assert_eq!(&read, b"beam");
     }
 
     #[test]
     #[should_panic(expected = "place < LENGTH")]
-    fn there_is_nothing_behind_the_end() {
+    fn a_place_beyond_the_end_panics() {
         super::byte(&TABLE, 4);
     }
 }

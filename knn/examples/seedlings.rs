@@ -1,7 +1,7 @@
 //! Tells beet seedlings from two weeds by the size of their leaves: `cargo run -p knn --example seedlings`.
 //!
-//! The measurements are made up, but of the right size. The scale and the examples are computed while compiling, as on
-//! a microcontroller, and one more example is added at run time.
+//! The measurements are invented, with plausible sizes. The compiler calculates scale and examples, as for a microcontroller. One
+//! more example is added at run time.
 
 use knn::{Answer, ClassifyError, Example, Kind, Range, Scale, Table, classify};
 
@@ -27,7 +27,7 @@ const MEASURED: [([i32; 3], u8); 12] = [
 const SCALE: Scale<3> =
     Scale::new([Range { lowest: 0, highest: 90 }, Range { lowest: 0, highest: 50 }, Range { lowest: 0, highest: 50 }]);
 
-/// Farther than this from every example (squared), and a plant is none of the three.
+/// Squared distance from all examples beyond which a plant is none of the three.
 const RADIUS: u32 = 1_000;
 
 fn main() -> Result<(), ClassifyError> {

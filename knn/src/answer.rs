@@ -1,30 +1,30 @@
-//! What a search answers, and why there may be no answer.
+//! The result of a search, and the errors.
 
 /// The largest k.
 pub const MAX_K: u8 = 15;
 
-/// What an answer is worth.
+/// How reliable an answer is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Kind {
     /// One class has more votes than any other, and the nearest example is within the radius.
     Known,
     /// Two or more classes share the most votes; the nearest example is within the radius.
     Tie,
-    /// The nearest example is farther than the radius: nothing like it was learned.
+    /// The nearest example is farther than the radius: no example is similar.
     Stranger,
 }
 
-/// The class of a query, and what speaks for it.
+/// The class of a query, and its votes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Answer<const CLASSES: usize> {
-    /// The class with the most votes. Among equals the one with the nearest example; among these the smallest label.
-    /// For a [`Kind::Tie`] or a [`Kind::Stranger`] it is only the best guess.
+    /// The class with the most votes. Among equals the one with the nearest example; among these the smallest label. For a
+    /// [`Kind::Tie`] or a [`Kind::Stranger`] it is only the best guess.
     pub label: u8,
-    /// The votes of each class: k in all, and more where several examples are as far as the k-th nearest.
+    /// The votes of each class: k in all, and more if several examples are as far as the k-th nearest.
     pub votes: [usize; CLASSES],
     /// The squared distance to the nearest example (see [`squared_distance`](crate::squared_distance)).
     pub nearest: u32,
-    /// What the answer is worth.
+    /// How reliable the answer is.
     pub kind: Kind,
 }
 
@@ -33,11 +33,11 @@ pub struct Answer<const CLASSES: usize> {
 pub enum ClassifyError {
     /// k is 0 or above [`MAX_K`].
     KOutOfRange,
-    /// There is no example at all.
+    /// There are no examples.
     NoExamples,
     /// There are examples, but fewer than k.
     TooFewExamples,
-    /// The label of an example that would vote is not below the number of classes.
+    /// A voting example's label is not below the number of classes.
     UnknownLabel,
 }
 

@@ -11,10 +11,10 @@ pub(crate) struct Ballot<const CLASSES: usize> {
 }
 
 impl<const CLASSES: usize> Ballot<CLASSES> {
-    /// Nobody has voted.
+    /// No votes.
     pub(crate) const EMPTY: Self = Self { votes: [0; CLASSES], unknown: false };
 
-    /// So many vote for their class.
+    /// Adds `voters` votes for a class.
     #[inline]
     pub(crate) fn vote(&mut self, label: u8, voters: u8) {
         match self.votes.get_mut(usize::from(label)) {
@@ -23,14 +23,14 @@ impl<const CLASSES: usize> Ballot<CLASSES> {
         }
     }
 
-    /// All these vote, 255 at most.
+    /// Adds a vote for each of these neighbours, at most 255.
     #[inline(always)]
     pub(crate) fn count(&mut self, voters: &[Neighbour]) {
         let [zeros, ones] = self.votes.as_mut_slice() else {
             return voters.iter().for_each(|voter| self.vote(voter.label(), 1));
         };
-        // Of two classes, the labels' sum is the second one's votes: an 8-bit processor adds a label in fewer cycles than it finds
-        // the votes of its class.
+        // With two classes, the sum of the labels is the second one's votes: an 8-bit processor adds a label in fewer cycles than
+        // it finds the votes of its class.
         let (mut sum, mut labels) = (0_u8, 0);
         for voter in voters {
             sum = sum.wrapping_add(voter.label());
@@ -41,7 +41,7 @@ impl<const CLASSES: usize> Ballot<CLASSES> {
         *zeros = zeros.wrapping_add(voters.len()).wrapping_sub(sum.into());
     }
 
-    /// The votes of each class; `None` where a voter's label is not a class.
+    /// The votes of each class; `None` if a voter's label is not a class.
     #[inline(always)]
     pub(crate) const fn votes(&self) -> Option<[usize; CLASSES]> {
         if self.unknown { None } else { Some(self.votes) }

@@ -1,13 +1,13 @@
-//! The class of what was measured: one search from its beginning to its end.
+//! A complete search and its vote.
 
 use crate::{Answer, ClassifyError, Examples, MAX_K, Nearest, Neighbour};
 
-/// The class of `features` by the vote of its `k` nearest examples.
+/// The class of `features`, by the vote of its `k` nearest examples.
 ///
 /// - All examples that are as far as the k-th nearest vote, so that the order of the examples never matters.
 /// - Each vote counts one, near or far; the class with the most votes wins (see [`Answer::label`] for ties).
-/// - `radius` is a squared distance: an answer whose nearest example is farther is a [`Kind::Stranger`](crate::Kind::Stranger), whatever the
-///   votes. `u32::MAX` knows no strangers.
+/// - `radius` is a squared distance: if the nearest example is farther, the answer is a [`Kind::Stranger`](crate::Kind::Stranger)
+///   with any votes. `u32::MAX` turns this off.
 ///
 /// ```
 /// use knn::{Answer, Example, Kind, classify};
@@ -29,7 +29,7 @@ use crate::{Answer, ClassifyError, Examples, MAX_K, Nearest, Neighbour};
 ///
 /// # Errors
 ///
-/// [`ClassifyError`], where k does not suit the number of examples or a voter's label is not a class.
+/// [`ClassifyError`] if k does not fit the number of examples, or a voter's label is not a class.
 pub fn classify<const FEATURES: usize, const CLASSES: usize>(
     examples: &(impl Examples<FEATURES> + ?Sized),
     features: &[u8; FEATURES],
@@ -43,9 +43,9 @@ pub fn classify<const FEATURES: usize, const CLASSES: usize>(
     }
 }
 
-/// [`classify`] with places for the k nearest, at least.
+/// [`classify`] with at least `k` places.
 ///
-/// Out of line, because AVR reaches the first 63 bytes of a stack frame by far the fastest: the places lie in the caller's.
+/// Out of line: AVR accesses the first 63 bytes of a stack frame by far the fastest. The places are in the caller's frame.
 #[inline(never)]
 fn search<const FEATURES: usize, const CLASSES: usize>(
     examples: &(impl Examples<FEATURES> + ?Sized),

@@ -1,17 +1,17 @@
-//! Labelled examples, and the trait by which they are searched wherever they lie.
+//! Labelled examples, and the trait that searches them in any memory.
 //!
-//! Examples may lie in flash, EEPROM or SRAM. The classifier asks a store for one thing only: to give its examples places
-//! among the nearest found so far. A store that can hand out an example has that for nothing; one with a faster way, such as an
-//! assembly loop that reads flash, overrides [`Examples::keep_nearest`]. A pair of stores is a store.
+//! Examples may be in flash, EEPROM or SRAM. The classifier asks a store to do one thing: to add its examples to the nearest found
+//! so far. A store that returns examples one by one gets this search from the trait. A store with a faster way, such as an assembly
+//! loop that reads flash, overrides [`Examples::keep_nearest`]. A pair of stores is a store.
 
 use crate::{Nearest, Neighbour, squared_distance};
 
-/// The label of a place that holds no example.
+/// The label of an empty place.
 pub const VACANT: u8 = u8::MAX;
 
-/// A labelled example: what was measured, and what it was.
+/// A labelled example: its features, and its class.
 ///
-/// It lies in memory as its features and then its label, for a search in assembly.
+/// In memory the features come first, then the label, for a search in assembly.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[repr(C)]
 pub struct Example<const FEATURES: usize> {
@@ -28,7 +28,7 @@ impl<const FEATURES: usize> Example<FEATURES> {
         Self { features, label }
     }
 
-    /// How far it is from `query`, and its class.
+    /// Its distance to `query`, and its class.
     #[inline]
     #[must_use]
     pub fn neighbour_of(&self, query: &[u8; FEATURES]) -> Neighbour {
@@ -38,8 +38,8 @@ impl<const FEATURES: usize> Example<FEATURES> {
 
 /// A store of labelled examples.
 ///
-/// Implemented for slices, arrays, [`Table`](crate::Table), references to stores, and pairs of stores, which are
-/// searched as one set: `(&in_flash, &in_eeprom)`, or `(&a, (&b, &c))` for three.
+/// Implemented for slices, arrays, [`Table`](crate::Table), references to stores, and pairs of stores, which are searched as one
+/// set: `(&in_flash, &in_eeprom)`, or `(&a, (&b, &c))` for three.
 ///
 /// ```
 /// use knn::{Example, Examples};
@@ -55,13 +55,11 @@ pub trait Examples<const FEATURES: usize> {
     /// The number of examples.
     fn len(&self) -> usize;
 
-    /// The example at `index`, or `None` from [`len`](Self::len) on.
+    /// The example at `index`; `None` from [`len`](Self::len) on.
     fn example(&self, index: usize) -> Option<Example<FEATURES>>;
 
-    /// Gives those of its examples that are near enough to `query` a place among the `nearest`: each does what
-    /// [`Nearest::join`] does, in any order.
-    ///
-    /// Distances must equal those of [`squared_distance`].
+    /// Adds its examples that are near enough to `query` to the `nearest`. The result must be that of [`Nearest::join`] with each
+    /// example, in any order, and distances must equal [`squared_distance`].
     #[inline]
     fn keep_nearest<const CLASSES: usize>(&self, query: &[u8; FEATURES], nearest: &mut Nearest<CLASSES>) {
         for example in (0..self.len()).filter_map(|index| self.example(index)) {
@@ -69,8 +67,8 @@ pub trait Examples<const FEATURES: usize> {
         }
     }
 
-    /// Does for examples in memory that somebody else holds what [`keep_nearest`](Self::keep_nearest) does for its own: for a store
-    /// that has a faster way for them too. Those labelled [`VACANT`] are none.
+    /// As [`keep_nearest`](Self::keep_nearest), for examples in another store's SRAM, if this store has a faster way for them.
+    /// Skips those labelled [`VACANT`].
     #[inline]
     fn keep_nearest_of<const CLASSES: usize>(
         &self,
@@ -151,7 +149,7 @@ impl<const FEATURES: usize, Store: Examples<FEATURES> + ?Sized> Examples<FEATURE
     }
 }
 
-/// Two stores searched as one set; the second's examples are counted after the first's.
+/// Two stores searched as one; the second's examples follow the first's.
 impl<const FEATURES: usize, First: Examples<FEATURES>, Second: Examples<FEATURES>> Examples<FEATURES>
     for (First, Second)
 {

@@ -3,11 +3,10 @@
 //!
 //! # How it works
 //!
-//! A [`Scale`] turns measured integers into a byte a feature, so that none drowns another. Labelled [`Example`]s lie in
-//! flash, EEPROM or SRAM behind the trait [`Examples`], and several stores are searched as one; a [`Table`] in SRAM
-//! takes new ones while the machine works. [`classify`] finds the k nearest and counts their votes. The answer says
-//! whether it is [`Kind::Known`], a [`Kind::Tie`] or a [`Kind::Stranger`], and is an error, never a class, where k does
-//! not suit the examples.
+//! A [`Scale`] turns measured integers into a byte a feature, so that no feature outweighs another. Labelled [`Example`]s are in
+//! flash, EEPROM or SRAM behind the trait [`Examples`], and several stores are searched as one. A [`Table`] in SRAM takes new
+//! examples at run time. [`classify`] finds the k nearest and counts their votes. The answer says whether it is [`Kind::Known`], a
+//! [`Kind::Tie`] or a [`Kind::Stranger`]. If k does not fit the examples, it is an error, never a class.
 //!
 //! ```
 //! use knn::{Answer, Example, Kind, Range, Scale, Table, classify};
@@ -30,9 +29,9 @@
 //! # Rules
 //!
 //! - All examples as far as the k-th nearest vote, so that their order never changes the answer.
-//! - Each vote counts one. Among classes with equal votes the one with the nearest example is named, among these the
-//!   smallest label, and the answer is a tie.
-//! - A nearest example beyond the radius makes a stranger, whatever the votes.
+//! - Each vote counts one. Equal votes are a tie. The answer then names the class with the nearest example, among these the
+//!   smallest label.
+//! - If the nearest example is beyond the radius, the answer is a stranger, with any votes.
 //!
 //! # Costs
 //!
@@ -46,17 +45,15 @@
 //! | [`Nearest`] for k, which may be kept | 4 k + 7 + 2 C | |
 //! | [`classify`] | about 130 + 2 C of stack | n F multiplications of 8 x 8 bits; k steps an example within reach; k + C to vote |
 //!
-//! The README has a table of cycles on an ATmega328P, for F = 5, C = 2 and k = 3. They are about 500 for the calls and the vote, 19 to 67
-//! for each example that is looked at, and some 75 more for each that was among the k nearest when it was met: about k (1 + ln(n / k))
-//! of n in random order, and up to all of them where one lies a little nearer than the one before it. [`classify`] clears its places
-//! first. Searched by the plain [`Examples::keep_nearest`], an
-//! example costs about 200 instead. [`Scale::quantise`] takes 1,400 cycles. `cargo bench-uno`, in the weeder's workspace, measures all
-//! of this anew in the simulator simavr.
+//! The README has a table of cycles on an ATmega328P, for F = 5, C = 2 and k = 3. The calls and the vote take about 500 cycles, and
+//! each example that is loaded 19 to 67. An example that is among the k nearest at that moment takes some 75 more. In random order
+//! these are about k (1 + ln(n / k)) of n. If each one is a little nearer than the one before, they are all. [`classify`] clears
+//! its places first. The plain [`Examples::keep_nearest`] takes about 200 cycles an example. [`Scale::quantise`] takes 1,400
+//! cycles. `cargo bench-uno` in the weeder's workspace measures all of this in the simulator simavr.
 //!
 //! # What it does not do
 //!
-//! It learns no scale by itself while working, weighs no votes by distance, and neither thins out examples nor chooses
-//! k or the radius: that is for the host.
+//! It does not learn a scale at run time, or weight votes by distance. The host thins out examples, and chooses k and the radius.
 
 #![no_std]
 #![forbid(unsafe_code)]

@@ -1,15 +1,14 @@
-//! The nearest examples of a search, how one more finds its place among them, and their vote.
+//! The nearest examples of a search, the insertion of another, and their vote.
 //!
-//! They stand in as many places as examples are to vote, sorted, farthest first; while some places are still free, these are in
-//! front. Those that are as far as the farthest but have found no place vote too, so their votes are counted, together with how
-//! far they are: where a nearer one is the farthest later on, they are worth nothing any more.
+//! There are k places, sorted, farthest first; free places come before them. Examples without a place that are as far as the
+//! farthest vote too. Their votes are counted together with their distance, and dropped when a nearer example becomes the farthest.
 
 use crate::{Answer, ClassifyError, Kind, MAX_K, Neighbour, ballot::Ballot};
 
-/// The nearest examples found so far, of `CLASSES` classes, and places for them: an array, which is passed on as a slice.
+/// The nearest examples found so far, of `CLASSES` classes, and their places: an array, passed on as a slice.
 ///
-/// [`classify`](crate::classify) is such a search from its beginning to its end. A machine that has little time at once keeps it, and
-/// has one store or another join whenever there is some.
+/// [`classify`](crate::classify) is a complete search. A loop with little time at once keeps a `Nearest`, and searches one store or
+/// another in each turn.
 ///
 /// ```
 /// use knn::{Answer, Example, Examples, Nearest, Neighbour};
@@ -25,18 +24,18 @@ use crate::{Answer, ClassifyError, Kind, MAX_K, Neighbour, ballot::Ballot};
 /// ```
 #[derive(Clone, Debug)]
 pub struct Nearest<const CLASSES: usize, Places: ?Sized = [Neighbour]> {
-    /// Places that are to be taken, the first ones.
+    /// Places in use, counted from the first.
     k: u8,
-    /// Of these, the first that nobody has taken.
+    /// The number of these that are free.
     free: u8,
-    /// The votes of those that have found no place, and one that is as far as they are.
+    /// The votes of examples without a place, and a neighbour at their distance.
     level: Ballot<CLASSES>,
     as_far: Neighbour,
     places: Places,
 }
 
 impl<const CLASSES: usize, const PLACES: usize> Nearest<CLASSES, [Neighbour; PLACES]> {
-    /// Nobody yet, and so many places, whoever stands there. None of them is to be taken before a search has begun.
+    /// No neighbours yet; the contents of `places` do not matter. No place is used before [`begin`](Self::begin).
     #[inline]
     #[must_use]
     pub const fn new(places: [Neighbour; PLACES]) -> Self {
@@ -46,11 +45,11 @@ impl<const CLASSES: usize, const PLACES: usize> Nearest<CLASSES, [Neighbour; PLA
 }
 
 impl<const CLASSES: usize> Nearest<CLASSES> {
-    /// Begins a search for the `k` nearest. What was found before is dropped.
+    /// Begins a search for the `k` nearest, and drops earlier results.
     ///
     /// # Errors
     ///
-    /// [`ClassifyError::KOutOfRange`] where `k` is 0, above [`MAX_K`], or more than there are places.
+    /// [`ClassifyError::KOutOfRange`] if `k` is 0, above [`MAX_K`], or above the number of places.
     #[inline]
     pub fn begin(&mut self, k: u8) -> Result<(), ClassifyError> {
         if k == 0 || k > MAX_K || usize::from(k) > self.places.len() {
@@ -61,9 +60,9 @@ impl<const CLASSES: usize> Nearest<CLASSES> {
         Ok(())
     }
 
-    /// The places: the free ones, of which there are so many, then those taken, farthest first.
+    /// The places: first the free ones, whose number is returned, then those taken, farthest first.
     ///
-    /// For a store that has a faster way than [`join`](Self::join). It does what that does, and says so by
+    /// For a store with a faster way than [`join`](Self::join). The store does what that does, and reports it with
     /// [`have_joined`](Self::have_joined) and then [`are_level`](Self::are_level).
     #[inline]
     #[must_use]
@@ -71,23 +70,23 @@ impl<const CLASSES: usize> Nearest<CLASSES> {
         (self.places.get_mut(..self.k.into()).unwrap_or_default(), self.free.into())
     }
 
-    /// Examples have joined the [`gps`](Self::places), of which so many are still free, and no more than were.
+    /// Reports that `free` of the [`places`](Self::places) are still free, at most as many as before.
     #[inline]
     pub fn have_joined(&mut self, free: usize) {
         self.free = free.min(self.free.into()) as u8;
     }
 
-    /// So many examples of a label have found no place although they are as far as the farthest is now.
+    /// Reports examples of a label without a place that are as far as the farthest is now.
     pub fn are_level(&mut self, label: u8, examples: u8) {
         self.vote_level(label, examples);
     }
 
-    /// An example takes its place, where it is not too far for that.
+    /// Gives an example its place, if it is near enough.
     ///
-    /// Where none is free, one has to make room: the farthest, or this one where it is no nearer; of two that are as far, the one
-    /// of the greater label.
+    /// If no place is free, the farthest example leaves, or this one if it is not nearer. Of two at the same distance, the one with
+    /// the greater label leaves.
     ///
-    /// Out of line, as it takes more code than a call of it.
+    /// Out of line, because it takes more code than a call.
     #[inline(never)]
     pub fn join(&mut self, example: Neighbour) {
         let is_full = self.is_full();
@@ -99,7 +98,7 @@ impl<const CLASSES: usize> Nearest<CLASSES> {
             let begin = free - usize::from(!is_full);
             let Some([place, places @ ..]) = places.get_mut(begin..) else { return };
             let mut place = place;
-            // Those that are farther move up.
+            // Move up the farther ones.
             for nearer in places {
                 if example.key() >= nearer.key() {
                     break;
@@ -121,7 +120,7 @@ impl<const CLASSES: usize> Nearest<CLASSES> {
         }
     }
 
-    /// So many vote that are as far as the farthest.
+    /// Counts votes at the distance of the farthest.
     #[inline(never)]
     fn vote_level(&mut self, label: u8, votes: u8) {
         if let Some(&farthest) = self.places.first()
@@ -132,11 +131,11 @@ impl<const CLASSES: usize> Nearest<CLASSES> {
         self.level.vote(label, votes);
     }
 
-    /// The class by the vote of all that have joined since the search [began](Self::begin), as [`classify`](crate::classify) says it.
+    /// The class by the vote of all that have joined since [`begin`](Self::begin), with the rules of [`classify`](crate::classify).
     ///
     /// # Errors
     ///
-    /// [`ClassifyError`] where fewer have joined than are to vote, or a voter's label is not a class.
+    /// [`ClassifyError`] if fewer than k have joined, or a voter's label is not a class.
     #[inline(never)]
     pub fn answer(&self, radius: u32) -> Result<Answer<CLASSES>, ClassifyError> {
         if !self.is_full() {
@@ -151,9 +150,9 @@ impl<const CLASSES: usize> Nearest<CLASSES> {
         let Some(votes) = ballot.votes() else { return Err(ClassifyError::UnknownLabel) };
         let (mut label, most, tie) = lead(&votes);
         if tie {
-            // Neighbours are sorted by distance and then by label, and the examples that found no place are behind them
-            // in the same order: the first leading class met this way is the nearest, and the smallest among equals.
-            // Where none is met, `label` is the smallest already. Of two classes, both lead.
+            // Neighbours are sorted by distance and then by label, and the examples without a place follow in the same order. So
+            // the first leading class found is the nearest, and the smallest among equals. If none is found, `label` already is the
+            // smallest. With two classes, both lead.
             if CLASSES == 2 {
                 label = nearest.label();
             } else {
@@ -170,13 +169,13 @@ impl<const CLASSES: usize> Nearest<CLASSES> {
         Ok(Answer { label, votes, nearest, kind })
     }
 
-    /// Whether every place is taken.
+    /// Whether all places are taken.
     const fn is_full(&self) -> bool {
         self.free == 0
     }
 }
 
-/// The class with the most votes, the smallest among equals; its votes; and whether another one has as many.
+/// The class with the most votes, the smallest among equals; its votes; and whether another class has as many.
 #[inline(always)]
 fn lead<const CLASSES: usize>(votes: &[usize; CLASSES]) -> (u8, usize, bool) {
     if let [zeros, ones] = votes.as_slice() {

@@ -1,19 +1,18 @@
-//! An example as a search meets it: how far it is, and what it is.
+//! An example in a search: its distance and its label.
 //!
-//! A neighbour is one number, its distance above its label, so that comparing two compares distances first and labels next.
+//! A neighbour is one number, with the distance above the label. So a comparison compares distances first, then labels.
 
-/// An example as a search meets it: its squared distance, and its label.
+/// An example in a search: its squared distance, and its label.
 ///
-/// Kept as the bytes of its [`key`](Self::key), the label first: an 8-bit processor looks at one of them faster than at a number of which
-/// it would be a part.
+/// Stored as the bytes of its [`key`](Self::key), the label first: an 8-bit processor reads a byte faster than a part of a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Neighbour([u8; 4]);
 
 impl Neighbour {
-    /// Nobody in particular, to begin with.
+    /// A placeholder.
     pub const NONE: Self = Self::new(0, 0);
 
-    /// An example at a squared distance, of which 24 bits are kept.
+    /// An example at a squared distance; 24 bits of it are kept.
     #[inline]
     #[must_use]
     pub const fn new(distance: u32, label: u8) -> Self {

@@ -1,14 +1,12 @@
-//! From measured integers to bytes: a scale for each feature, so that none drowns another.
+//! From measured integers to bytes: one scale for each feature, so that no feature outweighs another.
 //!
-//! A distance adds up differences of unlike things, millimetres and millimetres a second. Each feature is therefore
-//! mapped from a [`Range`] of its own onto 0..=255. The mapping is one subtraction, one shift and one 16 x 16 bit
-//! multiplication; what lies outside the range saturates. There is no division and no float, and the host and the
-//! microcontroller get the same byte from the same number.
+//! A distance adds differences in different units, such as mm and mm/s. So each feature is mapped from its own [`Range`] onto
+//! 0..=255. This takes one subtraction, one shift and one 16 x 16 bit multiplication. Values outside the range saturate. There is
+//! no division and no float, so host and microcontroller get the same byte from the same number.
 
 /// The values of one feature, in its own unit, that map onto 0 and 255.
 ///
-/// A range whose `highest` is not above its `lowest` maps every value onto 0: a feature that never changes tells
-/// nothing.
+/// If `highest` is not above `lowest`, each value maps onto 0: a constant feature does not count.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Range {
     /// Maps onto 0, as does everything below it.
@@ -44,12 +42,11 @@ impl<const FEATURES: usize> Scale<FEATURES> {
         Self { features }
     }
 
-    /// The ranges that make features comparable, learned from the rows of a training table; `None` without a row.
+    /// Learns the ranges from the rows of a training table; `None` without a row.
     ///
-    /// Each feature's values, from its smallest to its largest, are given the middle half of the bytes (about 64 to 192).
-    /// The quarter on either side is kept for what the training has not seen, so that a stranger stays far from every
-    /// example instead of saturating onto the outermost one. A single wild value stretches its feature's range and
-    /// makes the others finer: take outliers out before.
+    /// Each feature's values, from the smallest to the largest, take the middle half of the bytes (about 64 to 192). The quarters
+    /// on either side are for values outside the training. So a stranger stays far from all examples, instead of saturating onto
+    /// the outermost. One extreme value stretches its feature's range and compresses the other values: remove outliers first.
     #[must_use]
     pub const fn learn_ranges(rows: &[[i32; FEATURES]]) -> Option<[Range; FEATURES]> {
         let Some((first, others)) = rows.split_first() else {
@@ -95,7 +92,7 @@ impl<const FEATURES: usize> Scale<FEATURES> {
         }
     }
 
-    /// The features as bytes. Never overflows: values outside their range become 0 or 255.
+    /// The features as bytes. Values outside their range become 0 or 255.
     #[must_use]
     pub const fn quantise(&self, values: &[i32; FEATURES]) -> [u8; FEATURES] {
         let mut bytes = [0; FEATURES];
@@ -109,22 +106,22 @@ impl<const FEATURES: usize> Scale<FEATURES> {
 }
 
 impl Range {
-    /// The range widened by half its width on either side, as far as `i32` reaches.
+    /// The range widened by half its width on either side, within `i32`.
     const fn with_room(self) -> Self {
         let width = self.highest.abs_diff(self.lowest);
-        // Rounded up, so that even two neighbouring values keep room; a width of 0 stays 0.
+        // Rounded up, so that a width of 1 gets room too; a width of 0 stays 0.
         let room = width.div_ceil(2);
         Self { lowest: self.lowest.saturating_sub_unsigned(room), highest: self.highest.saturating_add_unsigned(room) }
     }
 }
 
-/// `byte = ((value - offset) >> shift) * factor >> 8`, held to 0..=255.
+/// `byte = ((value - offset) >> shift) * factor >> 8`, limited to 0..=255.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 struct FeatureScale {
     offset: i32,
     /// Brings the range's width below 512: a byte needs no finer step.
     shift: u8,
-    /// Bytes a step, with 8 fractional bits; 0 for a feature that tells nothing.
+    /// Bytes a step, with 8 fractional bits; 0 for a constant feature.
     factor: u16,
 }
 
@@ -134,7 +131,7 @@ impl FeatureScale {
             return Self { offset: range.lowest, shift: 0, factor: 0 };
         }
         let width = range.highest.abs_diff(range.lowest);
-        // At most 23, as the width has 32 bits and 9 are kept.
+        // At most 23, because the width has 32 bits and 9 are kept.
         let shift = 23_u32.saturating_sub(width.leading_zeros());
         // From 1 to 511, so the factor is from 128 to 65,280 and fits. Rounded up, it takes `highest` to 255.
         let steps = width >> shift;
@@ -145,10 +142,10 @@ impl FeatureScale {
         if value <= self.offset {
             return 0;
         }
-        // Above the offset, the wrapped difference is the true one.
+        // Above the offset, the wrapped difference is exact.
         let steps = (value as u32).wrapping_sub(self.offset as u32) >> self.shift;
-        // 511 steps of the smallest factor, 128, are already 255: holding the steps to 16 bits changes nothing, and
-        // the product of two 16-bit numbers fits 32 bits.
+        // 511 steps with the smallest factor, 128, already give 255. So a limit of 16 bits changes nothing, and the product of two
+        // 16-bit numbers fits 32 bits.
         let steps = if steps > u16::MAX as u32 { u16::MAX as u32 } else { steps };
         let byte = (steps * self.factor as u32) >> 8;
         if byte > 255 { 255 } else { byte as u8 }

@@ -1,4 +1,4 @@
-//! Examples in SRAM, in an array of fixed capacity, which can be added and removed while the machine works.
+//! Examples in SRAM, in an array of fixed capacity. They can be added and removed at run time.
 
 use crate::{Example, Examples, Nearest};
 
@@ -11,7 +11,7 @@ use crate::{Example, Examples, Nearest};
 /// let first = Example::new([3, 4], 0);
 /// let second = Example::new([5, 6], 1);
 /// assert_eq!(table.add_example(first), Ok(()));
-/// assert_eq!(table.add_example(second), Err(second), "a full table hands the example back");
+/// assert_eq!(table.add_example(second), Err(second), "a full table returns the example");
 /// assert_eq!(table.remove(0), Some(first));
 /// assert!(table.is_empty());
 /// ```
@@ -29,11 +29,11 @@ impl<const FEATURES: usize, const CAPACITY: usize> Table<FEATURES, CAPACITY> {
         Self { examples: [Example::new([0; FEATURES], 0); CAPACITY], len: 0 }
     }
 
-    /// Adds an example behind the others.
+    /// Adds an example after the others.
     ///
     /// # Errors
     ///
-    /// A full table hands the example back and stays as it was.
+    /// If the table is full, it returns the example and does not change.
     pub fn add_example(&mut self, example: Example<FEATURES>) -> Result<(), Example<FEATURES>> {
         let Some(free) = self.examples.get_mut(self.len) else {
             return Err(example);
@@ -43,7 +43,7 @@ impl<const FEATURES: usize, const CAPACITY: usize> Table<FEATURES, CAPACITY> {
         Ok(())
     }
 
-    /// Takes the example at `index` out; those behind it move up by one. `None` where there is no such example.
+    /// Removes the example at `index`; later ones move up by one. `None` if there is no such example.
     pub fn remove(&mut self, index: usize) -> Option<Example<FEATURES>> {
         let tail = self.examples.get_mut(..self.len)?.get_mut(index..)?;
         let removed = *tail.first()?;
@@ -52,7 +52,7 @@ impl<const FEATURES: usize, const CAPACITY: usize> Table<FEATURES, CAPACITY> {
         Some(removed)
     }
 
-    /// Takes all examples out.
+    /// Removes all examples.
     pub fn clear(&mut self) {
         self.len = 0;
     }

@@ -1,7 +1,7 @@
-//! The classifier against a plain one in floats, against smartcore's, and against itself with the examples reordered.
+//! Compares the classifier with a plain one in floats, with smartcore's, and with itself after reordering the examples.
 //!
-//! Features come from few values, or from the extremes, as often as from all bytes: level distances, on which the rules
-//! for ties rest, are then common.
+//! Features come from few values, or from the extremes, as often as from all bytes. Then equal distances are common, which the
+//! rules for ties need.
 
 use knn::{Answer, ClassifyError, Example, Examples, Kind, MAX_K, Nearest, Neighbour, Scale, Table, classify};
 use proptest::prelude::*;
@@ -12,7 +12,7 @@ use smartcore::{
     neighbors::knn_classifier::{KNNClassifier, KNNClassifierParameters},
 };
 
-/// The documented rules over floats: sort all, take those up to the k-th distance, count.
+/// The documented rules in floats: sort all, take those up to the k-th distance, count.
 fn reference<const FEATURES: usize, const CLASSES: usize>(
     examples: &[Example<FEATURES>],
     query: &[u8; FEATURES],
@@ -56,7 +56,7 @@ fn float_distance<const FEATURES: usize>(example: &Example<FEATURES>, query: &[u
     example.features.iter().zip(query).map(|(&left, &right)| (f64::from(left) - f64::from(right)).powi(2)).sum()
 }
 
-/// The most features with which something is tried. Whatever takes fewer gets the first of those that are drawn.
+/// The most features in a test. A test with fewer takes the first ones.
 const MOST: usize = 8;
 
 fn features() -> impl Strategy<Value = [u8; MOST]> {
@@ -85,7 +85,7 @@ fn first_of_all<const FEATURES: usize>(examples: &[Example<MOST>]) -> Vec<Exampl
     examples.iter().map(|example| Example::new(first(&example.features), example.label)).collect()
 }
 
-/// What has to hold, for each number of features.
+/// A check, for each number of features.
 macro_rules! for_each_number_of_features {
     ($holds:ident) => {
         [$holds::<1>, $holds::<2>, $holds::<3>, $holds::<4>, $holds::<5>, $holds::<6>, $holds::<7>, $holds::<8>]
@@ -159,7 +159,7 @@ proptest! {
     }
 }
 
-/// A store that only hands examples out, so that the trait's own search is used.
+/// A store that only returns examples, so that the trait's own search runs.
 struct OneByOne<'a, const FEATURES: usize>(&'a [Example<FEATURES>]);
 
 impl<const FEATURES: usize> Examples<FEATURES> for OneByOne<'_, FEATURES> {
@@ -172,7 +172,7 @@ impl<const FEATURES: usize> Examples<FEATURES> for OneByOne<'_, FEATURES> {
     }
 }
 
-/// A store that has its examples join all at once.
+/// A store that adds all its examples at once.
 struct AtOnce<'a, const FEATURES: usize>(&'a [Example<FEATURES>]);
 
 impl<const FEATURES: usize> Examples<FEATURES> for AtOnce<'_, FEATURES> {
@@ -246,7 +246,7 @@ fn on_fishers_irises_smartcore_gives_the_same_classes_and_few_are_wrong() {
 
 proptest! {
     #[test]
-    fn smartcore_gives_the_same_class_where_no_tie_leaves_it_open(
+    fn smartcore_gives_the_same_class_without_a_tie(
         examples in proptest::collection::vec(
             (any::<[u8; 5]>(), 0_u8..3).prop_map(|(features, label)| Example::new(features, label)), 15..60),
         query in any::<[u8; 5]>(), k in 3_u8..=MAX_K,
@@ -280,7 +280,7 @@ fn a_tie_of_level_examples_names_the_smallest_label() {
 }
 
 #[test]
-fn a_stranger_is_one_beyond_the_radius_and_not_at_it() {
+fn a_stranger_is_beyond_the_radius_and_not_at_it() {
     let examples = [Example::new([10], 0)];
     let kind = |radius| classify::<1, 1>(&examples, &[13], 1, radius).unwrap().kind;
     assert_eq!(kind(9), Kind::Known);
@@ -295,7 +295,7 @@ fn the_farthest_of_258_features_is_still_a_neighbour() {
 }
 
 #[test]
-fn what_cannot_be_answered_is_an_error_and_not_a_class() {
+fn an_impossible_question_is_an_error_and_not_a_class() {
     let one = [Example::new([1], 0)];
     assert_eq!(classify::<1, 2>(&one, &[1], 0, 0), Err(ClassifyError::KOutOfRange));
     assert_eq!(classify::<1, 2>(&one, &[1], 16, 0), Err(ClassifyError::KOutOfRange));
@@ -306,7 +306,7 @@ fn what_cannot_be_answered_is_an_error_and_not_a_class() {
 }
 
 #[test]
-fn an_error_says_what_would_be_right() {
+fn an_error_says_what_to_do() {
     for (error, advice) in [
         (ClassifyError::KOutOfRange, "choose 1 to 15"),
         (ClassifyError::NoExamples, "add at least k"),
@@ -318,9 +318,9 @@ fn an_error_says_what_would_be_right() {
 }
 
 #[test]
-fn level_examples_vote_whenever_they_are_met_and_only_while_they_are_level_with_the_kth() {
+fn examples_level_with_the_kth_vote_in_any_order_and_only_while_they_are_level() {
     let at = |place: u8, label| Example::new([place], label);
-    // Those at 9 are level with the third until nearer ones come; a label that is none does no harm then.
+    // Examples at 9 are level with the third until nearer ones come; an invalid label does no harm then.
     let answer = |examples: &[Example<1>]| classify::<1, 2>(examples, &[0], 3, u32::MAX).map(|answer| answer.votes);
     let far = [at(9, 1), at(9, 1), at(9, 7), at(9, 1)];
     assert_eq!(answer(&far), Err(ClassifyError::UnknownLabel));
@@ -330,7 +330,7 @@ fn level_examples_vote_whenever_they_are_met_and_only_while_they_are_level_with_
 }
 
 #[test]
-fn every_store_counts_and_hands_out_its_examples() {
+fn every_store_counts_and_returns_its_examples() {
     let examples = [[1], [2], [3]].map(|features| Example::new(features, features[0]));
     let [first, second, third] = examples;
     let mut table: Table<1, 4> = Table::new();

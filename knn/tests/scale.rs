@@ -1,4 +1,4 @@
-//! What a scale promises for every `i32`: it saturates, keeps order, and makes features comparable.
+//! Properties of a scale for each `i32`: it saturates, keeps order, and makes features comparable.
 
 use knn::{Range, Scale};
 use proptest::prelude::*;
@@ -54,7 +54,7 @@ proptest! {
 }
 
 #[test]
-fn a_feature_that_never_changes_tells_nothing() {
+fn a_constant_feature_does_not_count() {
     let scale = Scale::learn(&[[7, 1], [7, 2]]).unwrap();
     assert_eq!([-1000, 7, 1000].map(|value| scale.quantise(&[value, 1])[0]), [0; 3]);
 }
@@ -66,6 +66,6 @@ fn even_two_neighbouring_values_keep_room_for_strangers() {
 }
 
 #[test]
-fn nothing_is_learned_from_no_rows() {
+fn without_rows_there_is_no_scale() {
     assert_eq!(Scale::<2>::learn(&[]), None);
 }

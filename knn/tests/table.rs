@@ -1,4 +1,4 @@
-//! Random operations on a table against the same operations on a `Vec`.
+//! Compares random operations on a table with the same operations on a `Vec`.
 
 use knn::{Example, Examples, Table};
 use proptest::prelude::*;

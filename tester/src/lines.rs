@@ -1,7 +1,7 @@
 //! The lines to the weeder: six outputs on port C, the reset on D7, the LED's level on D6, and the capture pin on D8.
 //!
-//! Port C has nothing else, so a line changes by one write of the whole port. D7 is an open drain: it pulls low, or is an input, and the
-//! weeder's own pull-up raises the line.
+//! Port C has no other pins, so one write of the port changes a line. D7 is an open drain: it pulls low, or is an input, and then
+//! the weeder's own pull-up raises the line.
 
 use avr_device::atmega328p::{PORTB, PORTC, PORTD};
 use tester_core::pins::{ALL_LINES, AT_REST};
@@ -22,9 +22,9 @@ pub struct Lines {
 }
 
 impl Lines {
-    /// Sets the pins up, all lines at rest.
+    /// Sets up the pins, with all lines at rest.
     pub fn new(capture: PORTB, lines: PORTC, reset: PORTD) -> Self {
-        // SAFETY: port C is this file's alone. The levels come before the direction, so no line has a wrong level in between.
+        // SAFETY: only this file uses port C. The levels are set before the direction, so no line has a wrong level in between.
         lines.portc().write(|w| unsafe { w.bits(AT_REST) });
         // SAFETY: as above.
         lines.ddrc().write(|w| unsafe { w.bits(ALL_LINES) });
@@ -36,17 +36,17 @@ impl Lines {
         self.reset.pind().read().bits() & LAMP != 0
     }
 
-    /// Pulls the weeder's reset, or releases it.
+    /// Pulls the weeder's reset low, or releases it.
     pub fn pull_reset(&self, pulled: bool) {
-        // SAFETY: D7 is the one output of port D, and its level stays low.
+        // SAFETY: D7 is the only output of port D, and its level stays low.
         self.reset.ddrd().write(|w| unsafe { w.bits(if pulled { RESET } else { 0 }) });
     }
 
-    /// Drives the capture pin high, or releases it to be an input again. The weeder must not drive it.
+    /// Drives the capture pin high, or low and then as an input again. The weeder must not drive it.
     pub fn drive_capture(&self, high: bool) {
         // SAFETY: D8 is the only pin of port B that this firmware uses.
         self.capture.portb().write(|w| unsafe { w.bits(if high { CAPTURE } else { 0 }) });
-        // The pin stays an output at low, which ends the pulse, and is then released.
+        // The pin is driven low, which ends the pulse, and then released.
         // SAFETY: as above.
         self.capture.ddrb().write(|w| unsafe { w.bits(CAPTURE) });
         if !high {
@@ -56,14 +56,14 @@ impl Lines {
     }
 }
 
-/// Puts levels on port C.
+/// Sets the levels of port C.
 #[inline(always)]
 pub fn show(levels: u8) {
-    // SAFETY: one byte is written by one instruction, and every level of port C is a valid one.
+    // SAFETY: one instruction writes one byte, and each level of port C is valid.
     unsafe { (*PORTC::ptr()).portc().write(|w| w.bits(levels)) };
 }
 
-/// The levels on port C.
+/// The levels of port C.
 pub fn shown() -> u8 {
     // SAFETY: reading the port changes nothing.
     unsafe { (*PORTC::ptr()).portc().read().bits() }

@@ -1,7 +1,7 @@
 //! The tester's firmware: a second Uno that drives the weeder's inputs, and measures its outputs.
 //!
-//! The crate `tester-core` decides, and each file beside this one knows one peripheral. The loop passes bytes between the serial line and
-//! the station, and what was measured to the station. Interrupts play the plan and stamp pulses.
+//! The crate `tester-core` decides. Each file beside this one drives one peripheral. The loop passes bytes between the serial line
+//! and the station, and measurements to the station. Interrupts play the plan and stamp pulses.
 
 #![no_std]
 #![no_main]
@@ -32,7 +32,7 @@ struct Tester {
 #[avr_device::entry]
 fn main() -> ! {
     let station = &raw mut STATION;
-    // SAFETY: nothing else names this static, and the entry point runs once.
+    // SAFETY: no other code names this static, and the entry point runs once.
     run(unsafe { &mut *station })
 }
 
@@ -40,12 +40,12 @@ static mut STATION: Station = Station::new();
 
 #[inline(never)]
 fn run(station: &mut Station) -> ! {
-    // SAFETY: the entry point is the first code to run and runs once, as this does, so nothing else holds the peripherals.
+    // SAFETY: the entry point is the first code to run, and runs once, so no other code holds the peripherals.
     let peripherals = unsafe { Peripherals::steal() };
     let lines = Lines::new(peripherals.PORTB, peripherals.PORTC, peripherals.PORTD);
     let mut serial = Serial::new(peripherals.USART0);
     let mut tester = Tester { lines, timeline: Timeline::new(peripherals.TC1) };
-    // SAFETY: every interrupt's peripheral is set up, and no critical section is open.
+    // SAFETY: each interrupt's peripheral is set up, and no critical section is open.
     unsafe { interrupt::enable() };
 
     let mut sending = Frame::new();
@@ -60,7 +60,7 @@ fn run(station: &mut Station) -> ! {
             lit = now_lit;
             station.record(Record::Led { time: tester.now(), lit });
         }
-        // One at a time: a queue that fills loses the youngest, and its number is missed.
+        // One record a turn: a full queue drops the newest, and the gap in the numbers shows it.
         if let Some(record) = tester.timeline.measured() {
             station.record(record);
         }
@@ -135,7 +135,7 @@ impl Board for Tester {
     }
 }
 
-/// A tester that has panicked says nothing more, which the computer tells.
+/// After a panic the tester is silent; the computer reports that.
 #[panic_handler]
 fn panic(_: &PanicInfo) -> ! {
     interrupt::disable();

@@ -1,6 +1,6 @@
 //! The serial line on D0 and D1: 115200 baud, 8N1. Received bytes wait in a queue, and bytes to send go straight to the transmitter.
 //!
-//! A byte that finds the queue full is lost. Its frame then has a wrong CRC, and the computer sends it again.
+//! A byte is lost if the queue is full. Its frame then has a wrong CRC, and the computer sends it again.
 
 use avr_device::{
     atmega328p::USART0,
@@ -15,7 +15,7 @@ const BAUD_DIVISOR: u16 = 16;
 /// UCSR0B: receiver and transmitter on, and the interrupt for a received byte.
 const CONTROL: u8 = 0b1001_1000;
 
-/// Bytes received and not yet read: the longest command, and half of the next.
+/// Received bytes: the longest command, and half of the next.
 static RECEIVED: Mutex<RefCell<Deque<u8, 96>>> = Mutex::new(RefCell::new(Deque::new()));
 
 /// The serial line.
@@ -32,12 +32,12 @@ impl Serial {
         Self(usart)
     }
 
-    /// The oldest byte that was not read yet.
+    /// The oldest received byte.
     pub fn read(&mut self) -> Option<u8> {
         interrupt::free(|cs| RECEIVED.borrow(cs).borrow_mut().pop_front())
     }
 
-    /// Sends a byte, if the transmitter takes one now. Returns whether it did.
+    /// Sends a byte, if the transmitter is free. Returns whether it was sent.
     pub fn write(&mut self, byte: u8) -> bool {
         let is_free = self.0.ucsr0a().read().udre0().bit_is_set();
         if is_free {
@@ -47,10 +47,10 @@ impl Serial {
     }
 }
 
-// A byte has come in.
+// A byte was received.
 #[avr_device::interrupt(atmega328p)]
 fn USART_RX() {
-    // SAFETY: reading UDR0 is this handler's alone.
+    // SAFETY: only this handler reads UDR0.
     let byte = unsafe { (*USART0::ptr()).udr0().read().bits() };
     interrupt::free(|cs| {
         let _ = RECEIVED.borrow(cs).borrow_mut().push_back(byte);

@@ -1,8 +1,8 @@
 //! Timer1: the clock in cycles, the plan's events, and the servo's pulses on ICP1 (D8).
 //!
-//! The timer counts cycles and runs over every 4.096 ms; an interrupt counts on. Its compare interrupt fires the plan's events, each by the
-//! time at which it was due, so a late one does not delay the next. Its capture unit stamps the servo's edges (data sheet, 16.6), so other
-//! interrupts do not change what is measured.
+//! The timer counts cycles and overflows every 4.096 ms; an interrupt counts the overflows. The compare interrupt fires the plan's
+//! events. Each wait counts from the time at which the last event was due. So a late event does not delay the next. The capture
+//! unit stamps the servo's edges (data sheet, 16.6), so other interrupts do not change the measurement.
 
 use crate::lines;
 use avr_device::{
@@ -15,13 +15,14 @@ use tester_core::message::{QUEUE_PIECES, Record};
 use tester_core::piece::Piece;
 use tester_core::player::{Next, Player};
 
-/// The longest wait that the compare unit is set to at once, in cycles. Half the timer's range tells before from behind.
+/// Longest wait set in the compare unit at once, in cycles. It is below half of the timer's range, which separates future from
+/// past.
 const STRIDE: u16 = 0x4000;
 
 /// From the command to the plan's start, in cycles: 200 us.
 const LEAD: u16 = 3200;
 
-/// An event that is later than this is told of, in cycles: 10 us.
+/// Later events are reported as late, in cycles: 10 us.
 const LATE: u16 = 160;
 
 // TIMSK1 and TIFR1.
@@ -36,7 +37,7 @@ const NO_PRESCALER: u8 = 1;
 struct Inner {
     player: Player,
     queue: Deque<Piece, QUEUE_PIECES>,
-    /// Where the compare unit is set to, and cycles from there to the event.
+    /// The compare unit's time, and the cycles from there to the event.
     armed: u16,
     left: u32,
     overflows: u16,
@@ -61,13 +62,13 @@ static INNER: Mutex<RefCell<Inner>> = Mutex::new(RefCell::new(Inner {
     is_lost_told: true,
 }));
 
-/// The timer, as the loop sees it.
+/// The loop's side of the timer.
 pub struct Timeline(TC1);
 
 impl Timeline {
     /// Starts the clock.
     pub fn new(timer: TC1) -> Self {
-        // SAFETY: normal mode, the next edge rises.
+        // SAFETY: normal mode, the next edge is rising.
         timer.tccr1b().write(|w| unsafe { w.bits(RISING | NO_PRESCALER) });
         let timeline = Self(timer);
         timeline.enable(CAPTURE | OVERFLOW);
@@ -75,7 +76,7 @@ impl Timeline {
     }
 
     fn enable(&self, interrupts: u8) {
-        // SAFETY: the handlers of all three are below.
+        // SAFETY: the handlers of all three interrupts are below.
         self.0.timsk1().write(|w| unsafe { w.bits(interrupts) });
     }
 
@@ -88,12 +89,12 @@ impl Timeline {
         self.with(|inner, timer| inner.time(timer, timer.tcnt1().read().bits()))
     }
 
-    /// The position.
+    /// The encoder's position.
     pub fn position(&self) -> i32 {
         self.with(|inner, _| inner.player.position())
     }
 
-    /// Pieces that have room.
+    /// Free places for pieces.
     pub fn room(&self) -> u8 {
         self.with(|inner, _| (QUEUE_PIECES - inner.queue.len()) as u8)
     }
@@ -110,7 +111,7 @@ impl Timeline {
         self.with(|inner, _| inner.player.is_playing())
     }
 
-    /// Starts the plan. Returns when.
+    /// Starts the plan. Returns the start time.
     pub fn start(&self) -> u32 {
         self.enable(CAPTURE | COMPARE | OVERFLOW);
         self.with(|inner, timer| {
@@ -126,7 +127,7 @@ impl Timeline {
         })
     }
 
-    /// Gives up the plan, and drops its pieces.
+    /// Stops the plan, and drops its pieces.
     pub fn stop(&self) {
         self.enable(CAPTURE | OVERFLOW);
         self.with(|inner, _| {
@@ -143,19 +144,19 @@ impl Timeline {
         });
     }
 
-    /// Goes on behind a burst that has left these levels: the clock has lost time, and a pulse that has begun is void.
+    /// Continues after a burst that left these levels. The clock has lost time, so a pulse that has begun is dropped.
     pub fn restart(&self, levels: u8) {
         self.set(u8::MAX, levels);
         self.with(|inner, timer| {
             inner.rise = None;
-            // SAFETY: the next edge rises, and what was captured is dropped.
+            // SAFETY: the next edge is rising, and a captured edge is dropped.
             timer.tccr1b().write(|w| unsafe { w.bits(RISING | NO_PRESCALER) });
-            // SAFETY: a flag is cleared by writing it.
+            // SAFETY: writing 1 clears the flag.
             timer.tifr1().write(|w| unsafe { w.bits(CAPTURE) });
         });
     }
 
-    /// The oldest thing that was measured.
+    /// The oldest measurement.
     pub fn measured(&self) -> Option<Record> {
         self.with(|inner, _| {
             inner.measured.pop_front().or_else(|| {
@@ -167,15 +168,15 @@ impl Timeline {
 }
 
 impl Inner {
-    /// The time at which the counter's lower half was `low`, which is at most half its range ago.
+    /// The time at which the counter's lower half was `low`, at most half of its range ago.
     fn time(&self, timer: &TC1, low: u16) -> u32 {
-        // An overflow that waits for its interrupt belongs to a small number, and not to a large one.
+        // A pending overflow belongs to a small number, not to a large one.
         let is_pending = timer.tifr1().read().bits() & OVERFLOW != 0 && low < 1 << 15;
         let high = self.overflows.wrapping_add(is_pending.into());
         u32::from(high) << 16 | u32::from(low)
     }
 
-    /// Waits for the next event, or tells that there is none.
+    /// Waits for the next event, or records the end.
     fn follow(&mut self, next: Next, timer: &TC1) {
         let position = self.player.position();
         match next {
@@ -199,7 +200,7 @@ impl Inner {
         timer.ocr1a().write(|w| w.set(self.armed));
     }
 
-    /// Fires every event that is due.
+    /// Fires all events that are due.
     fn fire(&mut self, timer: &TC1) {
         while self.player.is_playing() {
             let since = timer.tcnt1().read().bits().wrapping_sub(self.armed);
@@ -226,10 +227,10 @@ impl Inner {
             self.rise = Some((time, self.player.position()));
         }
         let edge = if self.rise.is_none() { RISING } else { 0 };
-        // SAFETY: the other edge comes next.
+        // SAFETY: the next edge is the other one.
         timer.tccr1b().write(|w| unsafe { w.bits(edge | NO_PRESCALER) });
-        // A change of the edge may set the flag (data sheet, 16.6.3).
-        // SAFETY: a flag is cleared by writing it.
+        // Changing the edge may set the flag (data sheet, 16.6.3).
+        // SAFETY: writing 1 clears the flag.
         timer.tifr1().write(|w| unsafe { w.bits(CAPTURE) });
         if let Some((start, position)) = rise {
             self.measure(Record::Pulse { start, width: time.wrapping_sub(start), position });
@@ -244,9 +245,9 @@ impl Inner {
     }
 }
 
-/// From a handler of this file.
+/// Runs a change from a handler of this file.
 fn interrupted(change: impl FnOnce(&mut Inner, &TC1)) {
-    // SAFETY: the loop uses the timer in critical sections alone, or for writes of one byte that no handler makes.
+    // SAFETY: the loop uses the timer only in critical sections, or to write single bytes that no handler writes.
     let timer = unsafe { TC1::steal() };
     interrupt::free(|cs| change(&mut INNER.borrow(cs).borrow_mut(), &timer));
 }
@@ -263,7 +264,7 @@ fn TIMER1_COMPA() {
     interrupted(Inner::fire);
 }
 
-// The counter ran over.
+// The counter has overflowed.
 #[avr_device::interrupt(atmega328p)]
 fn TIMER1_OVF() {
     interrupted(|inner, _| inner.overflows = inner.overflows.wrapping_add(1));

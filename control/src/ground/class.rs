@@ -1,19 +1,19 @@
-//! The question what a detection is, plant or weed, and who answers it.
+//! Classes, and the trait of a classifier.
 //!
-//! Whatever an answer leaves open is [`Class::Unknown`], which everyone treats as a plant. The machine asks the [nearest
-//! examples](super::nearest); a test may ask something else.
+//! A detection without a clear class is [`Class::Unknown`], and every caller treats that as a plant. The firmware's classifier uses
+//! the [nearest examples](super::nearest). Tests may use another.
 
 use super::features::{self, Features};
 use knn::Example;
 
-/// What a detection is taken for.
+/// The class of a detection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Class {
     /// A crop plant: the tool leaves the row for it.
     Plant,
     /// A tall weed: the tool keeps working.
     Weed,
-    /// Like nothing that was taught, or like both: treated as a plant.
+    /// Like no example, or like both classes: treated as a plant.
     Unknown,
 }
 
@@ -22,12 +22,12 @@ pub enum Class {
 pub struct Vote {
     /// The class that won.
     pub class: Class,
-    /// Examples of that class among the nearest; of the strongest class where the answer is unknown.
+    /// Nearest examples of that class; of the strongest class for [`Class::Unknown`].
     pub votes: u8,
 }
 
 impl Vote {
-    /// Nobody knows, and nobody has voted.
+    /// Unknown, without a vote.
     pub const UNKNOWN: Self = Self { class: Class::Unknown, votes: 0 };
 }
 
@@ -37,69 +37,69 @@ pub mod label {
     pub const WEED: u8 = 0;
     /// A crop plant.
     pub const PLANT: u8 = 1;
-    /// How many labels there are.
+    /// The number of labels.
     pub const COUNT: usize = 2;
 }
 
-/// An example as it stands in the list of all.
+/// An example in the list of all examples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Listed {
     /// Whether it was taught in the field, and can be forgotten.
     pub from_field: bool,
-    /// Its number among those of its source.
+    /// Its number within its source.
     pub number: u8,
     /// The example.
     pub example: Example<{ features::COUNT }>,
 }
 
-/// All places for examples from the field are taken.
+/// All places for field examples are taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ExamplesFull;
 
-/// Tells plants from weeds, and may be taught.
+/// Classifies detections, and learns from examples.
 pub trait Classifier {
-    /// Looks what was kept over the loss of power; to be called once, before anything else.
+    /// Checks the saved examples. The caller calls it once, before any other method.
     fn init(&mut self);
 
     /// Classifies a detection by its `k` nearest examples.
     fn classify(&self, features: &Features, k: u8) -> Vote;
 
-    /// Begins to classify a detection as [`classify`](Self::classify) does, but takes no longer than a turn of the loop may; the vote, if
-    /// that was enough. Otherwise [`go_on`](Self::go_on) is called until it has the vote.
+    /// Starts to classify a detection as [`classify`](Self::classify) does, within the time of one turn. Returns the vote if it is
+    /// already certain. Otherwise the caller calls [`go_on`](Self::go_on) until it returns the vote.
     fn begin(&mut self, features: &Features, k: u8) -> Option<Vote> {
         Some(self.classify(features, k))
     }
 
-    /// Goes on with what was begun, for no longer than a turn of the loop may take; the vote, if that was enough. The examples are those
-    /// that there were when it began.
+    /// Runs the next step, within the time of one turn. Returns the vote once it is certain. Examples added since the start do not
+    /// count.
     fn go_on(&mut self) -> Option<Vote> {
         Some(Vote::UNKNOWN)
     }
 
-    /// What the built-in examples alone take a detection for; [`Class::Unknown`] where there are none. What was begun is dropped.
+    /// The class by the built-in examples alone; [`Class::Unknown`] if there are none. Ends a classification that has begun.
     fn built_in_class(&mut self, features: &Features) -> Class;
 
-    /// Adds a detection as an example of the class `label`, to be kept over a loss of power.
+    /// Adds a detection as an example of the class `label`, and starts to save it.
     ///
     /// # Errors
-    /// [`ExamplesFull`]; one has to be forgotten first.
+    /// [`ExamplesFull`]; the operator has to forget an example first.
     fn teach(&mut self, features: &Features, label: u8) -> Result<(), ExamplesFull>;
 
-    /// Adds an example that is known already, to be kept over a loss of power.
+    /// Adds a complete example, and starts to save it.
     ///
     /// # Errors
-    /// [`ExamplesFull`]; one has to be forgotten first.
+    /// [`ExamplesFull`]; the operator has to forget an example first.
     fn keep(&mut self, example: Example<{ features::COUNT }>) -> Result<(), ExamplesFull>;
 
-    /// Forgets the example from the field with this number; whether there was one.
+    /// Forgets a field example. Returns whether it existed.
     fn forget(&mut self, number: u8) -> bool;
 
     /// The first example from `place` on in the list of all, and the place behind it.
     fn listed(&self, place: u8) -> Option<(Listed, u8)>;
 
-    /// Examples that were found spoiled, and dropped, when the machine woke up.
+    /// Saved examples that were invalid at start-up, and dropped.
     fn spoiled(&self) -> u8;
 
-    /// Carries on with what is being kept for good, without waiting; whether all has been written.
+    /// Runs one step of saving, without waiting. Returns whether all is written.
     fn carry_on(&mut self) -> bool;
 }

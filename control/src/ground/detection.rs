@@ -1,4 +1,4 @@
-//! A detection: a stretch of ground that stood in the beam.
+//! A detection: a stretch of ground over which the beam was broken.
 
 use crate::units::{Length, WrappedPosition};
 
@@ -9,15 +9,15 @@ pub struct Detection {
     pub leading: WrappedPosition,
     /// Where the beam cleared, at or ahead of `leading`.
     pub trailing: WrappedPosition,
-    /// Whether its beginning was not seen, so that it may be the rest of something wider.
+    /// Whether the beginning was not seen. The detection may then be the rest of something wider.
     pub cut: bool,
 }
 
 impl Detection {
-    /// None.
+    /// No detection.
     pub const NONE: Self = Self { leading: WrappedPosition::new(0), trailing: WrappedPosition::new(0), cut: false };
 
-    /// What may stand at a place of which nothing has been seen.
+    /// An empty detection at the border of unseen ground: a plant there may reach into seen ground.
     pub(super) const fn cut_at(place: WrappedPosition) -> Self {
         Self { leading: place, trailing: place, cut: true }
     }
@@ -27,19 +27,19 @@ impl Detection {
         self.trailing - self.leading
     }
 
-    /// Whether nothing was there after all.
+    /// Whether a cut detection turned out to be empty.
     pub(super) fn is_nothing(&self) -> bool {
         self.cut && self.leading == self.trailing
     }
 }
 
-/// An end of what the second beam sees.
+/// Which end of a detection an edge of the second beam is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
-    /// It may be a leaf's.
+    /// Neither for certain: it may be a leaf's edge.
     None,
-    /// Where it begins.
+    /// The beginning.
     Leading,
-    /// Where it ends, as far as has been seen.
+    /// The end, as far as it was seen.
     Trailing,
 }

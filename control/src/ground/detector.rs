@@ -1,34 +1,33 @@
 //! Detections in the row, from the edges of the beam.
 //!
-//! The beam is watched along the ground, not along time: what counts is its level at ground that it has not seen before.
-//! [`Detector`] keeps the frontier, the farthest ground seen. Rolling back lets the beam cross known ground, where its edges
-//! mean nothing; when the machine reaches the frontier again, watching goes on with the level that the beam then has. So
-//! a plant is one detection, however often it is passed.
+//! The beam is read along the ground, not along time: only its level on new ground counts. [`Detector`] keeps the frontier, the
+//! farthest ground seen. When the machine rolls back, the beam crosses known ground, and its edges there are ignored. At the
+//! frontier, detection continues with the beam's level there. So a plant is one detection, even if the machine passes it several
+//! times.
 //!
-//! A canopy is ragged: clear stretches shorter than the merging gap belong to the detection, which ends only once the gap
-//! behind it has been seen in full. The same gap has to be seen before a detection for its beginning to be known: where
-//! watching begins, and where it has to forget, a detection is open of which nothing is known but that it may be the rest of
-//! a canopy. What a detection is, plant or weed, is not decided here.
+//! A canopy is ragged. Clear stretches shorter than the merging gap belong to the detection. It ends only after a clear stretch of
+//! that length. The beginning of a detection is certain only after such a clear stretch too. At the start, and after forgetting, an
+//! open detection therefore stands for the possible rest of a canopy. The detector does not classify.
 
 use super::detection::{Detection, End};
 use crate::units::{Length, WrappedPosition};
 
-/// Watches the row through the beam.
+/// Turns beam edges into detections.
 #[derive(Clone, Debug)]
 pub struct Detector {
     frontier: WrappedPosition,
-    /// The beam's level where the machine now is, at or behind the frontier.
+    /// The beam's level at the machine's position, at or behind the frontier.
     broken: bool,
     /// The beam's level at the frontier.
     broken_at_frontier: bool,
-    /// The detection whose end has not been seen in full. Clear ground behind it may turn out to be a gap in it.
+    /// The detection that has no certain end yet. Clear ground behind it may turn out to be a gap in it.
     detection: Option<Detection>,
-    /// Whether a clear stretch in what was seen since that was last asked is wider than between the leaves of one plant.
+    /// Whether, since the last query, a clear stretch was wider than the gaps between one plant's leaves.
     parted: bool,
 }
 
 impl Detector {
-    /// A watch that has not begun.
+    /// A detector before [`begin`](Self::begin).
     pub const NONE: Self = Self {
         frontier: WrappedPosition::new(0),
         broken: false,
@@ -37,20 +36,20 @@ impl Detector {
         parted: false,
     };
 
-    /// Begins to watch at a place, with the beam broken or not.
+    /// Starts at a place. `broken` is the beam's level.
     #[cfg_attr(target_arch = "avr", inline(never))]
     pub fn begin(&mut self, place: WrappedPosition, broken: bool) {
         (self.frontier, self.parted) = (place, false);
         self.lose_edges(broken);
     }
 
-    /// Forgets what was seen: what is at the frontier may be the rest of anything.
+    /// Forgets the ground seen: a detection at the frontier may be the rest of any plant.
     pub fn forget(&mut self) {
         self.detection = Some(Detection::cut_at(self.frontier));
     }
 
-    /// Edges were lost: where the machine now is, the beam is `broken` or not. At the frontier it may be the other way, which
-    /// shows when the machine comes there.
+    /// Edges were lost. The beam is now `broken` at the machine's position. The level at the frontier may differ; that shows when
+    /// the machine reaches it.
     pub fn lose_edges(&mut self, broken: bool) {
         (self.broken, self.broken_at_frontier) = (broken, broken);
         self.forget();
@@ -61,12 +60,13 @@ impl Detector {
         self.frontier
     }
 
-    /// Whether the beam is broken where the machine now is.
+    /// Whether the beam is broken at the machine's position.
     pub fn is_broken(&self) -> bool {
         self.broken
     }
 
-    /// The end of a detection that the next edge is, at a place: in the midst of one, as on ground that was seen before, it may be a leaf's.
+    /// Which end of a detection the next edge is, if it comes at this place. On known ground or inside a detection it may be a
+    /// leaf's, so neither.
     pub fn end(&self, place: WrappedPosition) -> End {
         if self.frontier.is_ahead_of(place) {
             End::None
@@ -79,17 +79,17 @@ impl Detector {
         }
     }
 
-    /// What is asked next may be more than one plant.
+    /// Marks the next detection as possibly more than one plant.
     pub fn doubt(&mut self) {
         self.parted = true;
     }
 
-    /// Whether the detection that was complete last may be more than one plant, for the gaps in it.
+    /// Whether gaps show that the last complete detection may be more than one plant. Clears the mark.
     pub fn is_parted(&mut self) -> bool {
         core::mem::take(&mut self.parted)
     }
 
-    /// Where the detection began whose end has not been seen yet.
+    /// Where the detection without a certain end begins.
     #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn open(&self) -> Option<WrappedPosition> {
         self.detection
@@ -97,7 +97,7 @@ impl Detector {
             .map(|detection| detection.leading)
     }
 
-    /// How far the detection goes that is [`open`](Self::open), as far as was seen; the frontier where none is.
+    /// How far the [`open`](Self::open) detection reaches so far; the frontier if there is none.
     pub fn open_to(&self) -> WrappedPosition {
         match self.detection {
             Some(detection) if !self.broken_at_frontier => detection.trailing,
@@ -105,7 +105,7 @@ impl Detector {
         }
     }
 
-    /// Takes an edge of the beam at a place; returns the detection that was complete before it.
+    /// Takes a beam edge at a place. Returns the detection that was complete before it.
     pub fn edge(&mut self, place: WrappedPosition, broken: bool, merge_gap: Length) -> Option<Detection> {
         let complete = self.roll_to(place, merge_gap);
         self.broken = broken;
@@ -115,13 +115,13 @@ impl Detector {
         complete
     }
 
-    /// The machine has rolled to a place without an edge; returns the detection that this completes.
+    /// The machine has rolled to a place without an edge. Returns the detection that this completes.
     #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn roll_to(&mut self, place: WrappedPosition, merge_gap: Length) -> Option<Detection> {
         if !place.is_ahead_of(self.frontier) {
             return None;
         }
-        // The machine may have come back to the frontier with another level than it left with.
+        // The machine may return to the frontier with another level than it left with.
         self.turn(merge_gap);
         self.frontier = place;
         let clear = !self.broken_at_frontier;
@@ -129,7 +129,7 @@ impl Detector {
         complete.filter(|detection| !detection.is_nothing())
     }
 
-    /// Takes the beam's level at the frontier for what is seen there.
+    /// Applies the beam's level to the frontier.
     #[cfg_attr(not(target_arch = "avr"), inline)]
     fn turn(&mut self, merge_gap: Length) {
         if self.broken == self.broken_at_frontier {
@@ -137,12 +137,12 @@ impl Detector {
         }
         self.broken_at_frontier = self.broken;
         let here = self.frontier;
-        // Where the beam breaks behind a detection, what was clear until now was a gap in it.
+        // If the beam breaks inside the merging gap, the clear stretch was a gap in the detection.
         let detection = self.detection.get_or_insert(Detection { leading: here, trailing: here, ..Detection::NONE });
         if !self.broken {
             detection.trailing = here;
         } else if here - detection.trailing > Length(merge_gap.0 >> 1) {
-            // Between the leaves of one plant there is less.
+            // The gaps between one plant's leaves are narrower.
             self.parted = true;
         }
     }
@@ -210,7 +210,7 @@ mod tests {
     }
 
     #[test]
-    fn a_gap_wider_than_between_leaves_is_told_of() {
+    fn a_gap_wider_than_between_leaves_is_reported_once() {
         for (gap, parted) in [(1, false), (GAP.0 / 2, false), (GAP.0 / 2 + 1, true), (GAP.0 - 1, true)] {
             let mut detector = begun(-100, false);
             for (place, broken) in [(0, true), (100, false), (100 + gap, true), (200, false), (201, true), (300, false)]
@@ -223,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_in_the_beam_when_watching_began_is_known_to_be_cut() {
+    fn a_detection_in_the_beam_at_the_start_is_cut() {
         let mut detector = begun(0, true);
         assert_eq!(detector.edge(WrappedPosition::new(20), false, GAP), None);
         assert_eq!(detector.edge(WrappedPosition::new(30), true, GAP), None, "its own leaves");
@@ -240,12 +240,12 @@ mod tests {
         let mut detector = begun(0, false);
         detector.roll_to(WrappedPosition::new(500), GAP);
         detector.edge(WrappedPosition::new(450), true, GAP);
-        assert_eq!(detector.open(), None, "what stands behind the frontier means nothing");
+        assert_eq!(detector.open(), None, "edges behind the frontier are ignored");
         detector.roll_to(WrappedPosition::new(501), GAP);
         assert_eq!(detector.open(), Some(WrappedPosition::new(500)));
     }
 
-    /// The first detection that a watch sees from a place on, behind which it has seen so much clear ground.
+    /// The first detection of a plant that begins at `begins`.
     fn first_detection(mut detector: Detector, begins: i16) -> Detection {
         detector.edge(WrappedPosition::new(begins), true, GAP);
         detector.edge(WrappedPosition::new(begins + 100), false, GAP);
@@ -253,7 +253,7 @@ mod tests {
     }
 
     #[test]
-    fn a_detection_before_which_no_whole_gap_was_seen_may_be_the_rest_of_one() {
+    fn a_detection_without_a_whole_gap_before_it_is_cut() {
         for clear in 0..80 {
             let whole = Detection {
                 leading: WrappedPosition::new(clear),
@@ -274,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn the_rest_of_a_half_seen_plant_is_cut_wherever_the_machine_stood_when_it_had_to_forget() {
+    fn the_rest_of_a_half_seen_plant_is_cut_after_forgetting_at_any_position() {
         for back in [0, 1, 50, 400] {
             for level_there in [false, true] {
                 let mut detector = begun(0, false);
@@ -295,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_no_detection() {
+    fn clear_ground_is_no_detection() {
         let mut detector = begun(0, false);
         assert_eq!(detector.open(), None);
         for place in 1..200 {

@@ -1,8 +1,7 @@
 //! The built-in examples: plants and tall weeds at the paper's four speeds.
 //!
-//! They were trained on simulated rows: `examples/table.rs` is what `weeder train --synthetic` wrote, in physical units.
-//! The compiler turns it into bytes. The result is a plain constant, so that it costs nothing where it is not used: the
-//! firmware lays it into flash, the host reads it as it is.
+//! They are trained on simulated rows: `weeder train --synthetic` writes `examples/table.rs`, in physical units. The compiler turns
+//! the table into bytes. The result is a plain constant: the firmware puts it into flash, the host uses it directly.
 
 mod table;
 
@@ -13,15 +12,15 @@ avr_progmem::progmem! {
     static progmem SCALE_IN_FLASH: Scale<{ features::COUNT }> = SCALE;
 }
 
-/// [`SCALE`], from where it costs no SRAM.
+/// [`SCALE`], read from flash so that it takes no SRAM.
 pub fn scale() -> Scale<{ features::COUNT }> {
     SCALE_IN_FLASH.load()
 }
 
-/// From a feature's value to a byte.
+/// Maps a feature's value to a byte.
 pub const SCALE: Scale<{ features::COUNT }> = Scale::new(table::RANGES);
 
-/// The ranges of [`SCALE`] as bytes: what an example's bytes stand for.
+/// The ranges of [`SCALE`] as bytes, for the CRC of field examples.
 pub const SCALE_BYTES: [u8; 8 * features::COUNT] = {
     let mut bytes = [0; 8 * features::COUNT];
     let mut feature = 0;
@@ -38,10 +37,10 @@ pub const SCALE_BYTES: [u8; 8 * features::COUNT] = {
 /// Squared distance beyond which a detection is like no example.
 pub const RADIUS: u32 = table::RADIUS;
 
-/// Examples that vote, as the table was trained.
+/// k of the training.
 pub const K: u8 = table::K;
 
-/// Half as wide, in mm, as the narrowest plant among the examples: what is narrower has a weed's width, whatever it is.
+/// Half the width, in mm, of the narrowest plant among the examples. A detection narrower than this has a weed's width.
 pub const NARROW_MM: i16 = {
     let (mut narrowest, mut index) = (i32::MAX, 0);
     while index < COUNT {
@@ -55,17 +54,17 @@ pub const NARROW_MM: i16 = {
     (narrowest / 2) as i16
 };
 
-/// Most examples that the flash is to hold, at 6 bytes each.
+/// Most examples within the flash budget, at 6 bytes each.
 pub const CAPACITY: usize = 72;
 
-/// Examples in the table.
+/// The number of examples.
 pub const COUNT: usize = table::TRAINED.len();
 
 const _: () = assert!(COUNT <= CAPACITY, "too many examples for the flash budget");
 
-/// The table, but in another order: [sorted by speed](sorted_by_first_feature). Within a speed, where trained ones lie beside their likes,
-/// a search would come ever nearer, and each of them would find a place among the nearest for a while: so each is as many places
-/// behind the one before it as `STEP` says.
+/// The table, [sorted by speed](sorted_by_first_feature), and shuffled within each speed: neighbours are `STEP` places apart in the
+/// table. In the trained order similar examples are neighbours, and a search comes ever nearer. Each example would then enter the
+/// list of the nearest for a while.
 pub const EXAMPLES: [Example<{ features::COUNT }>; COUNT] = {
     let mut examples = [Example::new([0; features::COUNT], 0); COUNT];
     let mut index = 0;
@@ -77,8 +76,8 @@ pub const EXAMPLES: [Example<{ features::COUNT }>; COUNT] = {
     sorted_by_first_feature(examples)
 };
 
-/// Examples as a search in flash expects them: it begins with those whose first feature is the query's, which are the nearest to it.
-/// Those that are alike in it stay in their order.
+/// Sorts examples for the search in flash: it starts with those whose first feature equals the query's, which are nearest to it.
+/// The sort is stable.
 pub const fn sorted_by_first_feature<const N: usize>(
     mut examples: [Example<{ features::COUNT }>; N],
 ) -> [Example<{ features::COUNT }>; N] {
@@ -96,7 +95,7 @@ pub const fn sorted_by_first_feature<const N: usize>(
     examples
 }
 
-/// Some five eighths of the table, and without a divisor in common with its length, so that none is left out.
+/// Some five eighths of the table, coprime to its length, so that no example is left out.
 const STEP: usize = {
     let mut step = COUNT * 5 / 8;
     while greatest_common_divisor(step, COUNT) != 1 {
@@ -132,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn every_example_of_the_table_is_among_the_built_in_ones() {
+    fn every_example_of_the_table_is_built_in() {
         for (features, label) in &table::TRAINED {
             assert!(EXAMPLES.contains(&Example::new(SCALE.quantise(features), *label)), "{features:?}");
         }
@@ -145,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn narrow_is_what_has_half_the_width_of_the_narrowest_plant() {
+    fn narrow_is_half_the_width_of_the_narrowest_plant() {
         let plants = table::TRAINED.iter().filter(|(_, label)| *label == label::PLANT);
         let narrowest = plants.map(|([_, _, _, hold, _], _)| hold - features::HOLD_BEYOND_WIDTH_MM).min();
         assert_eq!(narrowest.map(|width| width / 2), Some(NARROW_MM.into()));
@@ -154,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn the_settings_begin_with_the_k_of_the_training() {
+    fn the_default_k_is_the_k_of_the_training() {
         assert_eq!(Setting::K.description().default, u16::from(K));
     }
 
@@ -181,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_neither_is_never_taken_for_a_weed() {
+    fn a_detection_unlike_both_classes_is_never_a_weed() {
         for speed in SPEED_CLASSES_MM_S {
             for width_mm in (35..=90).chain([250, 400, 1000, 30_000]) {
                 for spacing_mm in (0..=2000).step_by(5) {
@@ -192,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn whatever_passes_at_most_a_third_of_the_examples_are_among_the_nearest_when_the_search_meets_them() {
+    fn at_most_a_third_of_the_examples_enter_the_list_of_the_nearest() {
         let among_the_nearest = |detection: Features| {
             let query = SCALE.quantise(&detection.values());
             let nearest: &mut knn::Nearest<{ label::COUNT }> =

@@ -1,9 +1,8 @@
 //! The paper's five features of a detection.
 //!
-//! Speed, encoder value, delay, hold and actuation are given in millimetres and millimetres a second, as the reference machine
-//! would schedule the detection: beam 400 mm ahead of the tool, 50 mm margin, 180 and 40 ms of lead. So the examples that one
-//! machine was taught hold on another, for all wheels, encoders and settings. The default lead is longer: the examples would not hold
-//! if the reference followed it.
+//! Speed, encoder value, delay, hold and actuation are in mm and mm/s. They describe how a reference machine would schedule the
+//! detection: beam 400 mm ahead of the tool, 50 mm margin, 180 and 40 ms of lead. So examples from one machine hold on another,
+//! with any wheel, encoder and settings. The default lead is longer, but the examples would not hold if the reference followed it.
 
 /// Features in a vector.
 pub const COUNT: usize = 5;
@@ -11,7 +10,7 @@ pub const COUNT: usize = 5;
 /// The forward speeds of the paper's trial, in mm/s: 1, 1.5, 2 and 2.5 km/h.
 pub const SPEED_CLASSES_MM_S: [i16; 4] = [278, 417, 556, 694];
 
-/// The machine as which every detection is described.
+/// The reference machine of all features.
 mod reference {
     pub const BEAM_TO_TOOL_MM: u16 = 400;
     pub const MARGIN_MM: u16 = 50;
@@ -19,7 +18,7 @@ mod reference {
     pub const LEAD_IN_MS: u16 = 40;
 }
 
-/// What hold is more than a detection's width, in mm.
+/// Hold minus width, in mm.
 pub const HOLD_BEYOND_WIDTH_MM: i32 = 2 * reference::MARGIN_MM as i32;
 
 /// The feature vector of a detection.
@@ -29,16 +28,16 @@ pub struct Features {
     pub speed_mm_s: i16,
     /// E: distance since the last plant's leading edge, the plant spacing, in mm.
     pub spacing_mm: i16,
-    /// Y: delay until the command to leave the row (Eq. 1, less the lead), in mm.
+    /// Y: delay until the command to leave the row (Eq. 1 minus the lead), in mm.
     pub delay_mm: i16,
-    /// Z: hold, the stretch that the tool stays out (Eq. 2), in mm.
+    /// Z: hold, the distance for which the tool stays out (Eq. 2), in mm.
     pub hold_mm: i16,
-    /// R: actuation, where the command to come back falls (Eq. 3, less the lead), in mm.
+    /// R: actuation, the position of the command to come back (Eq. 3 minus the lead), in mm.
     pub actuation_mm: i16,
 }
 
 impl Features {
-    /// Describes a detection of `width_mm`, `spacing_mm` behind the last plant, in one of the speed classes.
+    /// The features of a detection of `width_mm`, `spacing_mm` behind the last plant, in one of the speed classes.
     #[inline(never)]
     pub const fn describe(speed_class_mm_s: i16, spacing_mm: i16, width_mm: i16) -> Self {
         let delay = reference::BEAM_TO_TOOL_MM - reference::MARGIN_MM;
@@ -65,8 +64,8 @@ impl Features {
     }
 }
 
-/// How far a machine rolls, in millimetres. In units of 20 ms, the product of a speed class and a lead fits 16 bits, which the chip
-/// divides in a third of the time that 32 take.
+/// The distance rolled, in mm. In units of 20 ms, a speed class times a lead fits 16 bits. The chip divides 16 bits three times as
+/// fast as 32.
 const fn rolled(speed_mm_s: i16, milliseconds: u16) -> u16 {
     speed_mm_s as u16 * (milliseconds / 20) / 50
 }
@@ -75,7 +74,7 @@ const fn limited(millimetres: u16) -> i16 {
     if millimetres > i16::MAX as u16 { i16::MAX } else { millimetres as i16 }
 }
 
-/// The nearest of the paper's speed classes, in mm/s; faster than the fastest is the fastest.
+/// The nearest of the paper's speed classes, in mm/s; the fastest for anything faster.
 pub const fn speed_class(speed_mm_s: i16) -> i16 {
     match speed_mm_s {
         ..348 => 278,

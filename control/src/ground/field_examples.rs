@@ -1,11 +1,10 @@
-//! Examples taught in the field, in memory that outlives the power.
+//! Field examples: taught by the operator, and kept in the EEPROM.
 //!
-//! Each of [`CAPACITY`] examples has a slot of eight bytes: five features, the label, and a CRC-16 of both and of the scale
-//! by which the features became bytes, as under another scale they would mean something else. An erased slot reads as ones.
-//! A slot whose CRC does not fit, because the power went away while it was written or a bit fell over, is dropped, and
-//! counted so that it can be told. What the slots hold is read once, when the machine wakes up, and kept in SRAM: a search would take
-//! twice a turn of the loop to read them, and more to check them, and would wait for a byte that is being written. The bytes of a
-//! slot go to the memory one at a time, whenever it can take one.
+//! Each of [`CAPACITY`] examples has a slot of eight bytes: five features, the label, and a CRC-16. The CRC covers features, label
+//! and the features' scale, because on another scale the bytes mean something else. An erased slot reads as ones. A slot with a
+//! wrong CRC, after a power loss or a flipped bit, is dropped and counted. All slots are read once at start-up into SRAM. A search
+//! in the EEPROM would take two turns of the loop, and more with the CRC. It would also wait for a byte that is being written. The
+//! bytes of a slot are written one at a time, each when the memory is ready.
 
 use crate::{
     ground::{class::label, examples, features},
@@ -13,40 +12,40 @@ use crate::{
 };
 use knn::{Example, Examples, VACANT};
 
-/// Examples that can be taught.
+/// Most field examples.
 pub const CAPACITY: u8 = 32;
 
 /// Bytes of a slot.
 const SLOT: usize = features::COUNT + 3;
 
-/// An example as it was taught.
+/// A field example.
 type Taught = Example<{ features::COUNT }>;
 
-/// Stands for the scale in each slot's CRC.
+/// The scale, in each slot's CRC.
 const SCALE_MARK: [u8; 2] = checksum(&examples::SCALE_BYTES).to_le_bytes();
 
-/// The store of examples taught in the field.
+/// The store of field examples.
 #[derive(Clone, Debug)]
 pub struct FieldExamples<M> {
     memory: M,
-    /// The examples of the slots; labelled [`VACANT`] those that hold none.
+    /// The example of each slot; label [`VACANT`] if it holds none.
     examples: [Taught; CAPACITY as usize],
-    /// Slots from the first on, behind which no slot holds an example.
+    /// Number of slots up to the last example.
     used: u8,
-    /// A bit for each slot that is yet to be written, or erased where it holds none any more.
+    /// One bit for each slot that is yet to be written or erased.
     pending: [u8; CAPACITY as usize / 8],
     spoiled: u8,
     /// The slot that is being written.
     writing: u8,
     bytes: [u8; SLOT],
-    /// Bytes of it that are still to go.
+    /// Bytes of that slot still to write.
     left: u8,
 }
 
 impl<M: Memory> FieldExamples<M> {
-    /// The store in a memory that nobody has looked through.
+    /// The store before [`init`](Self::init).
     pub const fn asleep(memory: M) -> Self {
-        // Zeros take no flash. There is no example until the memory has been looked through.
+        // Zeros take no flash. `used` is 0, so none of them counts.
         let examples = [Example::new([0; features::COUNT], 0); CAPACITY as usize];
         Self {
             memory,
@@ -60,7 +59,7 @@ impl<M: Memory> FieldExamples<M> {
         }
     }
 
-    /// Looks through the memory for the examples that it holds.
+    /// Reads the examples from the memory.
     pub fn init(&mut self) {
         self.spoiled = 0;
         for (number, example) in (0..).zip(&mut self.examples) {
@@ -78,7 +77,7 @@ impl<M: Memory> FieldExamples<M> {
         }
     }
 
-    /// Slots that were found spoiled.
+    /// Slots with a wrong CRC.
     pub fn spoiled(&self) -> u8 {
         self.spoiled
     }
@@ -88,10 +87,10 @@ impl<M: Memory> FieldExamples<M> {
         self.examples.get(usize::from(number)).copied().filter(is_held)
     }
 
-    /// Adds an example, which [`carry_on`](Self::carry_on) will write; returns its slot.
+    /// Adds an example and returns its slot. [`carry_on`](Self::carry_on) writes it.
     ///
     /// # Errors
-    /// The example, when all slots are taken.
+    /// The example, if all slots are taken.
     pub fn add(&mut self, example: Taught) -> Result<u8, Taught> {
         let Some(number) = self.examples.iter().position(|example| !is_held(example)) else {
             return Err(example);
@@ -102,7 +101,7 @@ impl<M: Memory> FieldExamples<M> {
         Ok(number as u8)
     }
 
-    /// Forgets the example in a slot, which [`carry_on`](Self::carry_on) will erase; whether there was one.
+    /// Forgets the example in a slot. [`carry_on`](Self::carry_on) erases it. Returns whether there was one.
     pub fn forget(&mut self, number: u8) -> bool {
         let Some(example) = self.examples.get_mut(usize::from(number)).filter(|example| is_held(example)) else {
             return false;
@@ -112,12 +111,12 @@ impl<M: Memory> FieldExamples<M> {
         true
     }
 
-    /// Carries on with what is to be written, without waiting; whether all has been.
+    /// Writes the next byte, if the memory is ready. Returns whether all is written.
     pub fn carry_on(&mut self) -> bool {
         if !self.write_next_byte() {
             return false;
         }
-        // In nearly every turn there is none.
+        // The usual case, checked first because every turn comes here.
         if self.pending == [0; CAPACITY as usize / 8] {
             return true;
         }
@@ -131,17 +130,17 @@ impl<M: Memory> FieldExamples<M> {
         false
     }
 
-    /// The slots that hold examples, and some between them that are [`VACANT`].
+    /// The slots up to the last example; empty ones are [`VACANT`].
     pub fn places(&self) -> &[Taught] {
         self.examples.get(..self.used.into()).unwrap_or(&self.examples)
     }
 
-    /// The memory, to be looked at or put into another machine.
+    /// The memory, for a test or another machine.
     pub fn into_memory(self) -> M {
         self.memory
     }
 
-    /// The byte with the bit of a slot that may be pending.
+    /// The byte that holds a slot's pending bit.
     fn pending(&mut self, number: u8) -> &mut u8 {
         &mut self.pending[usize::from(number / 8)]
     }
@@ -153,7 +152,7 @@ impl<M: Memory> FieldExamples<M> {
         self.left = SLOT as u8;
     }
 
-    /// Writes a byte if the memory can take one; whether the last one has been written.
+    /// Writes the next byte of the slot, if the memory is ready. Returns whether the slot is complete.
     fn write_next_byte(&mut self) -> bool {
         if !self.memory.is_ready() {
             return false;
@@ -168,12 +167,12 @@ impl<M: Memory> FieldExamples<M> {
     }
 }
 
-/// The bit of a slot in its byte.
+/// A slot's bit in its byte.
 const fn bit(number: u8) -> u8 {
     1 << (number % 8)
 }
 
-/// Where a slot begins.
+/// A slot's first address.
 const fn address(number: u8) -> u16 {
     number as u16 * SLOT as u16
 }
@@ -200,7 +199,7 @@ fn encode(example: Taught) -> [u8; SLOT] {
     [a, b, c, d, e, example.label, low, high]
 }
 
-/// What a slot's bytes say, right or not.
+/// The example in a slot's bytes, without a check.
 fn example_in(bytes: [u8; SLOT]) -> Taught {
     let [a, b, c, d, e, label, ..] = bytes;
     Example::new([a, b, c, d, e], label)
@@ -232,12 +231,12 @@ mod tests {
     }
 
     #[test]
-    fn what_was_taught_is_there_after_a_restart() {
+    fn taught_examples_survive_a_restart() {
         let mut store = store();
         for number in 0..CAPACITY {
             assert_eq!(store.add(example(number)), Ok(number));
         }
-        assert_eq!(store.add(example(99)), Err(example(99)), "a full store hands the example back");
+        assert_eq!(store.add(example(99)), Err(example(99)), "a full store returns the example");
         while !store.carry_on() {}
         let mut store = restart(store);
         assert_eq!(store.len(), usize::from(CAPACITY));
@@ -246,7 +245,7 @@ mod tests {
         while !store.carry_on() {}
         let mut store = restart(store);
         assert_eq!((store.slot(7), store.slot(8)), (None, Some(example(8))));
-        assert_eq!(store.add(example(50)), Ok(7), "the free slot is taken again");
+        assert_eq!(store.add(example(50)), Ok(7), "the free slot is used again");
     }
 
     #[test]
@@ -282,7 +281,7 @@ mod tests {
     }
 
     #[test]
-    fn a_spoiled_byte_drops_its_example_and_is_counted() {
+    fn a_flipped_bit_drops_its_example_and_is_counted() {
         for byte in 0..SLOT {
             for bit in 0..8 {
                 let mut store = store();
@@ -297,7 +296,7 @@ mod tests {
     }
 
     #[test]
-    fn an_example_of_another_scale_is_spoiled() {
+    fn an_example_of_another_scale_is_invalid() {
         let mut store = store();
         store.add(example(0)).unwrap();
         while !store.carry_on() {}
@@ -309,7 +308,7 @@ mod tests {
     }
 
     #[test]
-    fn an_example_of_a_class_that_there_is_not_is_spoiled() {
+    fn an_example_with_an_unknown_label_is_invalid() {
         for label in [label::COUNT as u8, VACANT] {
             let mut memory = Volatile::new();
             memory.bytes[..SLOT].copy_from_slice(&encode(Example::new([1, 2, 3, 4, 5], label)));
@@ -319,13 +318,13 @@ mod tests {
     }
 
     #[test]
-    fn what_is_forgotten_before_it_is_written_is_erased() {
+    fn an_example_forgotten_before_it_is_written_is_erased() {
         let mut store = store();
         store.add(example(1)).unwrap();
         store.add(example(2)).unwrap();
         assert!(!store.carry_on(), "the first is being written");
         assert!(store.forget(0) && store.forget(1));
-        assert_eq!(store.add(example(3)), Ok(0), "its slot is free, whatever is still to be written there");
+        assert_eq!(store.add(example(3)), Ok(0), "its slot is free, although bytes are still to be written");
         while !store.carry_on() {}
         let store = restart(store);
         assert_eq!((store.slot(0), store.slot(1), store.spoiled()), (Some(example(3)), None, 0));

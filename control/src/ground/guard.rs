@@ -1,36 +1,35 @@
-//! Ground to be guarded: in a crop that is set at even distances, where a plant is due and the beam has seen none.
+//! Expected plants: guards the ground where a plant is due at the planting distance, if the beam has seen none.
 //!
-//! The plant seen last tells where the next is due: a spacing from its middle to the middle of that one, give or take the
-//! scatter of the crop. Whatever is kept and meets that stretch is the plant, and the next is counted from it. What is kept and
-//! does not, a double or a weed like a plant, changes nothing. Once the beam has seen all of the stretch, it becomes ground like
-//! that of a canopy, and is no other from then on. Behind `IN_A_ROW` of these the row is at its end, and nothing is due until
-//! a plant is seen.
+//! The last plant's middle plus the spacing gives the next expected middle, within the crop's scatter. A kept detection within that
+//! stretch is the expected plant, and the count continues from it. A kept detection outside, such as a double or a weed like a
+//! plant, changes nothing. Once the beam has passed the whole stretch, the stretch becomes a keep-out zone for good. After
+//! `IN_A_ROW` of these the row has ended, and no plant is expected until the beam sees one.
 //!
-//! What it does not do: tell an unseen plant from none. Gaps are guarded too, and weeds in them stay.
+//! What it does not do: tell a missed plant from a gap. Gaps are guarded too, and weeds in them stay.
 
 use super::{detection::Detection, keep_out::Canopy, reach::Geometry};
 use crate::units::{Length, WrappedPosition};
 
-/// Plants in a row that are taken for unseen; one more that does not come, and the row is at its end.
+/// Consecutive missed plants. If the next does not come either, the row has ended.
 const IN_A_ROW: u8 = 3;
 
-/// Where a plant is due.
+/// Where the next plant is expected.
 #[derive(Clone, Debug)]
 pub struct Guard {
-    /// Its middle.
+    /// The middle of the expected plant.
     due: WrappedPosition,
-    /// How many of this and the next are still waited for; none where nobody knows where any would be.
+    /// Plants still expected, this one included; 0 if no position is known.
     left: u8,
 }
 
 impl Guard {
-    /// No plant is due.
+    /// No plant is expected.
     pub const NONE: Self = Self { due: WrappedPosition::new(0), left: 0 };
 
-    /// Takes a detection that is kept.
+    /// Takes a kept detection.
     pub fn see(&mut self, plant: &Detection, geometry: &Geometry) {
         let (spacing, scatter) = (geometry.guard_spacing, geometry.guard_scatter);
-        // Of one whose beginning was not seen, nobody knows the middle.
+        // A cut detection has no known middle.
         if spacing == Length::ZERO || plant.cut {
             return;
         }
@@ -41,7 +40,7 @@ impl Guard {
         }
     }
 
-    /// The ground that is to be guarded now that the beam has seen what stands up to a place: where a plant was due.
+    /// The ground to guard once the beam has passed an expected plant. `seen_to` is how far the ground is seen and classified.
     #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn pass(&mut self, seen_to: WrappedPosition, geometry: &Geometry) -> Option<Canopy> {
         let (due, guarded) = (self.due, geometry.guarded);
@@ -53,7 +52,7 @@ impl Guard {
         Some(Canopy { leading: due - guarded, trailing: due + guarded, trim: 0 })
     }
 
-    /// Where the ground begins on which a plant may stand that has not been seen yet, if the beam has come to it.
+    /// Where the stretch of an expected plant begins, if the beam has reached it.
     #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn awaited(&self, frontier: WrappedPosition, geometry: &Geometry) -> Option<WrappedPosition> {
         let from = self.due - geometry.guarded;

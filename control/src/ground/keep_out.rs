@@ -1,12 +1,11 @@
-//! The schedule: ground where the tool must not work, and the paper's Y, Z and R.
+//! The keep-out zones: ground where the tool must not work, and the paper's Y, Z and R.
 //!
-//! A window is a canopy with a margin on both sides. The schedule remembers canopies as ground seen, not as a list of
-//! timed events, so that stopping, rolling back and changing speed need no bookkeeping: whether the tool may be in the
-//! row is a question about a stretch of ground. Ground never seen, or forgotten, is closed: what is unknown is a plant.
-//! Whatever is forgotten is closed, with a margin ahead of it for the plant that may end there.
+//! A zone is a canopy with a margin on both sides. Canopies are stored as stretches of ground, not as timed events. So stopping,
+//! rolling back and changing speed need no bookkeeping. Unseen and forgotten ground is closed. Forgotten ground is closed with a
+//! margin ahead of it, for a plant that may end there.
 //!
-//! Windows need not be merged: two that overlap close the ground between them, and a gap too short to swing in and out
-//! again is closed by the length of the stretch that the tool asks about.
+//! Zones are not merged. Two that overlap close the ground between them. The caller asks about a stretch as long as the servo
+//! needs. So a gap too short to swing in and out is closed too.
 
 use super::{
     detection::{Detection, End},
@@ -15,37 +14,40 @@ use super::{
 use crate::units::{Length, Ticks, WrappedPosition};
 use heapless::Vec;
 
-/// Canopies remembered at once, ahead of the tool and behind it: four plants between beam and tool at the longest
-/// distance and the closest spacing, and some six metres of row to roll back over.
+/// Canopies remembered at once, ahead of the tool and behind it. Four plants fit between beam and tool at the longest distance and
+/// closest spacing. The others allow rolling back over some six metres.
 pub const CAPACITY: usize = 16;
 
-/// What is known of the ground behind the place from which on it is known.
+/// Why the ground behind `known_from` is unknown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Behind {
-    /// It was never seen.
+    /// The beam never saw it.
     Unseen,
-    /// It was seen, and a fault has made it worth nothing.
+    /// The beam saw it, but a fault made the detections invalid.
     Spoiled,
-    /// It was seen, and lies too far behind.
+    /// The beam saw it, but it was dropped for distance or lack of room.
     Left,
 }
 
-/// A canopy that is kept: all of it, or where it is that of a single plant, the zone round its stem.
+/// A canopy to keep out of: its full width, or the stem zone of a single plant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Canopy {
     /// Where it begins.
     pub leading: WrappedPosition,
     /// Where it ends.
     pub trailing: WrappedPosition,
-    /// So much of it on either side is leaves alone, under which the tool may work.
+    /// Width of the leaves on either side under which the tool may work; 0 keeps the full width.
     pub trim: u8,
 }
 
 impl Canopy {
-    /// What is kept of a detection, should it be a plant: all of it, or a zone of so much around its middle.
+    /// No canopy.
+    pub(super) const NONE: Self = Self { leading: WrappedPosition::new(0), trailing: WrappedPosition::new(0), trim: 0 };
+
+    /// The canopy of a detection, if it is a plant: `zone` around its middle, or all of it if `zone` is 0 or wider.
     ///
-    /// A stem stands near the middle of its canopy, but the beam cannot tell one plant from two that have grown together, or from one with
-    /// a weed at its side. So either end is given up by a fifth of the zone at the most: no stem stands so near to it.
+    /// A stem stands near the middle of its canopy. But two plants that have grown together, or a plant with a weed beside it, look
+    /// the same to the beam. So at most a fifth of the zone is cut off either end: no stem stands so near to an end.
     pub(super) fn of(detection: &Detection, zone: Length) -> Self {
         let beside = detection.width() - zone;
         let most = (zone.0 as u16 * 13) >> 6;
@@ -53,21 +55,22 @@ impl Canopy {
         Self { leading: detection.leading, trailing: detection.trailing, trim }
     }
 
-    /// Where the tool has to be out, less the margin.
+    /// Where the tool has to be out, without the margin.
     fn from(&self) -> WrappedPosition {
         self.leading + Length(self.trim.into())
     }
 
-    /// Where it may come back, less the margin.
+    /// Where the tool may come back, without the margin.
     fn to(&self) -> WrappedPosition {
         self.trailing - Length(self.trim.into())
     }
 
-    /// The second beam sees something from one place to another, an end of it or all; whether that belongs to the canopy, because it lies
-    /// within `reach` of it.
+    /// Takes a stretch that the second beam sees, all of a detection or one `end`. Returns whether it lies within `reach` of the
+    /// canopy.
     ///
-    /// An end of a single plant that both beams have within a quarter of `within` is where the second has it, from where less distance is
-    /// left to slip on. Else the canopy goes as far as that, and is kept whole: one of the beams has not seen all of it.
+    /// If both beams see an end of a single plant within a quarter of `within`, the second beam's position counts: from there, less
+    /// distance is left for slip. Otherwise the canopy grows to include the stretch. It then keeps its full width, because one beam
+    /// has not seen all of it.
     #[cfg_attr(target_arch = "avr", inline(never))]
     pub(super) fn widen(
         &mut self,
@@ -96,55 +99,54 @@ impl Canopy {
     }
 }
 
-/// The canopies known, in the order in which the beam saw them.
+/// The known canopies, in the order in which the beam saw them.
 #[derive(Clone, Debug)]
 pub struct KeepOut {
     canopies: Vec<Canopy, CAPACITY, u8>,
-    /// Everything behind this place is unknown.
+    /// All ground behind this place is unknown.
     known_from: WrappedPosition,
     behind: Behind,
 }
 
-/// The schedule holds as many canopies ahead of the tool as it can; one more would have to be forgotten.
+/// All places hold canopies at the tool or ahead of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ScheduleFull;
 
 impl KeepOut {
-    /// A schedule of no ground.
+    /// Keep-out zones before any ground is known.
     pub const NONE: Self = Self::new(WrappedPosition::new(0));
 
-    /// An empty schedule that knows the ground from `known_from` on.
+    /// No canopies, with the ground known from `known_from` on.
     pub const fn new(known_from: WrappedPosition) -> Self {
         Self { canopies: Vec::new(), known_from, behind: Behind::Unseen }
     }
 
-    /// The place from which on the ground is known.
+    /// Where the known ground begins.
     pub fn known_from(&self) -> WrappedPosition {
         self.known_from
     }
 
-    /// Whether a place lies so far behind that the ground there, although it was seen, had to be forgotten.
+    /// Whether the ground at a place was seen, and dropped.
     #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn has_left(&self, place: WrappedPosition) -> bool {
         self.behind == Behind::Left && self.known_from.is_ahead_of(place)
     }
 
-    /// Declares the ground from `place` on known, which lies behind what the beam has seen.
+    /// Declares the ground known from `place` on. `place` lies behind the frontier.
     pub fn trust_from(&mut self, place: WrappedPosition) {
         (self.known_from, self.behind) = (place, Behind::Unseen);
     }
 
-    /// Forgets everything, as none of it is to be relied on: from `place` on, the ground is seen anew.
+    /// Forgets all canopies, because they are not reliable. The ground is known from `place` on.
     pub fn spoil(&mut self, place: WrappedPosition) {
         self.canopies.clear();
         (self.known_from, self.behind) = (place, Behind::Spoiled);
     }
 
-    /// Adds a canopy. When all places are taken, the oldest one behind the tool is forgotten, and the ground up to its
-    /// end with it.
+    /// Adds a canopy. If all places are taken, drops the oldest canopy behind the tool, and the ground up to its end.
     ///
     /// # Errors
-    /// [`ScheduleFull`] when even the oldest window lies at the tool or ahead of it; the canopy is then not added.
+    /// [`ScheduleFull`] if even the oldest zone lies at the tool or ahead of it. The canopy is then not added.
     pub fn push(&mut self, canopy: Canopy, tool: WrappedPosition, margin: Length) -> Result<(), ScheduleFull> {
         if self.canopies.is_full() {
             let oldest = self.canopies.first().ok_or(ScheduleFull)?;
@@ -157,10 +159,10 @@ impl KeepOut {
         self.canopies.push(canopy).map_err(|_| ScheduleFull)
     }
 
-    /// A canopy that reaches to within a distance of what stands from one place to another goes as far as that, unless one does
-    /// already; whether any does. A zone that was trimmed to the stem is widened as `Canopy::widen` says.
+    /// Widens the canopy that the second beam sees between `from` and `to`, see `Canopy::widen`. Returns whether a canopy is within
+    /// `within` of that stretch.
     pub fn widen(&mut self, from: WrappedPosition, to: WrappedPosition, within: Length, end: End) -> bool {
-        // One that reaches as far beyond it as it is long has all of it, and is asked for first.
+        // First look for a canopy that contains the whole stretch.
         let mut reach = from - to;
         loop {
             if self.canopies.iter_mut().any(|canopy| canopy.widen(from, to, reach, within, end)) {
@@ -173,14 +175,14 @@ impl KeepOut {
         }
     }
 
-    /// Forgets what ends at a place or behind it: the machine has left it behind.
+    /// Drops the canopies that end at a place or behind it.
     #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn leave(&mut self, place: WrappedPosition) {
         if !place.is_ahead_of(self.known_from) {
             return;
         }
         (self.known_from, self.behind) = (place, Behind::Left);
-        // They stand in order, so that only the first can lie behind.
+        // They are in order, so only the first can lie behind.
         while self.canopies.first().is_some_and(|canopy| !canopy.trailing.is_ahead_of(place)) {
             self.canopies.remove(0);
         }
@@ -193,13 +195,13 @@ impl KeepOut {
         if open_from.is_ahead_of(near) {
             return true;
         }
-        // Compared by distance from the near end, the counter's wrapping does no harm.
+        // Distances from the near end are compared, so the counter may wrap.
         let length = (far - near) + margin;
-        // Most lie behind the tool, and are told by their end.
+        // Most canopies lie behind the tool, and their end shows that.
         self.canopies.iter().any(|canopy| (canopy.to() - near) >= -margin && (canopy.from() - near) <= length)
     }
 
-    /// Where the zone begins and ends that is kept at a place or nearest to it, if the place is within `margin` of one.
+    /// The canopy whose margin covers a place, from its beginning to its end; the nearest one if there are several.
     pub fn zone_at(&self, place: WrappedPosition, margin: Length) -> Option<(WrappedPosition, WrappedPosition)> {
         let zones = self.canopies.iter().map(|canopy| (canopy.leading, canopy.trailing));
         let off =
@@ -207,13 +209,13 @@ impl KeepOut {
         zones.min_by_key(off).filter(|zone| off(zone) <= margin)
     }
 
-    /// Windows at the tool or ahead of it.
+    /// Zones at the tool or ahead of it.
     pub fn ahead(&self, tool: WrappedPosition, margin: Length) -> u8 {
         self.canopies.iter().filter(|canopy| !tool.is_ahead_of(canopy.trailing + margin)).count() as u8
     }
 }
 
-/// The paper's schedule of one canopy, from the place where the beam broke.
+/// The paper's schedule of one canopy, from its leading edge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Plan {
     /// Y: the tool leaves the row (Eq. 1).
@@ -223,7 +225,7 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// The schedule of a canopy of `width`, each within two units of the scale of its equation.
+    /// The schedule of a canopy of `width`. Each value is within two units of the scale of its equation.
     pub fn new(geometry: &Geometry, width: Length) -> Self {
         let Geometry { scale, beam_to_tool, margin, .. } = *geometry;
         let delay = (beam_to_tool - margin).max(Length::ZERO);
@@ -251,20 +253,20 @@ mod tests {
     }
 
     #[test]
-    fn a_window_reaches_from_margin_to_margin() {
+    fn a_zone_reaches_from_margin_to_margin() {
         let mut keep_out = KeepOut::new(WrappedPosition::new(0));
         keep_out.push(canopy(1000, 1300), WrappedPosition::new(0), MARGIN).unwrap();
         assert!(!closed(&keep_out, 904, 904));
         assert!(closed(&keep_out, 905, 905));
         assert!(closed(&keep_out, 1395, 1395));
         assert!(!closed(&keep_out, 1396, 1396));
-        assert!(closed(&keep_out, 800, 905), "a stretch that ends in the window");
-        assert!(closed(&keep_out, 0, 5000), "a stretch across the window");
+        assert!(closed(&keep_out, 800, 905), "a stretch that ends in the zone");
+        assert!(closed(&keep_out, 0, 5000), "a stretch across the zone");
         assert!(!closed(&keep_out, 0, 904));
     }
 
     #[test]
-    fn the_window_of_a_single_plant_is_its_zone_with_the_margins() {
+    fn a_single_plant_is_closed_in_its_stem_zone_and_margins() {
         let seen = |leading, trailing| Detection {
             leading: WrappedPosition::new(leading),
             trailing: WrappedPosition::new(trailing),
@@ -299,7 +301,7 @@ mod tests {
         assert_eq!(keep_out.push(canopy(20_000, 20_200), WrappedPosition::new(295), MARGIN), Err(ScheduleFull));
         assert_eq!(keep_out.push(canopy(20_000, 20_200), WrappedPosition::new(296), MARGIN), Ok(()));
         assert!(keep_out.has_left(WrappedPosition::new(199)) && !keep_out.has_left(WrappedPosition::new(200)));
-        assert!(closed(&keep_out, 294, 294), "what was forgotten is unknown");
+        assert!(closed(&keep_out, 294, 294), "forgotten ground is unknown");
         assert!(!closed(&keep_out, 295, 295));
         let (place, wider) = (WrappedPosition::new(299), Length(100));
         assert!(keep_out.is_closed(place, place, wider), "its margin is kept, even one that was set later");
@@ -307,7 +309,7 @@ mod tests {
     }
 
     #[test]
-    fn windows_ahead_are_counted_until_the_tool_has_passed_them() {
+    fn zones_ahead_are_counted_until_the_tool_has_passed_them() {
         let mut keep_out = KeepOut::new(WrappedPosition::new(0));
         keep_out.push(canopy(1000, 1300), WrappedPosition::new(0), MARGIN).unwrap();
         keep_out.push(canopy(2000, 2300), WrappedPosition::new(0), MARGIN).unwrap();
@@ -318,7 +320,7 @@ mod tests {
     }
 
     #[test]
-    fn what_lies_far_behind_is_left_before_the_counter_can_wrap_around_it() {
+    fn far_ground_is_dropped_before_the_counter_wraps() {
         let mut keep_out = KeepOut::new(WrappedPosition::new(0));
         keep_out.push(canopy(1000, 1300), WrappedPosition::new(0), MARGIN).unwrap();
         for step in 1..5000 {
@@ -332,18 +334,18 @@ mod tests {
     }
 
     #[test]
-    fn what_is_spoiled_is_closed_with_a_margin_behind_it() {
+    fn spoiled_ground_is_closed_with_a_margin_ahead_of_it() {
         let mut keep_out = KeepOut::new(WrappedPosition::new(0));
         keep_out.push(canopy(1000, 1300), WrappedPosition::new(0), MARGIN).unwrap();
         keep_out.spoil(WrappedPosition::new(1310));
         assert!(closed(&keep_out, 0, 0) && closed(&keep_out, 1310, 1310));
         assert!(closed(&keep_out, 1404, 1404));
         assert!(!closed(&keep_out, 1405, 1405));
-        assert!(!keep_out.has_left(WrappedPosition::new(1000)), "nobody left it");
+        assert!(!keep_out.has_left(WrappedPosition::new(1000)), "spoiled, not dropped");
     }
 
     #[test]
-    fn windows_close_the_same_ground_where_the_counter_wraps() {
+    fn zones_close_the_same_ground_where_the_counter_wraps() {
         let base = i16::MAX - 1100;
         let at = |offset: i16| WrappedPosition::new(base.wrapping_add(offset));
         let mut keep_out = KeepOut::new(at(0));

@@ -1,8 +1,7 @@
-//! What a detection is: the vote of the nearest labelled examples.
+//! The classifier: the vote of the nearest labelled examples.
 //!
-//! The examples are feature vectors in bytes, scaled by [`examples::scale`] and searched by the
-//! crate `knn` wherever they lie. Whatever the answer leaves open, a tie, a stranger, a table with fewer examples than
-//! are to vote, is [`Class::Unknown`], which everyone treats as a plant.
+//! Examples are feature vectors in bytes, scaled by [`examples::scale`]. The crate `knn` searches them, in flash and in SRAM. Three
+//! cases give [`Class::Unknown`], which counts as a plant: a tie, a detection far from all examples, and fewer than k examples.
 
 use crate::{
     ground::{
@@ -15,40 +14,40 @@ use crate::{
 };
 use knn::{Answer, ClassifyError, Example, Examples, Kind, MAX_K, Neighbour};
 
-/// Examples from the field that are asked in a turn of the loop, which takes half a millisecond where each is nearer than all before it.
+/// Field examples searched in one turn. This takes half a millisecond if each one is nearer than all before it.
 pub const AT_ONCE: usize = 16;
 
-/// What is kept of the nearest examples while they are searched.
+/// The nearest examples found so far.
 type Found<Places> = knn::Nearest<{ label::COUNT }, Places>;
 
-/// Classifies by the nearest of the built-in examples in `B` and those taught in the field, kept in `M`.
+/// Classifies by the nearest of the built-in examples in `B` and the field examples in `M`.
 #[derive(Clone, Debug)]
 pub struct Nearest<B, M> {
     built_in: B,
     field: FieldExamples<M>,
-    /// What is being classified, and what was found so far.
+    /// The detection that is being classified.
     query: [u8; features::COUNT],
     found: Found<[Neighbour; MAX_K as usize]>,
     asked: Asked,
 }
 
-/// How far a search over several turns has come.
+/// How far a search has come.
 #[derive(Clone, Copy, Debug)]
 enum Asked {
     Nobody,
-    /// The built-in examples, and from the field those of the slots before this one.
+    /// Finished: the built-in examples, and the field examples before this slot.
     FieldBefore(u8),
 }
 
 impl<B: Examples<{ features::COUNT }>, M: Memory> Nearest<B, M> {
-    /// A classifier with the built-in examples and those that the memory holds.
+    /// A classifier with the built-in examples and those in the memory.
     pub fn new(built_in: B, memory: M) -> Self {
         let mut nearest = Self::asleep(built_in, memory);
         nearest.init();
         nearest
     }
 
-    /// A classifier that has not looked at its memory yet.
+    /// A classifier that has not read its memory yet.
     pub const fn asleep(built_in: B, memory: M) -> Self {
         Self {
             built_in,
@@ -59,13 +58,13 @@ impl<B: Examples<{ features::COUNT }>, M: Memory> Nearest<B, M> {
         }
     }
 
-    /// Has the built-in examples join those that were found.
+    /// Adds the nearest built-in examples to those found.
     fn ask_built_in(&mut self) {
         self.built_in.keep_nearest(&self.query, &mut self.found);
         self.asked = Asked::FieldBefore(0);
     }
 
-    /// The vote of those that were found.
+    /// The vote of the examples found.
     #[inline(never)]
     fn vote(&self) -> Vote {
         let found: &Found<[Neighbour]> = &self.found;
@@ -73,13 +72,13 @@ impl<B: Examples<{ features::COUNT }>, M: Memory> Nearest<B, M> {
     }
 }
 
-/// The features in bytes, by the scale of the examples.
+/// The features in bytes, on the scale of the examples.
 #[inline(never)]
 fn scaled(features: &Features) -> [u8; features::COUNT] {
     examples::scale().quantise(&features.values())
 }
 
-/// What an answer says of the detection.
+/// Turns an answer into a vote.
 fn vote(answer: Result<Answer<{ label::COUNT }>, ClassifyError>) -> Vote {
     let Ok(Answer { label, votes, kind, .. }) = answer else { return Vote::UNKNOWN };
     let class = match (kind, label) {
@@ -123,7 +122,7 @@ impl<B: Examples<{ features::COUNT }>, M: Memory> Classifier for Nearest<B, M> {
     }
 
     fn built_in_class(&mut self, features: &Features) -> Class {
-        // As many vote as when they were trained, whatever the settings say for all together.
+        // With the k of the training, because the setting `k` is meant for all examples together.
         match self.begin(features, examples::K) {
             Some(vote) => vote.class,
             None => {
@@ -179,7 +178,7 @@ mod tests {
 
     #[test]
     fn examples_in_flash_and_from_the_field_are_searched_as_one_set() {
-        // As many of both as there may ever be: weeds built in, and the field teaches that the same detection is a plant.
+        // Both tables full: weeds built in, and field examples that call the same detection a plant.
         let features = Features::describe(556, 300, 60);
         let bytes = examples::scale().quantise(&features.values());
         let mut nearest = Nearest::new([Example::new(bytes, label::WEED); examples::CAPACITY], Volatile::new());
@@ -195,14 +194,14 @@ mod tests {
             (listed, place) = (listed + 1, next);
         }
         assert_eq!(listed, examples::CAPACITY + usize::from(field_examples::CAPACITY));
-        // All are level with the k-th nearest, so all vote, those from the field too.
+        // All are as near as the k-th nearest, so all vote, field examples too.
         let all = (&nearest.built_in, &nearest.field);
         let answer = knn::classify::<{ features::COUNT }, { label::COUNT }>(&all, &bytes, 3, examples::RADIUS).unwrap();
         assert_eq!(answer.votes.map(usize::from), [examples::CAPACITY, usize::from(field_examples::CAPACITY)]);
     }
 
     #[test]
-    fn spoiled_examples_from_the_field_are_counted_when_it_wakes_up() {
+    fn invalid_field_examples_are_counted_at_start_up() {
         let mut memory = Volatile::new();
         (memory.bytes[0], memory.bytes[100]) = (0, 0);
         let mut nearest = Nearest::new([Example::new([0; features::COUNT], label::WEED); 1], memory);
@@ -211,7 +210,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_forgotten_is_listed_no_longer_and_votes_no_longer() {
+    fn a_forgotten_example_is_not_listed_and_does_not_vote() {
         let features = Features::describe(556, 300, 60);
         let bytes = examples::scale().quantise(&features.values());
         let mut nearest = Nearest::new([Example::new(bytes, label::WEED); 2], Volatile::new());
@@ -231,13 +230,13 @@ mod tests {
         let field = [(true, 0, label::PLANT), (true, 1, label::WEED), (true, 2, label::PLANT)];
         assert_eq!(listed(&nearest), [built_in, second, field[0], field[1], field[2]]);
         assert_eq!(nearest.classify(&features, 1), Vote { class: Class::Weed, votes: 3 });
-        assert!(nearest.forget(1) && !nearest.forget(1), "it is there once");
+        assert!(nearest.forget(1) && !nearest.forget(1), "only the first call forgets it");
         assert_eq!(listed(&nearest), [built_in, second, field[0], field[2]]);
         assert_eq!(nearest.classify(&features, 1).class, Class::Unknown, "two against two");
         assert!(nearest.forget(0));
         assert_eq!(listed(&nearest), [built_in, second, field[2]]);
         assert_eq!(nearest.classify(&features, 1), Vote { class: Class::Weed, votes: 2 });
         assert!(!nearest.forget(field_examples::CAPACITY));
-        assert_eq!(nearest.built_in_class(&features), Class::Unknown, "two examples are fewer than are to vote");
+        assert_eq!(nearest.built_in_class(&features), Class::Unknown, "fewer examples than k");
     }
 }

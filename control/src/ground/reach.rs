@@ -1,4 +1,4 @@
-//! Where the tool may be in the row: the machine's distances, and the stretch of ground that its servo needs to be open.
+//! The machine's distances in units of the wheel, and the open ground that the servo needs at a speed.
 
 use super::slip::Slip;
 use crate::{
@@ -6,36 +6,36 @@ use crate::{
     units::{Length, LengthScale, Ticks, TicksPerSecond, Wheel},
 };
 
-/// How far the machine may be rolled back with the ground still remembered, in metres. Together with twice the longest X and
-/// the widest canopy that is less than the 13 m that a [`Length`] holds.
+/// Ground remembered behind the frontier, in metres. With twice the longest X and the widest canopy it stays below the 13 m of a
+/// [`Length`].
 const MEMORY_M: i16 = 8;
 
-/// Distances that follow from the settings, for the present wheel.
+/// Distances from the settings, for the present wheel and slip.
 #[derive(Clone, Copy, Debug)]
 pub struct Geometry {
-    /// The wheel by which the others are measured.
+    /// The wheel that the other distances use.
     pub wheel: Wheel,
-    /// Ticks in a unit of the others.
+    /// Ticks in a unit of [`Length`].
     pub scale: LengthScale,
-    /// X.
+    /// X: from beam to tool.
     pub beam_to_tool: Length,
-    /// From the first beam back to the second; zero where there is none.
+    /// From the first beam back to the second; 0 without a second beam.
     pub second_beam: Length,
-    /// Ground left alone on both sides of a canopy.
+    /// Ground to keep clear on both sides of a canopy.
     pub margin: Length,
-    /// What no canopy is wider than.
+    /// The widest canopy.
     pub max_width: Length,
-    /// What is kept of a single plant; zero for all of its canopy.
+    /// Width kept around a single plant's middle; 0 keeps the whole canopy.
     pub stem_zone: Length,
-    /// Clear ground behind which a canopy is over.
+    /// Clear ground that ends a detection.
     pub merge_gap: Length,
-    /// From the middle of a plant to that of the next; zero where the crop is not set at even distances.
+    /// From the middle of a plant to the middle of the next; 0 turns guarding off.
     pub guard_spacing: Length,
-    /// How far off its place such a plant may stand.
+    /// How far a plant may stand from its expected place.
     pub guard_scatter: Length,
-    /// How far ground is guarded on either side of where a plant is due: the zone of a stem that stands off by the scatter.
+    /// Ground guarded on either side of an expected plant: the scatter and half a stem zone.
     pub guarded: Length,
-    /// How far the machine may be rolled back with the ground still remembered.
+    /// Ground remembered behind the frontier.
     pub memory: Length,
 }
 
@@ -56,20 +56,20 @@ impl Geometry {
         memory: Length::ZERO,
     };
 
-    /// The narrowest that both beams are asked for, 8 mm or a tick: less may be an insect or a clod in one of them.
+    /// The narrowest detection that both beams have to see: 8 mm or a tick. Less may be an insect or a clod in one beam.
     pub fn least_seen(&self) -> Length {
         // The memory is eight metres.
         Length((self.memory.0 + 1023) >> 10)
     }
 
-    /// Those of the settings, where the wheel turns by so many 256ths of its way more than the ground that is rolled over.
+    /// The distances of these settings. `excess` is how much farther the wheel turns than the machine rolls, in 256ths.
     pub fn of(settings: &Settings, excess: i8) -> Self {
         let mut geometry = Self::NONE;
         geometry.follow(settings, excess);
         geometry
     }
 
-    /// Follows the settings, as [`of`](Self::of) does.
+    /// Recalculates as [`of`](Self::of) does, in place.
     pub fn follow(&mut self, settings: &Settings, excess: i8) {
         self.wheel = settings.wheel();
         let metre = self.wheel.ticks(1000);
@@ -90,11 +90,11 @@ impl Geometry {
         self.memory = Length(self.scale.length(metre).0 * MEMORY_M);
     }
 
-    /// A setting in millimetres, as the wheel turns over it.
+    /// A setting in millimetres as a length, with slip.
     #[cfg_attr(target_arch = "avr", inline(never))]
     fn length(&self, settings: &Settings, setting: Setting, excess: i8) -> Length {
         let millimetres = settings.get(setting);
-        // Each takes time, which those that are off need not.
+        // The conversion takes time, and a feature that is off needs none.
         if millimetres == 0 {
             return Length::ZERO;
         }
@@ -103,27 +103,27 @@ impl Geometry {
     }
 }
 
-/// Distances rolled at the present speed while something answers; negative when rolling backwards.
+/// Distances rolled at the present speed during each delay; negative backwards.
 #[derive(Clone, Copy, Debug)]
 pub struct Leads {
-    /// While the tool swings out.
+    /// While the tool swings out: `lead_out_ms`.
     pub out: Length,
-    /// Before the tool begins to come back: never longer than `out`.
+    /// Before the tool begins to come back: `lead_in_ms`. Never longer than `out`.
     pub back: Length,
-    /// While the beam's sensor answers.
+    /// During the sensor's response: `beam_response_ms`.
     pub response: Length,
 }
 
 impl Leads {
-    /// Those of a machine at rest.
+    /// Leads of a machine at rest.
     pub const NONE: Self = Self { out: Length::ZERO, back: Length::ZERO, response: Length::ZERO };
 
-    /// Those at a speed, in units of the scale.
+    /// The leads at a speed.
     pub fn at(speed: TicksPerSecond, settings: &Settings, scale: LengthScale) -> Self {
         let out_ms = settings.get(Setting::LeadOutMs);
         let rolled = |milliseconds| scale.length(speed.distance_in_ms(milliseconds));
-        // A lead is longer by what a command takes to the pin in the mean: half a tick, half a turn of the loop, half a pulse.
-        // Without a lead the paper's schedule stands as it is.
+        // 1 ms is added for the mean delay of a command: half a tick, half a turn, half a pulse. A lead of 0 stays 0, as the paper
+        // has it.
         let lead = |milliseconds: u16| rolled(milliseconds + u16::from(milliseconds > 0));
         Self {
             out: lead(out_ms),
@@ -132,21 +132,20 @@ impl Leads {
         }
     }
 
-    /// The stretch of ground, from the tool on, that has to be open for the tool to be in the row when a decision made now
-    /// shows: where it begins and where it ends, in the direction of rolling.
+    /// The ground that must be open for the tool to be in the row: from near to far, counted from the tool in rolling direction.
+    /// The tool will be there when a command of this turn takes effect.
     ///
-    /// What keeps a tool in the row is a part of what lets it in, and less by a fifth at both ends. So at a steady speed it goes
-    /// out once for a window and comes in once behind it, although the measured speed wavers.
+    /// To stay in, the tool needs a stretch that is shorter, by a fifth at both ends, than to come in. So at a steady speed the
+    /// tool leaves once and returns once for each zone, although the measured speed varies.
     #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn stretch(&self, tool_out: bool) -> (Length, Length) {
         let (out, back) = (self.out.0.unsigned_abs(), self.back.0.unsigned_abs());
-        // What lies farther than the lead out is not asked for yet.
+        // Ground beyond the lead out does not matter yet.
         let near = (back + back / 4).min(out);
         let (mut near, mut far) = (near.cast_signed(), out.cast_signed());
         if tool_out {
-            // Coming back pays only if the tool can stay for as long as its stroke takes, the difference of the leads. That also
-            // keeps it out for the window that it left for, should the speed falter. The tick on either side is for an encoder
-            // that trembles on an edge.
+            // Coming back pays only if the tool can stay for at least its stroke, the difference of the leads. This also keeps it
+            // out for the same zone if the speed drops. The tick at either end allows for an encoder that trembles on an edge.
             near -= near / 5 + 1;
             far += (out - back).max(out / 4).cast_signed() + 1;
         }
@@ -159,7 +158,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_keeps_the_tool_in_is_a_part_of_what_lets_it_in() {
+    fn the_stretch_to_stay_in_lies_within_the_stretch_to_come_in() {
         for out in -300..=300_i16 {
             for back in 0..=out.abs() {
                 let leads = Leads { out: Length(out), back: Length(back * out.signum()), response: Length::ZERO };
@@ -172,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn the_ground_that_has_to_be_open_lies_between_the_leads_and_a_part_of_them_farther() {
+    fn the_open_stretch_lies_between_the_leads_and_is_longer_for_a_tool_that_is_out() {
         let forward = Leads { out: Length(103), back: Length(60), response: Length::ZERO };
         assert_eq!(forward.stretch(false), (Length(75), Length(103)));
         assert_eq!(forward.stretch(true), (Length(75 - 16), Length(103 + 43 + 1)));
@@ -183,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lead_is_what_is_rolled_in_its_time_and_a_millisecond_and_none_is_none() {
+    fn a_lead_is_the_distance_in_its_time_and_a_millisecond_and_zero_stays_zero() {
         let mut settings = Settings::new();
         let leads = |settings: &Settings| {
             let Leads { out, back, response } = Leads::at(TicksPerSecond(1000), settings, LengthScale::TICK);
@@ -200,7 +199,7 @@ mod tests {
     }
 
     #[test]
-    fn lengths_of_every_wheel_fit_what_is_remembered() {
+    fn lengths_of_every_wheel_fit_16_bits() {
         for ticks_per_m in 40..=20_000 {
             let mut settings = Settings::new();
             for (setting, value) in

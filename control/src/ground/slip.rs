@@ -1,92 +1,90 @@
-//! Slip, as detections that pass both beams tell it.
+//! Wheel slip, from detections that pass both beams.
 //!
-//! Detections running have to agree before a slip is believed: two of them, and three where it jumps. Behind `UNTOLD` detections that
-//! told nothing, no slip is known any more.
+//! Consecutive detections have to agree before a slip is trusted: two, or three if the slip jumps. After `WITHOUT_SLIP` detections
+//! without agreement the slip is unknown.
 
 use crate::units::Length;
 
-/// Detections running that told no slip, until none is known: as few as a plant with its weeds, as many as a canopy of leaves.
-const UNTOLD: u8 = 6;
+/// Consecutive detections without a slip until it is unknown: as few as a plant with its weeds, as many as the leaves of a canopy.
+const WITHOUT_SLIP: u8 = 6;
 
-/// By how much the slips of detections running may differ, in 256ths: ground changes by some 5 % from plant to plant, and a leaf at either
-/// end of a canopy makes some more.
+/// Greatest difference between consecutive slips that agree, in 256ths. The ground changes by some 5 % from plant to plant. A leaf
+/// at either end of a canopy adds to that.
 const AGREES: u8 = 24;
 
-/// A slip that differs by more from what is believed, 16 %, needs a third detection that agrees: soft ground slips by 12 %, and no row has
-/// it change by more from one plant to the next.
+/// If a slip differs from the trusted one by more than this (16 %), a third detection has to agree. Soft ground slips by 12 %, and
+/// in no row does it change by more between plants.
 const JUMP: u8 = 40;
 
-/// What slip makes of the wheel's way: how much more it turns than the ground that is rolled over, in 256ths of that; less is
-/// negative.
+/// How much farther the wheel turns than the machine rolls, in 256ths of the distance rolled; negative if less.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Slip {
-    /// By the last detection, and how many running agree with it.
+    /// The slip of the last detection, and how many consecutive ones agree with it.
     last: i8,
-    running: u8,
-    /// What is believed, or was last.
+    agreeing: u8,
+    /// The trusted slip, or the last trusted one.
     excess: i8,
     is_known: bool,
-    /// Detections running that told none.
-    untold: u8,
+    /// Consecutive detections without agreement.
+    without_slip: u8,
     news: News,
 }
 
-/// What has become of the slip.
+/// What has changed about the slip.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum News {
-    /// Nothing.
+    /// No change.
     None,
-    /// A detection told it.
+    /// A detection confirmed a slip.
     Told,
-    /// One too many told none.
+    /// Too many detections gave none: the slip is unknown.
     Lost,
 }
 
 impl Slip {
-    /// None was measured yet.
-    pub const NONE: Self = Self { last: 0, running: 0, excess: 0, is_known: false, untold: 0, news: News::None };
+    /// No slip measured.
+    pub const NONE: Self = Self { last: 0, agreeing: 0, excess: 0, is_known: false, without_slip: 0, news: News::None };
 
-    /// What a 256th is a part of.
+    /// Units in the whole: `excess` is in 256ths.
     pub const WHOLE: i16 = 256;
 
-    /// Slip of 30 % either way: what is beyond was no plant.
+    /// Slip of 30 % in either direction. Anything beyond is not the same plant.
     const LEAST: i16 = -59;
     const GREATEST: i16 = 110;
 
-    /// How much more the wheel turns, in 256ths of the ground, as far as is known.
+    /// How much farther the wheel turns, in 256ths of the distance rolled; 0 if unknown.
     pub fn excess(&self) -> i8 {
         if self.is_known { self.excess } else { 0 }
     }
 
-    /// Whether any is known.
+    /// Whether the slip is known.
     pub(super) fn is_known(&self) -> bool {
         self.is_known
     }
 
-    /// As if it were known.
+    /// Marks the slip as known.
     #[cfg(test)]
     pub(super) fn be_known(&mut self) {
-        (self.is_known, self.untold) = (true, 0);
+        (self.is_known, self.without_slip) = (true, 0);
     }
 
-    /// What has become of it since this was last asked.
+    /// What has changed since the last call.
     pub(super) fn take_news(&mut self) -> News {
         core::mem::replace(&mut self.news, News::None)
     }
 
-    /// The detections to come do not agree with those before.
+    /// The next detections start a new run of agreement.
     pub(super) fn break_run(&mut self) {
-        self.running = 0;
+        self.agreeing = 0;
     }
 
-    /// As [`excess`](Self::excess), and what was believed until it became doubtful.
+    /// [`excess`](Self::excess), and the last trusted slip even if it is now unknown.
     pub fn believed(&self) -> (i8, i8) {
         (self.excess(), self.excess)
     }
 
-    /// Slip in thousandths of the wheel's way, above 0 where it turns farther than the machine rolls; none where too few plants have
-    /// told it.
+    /// Slip in thousandths of the wheel's distance, above 0 if the wheel turns farther than the machine rolls; `None` if unknown.
     #[cfg_attr(target_arch = "avr", inline(never))]
     pub fn permille(&self) -> Option<i16> {
         let turned = (Self::WHOLE + i16::from(self.excess)) as u16;
@@ -94,30 +92,31 @@ impl Slip {
         self.is_known.then_some(1000 - rolled_permille)
     }
 
-    /// A detection passed both beams, which stand `apart` by the slip known so far, in another way; none where it cannot be told.
+    /// A detection passed both beams. `apart` is the beams' distance with the slip known so far, `travel` how far the wheel turned
+    /// between them; 0 if ambiguous.
     #[cfg_attr(target_arch = "avr", inline(never))]
-    pub(super) fn measure(&mut self, apart: Length, way: Length) {
+    pub(super) fn measure(&mut self, apart: Length, travel: Length) {
         let believed = self.excess();
         let turned = (Self::WHOLE + i16::from(believed)) as u16;
-        let turned = u32::from(turned) * u32::from(way.0 as u16) / u32::from((apart.0 as u16).max(1));
+        let turned = u32::from(turned) * u32::from(travel.0 as u16) / u32::from((apart.0 as u16).max(1));
         let excess = turned as i16 - Self::WHOLE;
         let (last, now) = (self.last, excess as i8);
         self.last = now;
         if !(Self::LEAST..=Self::GREATEST).contains(&excess) {
-            self.running = 0;
+            self.agreeing = 0;
         } else if now.abs_diff(last) > AGREES {
-            self.running = 1;
-        } else if self.running < 3 {
-            self.running += 1;
+            self.agreeing = 1;
+        } else if self.agreeing < 3 {
+            self.agreeing += 1;
         }
-        if self.running > 1 + u8::from(now.abs_diff(believed) > JUMP) {
+        if self.agreeing > 1 + u8::from(now.abs_diff(believed) > JUMP) {
             self.excess = ((i16::from(last) + i16::from(now)) >> 1) as i8;
-            (self.is_known, self.untold, self.news) = (true, 0, News::Told);
+            (self.is_known, self.without_slip, self.news) = (true, 0, News::Told);
             return;
         }
-        if self.untold < UNTOLD {
-            self.untold += 1;
-            if self.untold == UNTOLD {
+        if self.without_slip < WITHOUT_SLIP {
+            self.without_slip += 1;
+            if self.without_slip == WITHOUT_SLIP {
                 (self.is_known, self.news) = (false, News::Lost);
             }
         }

@@ -1,133 +1,133 @@
-//! What encoder and beam show when they fail.
+//! Monitors of encoder and beam: they find a failed sensor.
 //!
-//! Neither sensor says that it is broken; it shows in what they say together. A machine that rolls makes progress, so edges
-//! of the encoder that lead nowhere come from one live channel, and plants that pass a machine at rest come from a dead
-//! encoder. A machine has a mass, so an encoder that falls silent without having become slow has failed, and one that is as
-//! fast again behind a gap as it was before has lost what lies between. A canopy has so many leaves and no more, so a beam that
-//! flickers sees dust. These monitors count; what a fault means for the tool is decided by the
-//! [`weeder`](crate::weeder).
+//! A failed sensor shows in how the readings fit together. A rolling machine makes progress, so encoder edges without progress come
+//! from a single working channel. Plants that pass a standing machine come from a dead encoder. A machine has mass, so an encoder
+//! that falls silent without slowing down has failed. If it is as fast after a gap as before, ticks are lost. A canopy has a
+//! limited number of leaves, so a flickering beam sees dust. The monitors count; the [`weeder`](crate::weeder) decides what a fault
+//! means for the tool.
 //!
-//! What small faults lose adds up until it has rolled by: [`EncoderMonitor`] holds it against what the tool may be astray by.
+//! Small losses add up over a distance. [`EncoderMonitor`] compares them with the position error that the tool may have.
 
 use crate::{
     alarm::Alarm,
     units::{Coarse, Instant, Position},
 };
 
-/// The time in which edges are counted.
+/// The time over which reversals are counted.
 const PERIOD: u16 = Coarse::steps_in_ms(500);
 
-/// Turns of the wheel to and fro in a period, without progress, that no tremble gives. One channel alone has each of its edges look
-/// like one, and shows so many from 0.6 km/h on; an engine's vibration of 50 Hz, which makes 50 of them, does not.
-const DEAD_CHANNEL_TURNS: u8 = 80;
+/// Reversals in a period, without progress, that no vibration causes. With one working channel each edge looks like a reversal:
+/// this many from 0.6 km/h on. An engine's vibration of 50 Hz causes only 50.
+const DEAD_CHANNEL_REVERSALS: u8 = 80;
 
-/// Without progress for so long, the machine stands: slower than 0.05 km/h.
+/// Time without progress after which the machine stands: slower than 0.05 km/h.
 const STANDS: u16 = Coarse::steps_in_ms(150);
 
-/// Turns to and fro without progress, in slow rolling, from which on the distance is unknown. A machine that stops rolls back a
-/// little, and on again: those are two.
-const FALTERS: u8 = 3;
+/// Reversals without progress, while rolling slowly, from which on the distance is unknown. A machine that stops rolls back a
+/// little and forward again: two reversals.
+const FALTERING_REVERSALS: u8 = 3;
 
-/// Times that the beam may break while the machine stands: leaves move in the wind, but plants do not pass.
+/// Beam breaks while the machine stands. The wind moves leaves, but plants do not pass.
 const BREAKS: u8 = 3;
 
-/// The time of a progress in steps of 256 us: all that tells slow rolling from standing fits into a byte.
+/// The time of a progress in steps of 256 us. All times that separate slow rolling from standing fit a byte.
 type Short = u8;
 
-/// When the speed meter begins to take silence for slowness, and leads shrink: from here on until it is clear what the silence
-/// is, a tool that is out stays out.
+/// Silence after which the speed meter assumes a slower machine and the leads shrink. From here until the silence is explained, a
+/// tool that is out stays out.
 const QUIET: Short = (crate::measure::speed::SPACING >> 2) as Short;
 
-/// A machine rolls steadily where a progress takes no longer than this, 15.4 ms: from 0.5 km/h on with ticks of 0.5 mm or finer.
-/// Coarser ones need four ticks in this time, and are not known to fall silent at less.
+/// Longest time of a progress in steady rolling, 15.4 ms: 0.5 km/h with ticks of 0.5 mm or finer. A coarser encoder needs four
+/// ticks in this time; slower, its silences cannot be found.
 ///
-/// Below it, nothing tells a silence from a stop: a machine stops within a progress.
+/// At less speed a silence looks like a stop, because the machine stops within a progress.
 const STEADY: Short = 59;
 
-/// A machine that brakes takes longer for each progress than for the one before, and soon stops. So it rolls steadily only where
-/// twice the last progress is no more than so much above the one before, 15.6 ms. Who brakes with 3.3 m/s2, 3 on the ground and a
-/// tenth for the wheel's slip, exceeds that in the last progress but one before the standstill: with `x` of them to roll and ticks of
-/// 0.5 mm it takes `sqrt(x + 1) - sqrt(x)` times 35.6 ms, and `x` below 1 gives 18.2 ms. From 1 on there is another progress,
-/// within 2.42 times this one: `sqrt(x) - sqrt(x - 1)` is at most so many times `sqrt(x + 1) - sqrt(x)`.
+/// Tells steady rolling from braking, 15.6 ms. A braking machine takes longer for each progress than for the one before. So rolling
+/// is steady only if twice the last progress is at most this much above the one before.
+///
+/// Braking with 3.3 m/s2 (3 on the ground, a tenth for wheel slip) exceeds this in the last progress but one. With `x` progresses
+/// left and ticks of 0.5 mm, a progress takes `sqrt(x + 1) - sqrt(x)` times 35.6 ms; `x` below 1 gives 18.2 ms. From `x` = 1 on
+/// another progress follows, within 2.42 times this one: `sqrt(x) - sqrt(x - 1)` is at most 2.42 times `sqrt(x + 1) - sqrt(x)`.
 const BRAKES: Short = 61;
 
-/// Slower than four ticks in this time, 32.8 ms, a wheel may tremble to and fro while it rolls: below 0.5 km/h with the coarsest
-/// encoder ([`TICKS_PER_M_LEAST`](crate::settings::TICKS_PER_M_LEAST)).
+/// Slower than four ticks in this time, 32.8 ms, a wheel may tremble while it rolls: below 0.5 km/h with the coarsest encoder
+/// ([`TICKS_PER_M_LEAST`](crate::settings::TICKS_PER_M_LEAST)).
 const SLOW: Short = 128;
 
-/// What a turn of the loop at either end may add to a time: 1 ms, or the turn and a step where it is longer.
+/// Error of a time from the turns of the loop at its ends: 1 ms, or a turn and a step if that is longer.
 const TURN: Short = 4;
 
 const fn grace(turn: Short) -> u16 {
     if turn < TURN { TURN as u16 } else { turn as u16 + 1 }
 }
 
-/// Silences in steady rolling that are an alarm, where none is farther behind the other than so many times the progress, 10 m. A
-/// sound encoder has none; one may be a wheel that a stone caught. Each costs the ground from beam to tool.
+/// Silences in steady rolling that raise an alarm, if each follows within `SILENCES_WITHIN` progresses (10 m) of the last. A sound
+/// encoder has none; a stone that catches the wheel causes one. Each silence makes the ground from beam to tool unknown.
 const SILENCES: u8 = 3;
 const SILENCES_WITHIN: u16 = 5000;
 
-/// What is lost is told in quarters of a progress, which are ticks where the encoder is no finer than 0.4 mm.
+/// Losses are counted in quarters of a progress: ticks, if the encoder is no finer than 0.4 mm.
 const PROGRESS: u8 = 4;
 
-/// Lost with half a pulse of a channel: where one does not come, the other channel counts a tick back and on again instead, and
-/// the wheel seems to turn round twice.
-const TURNED_ROUND: u8 = 2;
+/// Loss for half a missing pulse of one channel: the other channel then counts a tick back and forward again, which looks like two
+/// reversals.
+const REVERSAL_LOSS: u8 = 2;
 
-/// One that may be lost is paid for by so many times the progress, 32 quarters: who loses three in a hundred goes on.
-const PAID_BY: u8 = 8;
+/// One loss is cancelled by this many progresses (32 quarters), so losing 3 % is tolerated.
+const CANCELLED_BY: u8 = 8;
 
-/// More than this unpaid, 25 mm or half of the usual margin, is an alarm.
-const DEBT: u8 = 48;
+/// Losses above this raise an alarm: 25 mm, half of the usual margin.
+const MOST_LOST: u8 = 48;
 
-/// A time in shorter form, or the longest that there is.
+/// A time as a [`Short`], or the largest one.
 #[cfg_attr(target_arch = "avr", inline(never))]
 const fn shortened(time: u16) -> Short {
     if time < 1 << 10 { (time >> 2) as Short } else { Short::MAX }
 }
 
-/// Whether progress that takes `time` is more than unsteady beside one that takes `steady`.
+/// Whether a progress of `time` next to one of `steady` is more than uneven rolling.
 const fn is_gap(time: Short, steady: Short, turn: Short) -> bool {
     time as u16 > (steady + steady / 4) as u16 + grace(turn)
 }
 
-/// Whether no machine can have braked so hard that progress takes `time` behind one that took `steady`.
+/// Whether braking cannot explain a progress of `time` after one of `steady`.
 const fn is_silence(time: Short, steady: Short, turn: Short) -> bool {
     time as u16 > (2 * steady + steady / 2) as u16 + 2 * grace(turn)
 }
 
-/// Watches the encoder.
+/// The encoder's monitor.
 #[derive(Clone, Debug)]
 pub struct EncoderMonitor {
-    /// Where the machine last made progress, and when: lower halves are enough.
+    /// Position and time of the last progress; the lower halves are enough.
     anchor: u16,
     progress_at: Coarse,
-    /// How long that progress took, and the one before it.
+    /// Duration of the last progress and of the one before.
     took: Short,
     took_before: Short,
-    /// Whether it was made backwards.
+    /// Whether the last progress was backwards.
     backwards: bool,
-    /// Whether the machine stands since, whether it became quiet, and whether it fell silent too suddenly.
+    /// Since the last progress: whether the machine stands, whether the encoder is quiet, and whether it fell silent too suddenly.
     stands: bool,
     quiet: bool,
     silent: bool,
     /// The last reading.
     last: u16,
     read_at: Coarse,
-    /// Times that the wheel seemed to turn round since the period began, without progress.
-    turns: u8,
-    /// Times that the beam broke since the machine stands.
+    /// Reversals in this period without progress.
+    reversals: u8,
+    /// Beam breaks since the machine stands.
     breaks: u8,
     period_since: Coarse,
-    /// What may be lost and has not been paid for.
-    debt: u8,
-    /// Silences, and progress since the last one, modulo 137 m.
+    /// Losses not yet cancelled.
+    losses: u8,
+    /// Silences, and progresses since the last one, modulo 137 m.
     silences: u8,
     since_silence: u16,
 }
 
 impl EncoderMonitor {
-    /// A monitor that nobody has read.
+    /// A monitor before its first reading.
     pub const NONE: Self = Self {
         anchor: 0,
         progress_at: Coarse::ZERO,
@@ -139,15 +139,15 @@ impl EncoderMonitor {
         silent: false,
         last: 0,
         read_at: Coarse::ZERO,
-        turns: 0,
+        reversals: 0,
         breaks: 0,
         period_since: Coarse::ZERO,
-        debt: 0,
+        losses: 0,
         silences: 0,
         since_silence: 0,
     };
 
-    /// The machine wakes up, and stands at `position`.
+    /// Starts with the machine standing at `position`.
     pub const fn init(&mut self, now: Instant, position: Position) {
         let (now, place) = (now.coarse(), position.count() as u16);
         (self.anchor, self.last) = (place, place);
@@ -155,11 +155,11 @@ impl EncoderMonitor {
         (self.took, self.took_before, self.stands) = (Short::MAX, Short::MAX, true);
     }
 
-    /// Takes a reading, with the ticks that came by jumps and are not believed; returns the fault that it shows.
+    /// Takes a reading. `doubted` is the number of ticks from jumps that are probably noise. Returns a fault.
     ///
-    /// `progress` is a distance of some two millimetres, so that it means the same for every encoder, and four ticks at least. That
-    /// is a whole cycle of both channels, over which it does not matter that an encoder spaces its edges unevenly, and more
-    /// than a wheel makes that trembles on an edge, or one dead channel.
+    /// `progress` is a distance of about two millimetres, and at least four ticks. So it means the same for every encoder. Four
+    /// ticks are one cycle of both channels, so uneven edge spacing does not matter. A trembling wheel, or one dead channel, makes
+    /// fewer.
     #[cfg_attr(target_arch = "avr", inline(never))]
     #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn read(&mut self, now: Instant, position: Position, doubted: u8, progress: u8) -> Option<Alarm> {
@@ -167,9 +167,9 @@ impl EncoderMonitor {
         let place = position.count() as u16;
         if now.since(self.period_since) >= PERIOD {
             self.period_since = now;
-            self.turns = 0;
+            self.reversals = 0;
             if self.stands {
-                self.debt = 0;
+                self.losses = 0;
             }
         }
         let step = place.wrapping_sub(self.last).cast_signed();
@@ -182,28 +182,28 @@ impl EncoderMonitor {
         let mut alarm = Alarm::EncoderJumps;
         if moved.unsigned_abs() >= progress.into() {
             let (before, gap) = (self.took_before, self.took);
-            // Where the machine stood, the clock may have run round; else it may have come there as early as the turn began.
+            // The clock may have wrapped while the machine stood. Otherwise the progress may have ended as early as the turn began.
             self.took = if self.stands { Short::MAX } else { short - turn };
-            // Where it stood without having fallen silent, it has stopped, and there was no gap.
+            // A machine that stood without a silence has stopped: that was no gap.
             self.took_before = if self.stands && !self.silent { Short::MAX } else { gap };
             (self.anchor, self.progress_at) = (place, now);
             self.backwards = moved < 0;
             (self.stands, self.quiet, self.silent) = (false, false, false);
-            (self.turns, self.breaks) = (0, 0);
+            (self.reversals, self.breaks) = (0, 0);
             self.since_silence = self.since_silence.wrapping_add(1);
-            if (self.since_silence as u8).is_multiple_of(PAID_BY) {
-                self.debt -= u8::from(self.debt > 0);
+            if (self.since_silence as u8).is_multiple_of(CANCELLED_BY) {
+                self.losses -= u8::from(self.losses > 0);
             }
-            // As fast again behind the gap as before it, the machine has not been slow in between.
+            // As fast after the gap as before: the machine was not slow in between.
             let steady = before.max(self.took);
             if steady <= STEADY && is_gap(gap, steady, turn) {
                 alarm = Alarm::EncoderSilent;
                 if is_silence(gap, steady, turn) {
-                    // The ground is forgotten already.
+                    // `is_silent` has forgotten this ground already.
                     self.silences = if self.since_silence > SILENCES_WITHIN { 1 } else { self.silences + 1 };
                     self.since_silence = 0;
                     if self.silences >= SILENCES {
-                        lost += DEBT + 1;
+                        lost += MOST_LOST + 1;
                     }
                 } else {
                     lost += PROGRESS;
@@ -216,36 +216,36 @@ impl EncoderMonitor {
             self.stands |= time >= STANDS;
             if step != 0 && (step < 0) != self.backwards {
                 self.backwards = !self.backwards;
-                self.turns = self.turns.wrapping_add(1);
-                // No rolling wheel turns back for a tick or two and rolls on: pulses of a channel do not come.
+                self.reversals = self.reversals.wrapping_add(1);
+                // A rolling wheel does not turn back for a tick or two: one channel's pulses are missing.
                 if !self.silent && !self.stands && self.took <= SLOW {
                     alarm = Alarm::EncoderChannelDead;
-                    lost += TURNED_ROUND;
+                    lost += REVERSAL_LOSS;
                     if steady {
                         (self.anchor, self.progress_at) = (place, now);
                     } else {
-                        self.silent = self.turns >= FALTERS;
+                        self.silent = self.reversals >= FALTERING_REVERSALS;
                     }
                 }
             }
-            if self.turns > DEAD_CHANNEL_TURNS {
+            if self.reversals > DEAD_CHANNEL_REVERSALS {
                 return Some(Alarm::EncoderChannelDead);
             }
         }
-        self.debt += lost;
-        if self.debt <= DEBT {
+        self.losses += lost;
+        if self.losses <= MOST_LOST {
             return None;
         }
-        (self.debt, self.silences) = (0, 0);
+        (self.losses, self.silences) = (0, 0);
         Some(alarm)
     }
 
-    /// The beam broke; returns the fault that this shows.
+    /// Takes a break of the beam. Returns a fault.
     pub fn beam_broke(&mut self) -> Option<Alarm> {
         if !self.stands {
             return None;
         }
-        // Behind the alarm nobody counts on before the machine has rolled.
+        // Saturates: after the alarm, counting ends until the machine rolls.
         self.breaks += u8::from(self.breaks < BREAKS);
         (self.breaks >= BREAKS).then_some(Alarm::EncoderSilent)
     }
@@ -255,29 +255,29 @@ impl EncoderMonitor {
         self.stands
     }
 
-    /// Whether the encoder has just become quiet, and nobody knows yet whether the machine brakes or the encoder has died.
+    /// Whether the encoder has just become quiet. It is not yet known whether the machine brakes or the encoder has failed.
     pub const fn is_quiet(&self) -> bool {
         self.quiet
     }
 
-    /// Whether the encoder fell silent from one moment to the next: nobody knows how far the machine has rolled since.
+    /// Whether the encoder fell silent at speed. The distance since then is unknown.
     pub const fn is_silent(&self) -> bool {
         self.silent
     }
 
-    /// Whether the machine may roll although the encoder says that it stands: it fell silent, or the beam has been broken since.
+    /// Whether the machine may be rolling although the encoder stands: it fell silent, or the beam has broken since.
     pub const fn is_doubtful(&self) -> bool {
         self.silent || self.breaks > 0
     }
 }
 
-/// The time in which the beam's edges are counted.
+/// The time over which the beam's edges are counted.
 const FLICKER_PERIOD: u16 = Coarse::steps_in_ms(100);
 
-/// Edges in that time that no canopy makes: at 10 km/h a clear stretch every 14 mm.
+/// More edges in that time than any canopy makes: at 10 km/h a clear stretch every 14 mm.
 const FLICKER_EDGES: u8 = 40;
 
-/// Watches the beam.
+/// The beam's monitor.
 #[derive(Clone, Debug)]
 pub struct BeamMonitor {
     edges: u8,
@@ -288,12 +288,12 @@ impl BeamMonitor {
     /// A monitor that has seen no edge.
     pub const NONE: Self = Self { edges: 0, since: Coarse::ZERO };
 
-    /// The machine wakes up.
+    /// Starts counting.
     pub const fn init(&mut self, now: Instant) {
         self.since = now.coarse();
     }
 
-    /// The beam's level changed; returns the fault that this shows.
+    /// Takes a change of the beam's level. Returns a fault.
     pub fn edge(&mut self, now: Instant) -> Option<Alarm> {
         if now.coarse().since(self.since) >= FLICKER_PERIOD {
             (self.edges, self.since) = (0, now.coarse());
@@ -309,7 +309,7 @@ mod tests {
     use crate::units::Interval;
 
     #[test]
-    fn a_turn_at_either_end_of_a_time_is_allowed_for() {
+    fn a_time_may_be_off_by_a_turn_or_a_millisecond() {
         assert_eq!([0, 3, 4, 5, 200].map(grace), [4, 4, 5, 6, 201]);
     }
 
@@ -319,16 +319,16 @@ mod tests {
     }
 
     #[test]
-    fn a_gap_is_a_quarter_longer_than_steady_progress_and_a_silence_one_and_a_half_times_longer() {
+    fn a_gap_is_a_quarter_longer_than_steady_progress_and_a_silence_two_and_a_half_times_as_long() {
         for (steady, turn, gap, silence) in [(40, 0, 40 + 10 + 4, 80 + 20 + 8), (59, 9, 59 + 14 + 10, 118 + 29 + 20)] {
             assert_eq!([gap, gap + 1].map(|time| is_gap(time, steady, turn)), [false, true]);
             assert_eq!([silence, silence + 1].map(|time| is_silence(time, steady, turn)), [false, true]);
         }
     }
 
-    /// Whether an edge to and one fro, so many milliseconds apart, are a dead channel within so many edges.
+    /// Whether reversals, one every `edge_ms`, raise "channel dead" within `edges` of them.
     fn is_dead_channel(edge_ms: u32, edges: u32) -> bool {
-        let mut monitor = awake();
+        let mut monitor = standing();
         (1..=edge_ms * edges).any(|ms| {
             let position = Position::new((ms / edge_ms % 2) as i32);
             monitor.read(at(ms), position, 0, 4) == Some(Alarm::EncoderChannelDead)
@@ -336,14 +336,14 @@ mod tests {
     }
 
     #[test]
-    fn edges_that_lead_nowhere_are_a_dead_channel_where_they_come_faster_than_any_tremble() {
+    fn edges_without_progress_faster_than_vibration_are_a_dead_channel() {
         assert!(!is_dead_channel(5, 81));
         assert!(is_dead_channel(5, 82));
         assert!(!is_dead_channel(7, 1000), "71 in half a second");
     }
 
-    /// A monitor of a machine that stands.
-    fn awake() -> EncoderMonitor {
+    /// A monitor of a standing machine.
+    fn standing() -> EncoderMonitor {
         let mut monitor = EncoderMonitor::NONE;
         monitor.init(at(0), Position::new(0));
         monitor
@@ -353,15 +353,15 @@ mod tests {
         Instant::new(Interval::from_ms(ms).steps())
     }
 
-    /// The first alarm within a second of an encoder that shows a position at each millisecond, and when it comes.
+    /// The first alarm within a second, and its time in ms. `position` gives the encoder's position at each millisecond.
     fn first_alarm(position: impl Fn(u32) -> u32) -> Option<(u32, Alarm)> {
-        let mut monitor = awake();
+        let mut monitor = standing();
         (1..1000).find_map(|ms| Some((ms, monitor.read(at(ms), Position::new(position(ms) as i32), 0, 4)?)))
     }
 
     #[test]
-    fn a_rolling_wheel_is_quiet_when_no_progress_came_for_a_hundredth_of_a_second_until_it_comes() {
-        let mut monitor = awake();
+    fn a_rolling_wheel_is_quiet_from_10_ms_without_progress_until_the_next_progress() {
+        let mut monitor = standing();
         for ms in 0..100 {
             let position = if ms < 60 { ms.min(40) } else { ms - 20 };
             monitor.read(at(ms), Position::new(position as i32), 0, 4);
@@ -370,23 +370,23 @@ mod tests {
     }
 
     #[test]
-    fn ticks_that_may_be_lost_in_gaps_between_steady_ones_add_up_to_an_alarm() {
-        // 4 ticks in 4 ms three times over, and then in 7 ms: a progress may be lost each time, and half a tick is paid for. Debt
-        // is beyond 48 ticks at the 14th.
+    fn possible_losses_in_gaps_add_up_to_an_alarm() {
+        // Three times 4 ticks in 4 ms, then 4 ticks in 7 ms: each gap may have lost a progress, and half a tick is cancelled. The
+        // sum exceeds 48 at the 14th gap.
         let gaps = |ms: u32| 16 * (ms / 19) + (ms % 19).min(12) + (ms % 19).saturating_sub(15);
         assert_eq!(first_alarm(gaps), Some((14 * 19 + 4, Alarm::EncoderSilent)));
         assert_eq!(first_alarm(|ms| ms), None);
     }
 
     #[test]
-    fn a_rolling_wheel_that_seems_to_turn_round_for_a_tick_time_and_again_has_a_dead_channel() {
+    fn repeated_reversals_of_one_tick_while_rolling_are_a_dead_channel() {
         // A tick back every 12 ms.
         let alarm = first_alarm(|ms| 10 * (ms / 12) + if ms % 12 == 11 { 9 } else { ms % 12 });
         assert!(matches!(alarm, Some((144..180, Alarm::EncoderChannelDead))), "{alarm:?}");
     }
 
     #[test]
-    fn a_beam_flickers_that_changes_more_than_forty_times_in_a_tenth_of_a_second() {
+    fn more_than_40_edges_in_a_tenth_of_a_second_are_flicker() {
         let first_alarm = |every_ms: u32| {
             let mut monitor = BeamMonitor::NONE;
             (1..200).find(|edge| monitor.edge(at(every_ms * (edge - 1))) == Some(Alarm::BeamFlickers))

@@ -1,20 +1,20 @@
-//! The quadrature decoder: from two channels to steps of one tick, four a cycle.
+//! The quadrature decoder: turns the levels of two channels into steps of one tick, four a cycle.
 //!
-//! Forward is the sequence AB = 00, 10, 11, 01, 00. A change of both channels at once means that an edge was missed: a
-//! jump of two. It is taken to go on in the direction of the last step, which is right as long as the wheel did not turn
-//! round within those two edges; with no step before it, its direction is unknown and it is counted as lost.
+//! Forward is the sequence AB = 00, 10, 11, 01, 00. If both channels change at once, an edge was missed: a jump of two ticks. The
+//! decoder continues in the direction of the last step. This is right unless the wheel reversed within those two edges. Without an
+//! earlier step the direction is unknown, and the jump counts as lost.
 //!
-//! The firmware's interrupt looks its steps up in a table that the compiler makes of this decoder.
+//! The firmware's interrupt looks up its steps in a table that the compiler makes from this decoder.
 //!
-//! At walking speed no edge can be missed, and a jump is noise on both wires: the decoder adds two ticks when it comes and two
-//! more when it goes. The interrupt cannot tell, as it knows no time. So the [`Odometer`] takes them back when it reads the count.
+//! At walking speed no edge is missed, and a jump is noise on both wires: the decoder adds two ticks at its start and two at its
+//! end. The interrupt has no time, so it cannot tell the two apart. The [`Odometer`] removes these ticks when it reads the count.
 
 use crate::units::{Position, Ticks};
 
 /// Both channels' levels: A in bit 1, B in bit 0; values 0 to 3.
 pub type Channels = u8;
 
-/// The decoder's memory: where in the cycle the channels stood, and which way they last turned.
+/// The decoder's state: the phase of the cycle, and the last direction.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Quadrature {
     phase: u8,
@@ -22,22 +22,22 @@ pub struct Quadrature {
     direction: i8,
 }
 
-/// What a look at the channels told.
+/// The result of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
     /// The wheel turned by so many ticks, -2 to 2; 0 is no change.
     Ticks(i8),
-    /// Both channels changed and nothing tells which way: two ticks are lost.
+    /// Both channels changed, and the direction is unknown: two ticks are lost.
     Lost,
 }
 
 impl Quadrature {
-    /// A decoder whose channels now stand at `channels`.
+    /// A decoder that starts with these levels.
     pub const fn new(channels: Channels) -> Self {
         Self { phase: phase(channels), direction: 0 }
     }
 
-    /// A decoder whose channels stand at `channels` and whose last step was `direction`: 1, -1, or 0 for none.
+    /// A decoder with these levels, whose last step was `direction`: 1, -1, or 0 for none.
     pub const fn moving(channels: Channels, direction: i8) -> Self {
         Self { phase: phase(channels), direction }
     }
@@ -47,7 +47,7 @@ impl Quadrature {
         self.direction
     }
 
-    /// Takes the channels' levels and tells how far the wheel turned since the last look.
+    /// Takes the channels' levels. Returns how far the wheel turned since the last call.
     pub const fn step(&mut self, channels: Channels) -> Step {
         let now = phase(channels);
         let turned = now.wrapping_sub(self.phase) & 3;
@@ -68,46 +68,45 @@ impl Quadrature {
     }
 }
 
-/// More ticks than this in a turn of the loop, noise of two spikes included, and an edge may have been missed. A turn takes 0.2 ms
-/// at the least: so many ticks then come 12 us apart, where the interrupt looks again within 8.
+/// With more ticks than this in a turn, two noise spikes included, an edge may have been missed. A turn takes at least 0.2 ms, so
+/// the ticks are then 12 us apart. The interrupt samples again within 8 us.
 const CAN_BE_MISSED: u16 = 16;
 
-/// A wheel that turns faster may have an edge missed, so that its jumps are believed: edges come less than 50 us apart, in ticks a second.
-/// That is faster than any weeder with an encoder of 0.2 mm or more.
+/// Speed in ticks a second above which an edge may be missed, so jumps count: edges are less than 50 us apart. No weeder with an
+/// encoder of 0.2 mm or more is as fast.
 pub const FAST: u16 = 20_000;
 
-/// More ticks than this are not told to be in doubt: it is enough.
-const ENOUGH: u16 = 32;
+/// Most ticks reported as doubted: more change nothing.
+const MOST_DOUBTED: u16 = 32;
 
-/// Where the machine is by the encoder's count, without what noise on both channels has added to it.
+/// The machine's position: the encoder's count without the ticks that noise added.
 #[derive(Clone, Debug)]
 pub struct Odometer {
-    /// The count at the last reading, of which the lower half is enough, and the jumps until then.
+    /// The lower half of the count at the last reading, and the jumps until then.
     counted: u16,
     jumps: u16,
-    /// What noise has added to the count.
+    /// Ticks added by noise.
     surplus: Ticks,
 }
 
 impl Odometer {
-    /// An odometer that nobody has read.
+    /// An odometer before its first reading.
     pub const NONE: Self = Self { counted: 0, jumps: 0, surplus: Ticks::ZERO };
 
-    /// An odometer that believes what was `counted` until now.
+    /// An odometer that takes `counted` as correct.
     pub const fn new(counted: Position, jumps: u16) -> Self {
         let mut odometer = Self::NONE;
         odometer.init(counted, jumps);
         odometer
     }
 
-    /// The machine wakes up, and what was `counted` is believed.
+    /// Starts, and takes `counted` as correct.
     pub const fn init(&mut self, counted: Position, jumps: u16) {
         (self.counted, self.jumps) = (counted.count() as u16, jumps);
     }
 
-    /// Takes a reading of the count and of the jumps in it, modulo 65,536; returns how many ticks, 32 at the most, came by jumps
-    /// that are not believed. None is doubted of a wheel that
-    /// `is_fast`.
+    /// Takes the count, and the number of jumps in it, modulo 65,536. Returns how many ticks came from jumps that are noise, at
+    /// most 32; 0 for a wheel that `is_fast`.
     #[cfg_attr(target_arch = "avr", inline(never))]
     #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn read(&mut self, counted: Position, jumps: u16, is_fast: bool) -> u8 {
@@ -118,14 +117,14 @@ impl Odometer {
         if jumped == 0 || is_fast || moved.unsigned_abs() > CAN_BE_MISSED {
             return 0;
         }
-        let jumped = jumped.min(ENOUGH) as u8;
-        // No more than it moved: a wheel at rest that trembles may have taken a step back in between.
+        let jumped = jumped.min(MOST_DOUBTED) as u8;
+        // At most the distance moved: a trembling wheel may have stepped back in between.
         let added = Ticks((moved.unsigned_abs() as u8).min(jumped).into());
         self.surplus = if moved < 0 { self.surplus - added } else { self.surplus + added };
         jumped
     }
 
-    /// The place that a count stands for.
+    /// The position for a count.
     #[cfg_attr(target_arch = "avr", inline(never))]
     #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn place(&self, counted: Position) -> Position {
@@ -133,7 +132,7 @@ impl Odometer {
     }
 }
 
-/// The place of both channels' levels in the forward sequence, 0 to 3.
+/// The phase of both channels' levels in the forward sequence, 0 to 3.
 const fn phase(channels: Channels) -> u8 {
     let a = channels >> 1 & 1;
     let b = channels & 1;
@@ -148,7 +147,7 @@ mod tests {
     const FORWARD: [Channels; 4] = [0b00, 0b10, 0b11, 0b01];
 
     #[test]
-    fn every_pair_of_levels_is_decoded_as_the_sequence_says() {
+    fn every_pair_of_levels_is_decoded_by_the_sequence() {
         for from in 0..4 {
             for jump in 0..4 {
                 for direction in [-1, 0, 1] {
@@ -168,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn a_jump_goes_on_in_the_direction_of_the_step_before_it() {
+    fn a_jump_continues_in_the_direction_of_the_step_before_it() {
         let mut decoder = Quadrature::new(0b00);
         assert_eq!(decoder.step(0b11), Step::Lost);
         assert_eq!(decoder.step(0b10), Step::Ticks(-1));
@@ -178,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn the_direction_is_that_of_the_last_step() {
+    fn direction_returns_the_last_step() {
         let mut decoder = Quadrature::new(0b00);
         let directions = [0b00, 0b10, 0b10, 0b00, 0b11].map(|channels| {
             decoder.step(channels);
@@ -189,7 +188,7 @@ mod tests {
         assert_eq!(given.map(|direction| Quadrature::moving(0b11, direction).direction()), given);
     }
 
-    /// The odometer's place after these readings of count and jumps, and the ticks that it does not believe.
+    /// The odometer's position after these counts and jumps, and the ticks that it removed.
     fn read(readings: &[(i32, u16)]) -> (i32, u8) {
         let mut odometer = Odometer::new(Position::new(readings[0].0), readings[0].1);
         let doubted = readings.iter().map(|&(count, jumps)| odometer.read(Position::new(count), jumps, false)).sum();
@@ -197,15 +196,15 @@ mod tests {
     }
 
     #[test]
-    fn at_walking_speed_a_jump_is_not_believed_whichever_way_the_wheel_turns() {
+    fn at_walking_speed_a_jump_is_noise_in_both_directions() {
         assert_eq!(read(&[(100, 7), (101, 7), (106, 9), (107, 9)]), (103, 4));
         assert_eq!(read(&[(100, 7), (99, 7), (94, 9), (93, 9)]), (97, 4));
         assert_eq!(read(&[(0, u16::MAX), (-2, 0), (-4, 1)]), (0, 4), "at rest");
-        assert_eq!(read(&[(32_767, 0), (32_770, 1), (32_772, 2)]), (32_768, 4), "over the end of its lower half");
+        assert_eq!(read(&[(32_767, 0), (32_770, 1), (32_772, 2)]), (32_768, 4), "across a wrap of the lower half");
     }
 
     #[test]
-    fn where_an_edge_can_be_missed_a_jump_is_one() {
+    fn a_jump_counts_if_an_edge_can_be_missed() {
         assert_eq!(read(&[(0, 0), (17, 1)]), (17, 0));
         assert_eq!(read(&[(0, 0), (-17, 1)]), (-17, 0));
         assert_eq!(read(&[(0, 0), (16, 1)]), (14, 2), "sixteen ticks in a turn are too few");
@@ -215,7 +214,7 @@ mod tests {
     }
 
     #[test]
-    fn a_jump_that_nothing_resolves_has_added_nothing() {
+    fn a_jump_without_a_direction_adds_nothing() {
         assert_eq!(read(&[(0, 0), (0, 1), (-1, 1)]), (-1, 2));
         assert_eq!(read(&[(0, 0), (1, 1)]), (0, 2));
     }

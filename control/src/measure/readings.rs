@@ -1,9 +1,9 @@
-//! What the machine reads of itself: once a turn of the loop, an edge of the beam whenever one comes, and when it wakes up.
+//! The machine's readings: once a turn of the loop, at each beam edge, and at start-up.
 
 use super::reset::Cause;
 use crate::units::{Instant, Position};
 
-/// What the main loop reads from the machine for a turn.
+/// The readings of one turn.
 #[derive(Clone, Copy, Debug)]
 pub struct Readings {
     /// The time of the reading.
@@ -14,46 +14,46 @@ pub struct Readings {
     pub switch_on: bool,
     /// Encoder ticks known to be lost since power-up, modulo 65,536.
     pub lost: u16,
-    /// Times that both of the encoder's channels had changed at once, modulo 65,536.
+    /// Times that both channels changed at once since power-up, modulo 65,536.
     pub jumps: u16,
-    /// Whether the end switch, if there is one, says that the tool is out.
+    /// Whether the end switch reports "tool out".
     pub end_switch_on: bool,
-    /// Bytes of the stack that were never used.
+    /// Bytes of the stack never used so far.
     pub stack_free: u16,
 }
 
 impl Readings {
-    /// Readings of a machine with its switches off and nothing wrong.
+    /// Readings with the switches off and no fault.
     pub const fn new(now: Instant, position: Position) -> Self {
         Self { now, position, switch_on: false, lost: 0, jumps: 0, end_switch_on: false, stack_free: u16::MAX }
     }
 }
 
-/// What came from the beam since the last turn.
+/// A beam event since the last turn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Edge {
-    /// The beam broke or cleared, or the second one did.
+    /// The level of the first or the second beam changed.
     Seen {
-        /// What the encoder showed when it came.
+        /// The encoder's position at the edge.
         position: Position,
-        /// Whether the beam is broken from here on.
+        /// The first beam's level after the edge.
         broken: bool,
-        /// Whether the second beam is; nobody looks at it where there is none.
+        /// The second beam's level; ignored without a second beam.
         second_broken: bool,
     },
-    /// Edges found no room to wait in: what stood there is not known, and neither is the beam's level until then.
+    /// The queue was full and edges were lost. The ground until now is unknown.
     Lost {
-        /// Whether the beam is broken now.
+        /// The first beam's present level.
         broken: bool,
     },
 }
 
-/// How the machine woke up.
+/// The state at start-up.
 #[derive(Clone, Copy, Debug)]
 pub struct Startup {
     /// The first readings.
     pub readings: Readings,
-    /// Whether something is in the beam.
+    /// Whether the beam is broken.
     pub beam_broken: bool,
     /// Why the machine was reset.
     pub cause: Cause,

@@ -1,9 +1,9 @@
-//! Why the machine started: what the chip's reset flags tell, and what the firmware left behind for its next start.
+//! The cause of a reset, from the chip's reset flags and a mark that the firmware left in SRAM.
 //!
-//! A bootloader may clear the flags before the firmware starts, as optiboot does. The mark in SRAM, which a reset leaves
-//! alone, still tells then of a loop that stalled and of a panic; everything else is [`Cause::Unknown`].
+//! A bootloader, such as optiboot, may clear the flags before the firmware starts. The mark survives a reset, so a stalled loop and
+//! a panic are still known then. Any other cause is [`Cause::Unknown`].
 
-/// What started the machine.
+/// The cause of a start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Cause {
@@ -13,19 +13,19 @@ pub enum Cause {
     ResetPin,
     /// The supply was too low for a moment.
     BrownOut,
-    /// The watchdog ran out and nothing tells why.
+    /// The watchdog expired, without a mark.
     Watchdog,
     /// The loop stopped turning.
     LoopStalled,
-    /// The firmware met what cannot be, and gave up.
+    /// The firmware panicked: an impossible state.
     Panic,
     /// The flags were cleared before the firmware saw them.
     Unknown,
 }
 
-/// Marks that the firmware leaves in SRAM. At power-up SRAM holds either by a chance of one in 32,768.
+/// Marks that the firmware leaves in SRAM. At power-up SRAM holds either of them with a chance of one in 32,768.
 pub mod mark {
-    /// Nothing to tell.
+    /// No mark.
     pub const NONE: u16 = 0;
     /// The loop stopped turning.
     pub const LOOP_STALLED: u16 = 0x5AC3;
@@ -42,11 +42,10 @@ mod flag {
 }
 
 impl Cause {
-    /// The cause, from MCUSR as the start-up code found it and the mark that lay in SRAM.
+    /// The cause, from MCUSR at start-up and the mark in SRAM.
     ///
-    /// A supply that was too low may have spoiled the mark, which counts for nothing then. Otherwise a mark comes first: it was
-    /// left on the way to a reset, whatever has pulled that forward. Where several flags stand, the one that can have
-    /// caused the others is told.
+    /// Low supply may have corrupted the mark, so the mark is ignored then. Otherwise a mark comes first, because the firmware left
+    /// it on the way to a reset. Among several flags, the one that can cause the others wins.
     pub const fn of(mcusr: u8, mark: u16) -> Self {
         if mcusr & flag::POWER_ON != 0 {
             Self::PowerOn
@@ -73,7 +72,7 @@ mod tests {
     const MARKS: [u16; 4] = [mark::NONE, mark::LOOP_STALLED, mark::PANIC, 0xC5C5];
 
     #[test]
-    fn a_low_supply_makes_every_mark_worthless() {
+    fn after_low_supply_the_mark_is_ignored() {
         for mark in MARKS {
             for others in [0, flag::RESET_PIN, flag::WATCHDOG] {
                 assert_eq!(Cause::of(flag::POWER_ON | flag::BROWN_OUT | others, mark), Cause::PowerOn);
@@ -83,7 +82,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mark_tells_more_than_the_watchdog_and_more_than_cleared_flags() {
+    fn a_mark_comes_before_the_watchdog_flag_and_cleared_flags() {
         for mcusr in [flag::WATCHDOG, flag::RESET_PIN, 0] {
             assert_eq!(Cause::of(mcusr, mark::LOOP_STALLED), Cause::LoopStalled);
             assert_eq!(Cause::of(mcusr, mark::PANIC), Cause::Panic);
@@ -91,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn without_a_mark_the_flags_tell() {
+    fn without_a_mark_the_flags_decide() {
         for mark in [mark::NONE, 0xC5C5, mark::PANIC ^ 1] {
             assert_eq!(Cause::of(flag::WATCHDOG, mark), Cause::Watchdog);
             assert_eq!(Cause::of(flag::WATCHDOG | flag::RESET_PIN, mark), Cause::Watchdog);

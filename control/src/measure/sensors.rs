@@ -1,7 +1,7 @@
-//! The sensors, as a turn of the loop has read them, with what watches over each.
+//! The sensors, as the last turn read them, with the monitor of each.
 //!
-//! Place by the odometer, speed by the meter, levels of the switches once they have settled, and whether encoder and beam can be
-//! believed. What the beam has seen of the ground is not here.
+//! The odometer gives the position and the meter the speed. Switches are debounced. The monitors check encoder and beam. The ground
+//! that the beam has seen is not here.
 
 use super::{
     monitor::{BeamMonitor, EncoderMonitor},
@@ -15,26 +15,26 @@ use crate::units::{Instant, Position};
 /// The machine's sensors.
 #[derive(Clone, Debug)]
 pub struct Sensors {
-    /// The last readings, with the odometer's place for a position.
+    /// The last readings, with the odometer's position.
     pub readings: Readings,
     /// The work switch.
     pub switch: Switch,
     /// The end switch.
     pub end_switch: Switch,
-    /// What noise has added to the encoder's count.
+    /// Removes ticks that were noise.
     pub odometer: Odometer,
-    /// Whether the encoder can be believed.
+    /// The encoder's monitor.
     pub encoder: EncoderMonitor,
     /// The speed.
     pub meter: SpeedMeter,
-    /// Whether the beam can be believed.
+    /// The beam's monitor.
     pub beam: BeamMonitor,
     /// Whether the beam is broken.
     pub beam_broken: bool,
 }
 
 impl Sensors {
-    /// Sensors that nobody has read.
+    /// Sensors before [`init`](Self::init).
     pub const NONE: Self = {
         let (start, place) = (Instant::ZERO, Position::new(0));
         Self {
@@ -49,7 +49,7 @@ impl Sensors {
         }
     };
 
-    /// The machine wakes up, with sensors that nobody has read.
+    /// Takes the first readings.
     #[inline(always)]
     pub const fn init(&mut self, Startup { readings, beam_broken, .. }: Startup) {
         let Readings { now, position, jumps, .. } = readings;

@@ -1,26 +1,26 @@
-//! The machine's speed, from the encoder's position and the time at which it was read.
+//! The machine's speed, from the encoder's position and the time of each reading.
 //!
-//! The meter remembers the places and times of a few position changes, at least `SPACING` apart, and divides the
-//! distance since the oldest by the time it took: a window of about 80 ms at walking speed, and of six ticks when the
-//! machine creeps. A wheel that has fallen silent for longer than it should is slower than one tick in that silence; after
-//! `STANDSTILL` it stands. A single tick backwards, as vibration gives, moves the answer by its share and no more.
+//! The meter stores position and time of a few changes of position, at least `SPACING` apart. The speed is the distance since the
+//! oldest one, divided by its time: about 80 ms at walking speed, and six ticks if the machine creeps. After a longer silence than
+//! the speed explains, the speed is limited to one tick in that silence; after `STANDSTILL` it is 0. A single tick backwards from
+//! vibration changes the speed only by its share.
 
 use crate::units::{Coarse, Instant, Position, TicksPerSecond};
 
-/// The shortest time between two remembered places. Together with their number it sets the window: long enough that the
-/// grain of a tick and of the main loop stays below half a percent at 1 km/h, short enough to follow a walking person.
+/// The shortest time between two samples. With their number it sets the averaging time. It is long enough that ticks and turns
+/// cause less than half a percent of error at 1 km/h. It is short enough to follow a walking person.
 pub(crate) const SPACING: u16 = Coarse::steps_in_ms(10);
 
-/// Places remembered; a power of two keeps the ring's arithmetic short.
+/// Samples; a power of two keeps the ring's arithmetic short.
 const SAMPLES: u8 = 8;
 
-/// Silence after which the machine is said to stand.
+/// Silence after which the machine stands.
 const STANDSTILL: u16 = Coarse::steps_in_ms(500);
 
-/// The longest window has to fit into a coarse moment.
+/// The longest averaging time has to fit a coarse moment.
 const _: () = assert!(SAMPLES as u32 * (STANDSTILL as u32) < u16::MAX as u32);
 
-/// A place and a time, of which the lower halves are enough: in the longest window, 4 s, nobody rolls 32,767 ticks.
+/// A position and a time. The lower halves are enough: in the longest averaging time, 4 s, no machine rolls 32,767 ticks.
 #[derive(Clone, Copy, Debug, Default)]
 struct Sample {
     place: u16,
@@ -30,19 +30,19 @@ struct Sample {
 /// Measures the speed from readings of position and time.
 #[derive(Clone, Debug)]
 pub struct SpeedMeter {
-    /// A ring: `count` of them are valid, and the next one goes to `next`.
+    /// A ring: `count` samples are valid, and the next one goes to `next`.
     samples: [Sample; SAMPLES as usize],
     count: u8,
     next: u8,
-    /// The last reading at which the position had changed.
+    /// The last reading with a new position.
     last: Sample,
-    /// Silence that the present speed explains.
+    /// The silence that the present speed explains.
     patience: u16,
     speed: TicksPerSecond,
 }
 
 impl SpeedMeter {
-    /// A meter that nobody has read.
+    /// A meter before its first reading.
     pub const NONE: Self = Self {
         samples: [Sample { place: 0, time: Coarse::ZERO }; SAMPLES as usize],
         count: 0,
@@ -52,27 +52,25 @@ impl SpeedMeter {
         speed: TicksPerSecond(0),
     };
 
-    /// A meter for a machine that stands at `position`.
+    /// A meter of a machine that stands at `position`.
     pub const fn new(position: Position, now: Instant) -> Self {
         let mut meter = Self::NONE;
         meter.init(position, now);
         meter
     }
 
-    /// The machine wakes up, and stands at `position`.
+    /// Starts with the machine standing at `position`.
     pub const fn init(&mut self, position: Position, now: Instant) {
         self.last = Sample { place: position.count() as u16, time: now.coarse() };
         self.patience = STANDSTILL;
     }
 
-    /// The speed as of the last reading.
+    /// The speed at the last reading.
     pub fn speed(&self) -> TicksPerSecond {
         self.speed
     }
 
-    /// Takes a reading; returns the new speed where it changed.
-    ///
-    /// To be called at least every few milliseconds.
+    /// Takes a reading. Returns the speed if it has changed. The caller calls it at least every few milliseconds.
     #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn read(&mut self, now: Instant, position: Position) -> Option<TicksPerSecond> {
         let before = self.speed;
@@ -103,7 +101,7 @@ impl SpeedMeter {
         let time = reading.time.since(oldest.time);
         let speed = u32::from(distance.unsigned_abs()) * Coarse::STEPS_PER_SECOND / u32::from(time);
         self.speed = TicksPerSecond(if distance < 0 { -speed.cast_signed() } else { speed.cast_signed() });
-        // Two ticks' time: encoders do not space their edges evenly.
+        // The time of two ticks, because encoders do not space their edges evenly.
         self.patience = match speed {
             0 => STANDSTILL,
             speed => ((2 * Coarse::STEPS_PER_SECOND / speed) as u16).clamp(SPACING, STANDSTILL),
@@ -121,7 +119,7 @@ impl SpeedMeter {
         if silence < self.patience {
             return;
         }
-        // The window no longer tells how fast the machine is; when it rolls on, measuring starts anew.
+        // The samples no longer give the speed. Measurement restarts when the machine moves.
         self.count = 0;
         if silence >= STANDSTILL {
             self.speed = TicksPerSecond(0);
@@ -130,7 +128,7 @@ impl SpeedMeter {
         }
         let limit = i32::from(Coarse::STEPS_PER_SECOND as u16 / silence);
         self.speed = TicksPerSecond(self.speed.0.clamp(-limit, limit));
-        // Look again after an eighth more, so that the division stays rare.
+        // The next check comes after an eighth more, so that divisions stay rare.
         self.patience = (silence + silence / 8).min(STANDSTILL);
     }
 }

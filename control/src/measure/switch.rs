@@ -1,17 +1,17 @@
-//! A switch, freed of its contacts' bouncing: the work switch, or the tool's end switch.
+//! A debounced switch: the work switch, or the tool's end switch.
 //!
-//! Only a change counts: a switch that is on when the machine wakes up starts nothing until it has been off.
+//! Only a change counts: a switch that is on at start-up has no effect until it has been off.
 
 use crate::units::{Coarse, Instant};
 
-/// Contacts bounce for a few milliseconds; a level that lasts this long is meant.
+/// Contacts bounce for a few milliseconds. A level counts once it has lasted this long.
 const SETTLE: u16 = Coarse::steps_in_ms(20);
 
 /// A switch.
 #[derive(Clone, Debug)]
 pub struct Switch {
     on: bool,
-    /// Since when the level has differed from `on`.
+    /// Since when the level differs from `on`.
     differs_since: Option<Coarse>,
 }
 
@@ -19,7 +19,7 @@ impl Switch {
     /// A switch that is off.
     pub const NONE: Self = Self { on: false, differs_since: None };
 
-    /// The machine wakes up and finds it on or off.
+    /// Takes the level at start-up.
     pub const fn init(&mut self, on: bool) {
         self.on = on;
     }
@@ -29,7 +29,7 @@ impl Switch {
         self.on
     }
 
-    /// Takes the switch's level; returns its new position when it was thrown.
+    /// Takes the switch's level. Returns the new state when it changes.
     #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn read(&mut self, now: Instant, on: bool) -> Option<bool> {
         if on == self.on {
@@ -68,7 +68,7 @@ mod tests {
     }
 
     #[test]
-    fn bouncing_contacts_throw_it_once() {
+    fn bouncing_contacts_count_once() {
         let mut switch = Switch { on: false, ..Switch::NONE };
         let mut thrown = 0;
         for millisecond in 0..100 {

@@ -1,7 +1,6 @@
-//! What is tried on the bench: the tool by hand, the servo's times, and the swings of a row.
+//! Manual tests: the servo driven directly, the servo's times, and the swings of a row.
 //!
-//! All of it needs the machine in HOLD, where it stays, and ends when the machine is told to do something else. None of it
-//! touches what the machine knows of the ground.
+//! All need HOLD, and end with any command that changes the state. They do not change the known ground.
 
 use crate::{
     operate::{
@@ -12,44 +11,44 @@ use crate::{
     units::Instant,
 };
 
-/// What is being tried.
+/// The manual test in progress.
 #[derive(Clone, Debug)]
-// Nothing is 0, as the memory is before anybody has woken up.
+// `Idle` is 0, like memory before start-up.
 #[repr(u8)]
 pub enum Bench {
-    /// Nothing.
+    /// None.
     Idle,
-    /// The servo has this pulse.
+    /// The servo is driven directly with this pulse.
     ByHand(HalfMicros),
-    /// The servo swings to and fro, to be timed.
+    /// The servo swings in and out, to be timed.
     Swings(Swings),
     /// The tool swings as for a row of plants.
     Row(DryRun),
 }
 
 impl Bench {
-    /// The pulse that the servo has by hand.
+    /// The pulse that the operator drives the servo with.
     pub const fn pulse(&self) -> Option<HalfMicros> {
         if let Self::ByHand(pulse) = self { Some(*pulse) } else { None }
     }
 
-    /// Whether nobody asks what the sensors say: none need be wired for the servo to be tried.
+    /// Whether sensor alarms are ignored: a dry run needs no sensor.
     pub const fn needs_no_sensor(&self) -> bool {
         matches!(self, Self::Row(_))
     }
 
-    /// Whether the end switch is not held against the tool: the tool is where no order has put it, or the switch itself is timed.
+    /// Whether the end switch is not compared with the tool: the operator moves the tool, or times the switch itself.
     pub const fn needs_no_end_switch(&self) -> bool {
         matches!(self, Self::ByHand(_) | Self::Swings(_))
     }
 
-    /// Whether the tool swings to and fro.
+    /// Whether the tool swings in and out.
     pub const fn swings(&self) -> bool {
         matches!(self, Self::Swings(_) | Self::Row(_))
     }
 
-    /// Carries on with what is being tried, with a tool that is `out` or not; returns whether it has the tool out, if it says, and
-    /// how swings ended, if they did.
+    /// Runs one step; `out` is the tool's present command. Returns the next command, or `None` if the test does not decide it; and
+    /// the result of timed swings.
     #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn carry_on(&mut self, now: Instant, end_switch_on: bool, out: bool) -> (Option<bool>, Option<Outcome>) {
         let (out, outcome) = match self {

@@ -1,21 +1,21 @@
-//! Calibration: what the machine can measure of itself.
+//! Calibration: what the machine measures of itself.
 //!
-//! [`Distance`] counts the ticks of a stretch that the operator has measured, which takes in the tyre's wear and the wheel's slip.
-//! [`Swings`] times the servo by the end switch: from the command until the tool is out, and until it begins to come back.
-//! Without an end switch the same swings let the operator time them from a film, with the LED to mark the commands.
+//! [`Distance`] counts the ticks over a stretch that the operator has measured. So tyre wear and wheel slip are included.
+//! [`Swings`] times the servo with the end switch: from the command until the tool is out, and until it begins to come back.
+//! Without an end switch, the operator can film and time the same swings: the LED shows the commands.
 
 use crate::{
     operate::command_error::CommandError,
     units::{Instant, Interval, Position},
 };
 
-/// The shortest stretch that tells the wheel to better than 0.1 %.
+/// The shortest stretch that gives the ticks a metre to better than 0.1 %.
 pub const SHORTEST_MM: u16 = 1000;
 
-/// By how much a calibrated wheel may differ from what its diameter gives, in tenths: 30 %.
+/// How far a calibrated wheel may differ from its diameter, in tenths: 30 %.
 const TOLERANCE_TENTHS: u32 = 3;
 
-/// The stretch that is being measured.
+/// A stretch that is being measured.
 #[derive(Clone, Copy, Debug)]
 pub struct Distance {
     begin: Option<Position>,
@@ -23,7 +23,7 @@ pub struct Distance {
 }
 
 impl Distance {
-    /// None that has begun.
+    /// No stretch.
     pub const NONE: Self = Self { begin: None, counted: 0 };
 
     /// The stretch begins here.
@@ -31,22 +31,23 @@ impl Distance {
         self.begin = Some(position);
     }
 
-    /// Ticks a metre of a stretch of `length_mm` that ends at `position`, forward or back; `nominal` is what the wheel's diameter
-    /// gives, from which it may differ as far as it likes if it is `forced`.
+    /// Ticks a metre, from a stretch of `length_mm` that ends at `position`, forward or back. `nominal` is the value from the
+    /// wheel's diameter; `forced` allows any difference from it.
     ///
     /// # Errors
-    /// [`CommandError::NotBegun`], [`CommandError::TooShort`] and [`CommandError::WheelDiffers`]; the stretch can be ended again.
+    /// [`CommandError::NotBegun`], [`CommandError::TooShort`] and [`CommandError::WheelDiffers`]. The operator may end the stretch
+    /// again.
     pub fn end(&mut self, position: Position, length_mm: u16, nominal: u16, forced: bool) -> Result<u16, CommandError> {
         let begin = self.begin.ok_or(CommandError::NotBegun)?;
         if length_mm < SHORTEST_MM {
             return Err(CommandError::TooShort);
         }
         let length_mm = u32::from(length_mm);
-        // Up to 4 million ticks, 250 m of the finest wheel, which nobody measures by hand.
+        // Limited to 4 million ticks, 250 m with the finest wheel: longer than a hand-measured stretch.
         let ticks = (position - begin).0.unsigned_abs().min(u32::MAX / 1000 - 1);
         let counted = ((ticks * 1000 + length_mm / 2) / length_mm).min(u16::MAX.into()) as u16;
         self.counted = counted;
-        // Whole ticks differ by more than the tolerance where they do by more than its whole ticks.
+        // Whole ticks exceed the tolerance exactly if they exceed its whole part.
         let differs = counted.abs_diff(nominal) > (u32::from(nominal) * TOLERANCE_TENTHS / 10) as u16;
         if counted == 0 || differs && !forced {
             return Err(CommandError::WheelDiffers);
@@ -54,61 +55,61 @@ impl Distance {
         Ok(counted)
     }
 
-    /// Ticks a metre, as they were counted last; what 16 bits hold.
+    /// Ticks a metre of the last measurement, at most 65,535.
     pub const fn counted(&self) -> u16 {
         self.counted
     }
 }
 
-/// Times that the tool swings to and fro.
+/// Swings in and out.
 const ROUNDS: u8 = 3;
 
-/// The time given to a swing, several times what any servo takes.
+/// Time for a swing, several times as long as any servo needs.
 const SWING: Interval = Interval::from_ms(1500);
 
-/// What a command may wait beside the servo's gap: for the longest pulse on the line, and for some turns of the loop.
+/// Longest wait of a command besides the servo's gap: the longest pulse on the line, and some turns of the loop.
 const SPARE_MS: u8 = 7;
 
-/// What a command may wait in frames that are never cut short.
+/// Longest wait of a command in fixed frames.
 const FRAME_MS: u8 = 20;
 
-/// The servo's times, measured.
+/// The servo's measured times.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SwingTimes {
-    /// The longest time from the command until the tool was out, and a little more.
+    /// The longest time from the command until the tool was out, plus the longest wait of a command.
     pub out_ms: u16,
     /// The shortest time from the command until the tool began to come back.
     pub in_ms: u16,
 }
 
-/// How the swings ended.
+/// The result of the swings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// The end switch told the times.
+    /// The end switch gave the times.
     Measured(SwingTimes),
-    /// There is no end switch to tell them.
+    /// There is no end switch: the operator times the swings.
     Shown,
     /// The end switch did not follow a swing.
     Failed,
 }
 
-/// The tool swings in and out, and the end switch tells when it arrives and when it leaves.
+/// Timed swings of the tool. The end switch shows when the tool arrives and when it leaves.
 #[derive(Clone, Debug)]
 pub struct Swings {
-    /// Swings to come, this one included; an even number is a way in.
+    /// Swings left, this one included; even numbers are swings in.
     left: u8,
     since: Instant,
     /// Whether the switch has followed this swing.
     followed: bool,
     watched: bool,
-    /// What the longest way out may have missed of a command that comes when it is least welcome.
+    /// Longest wait of a command at its worst moment, which the measured swings may not have had.
     spare_ms: u8,
     leads: SwingTimes,
 }
 
 impl Swings {
-    /// The first swing, into the row, begins. `watched` tells whether there is an end switch, `gap_ms` the shortest gap between
-    /// servo pulses; 0 stands for fixed frames.
+    /// Starts with a swing into the row. `watched` tells whether there is an end switch. `gap_ms` is the shortest gap between servo
+    /// pulses; 0 stands for fixed frames.
     pub const fn new(now: Instant, watched: bool, gap_ms: u8) -> Self {
         let wait_ms = if gap_ms == 0 { FRAME_MS } else { gap_ms };
         Self {
@@ -121,17 +122,17 @@ impl Swings {
         }
     }
 
-    /// Whether the tool is to be out.
+    /// Whether the tool is commanded out.
     pub const fn tool_out(&self) -> bool {
         !self.left.is_multiple_of(2)
     }
 
-    /// Takes the end switch's level, on where it says that the tool is out; returns how it ended.
+    /// Takes the end switch's level, on for "tool out". Returns the result once all swings are done, or one has failed.
     pub fn step(&mut self, now: Instant, switch_on: bool) -> Option<Outcome> {
         let lasted = now - self.since;
         if self.watched && !self.followed && switch_on == self.tool_out() {
             self.followed = true;
-            // No servo is that fast: the switch is stuck, or was never where it should be.
+            // No servo is that fast: the switch is stuck or in the wrong position.
             if lasted < Interval::from_ms(5) {
                 return Some(Outcome::Failed);
             }
@@ -172,7 +173,7 @@ mod tests {
         end(&mut distance, ticks, length_mm, forced)
     }
 
-    /// What was counted of a stretch that is refused.
+    /// The count of a stretch that is refused.
     fn refused(ticks: i32, length_mm: u16, forced: bool) -> u16 {
         let mut distance = Distance::NONE;
         assert_eq!(end(&mut distance, ticks, length_mm, forced), Err(CommandError::WheelDiffers));
@@ -180,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn a_measured_stretch_tells_the_ticks_a_metre_forward_and_back() {
+    fn a_measured_stretch_gives_the_ticks_a_metre_forward_and_back() {
         assert_eq!(counted(18_900, 10_000, false), Ok(1890));
         assert_eq!(counted(-18_900, 10_000, false), Ok(1890));
         assert_eq!(counted(1905, 1000, false), Ok(1905));
@@ -188,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stretch_that_cannot_be_right_is_refused_and_can_be_forced() {
+    fn an_implausible_stretch_is_refused_and_can_be_forced() {
         let mut none = Distance::NONE;
         assert_eq!(none.end(Position::new(0), 5000, 1910, true), Err(CommandError::NotBegun));
         assert_eq!(counted(1900, 999, false), Err(CommandError::TooShort));
@@ -204,16 +205,16 @@ mod tests {
         Instant::new(u32::MAX - 500_000) + Interval::from_ms(milliseconds)
     }
 
-    /// Runs the swings with a switch that follows the tool so many milliseconds after the command, in the order of the swings.
+    /// Runs the swings with a switch that follows each command after this many milliseconds.
     fn run(watched: bool, follows_ms: [u32; 6]) -> (Outcome, u32) {
         let mut swings = Swings::new(at_ms(0), watched, 3);
-        let (mut told, mut out, mut count) = (0, true, 0);
+        let (mut commanded, mut out, mut count) = (0, true, 0);
         for now in 0_u32.. {
             if swings.tool_out() != out {
-                // The step before this told it.
-                (told, out, count) = (now.saturating_sub(1), swings.tool_out(), count + 1);
+                // The previous step gave this command.
+                (commanded, out, count) = (now.saturating_sub(1), swings.tool_out(), count + 1);
             }
-            let arrived = now - told >= follows_ms[count.max(1) - 1];
+            let arrived = now - commanded >= follows_ms[count.max(1) - 1];
             if let Some(outcome) = swings.step(at_ms(now), out == arrived) {
                 return (outcome, now);
             }
@@ -222,14 +223,14 @@ mod tests {
     }
 
     #[test]
-    fn the_end_switch_tells_the_longest_way_out_and_the_shortest_way_in() {
+    fn the_end_switch_gives_the_longest_swing_out_and_the_shortest_swing_in() {
         let (outcome, lasted_ms) = run(true, [61, 180, 57, 195, 70, 170]);
         assert_eq!(outcome, Outcome::Measured(SwingTimes { out_ms: 195 + 11, in_ms: 57 }));
         assert_eq!(lasted_ms, 9000);
     }
 
     #[test]
-    fn a_switch_that_does_not_follow_fails_and_none_at_all_shows_the_swings() {
+    fn a_switch_that_does_not_follow_fails_and_without_a_switch_the_swings_are_shown() {
         assert_eq!(run(true, [60, 180, 60, 9999, 60, 180]).0, Outcome::Failed);
         assert_eq!(run(true, [9999, 180, 60, 180, 60, 180]).0, Outcome::Failed);
         assert_eq!(run(true, [4, 180, 60, 180, 60, 180]).0, Outcome::Failed);

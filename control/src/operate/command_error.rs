@@ -1,6 +1,7 @@
-//! Why the machine may refuse what the operator asks.
+//! Errors of the operator's commands.
 //!
-//! A refusal is one byte, as the chip has it handed from function to function: the numbers that belong to one are with whoever refuses.
+//! An error is one byte, because the chip passes it from function to function. Numbers for its message stay with the module that
+//! returns it.
 
 /// A command that the present state does not allow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -8,40 +9,40 @@
 pub enum CommandError {
     /// An alarm is latched.
     AlarmLatched,
-    /// The setting changes where the tool is, or is to be saved, and the machine is at work.
+    /// The machine works: the setting changes where the tool is, or settings are to be saved.
     NotInHold,
-    /// Both of the servo's pulses would be the same.
+    /// Both servo pulses would be equal.
     PulsesEqual,
-    /// The beam would stand too near; how far it is to be, [`needed_mm`](crate::operate::configuration::Configuration::needed_mm) says.
+    /// The beam would be too near; [`needed_mm`](crate::operate::configuration::Configuration::needed_mm) has the least distance.
     BeamTooNear,
-    /// The second beam would stand too near to the first or not ahead of the tool, or X is too long for it.
+    /// The second beam would be too near to the first or to the tool, or X is too long for it.
     SecondBeamAstray,
     /// The wheel gives too few ticks a metre.
     EncoderTooCoarse,
-    /// The machine rolls, and the tool is to be moved.
+    /// The machine rolls, so the tool must not be moved.
     Rolls,
-    /// There is no detection to label yet, or the last one has its label.
+    /// There is no detection to label, or the last one has a label.
     NothingToLabel,
-    /// An example was to be taught whose features were not told, all and no more.
+    /// An example does not have exactly five features.
     IncompleteExample,
-    /// All places for examples are taken.
+    /// All places for field examples are taken.
     ExamplesFull,
-    /// No example from the field has this number.
+    /// No field example has this number.
     NoSuchExample,
-    /// No settings are saved that could be taken back.
+    /// No saved settings to load.
     NothingSaved,
-    /// Nobody has said where the stretch begins that was rolled.
+    /// No stretch has been started.
     NotBegun,
-    /// It is shorter than [`SHORTEST_MM`](crate::operate::calibration::SHORTEST_MM).
+    /// The stretch is shorter than [`SHORTEST_MM`](crate::operate::calibration::SHORTEST_MM).
     TooShort,
-    /// A row is not played at such a speed, but at the settings' top speed at the most.
+    /// A dry run is at most as fast as the settings' top speed.
     TestSpeed,
-    /// The wheel would differ by more than 30 % from its diameter; what was counted,
-    /// [`counted`](crate::operate::calibration::Distance::counted) says.
+    /// The ticks a metre differ by more than 30 % from the wheel's diameter;
+    /// [`counted`](crate::operate::calibration::Distance::counted) has the count.
     WheelDiffers,
-    /// The built-in examples are sure that the detection is a plant, and it was to be labelled a weed.
+    /// The built-in examples say plant, and the label says weed.
     TakenForPlant,
-    /// The other way round.
+    /// The built-in examples say weed, and the label says plant.
     TakenForWeed,
     /// The value lies outside the setting's range.
     OutOfRange,

@@ -1,4 +1,4 @@
-//! The settings in use, beside those that are saved: how the operator changes them, keeps them and takes them back.
+//! The settings in use and the saved ones: the operator changes, saves and reloads them here.
 
 use crate::{
     alarm::Alarm,
@@ -7,24 +7,24 @@ use crate::{
     settings::{Contradiction, Setting, Settings},
 };
 
-/// The settings in use and those that are saved.
+/// The settings in use and the saved settings.
 #[derive(Clone, Debug)]
 pub struct Configuration<M> {
     settings: Settings,
-    /// Whether what follows from them is yet to be worked out.
+    /// Whether leads, distances and limits are yet to be recalculated.
     changed: bool,
-    /// The X that margin, leads and top speed would have needed, where it was refused for that last.
+    /// The X that the margin, leads and top speed refused last would have needed.
     needed_mm: u16,
     saved: SavedSettings<M>,
 }
 
 impl<M: Memory> Configuration<M> {
-    /// A configuration that nobody has loaded.
+    /// A configuration before [`load`](Self::load).
     pub const fn new(memory: M) -> Self {
         Self { settings: Settings::NONE, changed: false, needed_mm: 0, saved: SavedSettings::new(memory) }
     }
 
-    /// Loads what is saved, or the defaults; returns what is wrong with it.
+    /// Loads the saved settings, or the defaults. Returns an alarm if the settings are lost or contradict each other.
     pub fn load(&mut self) -> Option<Alarm> {
         if self.saved.load_into(&mut self.settings) {
             return self.settings.contradiction().map(|_| Alarm::SettingsContradict);
@@ -43,26 +43,25 @@ impl<M: Memory> Configuration<M> {
         self.settings.get(setting)
     }
 
-    /// The value of a setting that is saved, if any is.
+    /// The saved value of a setting, if settings are saved.
     pub fn saved(&self, setting: Setting) -> Option<u16> {
         self.saved.value(setting)
     }
 
-    /// Whether the settings have changed since what follows from them was worked out.
+    /// Whether the settings have changed since [`follow`](Self::follow).
     pub fn has_changed(&self) -> bool {
         self.changed
     }
 
-    /// What follows from the settings is worked out.
+    /// The caller has recalculated from the settings.
     pub fn follow(&mut self) {
         self.changed = false;
     }
 
-    /// Sets several settings, or none of them; `is_working` tells whether the machine is.
+    /// Sets all of these settings or none. `is_working` tells whether the machine works.
     ///
     /// # Errors
-    /// [`CommandError::NotInHold`], [`CommandError::OutOfRange`], and that of a [`Contradiction`] where there was none before; nothing
-    /// is changed then.
+    /// [`CommandError::NotInHold`], [`CommandError::OutOfRange`], and a new [`Contradiction`]. Nothing is changed then.
     #[inline(never)]
     pub fn change(&mut self, changes: &[(Setting, u16)], is_working: bool) -> Result<(), CommandError> {
         let mut settings = self.settings.clone();
@@ -71,12 +70,12 @@ impl<M: Memory> Configuration<M> {
                 return Err(CommandError::NotInHold);
             }
             settings.set(setting, value).map_err(|_| CommandError::OutOfRange)?;
-            // Another wheel is one that has not been measured.
+            // Another wheel needs a new calibration.
             if setting.is_of_the_wheel() {
                 let _ = settings.set(Setting::TicksPerM, 0);
             }
         }
-        // Settings that contradict each other already are mended one at a time.
+        // Settings that already contradict each other are corrected one at a time.
         if let Some(contradiction) = settings.contradiction()
             && self.settings.contradiction().is_none()
         {
@@ -87,13 +86,13 @@ impl<M: Memory> Configuration<M> {
         Ok(())
     }
 
-    /// Goes back to the settings of a new machine.
+    /// Restores factory settings.
     pub fn take_defaults(&mut self) {
         self.settings.take_defaults();
         self.changed = true;
     }
 
-    /// Goes back to the saved settings.
+    /// Loads the saved settings.
     ///
     /// # Errors
     /// [`CommandError::NothingSaved`].
@@ -105,31 +104,31 @@ impl<M: Memory> Configuration<M> {
         Ok(())
     }
 
-    /// Begins to save the settings, which [`carry_on`](Self::carry_on) finishes.
+    /// Starts to save the settings; [`carry_on`](Self::carry_on) finishes it.
     ///
     /// # Errors
-    /// That of a [`Contradiction`].
+    /// A [`Contradiction`].
     pub fn save(&mut self) -> Result<(), CommandError> {
         self.expect_no_contradiction()?;
         self.saved.save(&self.settings);
         Ok(())
     }
 
-    /// Carries on with a save, without waiting; whether all has been written.
+    /// Runs one step of a save, without waiting. Returns whether all is written.
     pub fn carry_on(&mut self) -> bool {
         self.saved.carry_on()
     }
 
-    /// Nothing, if the settings can be right together.
+    /// Checks that the settings fit together.
     ///
     /// # Errors
-    /// That of a [`Contradiction`].
+    /// A [`Contradiction`].
     #[inline(never)]
     pub fn expect_no_contradiction(&mut self) -> Result<(), CommandError> {
         self.settings.contradiction().map_or(Ok(()), |contradiction| Err(self.refusal(contradiction)))
     }
 
-    /// The X that [`CommandError::BeamTooNear`] asked for last, in mm.
+    /// The least X for the last [`CommandError::BeamTooNear`], in mm.
     pub fn needed_mm(&self) -> u16 {
         self.needed_mm
     }
@@ -153,15 +152,15 @@ mod tests {
     use crate::memory::Volatile;
 
     #[test]
-    fn what_follows_from_the_settings_is_to_be_worked_out_once_for_each_change_of_them() {
+    fn each_change_of_settings_asks_for_one_recalculation() {
         let mut configuration = Configuration::new(Volatile::new());
         configuration.load();
-        assert!(!configuration.has_changed(), "waking up works it out");
+        assert!(!configuration.has_changed(), "start-up recalculates");
         assert_eq!(configuration.change(&[(Setting::K, 0)], false), Err(CommandError::OutOfRange));
         assert_eq!(configuration.take_saved(), Err(CommandError::NothingSaved));
-        assert!(!configuration.has_changed(), "what is refused changes nothing");
+        assert!(!configuration.has_changed(), "a refused change changes nothing");
         let changes: [fn(&mut Configuration<Volatile>); 3] = [
-            |configuration| configuration.change(&[(Setting::K, 5)], true).expect("it may be"),
+            |configuration| configuration.change(&[(Setting::K, 5)], true).expect("within its range"),
             |configuration| configuration.take_defaults(),
             |configuration| {
                 configuration.save().expect("nothing contradicts");

@@ -1,4 +1,4 @@
-//! The detections that were classified last, so that they can be looked at and labelled.
+//! The last classified detections, for the console and for labels.
 
 use crate::ground::{class::Vote, features::Features};
 use heapless::Vec;
@@ -6,15 +6,15 @@ use heapless::Vec;
 /// Detections remembered.
 const CAPACITY: usize = 16;
 
-/// A detection as it was classified: what its features follow from, in less room than they take.
+/// A classified detection: the values from which its features are calculated, which take less room.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Classified {
     pub(crate) speed_class_mm_s: i16,
     pub(crate) spacing_mm: i16,
     pub(crate) width_mm: i16,
-    /// What it was taken for.
+    /// The classifier's vote.
     pub vote: Vote,
-    /// What the operator said that it is, one of [`label`](crate::ground::class::label).
+    /// The operator's label, one of [`label`](crate::ground::class::label).
     pub label: Option<u8>,
 }
 
@@ -29,15 +29,15 @@ impl Classified {
 #[derive(Clone, Debug)]
 pub struct Detections {
     detections: Vec<Classified, CAPACITY, u8>,
-    /// The place of the oldest, which the next one takes where there is no room.
+    /// The index of the oldest, which the next one replaces if there is no room.
     oldest: u8,
 }
 
 impl Detections {
-    /// None.
+    /// No detections.
     pub const NONE: Self = Self { detections: Vec::new(), oldest: 0 };
 
-    /// Remembers a detection, and drops the oldest one where there is no room.
+    /// Adds a detection, and drops the oldest if there is no room.
     pub fn remember(&mut self, detection: Classified) {
         if let Err(detection) = self.detections.push(detection)
             && let Some(oldest) = self.detections.get_mut(usize::from(self.oldest))
@@ -47,33 +47,33 @@ impl Detections {
         }
     }
 
-    /// Whether there are none.
+    /// Whether there are no detections.
     pub fn is_empty(&self) -> bool {
         self.detections.is_empty()
     }
 
-    /// How many there are.
+    /// The number of detections.
     pub fn len(&self) -> u8 {
         self.detections.len() as u8
     }
 
-    /// One of them, counted from the oldest.
+    /// A detection, counted from the oldest.
     pub fn get(&self, number: u8) -> Option<&Classified> {
         if number < self.len() { self.detections.get(self.place(number)) } else { None }
     }
 
-    /// The last one.
+    /// The last detection.
     pub fn last(&self) -> Option<&Classified> {
         self.get(self.len().checked_sub(1)?)
     }
 
-    /// The last one.
+    /// The last detection, to change.
     pub fn newest(&mut self) -> Option<&mut Classified> {
         let last = self.place(self.len().checked_sub(1)?);
         self.detections.get_mut(last)
     }
 
-    /// Where one of them lies.
+    /// The index of a detection.
     fn place(&self, number: u8) -> usize {
         usize::from((self.oldest + number) % CAPACITY as u8)
     }

@@ -1,8 +1,8 @@
-//! A rehearsal: the servo swings as for a row of plants, without a field or a sensor.
+//! A dry run: the servo swings as for a row of plants, without a field or a sensor.
 //!
-//! The row has plants of 150 mm, 500 mm apart, on ground that is all known; the tool rolls along it at a steady speed. The
-//! swings follow from margin, leads and speed by the very rule of real ground ([`Leads::stretch`]), all in millimetres, and
-//! from nothing else: what the machine knows of the ground that it really stands on is neither asked nor changed.
+//! The row has plants of 150 mm, 500 mm apart, on known ground. The tool rolls along it at a constant speed. The swings follow from
+//! margin, leads and speed with the same rule as on real ground ([`Leads::stretch`]), in millimetres. The machine's real ground is
+//! neither used nor changed.
 
 use crate::{
     ground::reach::Leads,
@@ -16,26 +16,25 @@ pub const PLANTS: i16 = 6;
 const SPACING_MM: i16 = 500;
 const CANOPY_MM: i16 = 150;
 
-/// A row that is being played.
+/// A dry run in progress.
 #[derive(Clone, Copy, Debug)]
 pub struct DryRun {
     begin: Instant,
     speed_mm_s: u16,
-    /// In millimetres, which stand for ticks here.
+    /// In millimetres instead of ticks.
     leads: Leads,
     margin_mm: i16,
 }
 
 impl DryRun {
-    /// The tool begins to roll, half a metre before the first plant, at a speed in mm/s and with the margin and the leads of the
-    /// settings.
+    /// Starts half a metre before the first plant, at a speed in mm/s, with the settings' margin and leads.
     pub fn new(begin: Instant, speed_mm_s: u16, settings: &Settings) -> Self {
         let leads = Leads::at(TicksPerSecond(speed_mm_s.into()), settings, LengthScale::TICK);
         Self { begin, speed_mm_s, leads, margin_mm: settings.get(Setting::MarginMm) as i16 }
     }
 
-    /// Whether the tool has to be out now, if it was told to be out or not before; `None` when it has passed the last plant.
-    /// To be asked often enough to see the end: within a minute and a half.
+    /// Whether the tool has to be out now; `was_out` is the last answer. `None` after the last plant. The caller has to ask within
+    /// a minute and a half of the end.
     pub fn tool_out(&self, now: Instant, was_out: bool) -> Option<bool> {
         let milliseconds = (now - self.begin).steps() / (Interval::STEPS_PER_SECOND / 1000);
         let tool_mm = (milliseconds * u32::from(self.speed_mm_s) / 1000) as u16;
@@ -58,16 +57,16 @@ mod tests {
     use super::*;
     use std::vec::Vec;
 
-    /// The swings of a rehearsal at a speed, as the place of each in millimetres and whether it is one out.
+    /// The swings of a dry run: the position of each in mm, and whether it is a swing out.
     fn swings(speed_mm_s: u16, settings: &Settings) -> Vec<(u32, bool)> {
         let begin = Instant::new(u32::MAX - 300_000);
         let row = DryRun::new(begin, speed_mm_s, settings);
         let (mut out, mut swings) = (true, Vec::new());
         for milliseconds in 0.. {
             let now = begin + Interval::from_ms(milliseconds);
-            let Some(told) = row.tool_out(now, out) else { break };
-            if told != out {
-                out = told;
+            let Some(must_be_out) = row.tool_out(now, out) else { break };
+            if must_be_out != out {
+                out = must_be_out;
                 swings.push((milliseconds * u32::from(speed_mm_s) / 1000, out));
             }
         }
@@ -94,7 +93,7 @@ mod tests {
     }
 
     #[test]
-    fn windows_too_near_for_two_strokes_are_one() {
+    fn zones_too_near_for_two_strokes_are_one() {
         let mut settings = Settings::new();
         settings.set(Setting::LeadOutMs, 180).expect("within its range");
         for speed_mm_s in [1000, 1300] {
@@ -103,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn leads_that_are_level_give_one_swing_each_way_a_plant() {
+    fn equal_leads_give_one_swing_each_way_a_plant() {
         for lead_ms in [0, 100, 180, 240] {
             let mut settings = Settings::new();
             for lead in [Setting::LeadOutMs, Setting::LeadInMs] {

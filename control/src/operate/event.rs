@@ -1,4 +1,4 @@
-//! Events: what the machine has to tell while it works, one line each.
+//! Events: reports that the machine sends while it works, one line each.
 
 use crate::{
     alarm::{Alarm, Warning},
@@ -8,97 +8,97 @@ use crate::{
 };
 use heapless::Vec;
 
-/// Events that wait to be told. They are short-lived: a plant gives three in half a second.
+/// Events in the queue. They leave it quickly: a plant gives three in half a second.
 pub const CAPACITY: usize = 6;
 
-/// Something that happened.
+/// An event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event {
-    /// A detection was seen in full and classified.
+    /// A complete detection was classified.
     Detection {
-        /// What it was taken for.
+        /// The classifier's vote.
         vote: Vote,
         /// Where the beam broke.
         leading: Position,
-        /// Distance since the last plant's leading edge, or since watching began.
+        /// Distance from the last plant's leading edge, or from where detection began.
         spacing: Ticks,
         /// The paper's schedule for it.
         plan: Plan,
     },
-    /// A plant was due here, none was seen, and the ground is kept free all the same.
+    /// A plant was expected here and not seen. The ground is kept clear.
     Guarded(Position),
-    /// A plant has passed both beams, and this is the slip by the last of them, in thousandths.
+    /// A plant has passed both beams and gave a slip, in thousandths.
     Slip {
-        /// Above 0 where the wheel turns farther than the machine rolls.
+        /// Above 0 if the wheel turns farther than the machine rolls.
         permille: i16,
     },
-    /// The tool was told to leave the row or to come back.
+    /// The tool was commanded out of the row or back.
     Swing {
-        /// Out of the row, or back into it.
+        /// True for out of the row.
         out: bool,
         /// The machine's position at the command.
         position: Position,
     },
-    /// The machine went from one state to another.
+    /// The state changed.
     State(State),
-    /// A fault was latched.
+    /// An alarm was latched.
     Alarm {
-        /// Which.
+        /// The alarm.
         alarm: Alarm,
         /// The machine's position.
         position: Position,
     },
-    /// Something happened that the operator should know of.
+    /// A warning for the operator.
     Warning(Warning),
-    /// The servo's swings are over.
+    /// The servo's timed swings ended.
     Calibrated {
-        /// What they told.
+        /// Their result.
         outcome: Outcome,
-        /// Whether the leads are set to it: they may be out of range, or contradict other settings.
+        /// Whether the leads were set from it. The times may be out of range, or contradict other settings.
         fits: bool,
     },
 }
 
-/// The events that wait to be told.
+/// The queue of events.
 #[derive(Clone, Debug)]
 pub struct Events {
-    /// Whether they are told at all.
+    /// Whether events are reported.
     on: bool,
     missed: u16,
     waiting: Vec<Event, CAPACITY, u8>,
 }
 
 impl Events {
-    /// None, and none are told.
+    /// No events, with reporting off.
     pub const NONE: Self = Self { on: false, missed: 0, waiting: Vec::new() };
 
-    /// Tells events from now on, or no longer; none of those that wait.
+    /// Turns reporting on or off, and drops the waiting events.
     pub fn turn(&mut self, on: bool) {
         self.on = on;
         self.waiting.clear();
     }
 
-    /// Has an event wait, if events are told.
+    /// Queues an event, if reporting is on.
     pub fn add(&mut self, event: Event) {
         if self.on {
             self.announce(event);
         }
     }
 
-    /// Has an event wait that the operator waits for, whether or not events are told.
+    /// Queues an event that the operator waits for, even if reporting is off.
     pub fn announce(&mut self, event: Event) {
         if self.waiting.push(event).is_err() {
             count(&mut self.missed);
         }
     }
 
-    /// The next one to be told. The few behind it are moved up: a deque of heapless takes 116 bytes of flash more, and 4 of SRAM.
+    /// The next event. The others move up: heapless' deque takes 116 bytes more flash, and 4 of SRAM.
     #[inline(never)]
     pub fn take(&mut self) -> Option<Event> {
         (!self.waiting.is_empty()).then(|| self.waiting.remove(0))
     }
 
-    /// Those that found no room to wait in.
+    /// Events dropped because the queue was full.
     pub fn missed(&self) -> u16 {
         self.missed
     }

@@ -1,20 +1,20 @@
-//! An example that the operator tells the machine on the console, a feature a line.
+//! An example that the operator enters on the console, one feature a line.
 
 use crate::ground::features;
 
-/// The features of an example that the operator tells, one after the other.
+/// The features entered so far.
 #[derive(Clone, Debug)]
 pub struct ExampleEntry {
     features: [u8; features::COUNT],
-    /// How many were told.
+    /// The number entered.
     count: u8,
 }
 
 impl ExampleEntry {
-    /// Nothing.
+    /// Nothing entered.
     pub const NONE: Self = Self { features: [0; features::COUNT], count: 0 };
 
-    /// Takes the next feature. One more than there are is none of any example.
+    /// Takes the next feature. More than five make the example invalid.
     pub fn add(&mut self, feature: u8) {
         if let Some(next) = self.features.get_mut(usize::from(self.count)) {
             *next = feature;
@@ -22,7 +22,7 @@ impl ExampleEntry {
         self.count = self.count.saturating_add(1);
     }
 
-    /// The features, if they were told, all and no more. The next example begins anew in any case.
+    /// Returns the features if exactly five were entered, and clears the buffer.
     pub fn take(&mut self) -> Option<[u8; features::COUNT]> {
         let count = core::mem::take(&mut self.count);
         (usize::from(count) == features::COUNT).then_some(self.features)

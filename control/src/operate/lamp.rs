@@ -1,15 +1,16 @@
-//! The status LED: steady at work, a short flash a second in hold, and an alarm's code in flashes: the first digit, a
-//! short dark, the second digit, a long dark.
+//! The status LED: steady in WORK, a short flash a second in HOLD. An alarm blinks its code: the first digit, a short pause, the
+//! second digit, a long pause.
 
 use crate::{operate::state::State, units::Instant};
 
-/// Dark between the two digits of a code, and behind it, in quarters of a second. A flash is one of light and one of dark.
+/// Dark between the two digits of a code, and after the code, in quarters of a second. A flash is one quarter of light and one
+/// dark.
 const GAP: u16 = 2;
 const PAUSE: u16 = 6;
 
-/// Whether the LED shines.
+/// Whether the LED is lit.
 pub fn is_lit(state: State, now: Instant) -> bool {
-    // Shifts stand for divisions: 2^16 steps of 4 us are 262 ms.
+    // A shift instead of a division: 2^16 steps of 4 us are 262 ms.
     let quarter = (now.steps() >> 16) as u16;
     match state {
         State::Work => true,
@@ -41,7 +42,7 @@ mod tests {
             let flashes = |digit: u8| "* ".repeat(usize::from(digit));
             let code = flashes(first) + "  " + &flashes(second) + "      ";
             assert_eq!(seen, code.repeat(2), "{alarm:?}");
-            // As a person counts: what is parted by more than one dark quarter is another digit.
+            // Counted as a person does: more than one dark quarter separates digits.
             let counted: Vec<usize> =
                 seen.split("  ").map(|digit| digit.matches('*').count()).filter(|&n| n > 0).collect();
             assert_eq!(counted, [first, second, first, second].map(usize::from));

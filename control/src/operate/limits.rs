@@ -1,24 +1,24 @@
-//! What the machine is not to go beyond, worked out from the settings once and not anew each turn.
+//! Limits calculated from the settings once, instead of in each turn.
 
 use crate::{
     settings::{Setting, Settings},
     units::{Ticks, TicksPerSecond, Wheel},
 };
 
-/// What the machine is not to go beyond, in ticks of the present wheel.
+/// Limits in ticks of the present wheel.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits {
-    /// In ticks a second, 60,000 at the most.
+    /// In ticks a second, at most 60,000.
     top_speed: u16,
-    /// Zero for none.
+    /// 0 for no limit.
     no_plant: Ticks,
 }
 
 impl Limits {
-    /// Those of a machine that has not woken up.
+    /// Limits before the settings are loaded.
     pub const NONE: Self = Self { top_speed: 0, no_plant: Ticks::ZERO };
 
-    /// Those that these settings give, with this wheel.
+    /// The limits of these settings with this wheel.
     pub fn of(settings: &Settings, wheel: Wheel) -> Self {
         Self {
             top_speed: wheel.ticks(settings.get(Setting::TopSpeedMmS)).0 as u16,
@@ -26,12 +26,12 @@ impl Limits {
         }
     }
 
-    /// Whether a speed is beyond the greatest at which the machine works.
+    /// Whether a speed is above the top speed.
     pub fn is_too_fast(self, speed: TicksPerSecond) -> bool {
         speed.is_beyond(self.top_speed)
     }
 
-    /// The way without a plant after which the operator is warned; zero for none.
+    /// The distance without a plant after which the operator is warned; 0 for none.
     pub const fn no_plant(self) -> Ticks {
         self.no_plant
     }

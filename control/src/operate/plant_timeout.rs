@@ -1,8 +1,8 @@
-//! The way that the machine has worked without seeing a plant: it may have left the row, or its beam may be blind.
+//! The distance worked without a plant. If it is long, the machine may have left the row, or its beam may be blind.
 
 use crate::units::{Position, Ticks};
 
-/// How far the machine has worked without seeing a plant.
+/// The distance worked without a plant.
 #[derive(Clone, Debug)]
 pub struct PlantTimeout {
     /// Where the last detection ended, or work began.
@@ -11,12 +11,12 @@ pub struct PlantTimeout {
 }
 
 impl PlantTimeout {
-    /// None since here.
+    /// Starts at this position.
     pub const fn since(position: Position) -> Self {
         Self { since: position, warned: false }
     }
 
-    /// Whether the operator is to be warned, once, as none was seen on a way longer than this; zero never.
+    /// True once, when the distance exceeds `longest`; 0 disables the check.
     pub fn warn(&mut self, position: Position, longest: Ticks) -> bool {
         if self.warned || longest == Ticks::ZERO || position - self.since <= longest {
             return false;

@@ -1,4 +1,4 @@
-//! Curves for a plotter: which, and when their next points are due.
+//! Curves for a plotter: the format, and when the next points are due.
 
 use crate::units::{Coarse, Instant};
 
@@ -8,7 +8,7 @@ const PERIOD: u16 = Coarse::steps_in_ms(50);
 /// Curves for a plotter.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Plot {
-    /// None.
+    /// No curves.
     #[default]
     Off,
     /// For the Arduino IDE's Serial Plotter.
@@ -17,7 +17,7 @@ pub enum Plot {
     Teleplot,
 }
 
-/// The curves that are drawn.
+/// The curves that are sent.
 #[derive(Clone, Debug)]
 pub struct Telemetry {
     plot: Plot,
@@ -25,20 +25,20 @@ pub struct Telemetry {
 }
 
 impl Telemetry {
-    /// None.
+    /// No curves.
     pub const NONE: Self = Self { plot: Plot::Off, drawn_at: Coarse::ZERO };
 
-    /// The machine has woken up: the next points are due a period from now.
+    /// Starts: the next points are due a period from now.
     pub const fn init(&mut self, now: Instant) {
         self.drawn_at = now.coarse();
     }
 
-    /// Draws curves from now on, or no longer.
+    /// Selects the curves, or none.
     pub fn set(&mut self, plot: Plot) {
         self.plot = plot;
     }
 
-    /// The curves of which the next points are due, 20 times a second.
+    /// The format whose next points are due, 20 times a second.
     pub fn due(&mut self, now: Instant) -> Option<Plot> {
         if self.plot == Plot::Off || now.coarse().since(self.drawn_at) < PERIOD {
             return None;

@@ -1,10 +1,9 @@
-//! The settings as they are kept without power: two copies, written in turn.
+//! The saved settings: two copies in the EEPROM, written in turn.
 //!
-//! A copy is the table's mark, the number of values, a sequence number, the values, and a CRC-16 of all that. A save
-//! overwrites the older copy, a byte at a time, so that the power may go away at any moment: the newer one is still whole. The first
-//! byte of the mark is spoiled before and put right in the end, so that what is half written is no copy, whatever stood there: a
-//! copy of which a byte had been lost could else become whole again by that one byte.
-//! On waking up the newest copy counts that is whole, of this firmware's table, and within its ranges.
+//! A copy is the table's mark, the number of values, a sequence number, the values, and a CRC-16 of all. A save overwrites the
+//! older copy, one byte at a time, so a power loss leaves the newer copy intact. The save first makes the mark's first byte wrong
+//! and writes it correctly at the end. So a half-written copy is invalid, even if an old copy with one flipped bit is overwritten.
+//! At start-up the newest valid copy is used: right CRC, this firmware's table, all values within their ranges.
 
 use crate::{
     memory::{Memory, SIZE, checksum},
@@ -14,55 +13,55 @@ use crate::{
 /// Bytes before the values: the table's mark (2), their number, the sequence number.
 const HEADER: usize = 4;
 
-/// Where the sequence number stands.
+/// Index of the sequence number.
 const SEQUENCE: u16 = HEADER as u16 - 1;
 
-/// Where the values end.
+/// End of the values.
 const END: usize = HEADER + 2 * Setting::COUNT as usize;
 
-/// Bytes of a copy, its CRC included.
+/// Bytes of a copy with its CRC.
 pub const COPY: usize = END + 2;
 
-/// A save writes each byte, and the first twice.
+/// A save writes each byte once, and the first twice.
 const STEPS: u8 = COPY as u8 + 1;
 
-/// Each copy has half the memory, so that the table may grow without moving them.
+/// Each copy has half of the memory, so the table can grow without moving a copy.
 const STRIDE: u16 = SIZE as u16 / 2;
 
 const _: () = assert!(COPY <= STRIDE as usize && COPY < u8::MAX as usize);
 
-/// The settings in the memory.
+/// The settings in the EEPROM.
 #[derive(Clone, Debug)]
 pub struct SavedSettings<M> {
     memory: M,
-    /// The older copy, 0 or 1, which the next save overwrites, and the sequence number of the newer.
+    /// The older copy, 0 or 1, which the next save overwrites, and the newer copy's sequence number.
     older: u8,
     sequence: u8,
-    /// What was to be saved when that was asked for, whatever is set meanwhile.
+    /// The bytes to write: the settings at the time of the save.
     image: [u8; COPY],
-    /// Steps that are still to be taken: the first byte is spoiled, the others are written, and it is.
+    /// Writes left: the first byte wrong, the others, the first byte right.
     left: u8,
-    /// Whether there is a copy.
+    /// Whether there is a valid copy.
     exists: bool,
 }
 
 impl<M: Memory> SavedSettings<M> {
-    /// The settings in a memory, which are yet to be loaded.
+    /// The settings before [`load`](Self::load).
     pub const fn new(memory: M) -> Self {
         Self { memory, older: 0, sequence: 0, image: [0; COPY], left: 0, exists: false }
     }
 
-    /// Loads the newest copy that is whole; `None` where neither is.
+    /// Loads the newest valid copy; `None` if there is none.
     pub fn load(&mut self) -> Option<Settings> {
         let mut settings = Settings::NONE;
         self.load_into(&mut settings).then_some(settings)
     }
 
-    /// [`load`](Self::load), without room for a copy on the stack; returns whether a copy is whole. Where none is, `settings` are worth
-    /// nothing.
+    /// As [`load`](Self::load), without a second copy on the stack. Returns whether a copy is valid. If not, `settings` has
+    /// undefined values.
     pub fn load_into(&mut self, settings: &mut Settings) -> bool {
         let sequence = |copy| self.memory.read(address(copy) + SEQUENCE);
-        // Where only one copy is whole, it does not matter which of them is tried first.
+        // If only one copy is valid, the order does not matter.
         let newer = u8::from(sequence(1).wrapping_sub(sequence(0)).cast_signed() > 0);
         for turn in 0..2 {
             let copy = newer ^ turn;
@@ -75,7 +74,7 @@ impl<M: Memory> SavedSettings<M> {
         false
     }
 
-    /// Begins to save the settings as they are now; [`carry_on`](Self::carry_on) finishes it.
+    /// Starts to save the settings; [`carry_on`](Self::carry_on) finishes it.
     pub fn save(&mut self, settings: &Settings) {
         self.exists = true;
         self.older ^= 1;
@@ -84,35 +83,34 @@ impl<M: Memory> SavedSettings<M> {
         self.left = STEPS;
     }
 
-    /// Carries on with a save, without waiting; whether all has been written.
+    /// Writes the next byte, if the memory is ready. Returns whether all is written.
     pub fn carry_on(&mut self) -> bool {
         if !self.memory.is_ready() {
             return false;
         }
         while self.left > 0 {
-            let spoils = self.left == STEPS;
+            let invalidates = self.left == STEPS;
             let place = if self.left > 1 { STEPS - self.left } else { 0 };
             let (address, right) = (self.newest() + u16::from(place), self.image[usize::from(place)]);
             self.left -= 1;
-            // What is right already is left alone, as an EEPROM wears out; and so is a first byte that is wrong already, as the
-            // power may make anything of a byte that is being written.
-            if (self.memory.read(address) == right) == spoils {
-                self.memory.write(address, if spoils { !right } else { right });
+            // Correct bytes are not written again, because an EEPROM wears out. Nor is a first byte that is already wrong: a power
+            // loss during a write can leave any value.
+            if (self.memory.read(address) == right) == invalidates {
+                self.memory.write(address, if invalidates { !right } else { right });
                 return false;
             }
         }
         true
     }
 
-    /// The value of a setting that is saved, if any is; not while a save is under way.
+    /// The saved value of a setting, if settings are saved. Not valid during a save.
     pub fn value(&self, setting: Setting) -> Option<u16> {
         self.exists.then(|| self.value_at(self.newest(), setting))
     }
 
-    /// Puts what is saved in the place of `settings`: a copy that was whole when it was loaded, or was written since. Returns whether
-    /// anything is; else they stay.
+    /// Loads the saved settings into `settings`. Returns whether there are any; if not, `settings` keeps its values.
     ///
-    /// Out of line, as there would be room for two more copies on the stack of whoever carries a command out.
+    /// Out of line, because inlined it would put two more copies on the stack of the command's caller.
     #[inline(never)]
     pub fn restore(&self, settings: &mut Settings) -> bool {
         let mut saved = Settings::NONE;
@@ -123,29 +121,29 @@ impl<M: Memory> SavedSettings<M> {
         exists
     }
 
-    /// The memory, to be looked at or put into another machine.
+    /// The memory, for a test or another machine.
     pub fn into_memory(self) -> M {
         self.memory
     }
 
-    /// Where the newest copy begins.
+    /// The newest copy's address.
     fn newest(&self) -> u16 {
         address(self.older ^ 1)
     }
 
-    /// A value of the copy that begins at an address.
+    /// A value of the copy at an address.
     fn value_at(&self, copy: u16, setting: Setting) -> u16 {
         let place = copy + HEADER as u16 + 2 * setting as u16;
         u16::from_le_bytes([self.memory.read(place), self.memory.read(place + 1)])
     }
 
-    /// Sets `settings` to the values of the copy that begins at an address; whether none is out of its range.
+    /// Reads the values of the copy at an address. Returns whether all are within their ranges.
     #[inline(never)]
     fn values(&self, copy: u16, settings: &mut Settings) -> bool {
         Setting::all().all(|setting| settings.set(setting, self.value_at(copy, setting)).is_ok())
     }
 
-    /// Sets `settings` to a copy; whether it is whole.
+    /// Reads a copy. Returns whether it is valid.
     fn read(&self, copy: u8, settings: &mut Settings) -> bool {
         let byte = |place| self.memory.read(address(copy) + place);
         self.values(address(copy), settings)
@@ -167,7 +165,7 @@ fn image(settings: &Settings, sequence: u8) -> [u8; COPY] {
     bytes
 }
 
-/// Where a copy begins.
+/// A copy's address.
 const fn address(copy: u8) -> u16 {
     copy as u16 * STRIDE
 }
@@ -217,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn the_last_save_counts_however_often_the_sequence_wraps() {
+    fn the_last_save_counts_after_the_sequence_wraps() {
         let mut memory = Volatile::new();
         for time in 0..600 {
             memory = save(memory, &with_k(1 + time % 15));
@@ -237,25 +235,25 @@ mod tests {
                 failing.lose_power_after(power);
                 let after = load(&save(failing, &with_k(9)).with_power());
                 assert!(after == Some(with_k(before)) || after == Some(with_k(9)), "{power}: {after:?}");
-                assert!(power <= COPY || after == Some(with_k(9)), "nothing was lost");
+                assert!(power <= COPY || after == Some(with_k(9)), "complete save");
             }
         }
     }
 
     #[test]
-    fn a_spoiled_copy_gives_way_to_the_other() {
+    fn an_invalid_copy_is_replaced_by_the_other() {
         let memory = save(save(Volatile::new(), &with_k(5)), &with_k(7));
         for (copy, left) in [(0, 7), (1, 5)] {
             for place in 0..COPY {
                 for bit in 0..8 {
-                    let mut spoiled = memory.clone();
-                    spoiled.bytes[usize::from(address(copy)) + place] ^= 1 << bit;
-                    assert_eq!(load(&spoiled), Some(with_k(left)), "byte {place}, bit {bit}");
-                    // The copy that is left is never the one to be overwritten, and what was lost does not come back, whatever
-                    // becomes of the byte that is being written when the power goes away.
-                    let saved = save(spoiled.clone(), &with_k(9)).bytes;
+                    let mut corrupted = memory.clone();
+                    corrupted.bytes[usize::from(address(copy)) + place] ^= 1 << bit;
+                    assert_eq!(load(&corrupted), Some(with_k(left)), "byte {place}, bit {bit}");
+                    // A save never overwrites the remaining copy, and never makes the invalid copy valid again. At the power loss,
+                    // the byte being written may take any value.
+                    let saved = save(corrupted.clone(), &with_k(9)).bytes;
                     let cut = |power| {
-                        let mut failing = spoiled.clone();
+                        let mut failing = corrupted.clone();
                         failing.lose_power_after(power);
                         save(failing, &with_k(9)).with_power()
                     };
@@ -278,7 +276,7 @@ mod tests {
     }
 
     #[test]
-    fn two_spoiled_copies_are_no_settings() {
+    fn two_invalid_copies_are_no_settings() {
         let mut memory = save(save(Volatile::new(), &with_k(5)), &with_k(7));
         memory.bytes[10] ^= 1;
         memory.bytes[usize::from(STRIDE) + 20] ^= 0x80;
@@ -286,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn settings_of_another_table_or_length_are_none_although_their_crc_is_right() {
+    fn settings_of_another_table_or_length_are_invalid_with_a_right_crc() {
         for place in 0..HEADER - 1 {
             let mut bytes = image(&with_k(5), 1);
             bytes[place] ^= 1;
@@ -299,7 +297,7 @@ mod tests {
     }
 
     #[test]
-    fn values_out_of_their_range_are_no_settings_although_their_crc_is_right() {
+    fn values_out_of_range_are_invalid_with_a_right_crc() {
         let mut bytes = image(&Settings::new(), 1);
         bytes[HEADER..HEADER + 2].copy_from_slice(&u16::MAX.to_le_bytes());
         let check = checksum(&bytes[..END]).to_le_bytes();
@@ -310,10 +308,10 @@ mod tests {
     }
 
     #[test]
-    fn bytes_that_are_right_are_not_written_again() {
+    fn correct_bytes_are_not_written_again() {
         let memory = save(save(Volatile::new(), &with_k(5)), &with_k(5));
         let mut writes_few = memory.clone();
-        // The first byte, twice, the sequence number and the CRC.
+        // The first byte twice, the sequence number and the CRC.
         writes_few.lose_power_after(5);
         assert_eq!(save(writes_few, &with_k(5)).bytes, save(memory, &with_k(5)).bytes);
         assert_eq!(Volatile::new().bytes[0], ERASED);

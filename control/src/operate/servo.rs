@@ -1,16 +1,15 @@
-//! The servo's signal: pulse widths, and when a new one may be shown.
+//! The servo's signal: pulse widths, and when a new width may start.
 //!
-//! A frame of 20 ms would hold a swing back by up to that. A servo needs no more than a short gap between two pulses, so a
-//! new command may cut the frame short as soon as the line has been low for that gap. A pulse that has begun is never
-//! changed.
+//! With fixed frames of 20 ms a swing would wait for up to 20 ms. A servo needs only a short gap between two pulses. So a new
+//! command may end the frame once the line has been low for that gap. A pulse that has begun is never changed.
 
-/// A pulse width or a place in the frame, in steps of 0.5 us (Timer1 behind its prescaler of 8).
+/// A pulse width or a time in the frame, in steps of 0.5 us (Timer1 with a prescaler of 8).
 pub type HalfMicros = u16;
 
-/// The frame's length: 20 ms, the customary 50 Hz.
+/// The frame's length: 20 ms, the usual 50 Hz.
 pub const FRAME: HalfMicros = 40_000;
 
-/// So close to its end that a frame is left to end by itself: 10 us.
+/// From here on, 10 us before its end, a frame ends by itself.
 const END: HalfMicros = FRAME - 20;
 
 /// A pulse width given in microseconds.
@@ -18,19 +17,19 @@ pub const fn from_us(microseconds: u16) -> HalfMicros {
     microseconds * 2
 }
 
-/// What to do about a new pulse width.
+/// What to do with a new pulse width.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Action {
-    /// Nothing yet: the last pulse, or the gap behind it, is still on the line.
+    /// Nothing yet: the last pulse or its gap is still on the line.
     Wait,
-    /// Give the new width to the next frame, which begins by itself.
+    /// Set the width for the next frame, which begins by itself.
     Change,
-    /// Give the new width to a frame that begins now.
+    /// Set the width and start a new frame now.
     Restart,
 }
 
-/// What to do about a new pulse width, `since_rise` after the last pulse of `width` began, with a servo that needs
-/// `gap_ms` between pulses. A gap of 0 asks for fixed frames: none is cut short.
+/// What to do with a new pulse width. `since_rise` is the time since the last pulse of `width` began, and `gap_ms` the servo's
+/// shortest gap between pulses; 0 for fixed frames.
 pub const fn action(since_rise: HalfMicros, width: HalfMicros, gap_ms: u8) -> Action {
     if since_rise >= END {
         Action::Change

@@ -1,13 +1,13 @@
-//! What the machine is doing: HOLD, WORK, or an alarm that is latched.
+//! The machine's state: HOLD, WORK, or a latched alarm.
 
 use crate::alarm::Alarm;
 
-/// What the machine is doing.
+/// The machine's state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-// HOLD is 0, as the memory is before anybody has woken up.
+// `Hold` is 0, like memory before start-up.
 #[repr(u8)]
 pub enum State {
-    /// The tool stays out, whatever comes.
+    /// The tool stays out.
     Hold,
     /// The tool weeds between the plants.
     Work,

@@ -1,4 +1,4 @@
-//! The tool, as the servo was told to have it: where, since when, and whether that was in time; and why it may be out while the machine works.
+//! The tool's command: in or out, since when, and whether it was in time; and why the tool may be out while the machine works.
 
 use crate::{
     operate::servo::HalfMicros,
@@ -9,11 +9,11 @@ use crate::{
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Reason {
-    /// A plant is there, or comes up.
+    /// A plant is at the tool or comes up.
     Plant,
     /// The beam has not seen the ground.
     UnseenGround,
-    /// A plant just behind the beam would be reached before the tool is out.
+    /// The machine would reach a plant just behind the beam before the tool is out.
     TooFast,
     /// The encoder fell silent while the machine rolled, or the beam broke while it stands.
     EncoderDoubtful,
@@ -23,34 +23,34 @@ pub enum Reason {
 #[derive(Clone, Debug)]
 pub struct Tool {
     out: bool,
-    /// The servo's pulse, and since when it has been that.
+    /// The servo's pulse, and since when it has this width.
     pulse: HalfMicros,
     since: Instant,
-    /// Whether the ground for which it was sent out of the row is yet to come.
+    /// Whether the ground for which the tool left the row is yet to come.
     awaits_ground: bool,
     late: u16,
 }
 
 impl Tool {
-    /// A tool of which nobody knows anything.
+    /// A tool before [`init`](Self::init).
     pub const NONE: Self = Self { out: false, pulse: 0, since: Instant::ZERO, awaits_ground: false, late: 0 };
 
-    /// The machine has woken up, with the tool out of the row.
+    /// Starts with the tool out of the row.
     pub const fn init(&mut self, now: Instant) {
         (self.out, self.since) = (true, now);
     }
 
-    /// Whether it is to be out of the row.
+    /// Whether it is commanded out.
     pub const fn is_out(&self) -> bool {
         self.out
     }
 
-    /// Sends it out of the row or back into it; `for_ground` tells whether that is for ground which is yet to come.
+    /// Commands it out of the row or back. `for_ground`: the reason is ground that is yet to come.
     pub const fn send(&mut self, out: bool, for_ground: bool) {
         (self.out, self.awaits_ground) = (out, for_ground);
     }
 
-    /// Gives the servo a pulse.
+    /// Records the servo's pulse.
     #[cfg_attr(not(target_arch = "avr"), inline)]
     pub const fn order(&mut self, pulse: HalfMicros, now: Instant) {
         if pulse != self.pulse {
@@ -58,12 +58,12 @@ impl Tool {
         }
     }
 
-    /// Whether the servo has had this pulse for so long.
+    /// Whether the servo has had this pulse for this many milliseconds.
     pub fn has_had(&self, pulse: HalfMicros, now: Instant, milliseconds: u16) -> bool {
         pulse == self.pulse && self.is_settled(now, milliseconds)
     }
 
-    /// Closed ground has reached it; whether that was sooner than a tool that needs so long could be out.
+    /// Closed ground has reached the tool. Returns whether the command came less than `milliseconds` before, and counts that.
     pub fn is_late(&mut self, now: Instant, milliseconds: u16) -> bool {
         self.awaits_ground = false;
         let is_late = !self.is_settled(now, milliseconds);
@@ -73,17 +73,17 @@ impl Tool {
         is_late
     }
 
-    /// Whether the ground for which it was sent out is yet to come.
+    /// Whether the ground for which it left the row is yet to come.
     pub const fn awaits_ground(&self) -> bool {
         self.awaits_ground
     }
 
-    /// Times that closed ground came sooner than it could be out.
+    /// Times that closed ground came before the tool could be out.
     pub const fn late(&self) -> u16 {
         self.late
     }
 
-    /// Whether the servo has had its pulse for so long.
+    /// Whether the servo has had its pulse for this many milliseconds.
     #[cfg_attr(target_arch = "avr", inline(never))]
     fn is_settled(&self, now: Instant, milliseconds: u16) -> bool {
         now - self.since >= Interval::from_ms(milliseconds.into())

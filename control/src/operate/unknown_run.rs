@@ -1,28 +1,29 @@
-//! Narrow detections that follow each other: a crop of stalks, which the examples do not know, or weeds in a gap of the stand.
+//! Consecutive narrow detections: a crop with thin stalks that the examples do not know, or weeds in a gap of the stand.
 //!
-//! Both are narrow, and neither is taken for a plant. What stood before them tells them apart. A stand has shown a plant before its
-//! gap, and then it takes `TRUST` more of them: so many weeds stand in no gap. A crop of stalks has shown none. A stalk that has
-//! grown together with another, or with a weed, is wider than either, but not as wide as a plant: it counts for nothing, and ends
-//! nothing. How regularly they stand would tell no more: five are few, and maize has gaps and weeds of its own.
+//! Both are narrow, and neither is classified as a plant. The detections before tell them apart. A known crop has shown a plant
+//! before its gap. The alarm then needs `TRUST` more narrow detections: no gap has so many weeds. An unknown crop has shown no
+//! plant. Two stalks grown together, or a stalk and a weed, are wider than one, but narrower than a plant: they neither count nor
+//! restart the count. The distances between them would not help: five are few, and maize has gaps and weeds too.
 //!
-//! `cargo test --release -p field --test crop_unknown` measures how often that errs.
+//! `cargo test --release -p field --test crop_unknown` measures the error rate.
 
 use crate::ground::{class::Class, examples::NARROW_MM};
 
-/// As wide as the narrowest plant among the examples.
+/// The width of the narrowest plant among the examples.
 const WIDE_MM: i16 = 2 * NARROW_MM;
 
-/// So many more prove a crop of stalks where the stand has shown a plant since work began.
+/// More detections needed for the alarm if work has shown a plant.
 const TRUST: i8 = 4;
 
-/// Detections as narrow as a weed since the last plant, or since one was labelled, or since work began.
+/// Narrow detections since the last plant, the last label, or the start of work.
 ///
-/// Those that are unknown are kept, and count nevertheless: a stalk far behind the last plant is like no example, be it crop or weed.
+/// Unknown detections are kept as plants, and count nevertheless. A stalk far behind the last plant is like no example, crop or
+/// weed.
 #[derive(Clone, Debug)]
 pub struct UnknownRun {
-    /// Below 0 behind a plant.
+    /// Negative after a plant.
     count: i8,
-    /// Whether any of them was taken for a weed: else nothing is lost.
+    /// Whether any was classified as a weed. Otherwise no plant was lost.
     any_weed: bool,
 }
 
@@ -30,12 +31,12 @@ impl UnknownRun {
     /// No detections.
     pub const NONE: Self = Self { count: 0, any_weed: false };
 
-    /// Counts a detection; whether these are `enough` now, or more; zero never.
+    /// Counts a detection. True once `enough` is reached; 0 disables the check.
     pub fn count(&mut self, class: Class, width_mm: i16, enough: u8) -> bool {
         if class == Class::Plant || class == Class::Unknown && width_mm >= WIDE_MM {
             (self.count, self.any_weed) = (-TRUST, false);
         } else if (1..NARROW_MM).contains(&width_mm) {
-            // A leaf that moves while the machine stands has no width.
+            // A leaf that moves in the beam of a standing machine has width 0.
             self.any_weed |= class == Class::Weed;
             self.count = self.count.saturating_add(1);
         }
@@ -47,19 +48,19 @@ impl UnknownRun {
 mod tests {
     use super::*;
 
-    /// Which detection raises the alarm at `misfit_after` 3, of these and as many weeds behind them as it takes.
+    /// Which detection raises the alarm at `misfit_after` 3: these, then weeds.
     fn alarm_at(before: &[(Class, i16)]) -> usize {
-        let mut misfits = UnknownRun::NONE;
+        let mut run = UnknownRun::NONE;
         let weeds = core::iter::repeat(&(Class::Weed, 10));
         let mut detections = (1..).zip(before.iter().chain(weeds));
         detections
-            .find(|&(_, &(class, width_mm))| misfits.count(class, width_mm, 3))
+            .find(|&(_, &(class, width_mm))| run.count(class, width_mm, 3))
             .map(|(place, _)| place)
-            .expect("weeds without an end")
+            .expect("endless weeds")
     }
 
     #[test]
-    fn a_plant_or_what_is_as_wide_ends_the_count_of_misfits_and_is_a_reason_to_believe_the_stand() {
+    fn a_plant_or_a_detection_as_wide_restarts_the_count_with_trust() {
         let two = [(Class::Weed, 10); 2];
         assert_eq!(alarm_at(&[]), 3);
         assert_eq!(alarm_at(&two), 3);
@@ -69,7 +70,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_neither_narrow_nor_as_wide_as_a_plant_counts_for_nothing_and_ends_nothing() {
+    fn medium_widths_neither_count_nor_restart_the_count() {
         for between in
             [(Class::Unknown, NARROW_MM), (Class::Unknown, WIDE_MM - 1), (Class::Weed, 2 * WIDE_MM), (Class::Weed, 0)]
         {

@@ -13,9 +13,9 @@ use crate::{
     weeder::Controller,
 };
 
-/// The part of an answer that has not been written yet.
+/// The part of an answer that is not yet written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-// The greeting is 0, as the memory is before anybody has woken up.
+// `Greeting` is 0, like memory before start-up.
 #[repr(u8)]
 pub enum Answer {
     /// The greeting after a reset.
@@ -23,43 +23,43 @@ pub enum Answer {
     /// Nothing.
     #[default]
     Done,
-    /// Whatever answers this line, which has not been carried out yet.
+    /// The answer to this line, which has not been run yet.
     Typed(Result<Command, ParseError>),
-    /// The commands, from the one at this place on.
+    /// The commands from this index on.
     Help(u8),
-    /// What a setting is.
+    /// What a setting means.
     Explain(Setting),
-    /// The status: where the machine is.
+    /// First status line: the machine.
     Status,
-    /// The status: what was counted.
+    /// Second status line: counters.
     Counts,
     /// A setting's value.
     Get(Setting),
-    /// All settings, from the one at this place on.
+    /// The settings from this index on.
     GetAll(u8),
-    /// All examples, from the one at this place on.
+    /// The examples from this index on.
     Examples(u8),
-    /// The heading of the last detections.
+    /// The heading of the detections.
     DumpHeading,
-    /// The last detections, from the one at this place on.
+    /// The detections from this index on.
     Dump(u8),
     /// The firmware's name.
     Version,
     /// `ok`.
     Ok,
-    /// What was wrong with the line.
+    /// A parse error.
     Wrong(ParseError),
-    /// Why the command was refused.
+    /// A command error, and the command's setting.
     Refused(CommandError, Option<Setting>),
 }
 
 impl Answer {
-    /// Whether there is nothing left to write.
+    /// Whether the answer is complete.
     pub fn is_done(&self) -> bool {
         *self == Self::Done
     }
 
-    /// Puts the next line together, with its end.
+    /// Builds the next line and its end.
     #[inline(never)]
     pub fn write_line<C: Classifier, M: Memory>(&mut self, controller: &Controller<C, M>, line: &mut Line) {
         *self = match *self {
@@ -131,12 +131,12 @@ impl Answer {
                 line.say(texts::OK);
                 Self::Done
             }
-            Self::Wrong(mistake) => {
-                write_mistake(mistake, line);
+            Self::Wrong(error) => {
+                write_mistake(error, line);
                 Self::Done
             }
-            Self::Refused(refusal, setting) => {
-                write_refusal(refusal, setting, controller, line);
+            Self::Refused(error, setting) => {
+                write_refusal(error, setting, controller, line);
                 Self::Done
             }
         };
@@ -144,7 +144,7 @@ impl Answer {
     }
 }
 
-/// The rest of a name, and what it stands for.
+/// The rest of a name, and its explanation.
 fn explain(name: Text, explanation: Text, line: &mut Line) {
     line.say(name);
     line.say(texts::DASH);

@@ -1,21 +1,21 @@
 //! The console's grammar: bytes to lines, lines to commands.
 //!
-//! A line is at most 80 characters and ends with CR, LF or both; backspace works, because serial terminals send it. Words
-//! are separated by blanks. A line that cannot be understood becomes one [`ParseError`] and changes nothing. How commands
-//! are carried out and answered is the business of [`say`](crate::say).
+//! A line is at most 80 characters and ends with CR, LF or both. Backspace deletes a character, because serial terminals send it.
+//! Blanks separate words. A line with an error becomes one [`ParseError`] and has no other effect. [`say`](crate::say) runs and
+//! answers commands.
 
 use crate::{ground::class::label, operate::plot::Plot, settings::Setting};
 use heapless::Vec;
 
 pub use super::words::{Argument, Word};
 
-/// Characters that a line may have.
+/// Most characters of a line.
 pub const LINE_LENGTH: usize = 80;
 
-/// What stands in the stream of bytes where some were lost: ASCII's own character for it, SUB.
+/// Marks lost bytes in the stream: SUB, ASCII's own character for it.
 pub const GAP_MARK: u8 = 0x1A;
 
-/// A line that was understood.
+/// A command of the operator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Command {
     /// `help`.
@@ -40,9 +40,9 @@ pub enum Command {
     CalibrateStart,
     /// `calibrate MM`, or `calibrate MM force`.
     Calibrate {
-        /// The distance that was rolled since the start.
+        /// The distance rolled since the start.
         distance_mm: u16,
-        /// However far the result is from what the wheel's diameter gives.
+        /// Accepts any difference from the wheel's diameter.
         force: bool,
     },
     /// `calibrate servo`.
@@ -55,14 +55,14 @@ pub enum Command {
     Servo(u16),
     /// `test row`, or `test row MM_S`.
     TestRow {
-        /// The speed of the machine that is played, in mm/s.
+        /// The simulated speed, in mm/s.
         speed_mm_s: u16,
     },
     /// `test watchdog`.
     TestWatchdog,
     /// `start`, or `start now`.
     Start {
-        /// At once, over unseen ground.
+        /// At once, also over unseen ground.
         now: bool,
     },
     /// `hold`.
@@ -77,7 +77,7 @@ pub enum Command {
     Label {
         /// The [`label`].
         label: u8,
-        /// Whatever the built-in examples say.
+        /// Accepts a label that contradicts the built-in examples.
         force: bool,
     },
     /// `teach N`.
@@ -96,21 +96,21 @@ pub enum Command {
     Version,
 }
 
-/// Speed at which a row is played unless another is given: 1.8 km/h.
+/// Speed of a dry run without an argument: 1.8 km/h.
 const TEST_SPEED_MM_S: u16 = 500;
 
-/// Why a line was not understood.
+/// Why a line is not a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ParseError {
     /// More than [`LINE_LENGTH`] characters.
     TooLong,
     /// Characters other than printable ASCII.
     NotText,
-    /// Characters went missing before they could be read.
+    /// Bytes were lost before the firmware read them.
     CharactersLost,
     /// No command begins like this.
     UnknownCommand,
-    /// The command takes other words than these.
+    /// The command takes other arguments.
     Usage(Word),
     /// No setting has this name.
     UnknownSetting,
@@ -118,10 +118,10 @@ pub enum ParseError {
     Value(Setting),
 }
 
-/// Reads a line.
+/// Parses a line.
 ///
 /// # Errors
-/// A [`ParseError`] that says what would have been right.
+/// A [`ParseError`], whose text says what is allowed.
 #[inline(never)]
 pub fn parse(line: &[u8]) -> Result<Command, ParseError> {
     let (word, rest) = split_word(line);
@@ -145,7 +145,7 @@ pub fn parse(line: &[u8]) -> Result<Command, ParseError> {
         };
     }
     let argument = Argument::find(first);
-    // What is refused because it looks wrong can be insisted on.
+    // `force` overrides a plausibility check.
     let force = Argument::find(second) == Some(Argument::Force);
     let command = if first.is_empty() || argument.is_some() {
         let Some(command) = of_words(word, argument) else { return usage };
@@ -171,14 +171,14 @@ pub fn parse(line: &[u8]) -> Result<Command, ParseError> {
     }
 }
 
-/// The command that a word and the one behind it stand for, if there is one.
+/// The command for a word and its argument, if there is one.
 fn of_words(word: Word, argument: Option<Argument>) -> Option<Command> {
     let words = [word as u8, argument_number(argument)];
     let place = (0..ROWS).map(usize::from).find(|&place| WORDS.load_at(place) == words)?;
     Some(COMMANDS.load_at(place))
 }
 
-/// A word behind a command's by its number, and none at all by the one behind them.
+/// An argument's number in the table; without an argument, the number after the last.
 const fn argument_number(argument: Option<Argument>) -> u8 {
     match argument {
         Some(argument) => argument as u8,
@@ -186,8 +186,8 @@ const fn argument_number(argument: Option<Argument>) -> u8 {
     }
 }
 
-/// Makes the tables of all commands that their words tell without a number or a setting: the numbers of a word and of the one behind
-/// it, and what they say. Two tables, as the first is read row by row.
+/// The tables of commands without a number or a setting: the numbers of a word and its argument, and the command. There are two
+/// tables, because the search reads the first row by row.
 macro_rules! commands {
     () => { None };
     ($argument:ident) => { Some(Argument::$argument) };
@@ -203,7 +203,7 @@ macro_rules! commands {
 }
 
 commands! {
-    // Whose lines have most words to be read stand first, as the search takes 30 cycles a row.
+    // The commands with the longest lines come first, because the search takes 30 cycles a row.
     Label Plant => Command::Label { label: label::PLANT, force: false };
     Label Weed => Command::Label { label: label::WEED, force: false };
     Calibrate Start => Command::CalibrateStart;
@@ -235,7 +235,7 @@ commands! {
     Version => Command::Version;
 }
 
-/// What a word says for a setting: a number, or `on` or `off` for one that is switched.
+/// A setting's value from a word: a number, or `on` or `off` for a switch.
 fn value(setting: Setting, word: &[u8]) -> Option<u16> {
     match Argument::find(word) {
         Some(Argument::On) if setting.is_switched() => Some(1),
@@ -256,7 +256,7 @@ fn is_blank(byte: &u8) -> bool {
     matches!(byte, b' ' | b'\t')
 }
 
-/// A whole number in 16 bits, digits only.
+/// A whole number of 16 bits, digits only.
 fn number(digits: &[u8]) -> Option<u16> {
     digits.iter().try_fold(0_u16, |number, &digit| {
         let digit = digit.wrapping_sub(b'0');
@@ -265,25 +265,26 @@ fn number(digits: &[u8]) -> Option<u16> {
     })
 }
 
-/// Collects bytes to lines.
+/// Collects bytes into lines.
 #[derive(Clone, Debug, Default)]
 pub struct LineBuffer {
     characters: Vec<u8, LINE_LENGTH, u8>,
-    mistake: Option<ParseError>,
+    error: Option<ParseError>,
 }
 
 impl LineBuffer {
     /// An empty line.
     pub const fn new() -> Self {
-        Self { characters: Vec::new(), mistake: None }
+        Self { characters: Vec::new(), error: None }
     }
 
-    /// Takes a byte. At a line's end, returns what the line says; an empty line says nothing.
+    /// Takes a byte. At a line's end it returns the command or the error; nothing for an empty line.
     pub fn take(&mut self, byte: u8) -> Option<Result<Command, ParseError>> {
         if self.collect(byte) { self.read() } else { None }
     }
 
-    /// Takes a byte, the first half of [`take`](Self::take); whether it ends the line, which is to be [read](Self::read) then.
+    /// First half of [`take`](Self::take): stores a byte. Returns whether it ends the line; the caller then calls
+    /// [`read`](Self::read).
     #[inline(never)]
     pub fn collect(&mut self, byte: u8) -> bool {
         match byte {
@@ -293,20 +294,20 @@ impl LineBuffer {
             }
             b'\t' | b' '..=b'~' => {
                 if self.characters.push(byte).is_err() {
-                    self.spoil(ParseError::TooLong);
+                    self.fail(ParseError::TooLong);
                 }
             }
-            GAP_MARK => self.spoil(ParseError::CharactersLost),
-            _ => self.spoil(ParseError::NotText),
+            GAP_MARK => self.fail(ParseError::CharactersLost),
+            _ => self.fail(ParseError::NotText),
         }
         false
     }
 
-    /// Reads a line that has ended, the second half of [`take`](Self::take), which takes far longer than a byte does; the next line begins.
+    /// Second half of [`take`](Self::take): parses the line and starts the next. This takes far longer than storing a byte.
     #[inline(never)]
     pub fn read(&mut self) -> Option<Result<Command, ParseError>> {
-        let line = match self.mistake.take() {
-            Some(mistake) => Some(Err(mistake)),
+        let line = match self.error.take() {
+            Some(error) => Some(Err(error)),
             None if split_word(&self.characters).0.is_empty() => None,
             None => Some(parse(&self.characters)),
         };
@@ -314,8 +315,8 @@ impl LineBuffer {
         line
     }
 
-    fn spoil(&mut self, mistake: ParseError) {
-        self.mistake.get_or_insert(mistake);
+    fn fail(&mut self, error: ParseError) {
+        self.error.get_or_insert(error);
     }
 }
 
@@ -331,7 +332,7 @@ mod tests {
     }
 
     #[test]
-    fn every_command_is_understood_with_its_words() {
+    fn every_command_is_parsed_with_its_arguments() {
         for (line, command) in [
             (&b"help"[..], Command::Help),
             (b"help k", Command::Explain(Setting::K)),
@@ -382,8 +383,8 @@ mod tests {
     }
 
     #[test]
-    fn a_line_that_is_not_understood_says_what_would_be_right() {
-        for (line, mistake) in [
+    fn a_line_with_an_error_names_what_is_allowed() {
+        for (line, error) in [
             (&b"hepl"[..], ParseError::UnknownCommand),
             (b"HELP", ParseError::UnknownCommand),
             (b"help me now", ParseError::Usage(Word::Help)),
@@ -429,7 +430,7 @@ mod tests {
             (b"forget", ParseError::Usage(Word::Forget)),
             (b"forget 256", ParseError::Usage(Word::Forget)),
         ] {
-            assert_eq!(parse(line), Err(mistake), "{}", line.escape_ascii());
+            assert_eq!(parse(line), Err(error), "{}", line.escape_ascii());
         }
     }
 
@@ -442,12 +443,12 @@ mod tests {
     }
 
     #[test]
-    fn backspace_takes_back_the_last_character() {
+    fn backspace_deletes_the_last_character() {
         assert_eq!(answers(b"hole\x08d\n\x7F\x7Fclear\n"), [Ok(Command::Hold), Ok(Command::Clear)]);
     }
 
     #[test]
-    fn a_spoiled_line_is_one_mistake_and_the_next_line_is_read() {
+    fn an_invalid_line_is_one_error_and_the_next_line_is_read() {
         let mut text = [b'x'; 300].to_vec();
         text.extend(b"\nstatus\n");
         assert_eq!(answers(&text), [Err(ParseError::TooLong), Ok(Command::Status)]);
@@ -465,7 +466,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_that_lost_characters_is_not_carried_out() {
+    fn a_line_that_lost_characters_is_not_run() {
         assert_eq!(answers(b"set k 1\x1A\nhold\n"), [Err(ParseError::CharactersLost), Ok(Command::Hold)]);
     }
 }

@@ -1,4 +1,4 @@
-//! Lines that say what is wrong, and what would be right.
+//! Error lines: what is wrong, and what is allowed.
 
 use super::status::write_allowed;
 use crate::{
@@ -15,9 +15,9 @@ use crate::{
     weeder::Controller,
 };
 
-pub(super) fn write_mistake(mistake: ParseError, line: &mut Line) {
+pub(super) fn write_mistake(error: ParseError, line: &mut Line) {
     line.say(texts::ERROR);
-    let what = match mistake {
+    let what = match error {
         ParseError::TooLong => texts::TOO_LONG,
         ParseError::NotText => texts::NOT_TEXT,
         ParseError::CharactersLost => texts::CHARACTERS_LOST,
@@ -34,15 +34,15 @@ pub(super) fn write_mistake(mistake: ParseError, line: &mut Line) {
 }
 
 pub(super) fn write_refusal<C: Classifier, M: Memory>(
-    refusal: CommandError,
+    error: CommandError,
     setting: Option<Setting>,
     controller: &Controller<C, M>,
     line: &mut Line,
 ) {
     line.say(texts::ERROR);
-    let what = match (refusal, setting) {
+    let what = match (error, setting) {
         (CommandError::OutOfRange, Some(setting)) => return write_allowed(setting.text(), setting, line),
-        // Of all commands, this one alone takes a value that is no setting's.
+        // `servo US` is the only other command with a range.
         (CommandError::OutOfRange, None) => return write_allowed(Word::Servo.text(), Setting::ServoOutUs, line),
         (CommandError::NotInHold, Some(setting)) => {
             line.say(setting.text());
@@ -55,20 +55,20 @@ pub(super) fn write_refusal<C: Classifier, M: Memory>(
             texts::LOOK_AGAIN
         }
         (CommandError::TakenForPlant | CommandError::TakenForWeed, _) => {
-            let taken_for = if refusal == CommandError::TakenForPlant { Argument::Plant } else { Argument::Weed };
+            let taken_for = if error == CommandError::TakenForPlant { Argument::Plant } else { Argument::Weed };
             line.say(texts::TAKEN_FOR);
             line.say(taken_for.text());
             texts::LOOK_AGAIN
         }
         (CommandError::BeamTooNear, _) => {
             line.counted(controller.needed_mm());
-            refusal.text()
+            error.text()
         }
         (CommandError::TestSpeed, _) => {
             line.counted(controller.settings().get(Setting::TopSpeedMmS));
-            refusal.text()
+            error.text()
         }
-        _ => refusal.text(),
+        _ => error.text(),
     };
     line.say(what);
 }

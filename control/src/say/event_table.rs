@@ -1,22 +1,21 @@
-//! The events as they are told: one table for the firmware, which writes them, for the laptop's tools, which read them, for the
-//! page's types and for the manual.
+//! The table of events: for the firmware that writes them, the host tools that read them, the page's types, and the manual.
 
-/// Hands the table of events to a macro.
+/// Passes the table of events to a macro.
 ///
-/// A row has the event's name, what it means, which [`Event`](crate::operate::event::Event) it tells, and its line: how that begins,
-/// then `key=value` words. A value has a kind, what of the event it tells, and the field that it is read into. Rows whose
-/// lines begin alike are told apart by their keys.
+/// A row has the event's name, its meaning, the [`Event`](crate::operate::event::Event), and its line: the beginning, then
+/// `key=value` words. A value has a kind, an expression of the event, and the field that the host reads it into. Keys tell rows
+/// with the same beginning apart.
 ///
-/// A kind is written in `say::events` and `say::names`, and read in the laptop's crate `link`:
+/// `say::events` and `say::names` write the kinds, and the host's crate `link` reads them:
 ///
 /// | kind | the value |
 /// | --- | --- |
 /// | `number` | a whole number, -2147483648 to 2147483647 |
 /// | `count` | a whole number, 0 to 65535 |
-/// | `led` | how often the lamp flashes, and how often again behind a pause: two numbers with a dash between |
-/// | `class` | what a detection was taken for, in a word; it stands first in its line and has no key |
-/// | `place` | where the tool is told to be, `out` or `in` |
-/// | `state` | what the machine does, in a word |
+/// | `led` | an alarm's code as the lamp blinks it: two numbers with a dash between them |
+/// | `class` | a detection's class, in a word; it comes first in its line and has no key |
+/// | `place` | the tool's command, `out` or `in` |
+/// | `state` | the machine's state, in a word |
 /// | `alarm`, `warning` | its name |
 /// | `answer` | `yes` or `no` |
 #[macro_export]
@@ -78,11 +77,11 @@ macro_rules! event_table {
     };
 }
 
-/// What writes an event's line: `write(line)` gives the statements, and `texts(line)` the texts in them.
+/// Expands an event's line: `write(line)` into the statements that write it, and `texts(line)` into their texts.
 ///
-/// Values are passed over one by one, and the text before the next word grows with their keys, until that word ends it.
+/// Values are taken one by one. The text before the next word grows with their keys, until that word ends it.
 macro_rules! event_line {
-    // The words and numbers: text that has grown, texts that are done, statements.
+    // Words and numbers: the growing text, finished texts, statements.
     (@ [$($grown:tt)*] [$($done:tt)*] {$($does:tt)*} $to:ident($line:ident)
         "" = $kind:ident($value:expr) $(=> $field:ident: $Type:ty)?, $meaning:literal; $($rest:tt)*
     ) => {
@@ -112,7 +111,7 @@ macro_rules! event_line {
             { $($does)* $line.say(const { Text::of_event(concat!($($grown,)* " ", $key, "=")) }); $line.say(names::$word($value)); }
             $to($line) $($rest)*)
     };
-    // What stands behind them.
+    // The tail.
     (@ [$($grown:tt)*] $done:tt $does:tt $to:ident($line:ident) $tail:literal) => {
         event_line!(@ [$($grown)* $tail] $done $does $to($line))
     };

@@ -1,4 +1,4 @@
-//! The lines of events, written as the [table of events](crate::event_table) has them.
+//! Writes the lines of events from the [table of events](crate::event_table).
 
 use super::{
     event_table::event_line,
@@ -16,7 +16,7 @@ use crate::{
 
 macro_rules! write_event {
     ($($Event:ident $meaning:literal, $pattern:pat => $beginning:literal { $($values:tt)* } $($tail:literal)?)*) => {
-        /// Puts the line of an event together.
+        /// Builds the line of an event.
         #[inline(never)]
         pub fn write_event(event: &Event, line: &mut Line) {
             match *event {

@@ -1,4 +1,4 @@
-//! Commands, carried out: what each asks of the machine, and which answer that begins.
+//! Runs commands: what each does to the machine, and how its answer begins.
 
 use super::{
     answer::Answer,
@@ -9,7 +9,7 @@ use crate::{
     weeder::Controller,
 };
 
-/// Carries a line out and begins its answer.
+/// Runs a line and begins its answer.
 #[inline(never)]
 pub fn execute<C, M>(line: Result<Command, ParseError>, controller: &mut Controller<C, M>) -> Answer
 where
@@ -18,9 +18,9 @@ where
 {
     let command = match line {
         Ok(command) => command,
-        Err(mistake) => {
+        Err(error) => {
             controller.count_mistake();
-            return Answer::Wrong(mistake);
+            return Answer::Wrong(error);
         }
     };
     match command {
@@ -78,11 +78,11 @@ where
     }
 }
 
-/// The answer to a command that may have been refused.
+/// The answer to a command that can fail.
 #[inline(never)]
 fn done(result: Result<(), CommandError>, setting: Option<Setting>) -> Answer {
     match result {
         Ok(()) => Answer::Ok,
-        Err(refusal) => Answer::Refused(refusal, setting),
+        Err(error) => Answer::Refused(error, setting),
     }
 }

@@ -1,7 +1,7 @@
-//! A line on its way to the terminal: its texts, and the numbers for the `#` in them.
+//! A line that is being sent: its texts, and the numbers for the `#` in them.
 //!
-//! A line is put together at once, so that what it tells belongs together, and goes out a character at a time, as the main
-//! loop has time for no more: a text is unpacked and a number divided into its digits only as far as the next character.
+//! A line's values are taken at once, so they belong to one moment. It is sent a character at a time, because a turn has little
+//! time. Each call unpacks or divides only as far as the next character.
 
 use crate::{
     alarm::Alarm,
@@ -9,18 +9,18 @@ use crate::{
 };
 use ufmt::{Formatter, uDisplay, uWrite};
 
-/// Texts that a line may have; one that shows a setting has ten. A power of two, for short arithmetic.
+/// Most texts of a line; a setting's line has ten. A power of two, for short arithmetic.
 pub const TEXTS: usize = 16;
 
-/// Numbers that it may have; one that shows a detection has six. A power of two as well.
+/// Most numbers of a line; a detection's line has six. A power of two too.
 const NUMBERS: usize = 8;
 
-/// A line, or what is left of it.
+/// A line, or the rest of it.
 #[derive(Clone, Debug)]
 pub struct Line {
-    /// The rest of the text that was begun last, and of the number in it.
+    /// The rest of the present text, and of the number in it.
     characters: Characters,
-    /// Texts and numbers of the line, and how many of them have been begun.
+    /// The number of texts and numbers, and how many of each have been started.
     texts: u8,
     texts_begun: u8,
     numbers: u8,
@@ -43,12 +43,12 @@ impl Line {
         }
     }
 
-    /// Whether there is nothing left of it.
+    /// Whether all of it is sent.
     pub fn is_done(&self) -> bool {
         self.texts == 0
     }
 
-    /// A text, in which each `#` stands for the next of the line's numbers.
+    /// Adds a text. Each `#` in it stands for the line's next number.
     #[inline(never)]
     pub(crate) fn say(&mut self, text: Text) {
         debug_assert!(usize::from(self.texts) < TEXTS, "a line has {TEXTS} texts at most");
@@ -56,13 +56,13 @@ impl Line {
         self.texts += 1;
     }
 
-    /// A number for a `#` that is never negative.
+    /// Adds a number for a `#` that is never negative.
     #[inline(never)]
     pub(crate) fn counted(&mut self, number: u16) {
         self.number(number.into());
     }
 
-    /// A number for a `#`.
+    /// Adds a number for a `#`.
     #[inline(never)]
     pub(crate) fn number(&mut self, number: i32) {
         debug_assert!(usize::from(self.numbers) < NUMBERS, "a line has {NUMBERS} numbers at most");
@@ -70,7 +70,7 @@ impl Line {
         self.numbers += 1;
     }
 
-    /// An alarm's code, for two `#`.
+    /// Adds an alarm's code, for two `#`.
     #[inline(never)]
     pub(crate) fn led(&mut self, alarm: Alarm) {
         let (first, second) = alarm.code();
@@ -82,7 +82,7 @@ impl Line {
 impl Iterator for Line {
     type Item = u8;
 
-    /// The next character, ASCII. Behind the last one the line is empty, and another can be put together.
+    /// The next character, ASCII. After the last one the line is empty and ready for another.
     #[inline(never)]
     fn next(&mut self) -> Option<u8> {
         loop {
@@ -91,7 +91,7 @@ impl Iterator for Line {
                     let number = self.number[usize::from(self.numbers_begun) % NUMBERS];
                     self.numbers_begun += 1;
                     self.characters.insert(number);
-                    // A number has a digit at least.
+                    // A number has at least one digit.
                     return self.characters.next();
                 }
                 Some(character) => return Some(character),
@@ -108,7 +108,7 @@ impl Iterator for Line {
     }
 }
 
-/// What is left of a line, for whoever can wait for all of it.
+/// The whole rest of a line, for callers that can wait.
 impl uDisplay for Line {
     fn fmt<W: uWrite + ?Sized>(&self, out: &mut Formatter<'_, W>) -> Result<(), W::Error> {
         self.clone().try_for_each(|character| out.write_char(character.into()))
@@ -138,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn every_number_reads_as_it_should() {
+    fn every_number_is_written_in_decimal() {
         let powers = (0..10).map(|exponent| 10_i32.pow(exponent)).flat_map(|power| [power - 1, power, power + 1]);
         let ends = [i32::MIN, i32::MIN + 1, i32::MAX, 2_000_000_000, 65_535];
         for number in powers.chain(ends).flat_map(|number| [number, number.wrapping_neg()]) {
@@ -150,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_is_its_texts_with_the_numbers_in_their_places() {
+    fn a_line_is_its_texts_with_its_numbers_for_each_hash() {
         let mut line = Line::new();
         line.say(texts::OK);
         line.say(texts::RANGE);
@@ -162,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_that_was_written_makes_room_for_the_next() {
+    fn a_written_line_makes_room_for_the_next() {
         let mut line = Line::new();
         for _ in 0..3 {
             (0..TEXTS).for_each(|_| line.say(texts::OK));

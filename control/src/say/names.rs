@@ -1,4 +1,4 @@
-//! What things are called: the text of each of the machine's words (`words`), and which of them was typed.
+//! Names: the text of each of the machine's words (`words`), and the search for a typed word.
 
 use crate::{
     alarm::{Alarm, Warning},
@@ -13,18 +13,18 @@ use crate::{
     settings::{self, Setting},
 };
 
-/// Has an enum write and read its words, `WORDS`.
+/// Gives an enum the texts of its words, `WORDS`, and the search for a word.
 macro_rules! written {
     ($($Name:ident)*) => {$(
         impl $Name {
             const FIRST: Text = Text::first_of(Self::WORDS);
 
-            /// The word for it.
+            /// Its word.
             pub const fn text(self) -> Text {
                 Self::FIRST.plus(self as u8)
             }
 
-            /// The one that `word` stands for.
+            /// The variant for a word.
             pub fn find(word: &[u8]) -> Option<Self> {
                 Self::from_index(packed::find(Self::FIRST, Self::COUNT, word))
             }
@@ -35,18 +35,18 @@ macro_rules! written {
 written! { Setting Word Argument Alarm Warning Reason Cause }
 
 impl Setting {
-    /// What it is, for the operator.
+    /// Its help text.
     pub fn help(self) -> Text {
         const { Text::first_of(settings::HELPS) }.plus(self as u8)
     }
 
-    /// Its unit behind a blank, or nothing where it is a count or switched.
+    /// A blank and its unit; empty for a count or a switch.
     pub fn unit(self) -> Text {
         const { Text::first_of(settings::UNITS) }.plus(self as u8)
     }
 }
 
-/// What the machine does.
+/// The state's name.
 pub fn state(state: State) -> Text {
     match state {
         State::Hold => Word::Hold.text(),
@@ -65,7 +65,7 @@ pub fn warning(warning: Warning) -> Text {
     warning.text()
 }
 
-/// Where the tool is, or is to be.
+/// The tool's command: `in` or `out`.
 pub fn place(tool_out: bool) -> Text {
     if tool_out { Argument::Out.text() } else { Argument::In.text() }
 }
@@ -75,12 +75,12 @@ pub fn answer(yes: bool) -> Text {
     if yes { texts::YES } else { texts::NO }
 }
 
-/// What a [label](mod@crate::ground::class::label) stands for.
+/// A [label](mod@crate::ground::class::label)'s name.
 pub fn label(label: u8) -> Text {
     if label == label::PLANT { Argument::Plant.text() } else { Argument::Weed.text() }
 }
 
-/// What a detection was taken for.
+/// A class's name.
 pub fn class(class: Class) -> Text {
     match class {
         Class::Plant => Argument::Plant.text(),

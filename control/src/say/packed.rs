@@ -1,18 +1,17 @@
-//! All that the machine says, packed into one table in flash, and read from there.
+//! All texts, packed into one table in flash.
 //!
-//! An AVR keeps Rust's string literals in SRAM, of which there are 2 KiB. So the table lies in flash, and a [`Text`] is no more
-//! than its number there: one byte. What the table is made of stands in `texts`.
+//! An AVR keeps Rust's string literals in SRAM, which has 2 KiB. So the table is in flash, and a [`Text`] is one byte: its number
+//! in the table. `texts` defines the texts.
 //!
-//! The texts are packed: fragments that come again and again are one byte each. A fragment is a pair of bytes, each of
-//! which is a character or stands for another fragment, so that nothing is searched where one is unpacked. The compiler
-//! packs, and [`Characters`] unpacks. A test finds the fragments (`fragments.rs`).
+//! Frequent fragments take one byte each. A fragment is a pair of bytes, each a character or another fragment. So unpacking needs
+//! no search. The compiler packs, and [`Characters`] unpacks. A test finds the fragments (`fragments.rs`).
 
 mod fragments;
 
 use self::fragments::FRAGMENTS;
 use crate::say::texts::{COUNT, GROUPS, Text};
 
-/// The characters in the texts, each of which stands for itself as a byte: its place here.
+/// The characters in the texts. Each is stored as its index here.
 const CHARACTERS: ([u8; 128], usize) = {
     let said = said();
     let (mut characters, mut count, mut character) = ([0; 128], 0, 0);
@@ -25,35 +24,35 @@ const CHARACTERS: ([u8; 128], usize) = {
     (characters, count)
 };
 
-/// The first byte that stands for a fragment.
+/// The first byte that is a fragment.
 const FIRST_FRAGMENT: u8 = CHARACTERS.1 as u8;
 
-/// The byte that stands for the digit 0. The others stand behind it.
+/// The byte for the digit 0. The other digits follow it.
 const ZERO: u8 = place_of(b'0');
 const _: () = assert!(place_of(b'9') == ZERO + 9);
 
-/// Characters and second halves of fragments that wait while others are unpacked, at most; a power of two, for short arithmetic.
+/// Most digits and second halves of fragments on the stack during unpacking; a power of two, for short arithmetic.
 const WAITING: usize = 16;
 
-/// Of these, the longest number may have so many.
+/// Digits and sign of the longest number.
 const DIGITS: usize = "-2147483648".len();
 
-/// How often a byte is halved at most until its first half is a character.
+/// Most steps from a byte to its first character.
 pub const HALVINGS: usize = 4;
 
-/// Texts from one entry of the index to the next; from there on, a text is found by the lengths of those before it.
+/// Texts for each entry of the index. From an entry on, a text is found by the lengths of those before it.
 const STRIDE: u8 = 16;
 
-/// The bits of a text's header that tell its packed length. The others are its [`mark`], by which most of the words that are not
-/// the one looked for are passed over without being unpacked.
+/// Bits of a text's header with its packed length. The other two are its [`mark`], which excludes most words in a search without
+/// unpacking them.
 const LENGTH: u8 = 0x3F;
 
-/// Where the characters begin in the table, behind the fragments, where the index does, and where the texts do.
+/// Table offsets: the characters after the fragments, then the index, then the texts.
 const LETTERS: usize = 2 * FRAGMENTS.len();
 const INDEX: usize = LETTERS + CHARACTERS.1;
 const TEXTS: usize = INDEX + 2 * (COUNT as usize).div_ceil(STRIDE as usize);
 
-/// The table with room behind it, and its length.
+/// The table in a larger array, and its length.
 #[allow(long_running_const_eval, reason = "it packs hundreds of texts, and ends")]
 const PACKED: ([u8; 4096], usize) = table();
 
@@ -83,7 +82,7 @@ impl Text {
     }
 }
 
-/// Which of `count` texts from `first` on reads as `word`; `count` where none does.
+/// The index of `word` among `count` texts from `first` on; `count` if it is not among them.
 #[inline(never)]
 pub(crate) fn find(first: Text, count: u8, word: &[u8]) -> u8 {
     if word.is_empty() {
@@ -100,13 +99,13 @@ pub(crate) fn find(first: Text, count: u8, word: &[u8]) -> u8 {
                 return place;
             }
         }
-        // The texts lie one behind the other.
+        // The next text follows directly.
         start += 1 + usize::from(header & LENGTH);
     }
     count
 }
 
-/// Where a text begins in the table.
+/// A text's offset in the table.
 #[inline(never)]
 fn start(text: Text) -> usize {
     let entry = INDEX + 2 * usize::from(text.number() / STRIDE);
@@ -117,7 +116,7 @@ fn start(text: Text) -> usize {
     start
 }
 
-/// Off the chip, where there is room for `core::fmt`.
+/// On the host only, where `core::fmt` has room.
 #[cfg(not(target_arch = "avr"))]
 impl core::fmt::Display for Text {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
@@ -128,30 +127,30 @@ impl core::fmt::Display for Text {
 /// The characters of a text that are still to be unpacked.
 #[derive(Clone, Debug)]
 pub struct Characters {
-    /// Where the next byte lies, and how many there are.
+    /// The next byte's offset, and how many bytes are left.
     next: usize,
     left: u8,
-    /// What waits, the last one first: digits, and second halves of fragments; and how many they are.
+    /// A stack of digits and second halves of fragments, last one first; and its depth.
     waiting: [u8; WAITING],
     halves: u8,
 }
 
 impl Characters {
-    /// None at all.
+    /// No characters.
     pub(crate) const NONE: Self = Self { next: 0, left: 0, waiting: [0; WAITING], halves: 0 };
 
-    /// Begins a text; what is left of another is dropped.
+    /// Starts a text, and drops the rest of another.
     pub(crate) fn begin(&mut self, text: Text) {
         self.begin_at(start(text));
     }
 
-    /// Inserts a number before what is left of the text.
+    /// Inserts a number before the rest of the text.
     #[inline(never)]
     pub(crate) fn insert(&mut self, number: i32) {
         let mut rest = number.unsigned_abs();
         loop {
             let tenth = tenth(rest);
-            // The remainder is less than 10, so that eight bits of it are enough. What waits last comes first.
+            // The remainder is below 10, so eight bits of it are enough. The stack reverses the digits.
             self.wait((rest as u8).wrapping_sub((tenth as u8).wrapping_mul(10)) + ZERO);
             rest = tenth;
             if rest == 0 {
@@ -169,14 +168,14 @@ impl Characters {
         self.halves += 1;
     }
 
-    /// Begins the text at this place in the table.
+    /// Starts the text at an offset of the table.
     #[inline(never)]
     fn begin_at(&mut self, start: usize) {
         (self.next, self.left, self.halves) = (start + 1, byte(start) & LENGTH, 0);
     }
 }
 
-/// A tenth, rounded down: in a function of its own, as the division needs most of the chip's registers.
+/// A tenth, rounded down. A separate function, because the division needs most of the chip's registers.
 #[inline(never)]
 fn tenth(number: u32) -> u32 {
     number / 10
@@ -204,7 +203,7 @@ impl Iterator for Characters {
     }
 }
 
-/// Two bits that words differ in, at the place that the length leaves.
+/// Two bits that differ between words, above the length's bits.
 const fn mark(word: &[u8]) -> u8 {
     match word.last() {
         Some(&last) => last.wrapping_add(word.len() as u8) << LENGTH.count_ones(),
@@ -212,7 +211,7 @@ const fn mark(word: &[u8]) -> u8 {
     }
 }
 
-/// The table and its length: the fragments, the index, and the texts, each behind a byte with its mark and packed length.
+/// The table and its length: fragments, characters, index, and the texts, each after a byte with its mark and packed length.
 const fn table() -> ([u8; 4096], usize) {
     let mut table = [0; 4096];
     let mut place = 0;
@@ -251,11 +250,12 @@ const fn table() -> ([u8; 4096], usize) {
     (table, end)
 }
 
-/// Writes a text into the table, in as few bytes as the fragments allow; returns where it ends.
+/// Writes a text into the table in the fewest bytes. Returns its end.
 const fn pack(text: &str, table: &mut [u8], mut end: usize) -> usize {
     assert!(text.is_ascii(), "a serial monitor can be trusted with ASCII alone");
     let text = text.as_bytes();
-    // From the text's end forward: with which byte the rest of it is shortest, how long that byte reads, and how long the rest is.
+    // From the end backwards: the byte that makes the rest shortest, the characters that this byte stands for, and the rest's
+    // length.
     let mut best = [(0, 0, 0); 128];
     let mut at = text.len();
     while at > 0 {
@@ -278,7 +278,7 @@ const fn pack(text: &str, table: &mut [u8], mut end: usize) -> usize {
     end
 }
 
-/// The two bytes that a fragment stands for.
+/// The two bytes of a fragment.
 const fn split(fragment: &[u8]) -> [u8; 2] {
     let mut at = 1;
     while at < fragment.len() {
@@ -291,7 +291,7 @@ const fn split(fragment: &[u8]) -> [u8; 2] {
     panic!("a fragment consists of two characters or other fragments");
 }
 
-/// The byte that stands for a part of a text, if one does.
+/// The byte for a part of a text, if there is one.
 const fn code(part: &[u8]) -> Option<u8> {
     if let [character] = part {
         return Some(place_of(*character));
@@ -306,7 +306,7 @@ const fn code(part: &[u8]) -> Option<u8> {
     None
 }
 
-/// Second halves that wait at once while a byte is unpacked, and how often it is halved until its first half is a character.
+/// Second halves on the stack while a byte is unpacked, and the steps to its first character.
 const fn depth(code: u8, table: &[u8]) -> (usize, usize) {
     let Some(fragment) = code.checked_sub(FIRST_FRAGMENT) else { return (0, 0) };
     let pair = 2 * fragment as usize;
@@ -314,11 +314,11 @@ const fn depth(code: u8, table: &[u8]) -> (usize, usize) {
     (if first + 1 > second { first + 1 } else { second }, halvings + 1)
 }
 
-/// Whether a character is in a text, or in a number, or may be in the commit of a release.
+/// Which characters are in a text, in a number, or in the commit of a release.
 const fn said() -> [bool; 128] {
     let (mut said, mut character) = ([false; 128], 0);
     while character < 128 {
-        // Those of every number and of every commit, that of a changed clone too.
+        // Those of numbers and commits, with the `+` of a changed checkout.
         said[character as usize] = matches!(character, b'0'..=b'9' | b'a'..=b'f' | b'-' | b'(' | b')' | b'+');
         character += 1;
     }
@@ -338,7 +338,7 @@ const fn said() -> [bool; 128] {
     said
 }
 
-/// For each character, the byte that stands for it.
+/// For each character, its byte.
 const PLACES: [u8; 128] = {
     let (mut places, mut place) = ([u8::MAX; 128], 0);
     while place < CHARACTERS.1 {
@@ -348,17 +348,17 @@ const PLACES: [u8; 128] = {
     places
 };
 
-/// The byte that stands for a character.
+/// A character's byte.
 const fn place_of(character: u8) -> u8 {
     PLACES[character as usize]
 }
 
-/// Where the fragments stand that begin with a character: the first one's place, and the place behind the last one.
+/// The fragments that begin with a character: the first index, and the index after the last.
 const fn beginning_with(character: u8) -> [usize; 2] {
     [STARTS[character as usize], STARTS[character as usize + 1]]
 }
 
-/// For each character, how many fragments begin with one before it.
+/// For each character, the number of fragments that begin with an earlier one.
 const STARTS: [usize; 129] = {
     let mut starts = [0; 129];
     let (mut character, mut place) = (0, 0);
@@ -373,7 +373,7 @@ const STARTS: [usize; 129] = {
     starts
 };
 
-/// Whether a part begins at a place in a text.
+/// Whether a part is at this offset of a text.
 const fn begins(text: &[u8], at: usize, part: &[u8]) -> bool {
     let mut same = 0;
     while same < part.len() && at + same < text.len() && text[at + same] == part[same] {
@@ -399,13 +399,13 @@ mod tests {
     }
 
     #[test]
-    fn texts_are_packed_to_two_thirds_at_most() {
+    fn packing_saves_at_least_a_third() {
         let written: usize = GROUPS.iter().copied().flatten().map(|text| text.len()).sum();
         assert!(3 * TABLE.len() < 2 * written, "{} of {written}", TABLE.len());
     }
 
     #[test]
-    fn a_word_is_found_among_its_own_group_and_as_a_whole_only() {
+    fn only_a_whole_word_of_the_group_is_found() {
         let group = GROUPS.last().expect("there are groups");
         let first = Text::first_of(group);
         for (place, word) in (0..).zip(*group) {

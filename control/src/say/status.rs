@@ -1,4 +1,4 @@
-//! Lines that show the machine: its status, its curves, its settings, examples and detections.
+//! Lines about the machine: status, curves, settings, examples and detections.
 
 use super::names;
 use crate::{
@@ -15,7 +15,7 @@ use crate::{
     weeder::Controller,
 };
 
-/// The state, and which alarm, its code in a text between them.
+/// The state, and for an alarm its code within the text `between`, and its name.
 pub(super) fn write_state(state: State, between: Text, line: &mut Line) {
     line.say(names::state(state));
     if let State::Alarm(alarm) = state {
@@ -23,7 +23,7 @@ pub(super) fn write_state(state: State, between: Text, line: &mut Line) {
     }
 }
 
-/// An alarm's code and name: a text with room for the code's digits, and the name.
+/// An alarm's code, within a text for its two digits, and its name.
 #[inline(never)]
 pub(super) fn write_alarm(alarm: Alarm, code: Text, line: &mut Line) {
     line.say(code);
@@ -70,7 +70,7 @@ pub(super) fn write_counts<C: Classifier, M: Memory>(controller: &Controller<C, 
     }
 }
 
-/// Puts the next points of a plotter's curves together, each `label:value`.
+/// Builds the next points of a plotter's curves, each `label:value`.
 #[inline(never)]
 pub fn write_plot<C: Classifier, M: Memory>(controller: &Controller<C, M>, plot: Plot, line: &mut Line) {
     line.say(if plot == Plot::Teleplot { texts::TELEPLOT } else { texts::SERIAL_PLOTTER });
@@ -100,7 +100,7 @@ pub(super) fn write_setting<C: Classifier, M: Memory>(
     }
 }
 
-/// A text and a setting's value after it.
+/// A text, then a setting's value.
 #[inline(never)]
 fn write_value(text: Text, setting: Setting, value: u16, line: &mut Line) {
     line.say(text);
@@ -120,7 +120,7 @@ fn write_range(setting: Setting, line: &mut Line) {
     line.counted(setting.greatest());
 }
 
-/// What may be given for a setting, or for something else that has the same range.
+/// The range of a setting, under the setting's name or another.
 #[inline(never)]
 pub(super) fn write_allowed(name: Text, setting: Setting, line: &mut Line) {
     line.say(name);

@@ -1,7 +1,7 @@
-//! Everything that the machine says, and the number that each of it has: a [`Text`].
+//! All texts of the machine, and their numbers: a [`Text`].
 //!
-//! What its settings' table says of them stands there, and the words that the machine also reads in [`words`](crate::say::words).
-//! A `#` in a text stands for a number of its line. How the texts lie in flash, and how one is read, is `packed`'s.
+//! Texts about settings are in the settings' table, and words that the console also reads in [`words`](crate::say::words). A `#` in
+//! a text stands for a number of its line. `packed` stores and reads the texts.
 
 use crate::{
     alarm::{Alarm, Warning},
@@ -16,7 +16,7 @@ use crate::{
     settings::{self, Setting},
 };
 
-/// All texts of the machine, from which the table in flash is made.
+/// All texts, in the order of the table in flash.
 pub(crate) const GROUPS: &[&[&str]] = &[
     SAID,
     EVENTS,
@@ -34,7 +34,7 @@ pub(crate) const GROUPS: &[&[&str]] = &[
     Cause::WORDS,
 ];
 
-/// How many texts there are.
+/// The number of texts.
 pub(crate) const COUNT: u8 = {
     let (mut count, mut group) = (0, 0);
     while group < GROUPS.len() {
@@ -50,7 +50,7 @@ pub(crate) const COUNT: u8 = {
 pub struct Text(u8);
 
 impl Text {
-    /// The table's first.
+    /// The first text of the table.
     pub(crate) const FIRST: Self = Self(0);
 
     /// The first text of a group.
@@ -70,12 +70,12 @@ impl Text {
         Self::first_of(EVENTS).plus(place as u8)
     }
 
-    /// The text that stands so many places behind this one.
+    /// The text this many places after this one.
     pub(crate) const fn plus(self, places: u8) -> Self {
         Self(self.0 + places)
     }
 
-    /// How many texts stand before it.
+    /// Its index in the table.
     pub(crate) const fn number(self) -> u8 {
         self.0
     }
@@ -106,7 +106,7 @@ macro_rules! texts_of_events {
 
 event_table!(texts_of_events);
 
-/// The same, each once, and how many.
+/// The same without repetitions, and their number.
 const DISTINCT: ([&str; 32], usize) = {
     let (mut texts, mut count, mut line) = ([""; 32], 0, 0);
     while line < OF_EVENTS.len() {
@@ -125,7 +125,7 @@ const DISTINCT: ([&str; 32], usize) = {
 
 const EVENTS: &[&str] = DISTINCT.0.split_at(DISTINCT.1).0;
 
-/// Where a text stands; behind the last where it does not.
+/// A text's index; the length if it is not there.
 const fn place_of(text: &str, texts: &[&str]) -> usize {
     let mut place = 0;
     while place < texts.len() && !is_same_text(texts[place].as_bytes(), text.as_bytes()) {
@@ -134,7 +134,7 @@ const fn place_of(text: &str, texts: &[&str]) -> usize {
     place
 }
 
-/// Names for texts.
+/// Names the texts.
 macro_rules! said {
     ($($NAME:ident = $text:expr;)*) => {
         const SAID: &[&str] = &[$($text),*];
@@ -204,7 +204,7 @@ said! {
     LOOK_AGAIN = ", look again, or add force";
 }
 
-/// What is wrong where the machine refuses: one text each, but for those behind the last, which are put together of several.
+/// The texts of command errors: one each, up to `WheelDiffers`. From there on several texts make the line.
 macro_rules! refusals {
     ($($CommandError:ident $text:literal;)*) => {
         const REFUSALS: &[&str] = &[$($text),*];
@@ -221,7 +221,7 @@ macro_rules! refusals {
 }
 
 impl CommandError {
-    /// What is wrong, of those that are one text.
+    /// Its text, if it has only one.
     pub(crate) fn text(self) -> Text {
         const { Text::first_of(REFUSALS) }.plus(self as u8)
     }
@@ -245,7 +245,7 @@ refusals! {
     TestSpeed "test row takes a speed in mm/s from 100 to #";
 }
 
-/// The one table of what is said about the commands.
+/// The texts about the commands.
 macro_rules! commands {
     ($($Word:ident $takes:literal, $help:literal;)*) => {
         const TAKES_WORDS: &[&str] = &[$($takes),*];
@@ -263,12 +263,12 @@ macro_rules! commands {
 }
 
 impl Word {
-    /// The words that stand behind it, each with a blank before it.
+    /// Its arguments, each after a blank.
     pub(crate) fn takes(self) -> Text {
         const { Text::first_of(TAKES_WORDS) }.plus(self as u8)
     }
 
-    /// What it does.
+    /// Its help text.
     pub(crate) fn help(self) -> Text {
         const { Text::first_of(HELPS) }.plus(self as u8)
     }

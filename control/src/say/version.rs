@@ -1,9 +1,9 @@
-//! What the firmware calls itself: its version, and the commit that it was built from.
+//! The firmware's name: version and commit.
 //!
-//! The commit is that of the environment variable `WEEDER_COMMIT`, which `release.sh` sets. A build without it says no commit, so
-//! that its size is the same at every commit.
+//! The commit comes from the environment variable `WEEDER_COMMIT`, which `release.sh` sets. A build without it names no commit, so
+//! its size is the same at every commit.
 
-/// As `weeder 0.2.0`, or `weeder 0.2.0 (abc1234)`.
+/// For example `weeder 0.2.0`, or `weeder 0.2.0 (abc1234)`.
 pub(super) const NAME: &str = match core::str::from_utf8(&BYTES) {
     Ok(name) => name,
     Err(_) => panic!("WEEDER_COMMIT is not text"),

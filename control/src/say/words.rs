@@ -1,7 +1,6 @@
-//! The words for what the machine tells apart: its alarms, its settings, what was typed.
+//! The console's words for alarms, warnings, settings, commands and arguments.
 //!
-//! Such a thing is a plain enum wherever it stands. Here it gets a word for each of its variants; `names` has it write and
-//! read them.
+//! Elsewhere these are plain enums. This file gives each variant a word; `names` writes and reads them.
 
 use crate::{
     alarm::{Alarm, Warning},
@@ -15,23 +14,23 @@ use crate::{
 pub enum Word {
     /// Lists the commands, or explains a setting.
     Help,
-    /// One line of figures.
+    /// Two lines of figures.
     Status,
     /// Shows one setting or all.
     Get,
     /// Changes a setting.
     Set,
-    /// Keeps the settings.
+    /// Saves the settings.
     Save,
-    /// Goes back to the saved settings.
+    /// Loads the saved settings.
     Revert,
-    /// Goes back to the settings of a new machine.
+    /// Restores factory settings.
     Defaults,
     /// Measures the wheel or the servo.
     Calibrate,
-    /// Moves the tool by hand.
+    /// Drives the servo directly.
     Servo,
-    /// Swings the tool as for a row.
+    /// A dry run, or a watchdog test.
     Test,
     /// Goes to work.
     Start,
@@ -39,31 +38,31 @@ pub enum Word {
     Hold,
     /// Clears an alarm.
     Clear,
-    /// Tells what happens, or stops telling.
+    /// Turns event lines on or off.
     Events,
-    /// Draws curves on a plotter.
+    /// Sends curves to a plotter.
     Plot,
-    /// Says what the last object was, and teaches it.
+    /// Labels the last detection, and teaches it.
     Label,
-    /// Tells a feature of an example, and teaches it.
+    /// Takes a feature of an example, or teaches the example.
     Teach,
     /// Lists the examples.
     Examples,
-    /// Forgets examples from the field.
+    /// Forgets field examples.
     Forget,
-    /// Lists the last objects.
+    /// Lists the last detections.
     Dump,
     /// Names the firmware.
     Version,
 }
 
-/// A word that a command may take.
+/// An argument of a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Argument {
     /// Of `start`.
     Now,
-    /// Of `events`, and of settings that are switched.
+    /// Of `events`, and of settings that are switches.
     On,
     /// As `on`.
     Off,
@@ -98,10 +97,10 @@ macro_rules! words {
             /// The words, in the order of declaration.
             pub(crate) const WORDS: &[&str] = &[$($word),*];
 
-            /// How many there are.
+            /// The number of variants.
             pub const COUNT: u8 = Self::WORDS.len() as u8;
 
-            /// The one at a place in the order of declaration.
+            /// The variant at an index in the order of declaration.
             pub const fn from_index(index: u8) -> Option<Self> {
                 match index {
                     $(index if index == Self::$Variant as u8 => Some(Self::$Variant),)*

@@ -1,4 +1,4 @@
-//! What the operator tries on the bench: the tool by hand, the servo's times, the wheel's ticks, and the swings of a row.
+//! Manual tests: the servo driven directly, the servo's times, the wheel's ticks, and the swings of a row.
 
 use super::Controller;
 use crate::{
@@ -18,10 +18,11 @@ use crate::{
 };
 
 impl<C: Classifier, M: Memory> Controller<C, M> {
-    /// Gives the servo a pulse by hand, in microseconds.
+    /// Drives the servo directly. `pulse_us` is the pulse width in microseconds.
     ///
     /// # Errors
-    /// [`CommandError::NotInHold`], [`CommandError::AlarmLatched`], [`CommandError::Rolls`], and [`CommandError::OutOfRange`] for what is no servo's pulse.
+    /// [`CommandError::NotInHold`], [`CommandError::AlarmLatched`], [`CommandError::Rolls`], and [`CommandError::OutOfRange`] for a
+    /// width that no servo takes.
     #[inline(never)]
     pub fn servo_by_hand(&mut self, pulse_us: u16) -> Result<(), CommandError> {
         self.expect_rest()?;
@@ -32,7 +33,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         Ok(())
     }
 
-    /// Moves the tool into the row by hand.
+    /// Drives the tool into the row.
     ///
     /// # Errors
     /// As [`servo_by_hand`](Self::servo_by_hand).
@@ -40,7 +41,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         self.servo_by_hand(self.configuration.get(Setting::ServoInUs))
     }
 
-    /// Ends what was tried: the tool goes out of the row.
+    /// Ends the manual test: the tool leaves the row.
     ///
     /// # Errors
     /// [`CommandError::NotInHold`] and [`CommandError::AlarmLatched`].
@@ -50,7 +51,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         Ok(())
     }
 
-    /// Begins to time the servo; an event tells how it ends.
+    /// Starts to time the servo. [`Event::Calibrated`] reports the result.
     ///
     /// # Errors
     /// [`CommandError::NotInHold`], [`CommandError::AlarmLatched`] and [`CommandError::Rolls`].
@@ -62,7 +63,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         Ok(())
     }
 
-    /// Begins to measure a distance, from where the machine stands.
+    /// Starts to measure a distance from the machine's position.
     ///
     /// # Errors
     /// [`CommandError::NotInHold`] and [`CommandError::AlarmLatched`].
@@ -72,10 +73,10 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         Ok(())
     }
 
-    /// Sets the wheel's ticks a metre by a distance that was rolled since [`calibrate_start`](Self::calibrate_start).
+    /// Sets the wheel's ticks a metre from the distance rolled since [`calibrate_start`](Self::calibrate_start).
     ///
     /// # Errors
-    /// Those of [`Distance::end`](crate::operate::calibration::Distance::end) and [`set`](Self::set); nothing is changed then.
+    /// Those of [`Distance::end`](crate::operate::calibration::Distance::end) and [`set`](Self::set). Nothing is changed then.
     pub fn calibrate(&mut self, distance_mm: u16, force: bool) -> Result<(), CommandError> {
         let nominal = self.configuration.settings().nominal_ticks_per_m();
         let counted = self.distance.end(self.sensors.readings.position, distance_mm, nominal, force)?;
@@ -85,8 +86,8 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// Swings the tool as for a row of plants, at a speed in mm/s.
     ///
     /// # Errors
-    /// [`CommandError::NotInHold`], [`CommandError::AlarmLatched`], [`CommandError::Rolls`], that of a
-    /// [`Contradiction`](crate::settings::Contradiction), and [`CommandError::TestSpeed`] for what the machine would not work at.
+    /// [`CommandError::NotInHold`], [`CommandError::AlarmLatched`], [`CommandError::Rolls`], a
+    /// [`Contradiction`](crate::settings::Contradiction), and [`CommandError::TestSpeed`] for a speed outside the machine's limits.
     pub fn test_row(&mut self, speed_mm_s: u16) -> Result<(), CommandError> {
         self.expect_rest()?;
         self.configuration.expect_no_contradiction()?;
@@ -108,12 +109,12 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         Ok(())
     }
 
-    /// Whether the loop is to show that it turns; not from [`test_watchdog`](Self::test_watchdog) to the reset.
+    /// Whether the loop has to beat. False from [`test_watchdog`](Self::test_watchdog) to the reset.
     pub const fn has_heartbeat(&self) -> bool {
         !self.tests_watchdog
     }
 
-    /// Carries on with what is being tried; whether it has the tool out, if it says.
+    /// Runs one step of the manual test. Returns whether the tool is to be out; `None` if the test does not decide that.
     pub(super) fn try_out(&mut self) -> Option<bool> {
         let Readings { now, end_switch_on, .. } = self.sensors.readings;
         let (out, outcome) = self.bench.carry_on(now, end_switch_on, self.tool.is_out());
@@ -123,7 +124,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         out
     }
 
-    /// Sets the leads by what was measured, if they fit, and tells how it ended.
+    /// Sets the leads from the measured times, if the settings allow them, and reports the result.
     fn finish_swings(&mut self, outcome: Outcome) {
         let fits = match outcome {
             Outcome::Measured(SwingTimes { out_ms, in_ms }) => self
@@ -135,7 +136,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         self.events.announce(Event::Calibrated { outcome, fits });
     }
 
-    /// What moves the tool in hold swings it over ground that may have plants, and by no speed: it needs a machine that stands.
+    /// In HOLD, tests swing the tool over ground that may have plants, and without a lead. So the machine must stand.
     #[inline(never)]
     fn expect_rest(&self) -> Result<(), CommandError> {
         self.expect_hold()?;

@@ -1,4 +1,4 @@
-//! What the operator may ask of the machine, by switch or console.
+//! The operator's commands, from switch or console.
 
 use super::Controller;
 use crate::{
@@ -14,10 +14,10 @@ use crate::{
 use knn::Example;
 
 impl<C: Classifier, M: Memory> Controller<C, M> {
-    /// Goes to work; with `now`, at once and over ground that the beam has not seen.
+    /// Goes to work. With `now`, the tool may also enter ground that the beam has not seen.
     ///
     /// # Errors
-    /// [`CommandError::AlarmLatched`] while an alarm is, and that of a [`Contradiction`](crate::settings::Contradiction).
+    /// [`CommandError::AlarmLatched`], and a [`Contradiction`](crate::settings::Contradiction) between settings.
     pub fn start(&mut self, now: bool) -> Result<(), CommandError> {
         if let State::Alarm(_) = self.state {
             return Err(CommandError::AlarmLatched);
@@ -50,13 +50,13 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// Sets a setting.
     ///
     /// # Errors
-    /// [`CommandError::NotInHold`], [`CommandError::OutOfRange`], and that of a [`Contradiction`](crate::settings::Contradiction) where there
-    /// was none before; nothing is changed then.
+    /// [`CommandError::NotInHold`], [`CommandError::OutOfRange`], and a new [`Contradiction`](crate::settings::Contradiction).
+    /// Nothing is changed then.
     pub fn set(&mut self, setting: Setting, value: u16) -> Result<(), CommandError> {
         self.configuration.change(&[(setting, value)], self.is_working())
     }
 
-    /// Goes back to the settings of a new machine; [`save`](Self::save) makes it last.
+    /// Restores factory settings in RAM. [`save`](Self::save) writes them to the EEPROM.
     ///
     /// # Errors
     /// [`CommandError::NotInHold`].
@@ -68,7 +68,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         Ok(())
     }
 
-    /// Goes back to the saved settings.
+    /// Loads the saved settings.
     ///
     /// # Errors
     /// [`CommandError::NotInHold`] and [`CommandError::NothingSaved`].
@@ -79,8 +79,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         self.configuration.take_saved()
     }
 
-    /// Works out what follows from the settings. That takes half a millisecond, so the turn in which they are set leaves it to
-    /// the next one.
+    /// Recalculates from the settings. This takes half a millisecond, so the turn that sets a setting leaves it to the next turn.
     #[inline(never)]
     pub(super) fn follow_settings(&mut self) {
         self.configuration.follow();
@@ -93,10 +92,10 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         (self.leads_are_old, self.turn_spent) = (false, true);
     }
 
-    /// Begins to save the settings, which [`carry_on`](Self::carry_on) finishes.
+    /// Starts to save the settings; [`carry_on`](Self::carry_on) finishes it.
     ///
     /// # Errors
-    /// [`CommandError::NotInHold`] and that of a [`Contradiction`](crate::settings::Contradiction).
+    /// [`CommandError::NotInHold`], and a [`Contradiction`](crate::settings::Contradiction).
     pub fn save(&mut self) -> Result<(), CommandError> {
         if self.is_working() {
             return Err(CommandError::NotInHold);
@@ -104,24 +103,24 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         self.configuration.save()
     }
 
-    /// Carries on with what is being kept for good, settings and examples, without waiting; whether all has been written.
+    /// Runs one step of writing settings and examples to the EEPROM, without waiting. Returns whether all are written.
     pub fn carry_on(&mut self) -> bool {
         self.configuration.carry_on() && self.classifier.carry_on()
     }
 
-    /// Labels the last detection and teaches it to the classifier; if it is `forced`, against the built-in examples too.
+    /// Labels the last detection and teaches it to the classifier. `forced` allows a label that contradicts the built-in examples.
     ///
     /// # Errors
-    /// [`CommandError::NothingToLabel`], [`CommandError::TakenForPlant`] or [`CommandError::TakenForWeed`], and [`CommandError::ExamplesFull`]; the detection has no label then.
+    /// [`CommandError::NothingToLabel`], [`CommandError::TakenForPlant`], [`CommandError::TakenForWeed`],
+    /// [`CommandError::ExamplesFull`]. The detection has no label then.
     pub fn label(&mut self, label: u8, forced: bool) -> Result<(), CommandError> {
-        let is_judged = !self.is_classifying;
         let detection = self
             .detections
             .newest()
-            .filter(|detection| is_judged && detection.label.is_none())
+            .filter(|detection| detection.label.is_none() && self.ground.unclassified().is_none())
             .ok_or(CommandError::NothingToLabel)?;
         let features = detection.features();
-        // A label that is wrong would turn the class of all that come after it, and nobody would see why.
+        // A wrong label would change the class of later detections, without any sign of the cause.
         if !forced {
             match (self.classifier.built_in_class(&features), label) {
                 (Class::Weed, label::PLANT) => return Err(CommandError::TakenForWeed),
@@ -131,21 +130,21 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         }
         self.classifier.teach(&features, label).map_err(|ExamplesFull| CommandError::ExamplesFull)?;
         detection.label = Some(label);
-        // Whoever labels looks at what the detections are taken for.
+        // Labelling shows that the operator is watching, so the count restarts.
         self.unknown_run = UnknownRun::NONE;
         Ok(())
     }
 
-    /// Takes the next feature of an example that is told.
+    /// Takes the next feature of an example that the operator enters.
     pub fn tell_feature(&mut self, feature: u8) {
         self.told.add(feature);
     }
 
-    /// Teaches the classifier the example that was told, whatever the built-in ones say of it: who tells one has it from a machine or
-    /// a file.
+    /// Teaches the classifier the entered example. The built-in examples are not asked: the example comes from another machine or a
+    /// file.
     ///
     /// # Errors
-    /// [`CommandError::NotInHold`], as what stands between beam and tool would be classified by other examples than what came before it;
+    /// [`CommandError::NotInHold`], because new examples would classify the plants between beam and tool differently;
     /// [`CommandError::IncompleteExample`] and [`CommandError::ExamplesFull`].
     pub fn teach(&mut self, label: u8) -> Result<(), CommandError> {
         if self.is_working() {
@@ -153,12 +152,12 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         }
         let features = self.told.take().ok_or(CommandError::IncompleteExample)?;
         self.classifier.keep(Example::new(features, label)).map_err(|ExamplesFull| CommandError::ExamplesFull)?;
-        // Whoever teaches looks at what the detections are taken for.
+        // Teaching shows that the operator is watching, so the count restarts.
         self.unknown_run = UnknownRun::NONE;
         Ok(())
     }
 
-    /// Forgets an example from the field.
+    /// Forgets a field example.
     ///
     /// # Errors
     /// [`CommandError::NoSuchExample`].
@@ -166,24 +165,24 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         if self.classifier.forget(number) { Ok(()) } else { Err(CommandError::NoSuchExample) }
     }
 
-    /// Forgets all examples from the field.
+    /// Forgets all field examples.
     pub fn forget_all(&mut self) {
         for number in 0..field_examples::CAPACITY {
             self.classifier.forget(number);
         }
     }
 
-    /// Turns the telling of events on or off.
+    /// Turns event lines on or off.
     pub fn tell_events(&mut self, on: bool) {
         self.events.turn(on);
     }
 
-    /// Draws curves for a plotter, or no longer.
+    /// Selects the curves for a plotter, or none.
     pub fn set_plot(&mut self, plot: Plot) {
         self.telemetry.set(plot);
     }
 
-    /// Counts a line that was not understood.
+    /// Counts a console line with an error.
     pub fn count_mistake(&mut self) {
         count(&mut self.mistakes);
     }

@@ -1,4 +1,4 @@
-//! Faults and warnings: what the readings show that the machine cannot work with, and what the operator should know.
+//! Faults and warnings: readings with which the machine cannot work, and states that the operator should know.
 
 use super::Controller;
 use crate::{
@@ -11,28 +11,28 @@ use crate::{
     units::Length,
 };
 
-/// What the end switch may take longer than the lead: a servo frame, the contacts' bouncing, and some patience.
+/// How much longer than the lead the end switch may take: a servo frame (20 ms), the contacts' bouncing, and a reserve.
 const END_SWITCH_GRACE_MS: u16 = 100;
 
-/// Free bytes of stack below which the machine does not work on: two interrupts' worth.
+/// Least free stack in bytes for working: two interrupts' worth.
 const STACK_RESERVE: u16 = 48;
 
-/// What the encoder's monitor takes for progress: 1.7 to 3.3 mm with an encoder finer than 0.4 mm, and four ticks with any other.
+/// Progress for the encoder's monitor: 1.7 to 3.3 mm with an encoder finer than 0.4 mm, four ticks with any other.
 const PROGRESS: Length = Length(4);
 
 impl<C: Classifier, M: Memory> Controller<C, M> {
-    /// The fault that the readings show, if any; so many of the encoder's ticks are `doubted`.
+    /// The fault in the readings, if any. `doubted` is the number of ticks that may be noise.
     #[cfg_attr(target_arch = "avr", inline(never))]
     pub(super) fn fault(&mut self, doubted: u8) -> Option<Alarm> {
         let Readings { now, position, end_switch_on, stack_free, .. } = self.sensors.readings;
         let working = self.is_working();
         let fault = self.sensors.encoder.read(now, position, doubted, self.ground.ticks(PROGRESS).0 as u8);
         if !self.sensors.encoder.stands() {
-            // What is tried on the bench ends with the tool out.
+            // Movement ends a manual test, with the tool out.
             self.bench = Bench::Idle;
         }
         if self.sensors.encoder.is_silent() {
-            // Nobody knows how far the machine has rolled since.
+            // The distance since then is unknown.
             self.ground.forget();
         }
         match fault {
@@ -54,7 +54,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         if self.configuration.get(Setting::EndSwitch) != 0
             && !self.bench.needs_no_end_switch()
             && self.sensors.end_switch.is_on() != self.tool.is_out()
-            // Where what was done by hand has ended just now, the tool is yet to be told.
+            // After a manual test has ended, the tool has not had its command yet.
             && self.tool.has_had(self.orders().pulse, now, self.configuration.get(Setting::LeadOutMs) + END_SWITCH_GRACE_MS)
         {
             return Some(Alarm::ToolStuck);
@@ -62,7 +62,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         (stack_free < STACK_RESERVE).then_some(Alarm::StackLow)
     }
 
-    /// Counts what a detection was taken for, while it is at stake.
+    /// Counts unknown detections and detections of unusual width while the machine works.
     pub(super) fn count_misfit(&mut self, class: Class, width_mm: i16) {
         let enough = self.configuration.get(Setting::MisfitAfter) as u8;
         if self.is_working() && self.unknown_run.count(class, width_mm, enough) {
@@ -70,13 +70,13 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         }
     }
 
-    /// Tells what the operator should know, once.
+    /// Reports late commands and missing plants, each once.
     pub(super) fn warn(&mut self) {
         if !self.is_working() {
             return;
         }
         if self.tool.awaits_ground() && self.ground.is_closed_at_tool() {
-            // An eighth of the lead is what the speed may waver by.
+            // The speed may vary by an eighth of the lead.
             let lead_ms = self.configuration.get(Setting::LeadOutMs);
             if self.tool.is_late(self.sensors.readings.now, lead_ms - lead_ms / 8) {
                 self.events.add(Event::Warning(Warning::LateCommand));

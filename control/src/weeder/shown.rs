@@ -1,4 +1,4 @@
-//! What the machine shows of itself: its state, what it has counted, and what there is to tell.
+//! Queries: the machine's state, its counters, and the next event or plot line.
 
 use super::Controller;
 use crate::{
@@ -13,12 +13,12 @@ use crate::{
 };
 
 impl<C: Classifier, M: Memory> Controller<C, M> {
-    /// What the machine is doing.
+    /// The machine's state.
     pub fn state(&self) -> State {
         self.state
     }
 
-    /// Why the tool is out of the row although the machine works.
+    /// Why the tool is out of the row while the machine works; `None` if it is in, or the machine does not work.
     pub fn reason(&self) -> Option<Reason> {
         if !self.is_working() || !self.tool.is_out() {
             None
@@ -33,7 +33,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         }
     }
 
-    /// What keeps the tool out where it is.
+    /// Why the tool may or may not work at its position.
     pub fn ground_at_tool(&self) -> AtTool {
         self.ground.at_tool(self.sensors.readings.position)
     }
@@ -43,12 +43,12 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         self.ground.millimetres(Ticks(self.sensors.meter.speed().0))
     }
 
-    /// Windows at the tool or ahead of it, the one still being seen included.
+    /// Keep-out zones at the tool or ahead of it, with an open detection.
     pub fn zones(&self) -> u8 {
         self.ground.zones()
     }
 
-    /// How far the machine has to roll until ground that the beam has seen reaches the tool, in millimetres.
+    /// The distance in mm until ground that the beam has seen reaches the tool.
     pub fn unseen_mm(&self) -> i16 {
         self.ground.millimetres(self.ground.unseen())
     }
@@ -58,17 +58,17 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         self.ground.has_second_beam()
     }
 
-    /// The wheel's slip in thousandths, above 0 where it turns farther than the machine rolls; none where nothing has told it.
+    /// The wheel's slip in thousandths, above 0 if the wheel turns farther than the machine rolls; `None` if it is unknown.
     pub fn slip_permille(&self) -> Option<i16> {
         self.ground.slip_permille()
     }
 
-    /// Whether the encoder fell silent from one moment to the next, so that nobody knows how far the machine has rolled since.
+    /// Whether the encoder fell silent at speed. The distance since then is unknown.
     pub fn encoder_is_silent(&self) -> bool {
         self.sensors.encoder.is_silent()
     }
 
-    /// Whether the wheel turns so fast that an edge may be missed, and both channels may have changed at once.
+    /// Whether the wheel turns so fast that an edge can be missed: both channels may then change at once.
     pub fn believes_jumps(&self) -> bool {
         self.sensors.meter.speed().is_beyond(quadrature::FAST)
     }
@@ -78,12 +78,12 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         self.sensors.beam_broken
     }
 
-    /// Whether the status LED shines: while the servo is being tried, it marks the commands.
+    /// Whether the status LED is lit. During a servo test it shows the commands.
     pub fn lamp_is_lit(&self) -> bool {
         if self.bench.swings() { self.tool.is_out() } else { lamp::is_lit(self.state, self.sensors.readings.now) }
     }
 
-    /// Whether the tool is to be out of the row.
+    /// Whether the tool is commanded out of the row.
     pub fn tool_out(&self) -> bool {
         self.tool.is_out()
     }
@@ -98,22 +98,22 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         self.configuration.settings()
     }
 
-    /// The X that was needed where the settings were refused for that last, in mm.
+    /// The smallest `beam_to_tool_mm`, in mm, that would fit the settings refused last.
     pub fn needed_mm(&self) -> u16 {
         self.configuration.needed_mm()
     }
 
-    /// The stretch by which the wheel is measured.
+    /// The distance measurement for the wheel's calibration.
     pub fn distance(&self) -> &Distance {
         &self.distance
     }
 
-    /// The value of a setting that is saved, if any is.
+    /// The saved value of a setting, if settings are saved.
     pub fn saved(&self, setting: Setting) -> Option<u16> {
         self.configuration.saved(setting)
     }
 
-    /// What tells plants from weeds.
+    /// The classifier.
     pub fn classifier(&self) -> &C {
         &self.classifier
     }
@@ -123,42 +123,42 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         &self.detections
     }
 
-    /// Why the machine was reset.
+    /// The cause of the last reset.
     pub fn cause(&self) -> Cause {
         self.cause
     }
 
-    /// Times that closed ground reached the tool sooner than it could be out.
+    /// Times that closed ground reached the tool before it could be out.
     pub fn late(&self) -> u16 {
         self.tool.late()
     }
 
-    /// Lines that were not understood.
+    /// Console lines with an error.
     pub fn mistakes(&self) -> u16 {
         self.mistakes
     }
 
-    /// Detections that were too narrow to be classified.
+    /// Detections narrower than `min_width_mm`.
     pub fn dust(&self) -> u16 {
         self.dust
     }
 
-    /// Events that found no room to wait in.
+    /// Events dropped because the queue was full.
     pub fn events_missed(&self) -> u16 {
         self.events.missed()
     }
 
-    /// Whether the machine has worked for a long way without seeing a plant.
+    /// Whether the machine has worked over a long distance without a plant.
     pub fn sees_no_plants(&self) -> bool {
         self.plant_timeout.has_warned()
     }
 
-    /// The next event to be told.
+    /// The next event to report.
     pub fn next_event(&mut self) -> Option<Event> {
         self.events.take()
     }
 
-    /// The curves of which the next points are due, which are due 20 times a second.
+    /// The curves whose next points are due, 20 times a second.
     pub fn next_plot(&mut self) -> Option<Plot> {
         self.telemetry.due(self.sensors.readings.now)
     }

@@ -1,4 +1,4 @@
-//! The console as the firmware's main loop has it: a line is carried out once the one before it has been answered.
+//! The console as in the firmware's main loop: a line runs once the one before it is answered.
 
 use crate::decisions::Weeder;
 use control::say::{self, Answer, LINE, command::LineBuffer, line::Line};
@@ -11,7 +11,7 @@ use std::collections::VecDeque;
 pub struct Console {
     line: LineBuffer,
     answer: Answer,
-    /// Bytes on their way, and the lines that they make.
+    /// Bytes on the line, and the lines that they make.
     typed: VecDeque<u8>,
     lines: VecDeque<String>,
 }
@@ -21,13 +21,13 @@ impl Console {
         Self { line: LineBuffer::new(), answer: Answer::Greeting, typed: VecDeque::new(), lines: VecDeque::new() }
     }
 
-    /// Puts a line onto the wire, or several.
+    /// Sends one or several lines.
     pub fn put(&mut self, text: &str, lines: &[String]) {
         self.typed.extend(text.bytes().chain(*b"\n"));
         self.lines.extend(lines.iter().cloned());
     }
 
-    /// Has the machine carry out a line that has come, if there is one.
+    /// Runs a received line, if there is one.
     pub fn carry_out(&mut self, machine: &mut Weeder) -> Option<String> {
         while self.answer.is_done()
             && let Some(byte) = self.typed.pop_front()
@@ -40,7 +40,7 @@ impl Console {
         None
     }
 
-    /// Writes what there is room for.
+    /// Sends as much as there is room for.
     pub fn write(&mut self, machine: &mut Weeder) -> Result<String, TestCaseError> {
         let mut line = Line::new();
         if !machine.carry_on() {
@@ -56,7 +56,7 @@ impl Console {
         Ok(written)
     }
 
-    /// Whether everything that was typed has been answered.
+    /// Whether all lines are answered.
     pub fn is_done(&self) -> bool {
         self.typed.is_empty() && self.answer.is_done()
     }

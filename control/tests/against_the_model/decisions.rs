@@ -1,5 +1,4 @@
-//! The decisions as a machine that is driven: the controller with a classifier that goes by the width alone, its console and an
-//! EEPROM, and nothing of a chip.
+//! The decisions as a machine under test: the controller with a classifier by width, its console and an EEPROM, without a chip.
 
 use crate::{
     console::Console,
@@ -30,17 +29,17 @@ use model_test::{
 use proptest::prelude::*;
 use std::{cell::Cell, rc::Rc};
 
-/// Narrower than this is a weed.
+/// Narrower detections are weeds.
 const PLANT_MM: i16 = 60;
 
-/// What the features add to a width, in millimetres.
+/// Hold minus width, in millimetres.
 const MARGINS_MM: i16 = 100;
 
-/// Takes for a weed what is narrow, and for a plant what is not, but keeps examples as the firmware does.
+/// Classifies by width, but keeps examples as the firmware does.
 #[derive(Debug)]
 pub struct ByWidth {
     nearest: Nearest<&'static [Example<5>], Half>,
-    /// The width of what was last taken for a weed, in millimetres.
+    /// The width of the last weed, in millimetres.
     weed: Rc<Cell<Option<i16>>>,
 }
 
@@ -87,22 +86,22 @@ impl Classifier for ByWidth {
     }
 }
 
-/// The controller of such a machine.
+/// The controller of that machine.
 pub type Weeder = Controller<ByWidth, Half>;
 
-/// The machine, see the module's words.
+/// The machine under test.
 #[derive(Debug)]
 pub struct Decisions {
     odometer: Odometer,
     weeder: Weeder,
     orders: Orders,
     console: Console,
-    /// What it has just taken for a weed.
+    /// The width of the weed classified just now.
     weed: Rc<Cell<Option<i16>>>,
     eeprom: Eeprom,
-    /// What the clock showed in the beginning.
+    /// The clock at the start.
     steps: u32,
-    /// Whether each reading is from before the edges that come with it.
+    /// Whether readings are taken before the edges that come with them.
     reads_first: bool,
 }
 
@@ -123,7 +122,7 @@ fn readings(steps: u32, world: &World) -> Readings {
     }
 }
 
-/// The count nearest to `count`, without its wrapping, that a position stands for.
+/// The unwrapped count nearest to `count` for a position.
 fn unwrapped(count: i64, position: Position) -> i64 {
     count + i64::from((position - Position::new(count as i32)).0)
 }
@@ -275,7 +274,7 @@ impl Machine for Decisions {
     }
 }
 
-/// The examples that were taught.
+/// The field examples.
 fn from_the_field(classifier: &impl Classifier) -> Vec<Listed> {
     let all = std::iter::successors(classifier.listed(0), |&(_, next)| classifier.listed(next));
     all.map(|(listed, _)| listed).filter(|listed| listed.from_field).collect()

@@ -1,15 +1,15 @@
-//! An EEPROM that takes its time for a byte, and outlives the machine.
+//! An EEPROM with a write time, which survives a reset.
 
 use control::memory::{ERASED, Memory, SIZE};
 use std::{cell::RefCell, rc::Rc};
 
-/// How often the machine has to ask before a byte is written: once a turn, for some milliseconds.
+/// Calls of `is_ready` until a byte is written: once a turn, for some milliseconds.
 const PATIENCE: u8 = 3;
 
 #[derive(Clone, Debug)]
 struct Chip {
     bytes: [u8; 2 * SIZE],
-    /// The byte that is being written, with its address, and the questions that it still takes.
+    /// The byte that is being written, its address, and the calls left.
     under_way: Option<(usize, u8)>,
     patience: u8,
 }
@@ -34,7 +34,7 @@ pub struct Half {
 }
 
 impl Eeprom {
-    /// An erased one.
+    /// An erased half.
     pub fn new() -> Self {
         Self(Rc::new(RefCell::new(Chip { bytes: [ERASED; 2 * SIZE], under_way: None, patience: 0 })))
     }
@@ -44,12 +44,12 @@ impl Eeprom {
         [0, SIZE].map(|begin| Half { chip: Rc::clone(&self.0), begin })
     }
 
-    /// The machine is reset: a byte under way is written to its end.
+    /// Resets the machine: a write in progress is completed.
     pub fn reset(&mut self) {
         self.0.borrow_mut().finish();
     }
 
-    /// The power goes away: a byte under way becomes this one.
+    /// The power fails: a write in progress leaves this byte.
     pub fn lose_power(&mut self, becomes: u8) {
         let mut chip = self.0.borrow_mut();
         if let Some((_, byte)) = &mut chip.under_way {

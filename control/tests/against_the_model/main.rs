@@ -1,23 +1,23 @@
-//! The controller against a model that is slow and obvious, over random runs on which anything may happen at any moment: every
-//! line that can be typed, alarms of every kind, the work switch, rolling either way, standing and trembling, resets and power
-//! cuts at any byte, edges lost, dust, an encoder that falls silent or is disturbed, and counters at their ends.
+//! Compares the controller with a slow and simple model, in random runs with anything at any moment. The operator uses each console
+//! line and the work switch. The machine rolls in both directions, stands and trembles. Faults are alarms of each kind, resets and
+//! power cuts at any byte, lost edges, dust, and a silent or disturbed encoder. Counters wrap.
 //!
-//! After each turn of the loop this is held:
-//! - the tool is not in the row over a canopy that the beam has seen, nor over its margin, whatever happened since; it may be
-//!   told to come back before the margin's end by what the lead gives, at any speed of the last second;
-//! - what was taken for a weed was seen whole;
-//! - each line that is typed is answered by its lines and then by one `ok` or `error: `;
-//! - what was answered with `ok` is there after a reset and after a power cut, settings and examples;
-//! - at a steady speed the tool leaves the row once for a canopy, whatever the settings;
-//! - it is out in every state but at work, and nothing but the operator has the machine work or clears an alarm;
-//! - in the end, faults mended, the machine comes back to work.
+//! After each turn of the loop it checks:
+//! - after any event, the tool is never in the row over a seen canopy or its margin; it may be commanded back early by the lead at
+//!   any speed of the last second;
+//! - each weed was seen whole;
+//! - each line of the console is answered by its lines and then one `ok` or `error: `;
+//! - settings and examples answered with `ok` survive a reset and a power cut;
+//! - at a steady speed the tool leaves the row once for each canopy, with any settings;
+//! - the tool is out in each state except WORK, and only the operator starts work or clears an alarm;
+//! - in the end, after the faults are repaired, the machine works again.
 //!
-//! With a second beam each plant is held against where it really stands: the tool is in none that at least one beam has seen, although
-//! the wheel slips, the slip changes, stands are denser than the beams, and either beam misses plants or sees dust of its own.
+//! With a second beam, each plant's real position counts. The tool keeps off each plant that at least one beam has seen. Meanwhile
+//! the wheel slips, the slip changes, and stands are too dense for the beams. Either beam misses plants, and sees its own dust.
 //!
-//! A failure is shrunk to a few steps and printed as what a person would type and roll. The runs are the same each time,
-//! so that a change is judged by them and not by luck. Runs and model are those of the crate `model_test`, which has the firmware walked as
-//! well. For others, for as long as you like:
+//! A failure is reduced to a few steps, printed as console lines and motion. Runs are the same each time, so that only a change of
+//! the code can change the result. Runs and model come from the crate `model_test`, which also tests the firmware with them. For
+//! other runs:
 //!
 //! ```sh
 //! WEEDER_SEED=7 WEEDER_CASES=1000000 cargo test -p control --release --test against_the_model
@@ -32,19 +32,19 @@ use decisions::Decisions;
 use model_test::{Extent, drive::Drive, go_all, run};
 
 #[test]
-fn whatever_happens_the_tool_keeps_off_every_canopy_that_was_seen_and_the_machine_comes_back_to_work() {
+fn after_any_event_the_tool_keeps_off_every_seen_canopy_and_the_machine_works_again() {
     let extent = Extent { runs: 1500, least_turns: 10_000_000, shrinkings: 5000 };
     go_all(extent, &run::wild(30), Drive::<Decisions>::go);
 }
 
 #[test]
-fn whatever_either_beam_misses_and_the_wheel_slips_the_tool_keeps_off_every_plant() {
+fn with_missed_plants_and_slip_the_tool_keeps_off_every_plant_that_a_beam_has_seen() {
     let extent = Extent { runs: 1500, least_turns: 10_000_000, shrinkings: 3000 };
     go_all(extent, &run::beams(24), Drive::<Decisions>::go);
 }
 
 #[test]
-fn at_a_steady_speed_the_tool_leaves_the_row_once_for_a_canopy_whatever_the_settings() {
+fn at_a_steady_speed_the_tool_leaves_the_row_once_for_a_canopy_with_any_settings() {
     let extent = Extent { runs: 300, least_turns: 1_000_000, shrinkings: 5000 };
     go_all(extent, &run::calm(8), Drive::<Decisions>::go);
 }

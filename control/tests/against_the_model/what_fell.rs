@@ -1,4 +1,4 @@
-//! What once fell, by name: the very lines and rolls that showed it, and their like on both sides, held against the model.
+//! Former failures, by name: the console lines and motion that showed each, and similar cases, checked by the model.
 
 use crate::decisions::Decisions;
 use control::{alarm::Alarm, operate::state::State};
@@ -10,21 +10,21 @@ use rayon::prelude::*;
 
 type Drive = drive::Drive<Decisions>;
 
-/// Two plants, and bare ground behind them.
+/// Two plants, then bare ground.
 const PLANTS: [(u32, u32); 3] = [(300, 150), (350, 150), (9000, 0)];
 
-/// Plants to the end of the world.
+/// An endless row of plants.
 const ROW: [(u32, u32); 1] = [(450, 150)];
 
-/// Faster than 600 mm/s, so that there is an alarm, and to a stop.
+/// Faster than 600 mm/s, which raises an alarm, and then to a stop.
 const TOO_FAST: &str = "roll 60 mm at 694 mm/s\nstand for 800 ms";
 
-/// A machine that gains and loses speed as a person pushes it, on a row.
+/// A machine that accelerates and brakes as a person pushes it, on a row.
 fn run(row: &[(u32, u32)], lines: &str) -> Run {
     Run::written(row, lines)
 }
 
-/// Goes the run, checked after each step; returns the machine.
+/// Runs the steps, checked after each. Returns the machine.
 #[track_caller]
 fn go(run: &Run) -> Drive {
     let gone = Drive::new(run).and_then(|mut drive| {
@@ -54,14 +54,14 @@ fn the_rest_of_a_half_seen_plant_is_no_weed_after_an_alarm() {
                     800 + seen_mm
                 ),
             ));
-            assert_eq!((drive.state(), drive.tool_out()), (State::Work, false), "the machine works on");
+            assert_eq!((drive.state(), drive.tool_out()), (State::Work, false), "the machine continues to work");
         }
     }
 }
 
 #[test]
-fn an_alarm_in_a_gap_between_leaves_makes_no_weed_of_the_next_leaf() {
-    // Leaves of 40 mm with light of 15 mm between them: each of them alone is as narrow as a weed.
+fn after_an_alarm_in_a_gap_between_leaves_the_next_leaf_is_no_weed() {
+    // Leaves of 40 mm with gaps of 15 mm: each leaf alone is as narrow as a weed.
     let ragged = [(800, 40), (15, 40), (15, 40), (9000, 0)];
     for seen_mm in 1..=180 {
         let lines = format!(
@@ -84,7 +84,7 @@ fn the_margin_behind_a_canopy_is_kept_over_an_alarm() {
 }
 
 #[test]
-fn what_is_typed_in_the_turn_in_which_a_row_ends_leaves_the_real_plants_alone() {
+fn a_line_in_the_last_turn_of_a_dry_run_leaves_real_plants_their_zones() {
     for line in ["servo in", "servo out", "calibrate servo", "test row 1300", "start", "start now", "hold", "status"] {
         for ms in 2672..2712 {
             let lines = format!("test row 1300\nstand for {ms} ms\n{line}\nhold\nstart\nroll 2500 mm at 700 mm/s");
@@ -95,7 +95,7 @@ fn what_is_typed_in_the_turn_in_which_a_row_ends_leaves_the_real_plants_alone() 
 }
 
 #[test]
-fn what_was_saved_is_kept_although_the_servos_swings_end_while_it_is_written() {
+fn a_save_is_complete_although_timed_swings_end_during_it() {
     for ms in (8800..9020).step_by(4) {
         for turns in [3, 100, 400] {
             let lines = format!("set end_switch on\nset k 5\nstand for 100 ms\ncalibrate servo\nstand for {ms} ms");
@@ -103,7 +103,7 @@ fn what_was_saved_is_kept_although_the_servos_swings_end_while_it_is_written() {
             run.steps.push(Step::CutPower { line: "save", turns, byte: 0 });
             go(&run);
         }
-        // Answered with `ok`, and the power goes at once.
+        // Answered with `ok`, and then the power fails at once.
         let lines = format!("set end_switch on\nset k 5\nstand for 100 ms\ncalibrate servo\nstand for {ms} ms\nsave");
         let mut run = run(&ROW, &lines);
         run.steps.push(Step::CutPower { line: "status", turns: 0, byte: 0 });
@@ -112,12 +112,12 @@ fn what_was_saved_is_kept_although_the_servos_swings_end_while_it_is_written() {
 }
 
 #[test]
-fn leads_near_each_other_give_one_swing_each_way_a_window_at_every_speed() {
+fn leads_near_each_other_give_one_swing_each_way_a_zone_at_every_speed() {
     let leads_ms = [0, 40, 100, 150, 180, 230, 300, 500];
     let swings_at = |mm_s: u32| -> u32 {
         let leads = leads_ms.iter().flat_map(|out| leads_ms.map(|back| (out, back)));
         let swings = leads.map(|(lead_out_ms, lead_in_ms)| {
-            // What the tool's distance does not allow at the top speed is refused, and the lead stays as it was.
+            // If X does not allow the lead at the top speed, it is refused, and the lead does not change.
             let lines = format!(
                 "set beam_to_tool_mm 1200
                  set lead_out_ms {lead_out_ms}
@@ -133,11 +133,11 @@ fn leads_near_each_other_give_one_swing_each_way_a_window_at_every_speed() {
     let speeds = cases(66) as u32;
     let mm_s = |place: u32| 100 + 1300 * place / (speeds - 1);
     let swings: u32 = (0..speeds).into_par_iter().map(|place| swings_at(mm_s(place))).sum();
-    assert!(swings > 150 * speeds, "{swings} swings were looked at");
+    assert!(swings > 150 * speeds, "{swings} swings were checked");
 }
 
 #[test]
-fn a_tool_moved_by_hand_is_not_stuck_when_the_machine_takes_it_out_again() {
+fn a_tool_driven_directly_is_not_stuck_when_the_machine_takes_it_out_again() {
     for moved in ["servo in", "servo 1750", "test row 500", "calibrate servo"] {
         for ms in [1, 50, 150, 400, 1000, 3000] {
             for back in ["servo out", "hold", "start", "start now", "servo in\nservo out"] {
@@ -158,7 +158,7 @@ fn a_tool_moved_by_hand_is_not_stuck_when_the_machine_takes_it_out_again() {
 }
 
 #[test]
-fn a_row_is_played_to_its_end_at_every_speed_that_is_accepted() {
+fn a_dry_run_ends_at_every_accepted_speed() {
     for mm_s in (100..1200).step_by(50).chain(1200..=1300) {
         let ms = 3500 * 1000 / mm_s;
         let played = |ms| go(&run(&ROW, &format!("test row {mm_s}\nstand for {ms} ms")));
@@ -169,7 +169,7 @@ fn a_row_is_played_to_its_end_at_every_speed_that_is_accepted() {
 }
 
 #[test]
-fn ground_that_was_forgotten_stays_closed_however_far_the_machine_is_rolled_back() {
+fn forgotten_ground_stays_closed_over_any_distance_rolled_back() {
     for back_mm in (500..12_000).step_by(500) {
         for beam_to_tool_mm in [100, 400, 2000] {
             let lines = format!(

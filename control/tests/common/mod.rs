@@ -1,4 +1,4 @@
-//! What the tests of the decisions share: readings, and a classifier that knows the truth.
+//! Shared by the tests of the decisions: readings, and a classifier by width.
 
 mod readings;
 
@@ -15,24 +15,24 @@ use control::{
 };
 use knn::Example;
 
-/// Takes for a weed what is narrower than 60 mm, or nothing.
+/// Classifies detections narrower than 60 mm as weeds, or none.
 #[derive(Clone, Debug)]
 pub struct ByWidth {
-    /// What the hold of a plant is at least.
+    /// The least hold of a plant.
     least_hold_mm: i16,
-    /// Turns more than one that it takes.
+    /// Additional turns for each classification.
     turns: u16,
-    /// What it will say, and in how many turns.
+    /// The pending vote, and the turns until it.
     vote: (Vote, u16),
 }
 
 impl ByWidth {
-    /// One that answers so many turns later.
+    /// A classifier that answers this many turns later.
     pub fn late_by(turns: u16) -> Self {
         Self { least_hold_mm: 160, turns, vote: (Vote::UNKNOWN, 0) }
     }
 
-    /// One that takes everything for a plant, as where stalks were taught.
+    /// A classifier that calls all detections plants, as after teaching a crop of stalks.
     #[allow(dead_code, reason = "not every test has stalks")]
     pub fn of_stalks() -> Self {
         Self { least_hold_mm: 0, ..Self::late_by(0) }
@@ -87,17 +87,17 @@ impl Classifier for ByWidth {
     }
 }
 
-/// A machine in HOLD that woke up without saved settings and was told that this is right.
+/// A machine in HOLD that started without saved settings; the operator has cleared that alarm.
 pub fn machine() -> Machine {
-    machine_that_judges(ByWidth::late_by(0))
+    machine_with(ByWidth::late_by(0))
 }
 
-/// The same, with a classifier that may take its time.
-pub fn machine_that_judges(classifier: ByWidth) -> Machine {
+/// The same, with this classifier.
+pub fn machine_with(classifier: ByWidth) -> Machine {
     let mut machine = Controller::new(classifier, Volatile::new(), woken_up(Cause::PowerOn));
     machine.clear();
     machine
 }
 
-/// A machine as the tests have it.
+/// The machine of the tests.
 pub type Machine = Controller<ByWidth, Volatile>;

@@ -1,4 +1,4 @@
-//! What a machine reads, for tests whether or not they have a classifier of their own.
+//! Readings for all tests.
 
 use control::{
     measure::{
@@ -8,12 +8,12 @@ use control::{
     units::{Instant, Interval, Position},
 };
 
-/// Waking up at rest, with nothing in the beam.
+/// Start-up at rest, with a clear beam.
 pub fn woken_up(cause: Cause) -> Startup {
     Startup { readings: readings(0, 0), beam_broken: false, cause }
 }
 
-/// Readings of a machine at `count`, `microseconds` after the first moment.
+/// Readings at `count`, `microseconds` after power-up.
 pub fn readings(microseconds: u64, count: i32) -> Readings {
     let now = Instant::default() + Interval::from_steps((microseconds / 4) as u32);
     Readings::new(now, Position::new(count))

@@ -1,6 +1,6 @@
-//! A machine at work along a row: what each beam sees is given, and where the tool was in the row and what was told is kept.
+//! A machine at work along a row. The test gives what each beam sees; this records where the tool was in the row, and the events.
 //!
-//! The wheel may slip. The tool is told apart in the row and out of it only: it swings in no time.
+//! The wheel may slip. The tool is either in or out: it swings in no time.
 
 #![allow(dead_code, reason = "no test uses all of it")]
 
@@ -11,48 +11,48 @@ use control::{
     settings::Setting,
 };
 
-/// Ticks a millimetre of the default wheel, where it does not slip.
+/// Ticks a millimetre of the default wheel without slip.
 pub const TICKS_A_MM: f64 = 1.90986;
 
-/// Where the tool is behind the first beam, and the second beam behind it.
+/// Distances of the tool and the second beam behind the first beam.
 pub const BEAM_TO_TOOL_MM: f64 = 400.0;
 pub const SECOND_BEAM_MM: f64 = 200.0;
 
-/// What stays free on each side of a plant.
+/// Ground kept on each side of a plant.
 pub const MARGIN_MM: f64 = 50.0;
 
 /// A turn of the main loop.
 const TURN_US: u64 = 500;
 
-/// A machine on its way.
+/// A machine under way.
 pub struct Rolling {
     pub machine: Machine,
-    /// The ground below the first beam.
+    /// The first beam's position.
     pub place_mm: f64,
-    /// What the wheel turns for a millimetre of ground.
+    /// The wheel's travel for a millimetre of ground.
     pub turns: f64,
-    /// Places where the tool was in the row.
+    /// Positions at which the tool was in the row.
     pub weeded_mm: Vec<f64>,
-    /// What the machine told, and the ground below the first beam then.
+    /// Events, and the first beam's position at each.
     pub told: Vec<(Event, f64)>,
     time_us: u64,
     wheel_mm: f64,
-    /// What each of the beams sees, from and to.
+    /// What each beam sees, from and to.
     first_mm: Vec<(f64, f64)>,
     second_mm: Vec<(f64, f64)>,
     levels: (bool, bool),
-    /// How far the second beam and the tool are behind the first.
+    /// Distances of the second beam and the tool behind the first.
     second_beam_mm: f64,
     beam_to_tool_mm: f64,
 }
 
 impl Rolling {
-    /// At work, with these settings, a beam that answers at once, and nothing known of the ground.
+    /// At work, with these settings, a beam that responds at once, and unknown ground.
     pub fn along(first_mm: Vec<(f64, f64)>, second_mm: Vec<(f64, f64)>, settings: &[(Setting, u16)]) -> Self {
         Self::with(machine(), first_mm, second_mm, settings)
     }
 
-    /// The same, with a machine that woke up in HOLD.
+    /// The same, with a machine that has started in HOLD.
     pub fn with(
         mut machine: Machine,
         first_mm: Vec<(f64, f64)>,
@@ -82,7 +82,7 @@ impl Rolling {
         }
     }
 
-    /// Rolls to a place of the first beam.
+    /// Rolls until the first beam is at a position.
     pub fn roll_to(&mut self, to_mm: f64, speed_mm_s: f64) {
         let step_mm = (to_mm - self.place_mm).signum() * speed_mm_s * TURN_US as f64 / 1e6;
         while (to_mm - self.place_mm) * step_mm > 0.0 {
@@ -90,7 +90,7 @@ impl Rolling {
         }
     }
 
-    /// Rolls by so much in a turn of the loop.
+    /// Rolls by this distance in a turn of the loop.
     pub fn turn(&mut self, step_mm: f64) {
         self.place_mm += step_mm;
         self.wheel_mm += step_mm * self.turns;
@@ -110,12 +110,12 @@ impl Rolling {
         }
     }
 
-    /// Some edges of the first beam are lost, which is an alarm.
+    /// Loses edges of the first beam, which is an alarm.
     pub fn lose_edges(&mut self) {
         self.machine.turn(self.readings(), [Edge::Lost { broken: self.levels.0 }]);
     }
 
-    /// What was told of a kind.
+    /// The events of a kind.
     pub fn told_of<T>(&self, of: impl Fn(Event) -> Option<T>) -> Vec<T> {
         self.told.iter().filter_map(|&(event, _)| of(event)).collect()
     }

@@ -1,4 +1,4 @@
-//! A beam or a crop that cannot be right: too many weeds, no plant for long, a beam that flickers; and dust, which is neither.
+//! Faults of beam or crop: too many weeds, no plant over a long distance, a flickering beam; and dust, which is neither.
 
 use crate::drive::Drive;
 use control::{
@@ -9,16 +9,16 @@ use control::{
 };
 
 #[test]
-fn a_row_of_stalks_that_are_taken_for_weeds_is_an_alarm_at_the_fifth() {
+fn a_row_of_stalks_classified_as_weeds_is_an_alarm_at_the_fifth() {
     let mut drive = Drive::at_work();
     assert_eq!((drive.pass_stalks(20), drive.alarm()), (5, Some(Alarm::CropUnknown)));
     drive.machine.clear();
     drive.machine.start(false).unwrap();
-    assert_eq!((drive.pass_stalks(20), drive.alarm()), (5, Some(Alarm::CropUnknown)), "it is counted anew");
+    assert_eq!((drive.pass_stalks(20), drive.alarm()), (5, Some(Alarm::CropUnknown)), "the count restarts");
 }
 
 #[test]
-fn so_many_stalks_as_are_set_are_an_alarm_and_none_where_that_is_zero() {
+fn as_many_stalks_as_set_are_an_alarm_and_0_turns_it_off() {
     for (misfit_after, stalks) in [(1, 1), (2, 2), (100, 100), (0, 300)] {
         let mut drive = Drive::at_work();
         drive.machine.set(Setting::MisfitAfter, misfit_after).unwrap();
@@ -42,24 +42,24 @@ fn weeds_with_a_plant_between_them_are_no_alarm_and_neither_are_those_in_hold() 
 }
 
 #[test]
-fn what_is_narrower_than_the_least_width_is_counted_as_dust_and_is_neither_a_plant_nor_a_misfit() {
+fn a_detection_below_the_least_width_is_dust_and_neither_a_plant_nor_a_misfit() {
     let mut drive = Drive::at_work();
     for (setting, value) in [(Setting::MinWidthMm, 25), (Setting::NoPlantM, 2)] {
         drive.machine.set(setting, value).unwrap();
     }
     assert_eq!((drive.pass_stalks(10), drive.alarm()), (10, None));
     assert_eq!((drive.machine.dust(), drive.machine.detections().len()), (10, 0));
-    assert_eq!(drive.events(), [Event::Warning(Warning::NoPlants)], "nobody has seen a plant");
+    assert_eq!(drive.events(), [Event::Warning(Warning::NoPlants)], "no plant was seen");
     drive.pass(0.5, 0.03);
     drive.roll(0.5, 0.1);
     assert_eq!((drive.machine.dust(), drive.machine.detections().len()), (10, 1));
     drive.pass(0.5, 0.0252);
     drive.roll(0.5, 0.1);
-    assert_eq!((drive.machine.dust(), drive.machine.detections().len()), (10, 2), "as wide as the least is no dust");
+    assert_eq!((drive.machine.dust(), drive.machine.detections().len()), (10, 2), "the least width is no dust");
 }
 
 #[test]
-fn the_narrow_rest_of_an_object_is_no_dust() {
+fn the_narrow_rest_of_a_detection_is_no_dust() {
     let mut drive = Drive::in_hold();
     drive.machine.set(Setting::MinWidthMm, 100).unwrap();
     drive.edges.push(Edge::Lost { broken: true });
@@ -92,7 +92,7 @@ fn a_beam_that_flickers_is_an_alarm_and_a_ragged_canopy_is_none() {
 }
 
 #[test]
-fn a_long_way_without_a_plant_is_a_warning_once() {
+fn a_long_distance_without_a_plant_is_one_warning() {
     let mut drive = Drive::at_work();
     drive.machine.set(Setting::NoPlantM, 3).unwrap();
     let warned = |drive: &mut Drive| {

@@ -1,4 +1,4 @@
-//! A machine that is driven along: each test has its beam and its encoder do what is to be found out.
+//! A machine for tests that control its beam and its encoder.
 
 use crate::common::{Machine, machine, readings};
 use control::{
@@ -16,14 +16,14 @@ pub const TICKS_A_METRE: f64 = 1909.86;
 /// A turn of the main loop.
 pub const TURN_US: u64 = 500;
 
-/// A machine with its clock and its place.
+/// A machine with clock and position.
 pub struct Drive {
     pub machine: Machine,
     pub time_us: u64,
     pub place: f64,
-    /// What every reading has besides time and place.
+    /// The readings apart from time and position.
     pub readings: Readings,
-    /// What came from the beam since the last turn.
+    /// Beam edges since the last turn.
     pub edges: Vec<Edge>,
 }
 
@@ -42,7 +42,7 @@ impl Drive {
     /// In HOLD, at rest.
     pub fn in_hold() -> Self {
         let mut machine = machine();
-        // A servo that is out after 180 ms leaves room for speeds up to 5 km/h.
+        // A servo that is out after 180 ms allows speeds up to 5 km/h.
         machine.set(Setting::LeadOutMs, 180).unwrap();
         machine.set(Setting::TopSpeedMmS, 1400).unwrap();
         Self { machine, time_us: 0, place: 0.0, readings: readings(0, 0), edges: Vec::new() }
@@ -60,7 +60,7 @@ impl Drive {
         self.machine.turn(readings, self.edges.drain(..))
     }
 
-    /// Rolls so many metres at a speed, or stands for so many seconds at none.
+    /// Rolls this many metres at a speed, or stands for this many seconds at speed 0.
     pub fn roll(&mut self, speed_m_s: f64, metres_or_seconds: f64) {
         let seconds = if speed_m_s == 0.0 { metres_or_seconds } else { metres_or_seconds / speed_m_s.abs() };
         for _ in 0..(seconds * 1e6) as u64 / TURN_US {
@@ -69,7 +69,7 @@ impl Drive {
         }
     }
 
-    /// Comes to rest as a machine does, with 3 m/s2.
+    /// Brakes to a standstill with 3 m/s2.
     pub fn brake(&mut self, speed_m_s: f64) {
         self.brake_by(speed_m_s, 3.0);
     }
@@ -83,7 +83,7 @@ impl Drive {
         }
     }
 
-    /// Gains a speed from rest.
+    /// Accelerates from rest.
     pub fn speed_up(&mut self, speed_m_s: f64, acceleration_m_s2: f64) {
         let mut speed = 0.0;
         while speed < speed_m_s {
@@ -106,14 +106,14 @@ impl Drive {
         self.pass(speed_m_s, 0.15);
     }
 
-    /// Something as wide as this passes the beam, in metres.
+    /// A detection of this width, in metres, passes the beam.
     pub fn pass(&mut self, speed_m_s: f64, width_m: f64) {
         self.beam(true);
         self.roll(speed_m_s, width_m);
         self.beam(false);
     }
 
-    /// Stalks of 20 mm pass the beam, which this machine takes for weeds, until an alarm or so many of them; how many did.
+    /// Stalks of 20 mm, weeds for this machine, pass the beam until an alarm or `most` of them. Returns their number.
     pub fn pass_stalks(&mut self, most: u32) -> u32 {
         (1..=most)
             .find(|_| {

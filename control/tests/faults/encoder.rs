@@ -1,4 +1,4 @@
-//! An encoder that falls silent, dies, loses a channel or jumps, and what looks like it and is none: stops, trembling, leaves.
+//! Encoder faults: silent, dead, a dead channel, jumps. And similar readings without a fault: stops, trembling, leaves.
 
 use crate::{
     common::{ByWidth, machine, readings, woken_up},
@@ -14,13 +14,13 @@ use control::{
     weeder::Controller,
 };
 
-/// How long the encoder may be silent at a speed until that is sudden, in seconds: the time of ten ticks, and three turns.
+/// Silence in seconds, at a speed, after which it counts as sudden: ten ticks and three turns.
 fn sudden_s(speed_m_s: f64) -> f64 {
     10.0 / (speed_m_s * TICKS_A_METRE) + 0.004
 }
 
 #[test]
-fn an_encoder_that_falls_silent_from_one_moment_to_the_next_has_the_tool_out_until_it_comes_to_ground_seen_since() {
+fn after_a_sudden_silence_the_tool_is_out_until_ground_seen_since_reaches_it() {
     for speed_m_s in [0.14, 0.3, 0.7, 1.3] {
         let mut drive = Drive::at_work();
         drive.roll(speed_m_s, 0.5);
@@ -31,7 +31,7 @@ fn an_encoder_that_falls_silent_from_one_moment_to_the_next_has_the_tool_out_unt
         assert_eq!(drive.machine.reason(), Some(Reason::EncoderDoubtful));
         drive.roll(0.0, 10.0);
         assert!(!drive.tool_is_in(), "{speed_m_s} m/s");
-        // Nobody knows how far the machine has rolled: the tool stays out over all that was seen, and a margin ahead of it.
+        // The distance is unknown: the tool stays out over all ground seen before, and a margin ahead of it.
         for _ in 0..42 {
             drive.roll(0.5, 0.01);
             assert!(!drive.tool_is_in(), "{speed_m_s} m/s");
@@ -43,7 +43,7 @@ fn an_encoder_that_falls_silent_from_one_moment_to_the_next_has_the_tool_out_unt
 }
 
 #[test]
-fn what_stood_in_the_beam_when_the_encoder_fell_silent_is_a_plant_however_narrow_its_rest() {
+fn a_detection_in_the_beam_at_a_silence_is_a_plant_with_any_width_of_its_rest() {
     let mut drive = Drive::at_work();
     drive.beam(true);
     drive.roll(0.7, 0.1);
@@ -74,7 +74,7 @@ fn the_third_silence_within_ten_metres_of_the_one_before_is_an_alarm() {
 }
 
 #[test]
-fn stops_are_never_an_alarm_however_many_and_however_hard() {
+fn many_and_hard_stops_are_no_alarm() {
     let mut drive = Drive::at_work();
     for stop in 0..30 {
         drive.roll(0.3 + f64::from(stop) / 30.0, 0.3);
@@ -86,8 +86,8 @@ fn stops_are_never_an_alarm_however_many_and_however_hard() {
 }
 
 #[test]
-fn a_hard_stop_is_no_silence_whatever_the_encoder() {
-    // From 16,000 ticks a metre to 900. A person brakes with 3 m/s2, and the wheel with a tenth more, as it slips. Progress of an
+fn a_hard_stop_is_no_silence_with_any_encoder() {
+    // From 16,000 ticks a metre to 900. A person brakes with 3 m/s2, and the slipping wheel with a tenth more. The progress of an
     // encoder finer than 0.4 mm may be a little shorter.
     let machines =
         [(2400, 400, 3.3), (10_000, 200, 3.3), (5000, 300, 3.3), (4000, 530, 2.6), (1250, 400, 3.3), (2300, 800, 3.3)];
@@ -107,7 +107,7 @@ fn a_hard_stop_is_no_silence_whatever_the_encoder() {
         for stop in 0..400 {
             let mut speed_m_s = 0.2 + f64::from(stop) * 0.003;
             place_m += 0.000_013;
-            // From standstill with 2 m/s2, some way, and to a stop.
+            // From standstill with 2 m/s2, over some distance, and to a stop.
             let from = (0..(speed_m_s / 0.0005) as u32).any(|step| turn(f64::from(step) * 0.0005, &mut place_m));
             let rolling = (0..1600).any(|_| turn(speed_m_s, &mut place_m));
             let mut braking = false;
@@ -123,7 +123,7 @@ fn a_hard_stop_is_no_silence_whatever_the_encoder() {
 }
 
 #[test]
-fn a_fine_encoder_that_falls_silent_is_noticed_as_soon() {
+fn a_fine_encoder_that_falls_silent_is_found_as_soon() {
     let mut machine = machine();
     machine.set(Setting::TicksPerM, 20_000).unwrap();
     for speed_m_s in [0.3, 0.7, 1.3] {
@@ -144,8 +144,8 @@ fn a_fine_encoder_that_falls_silent_is_noticed_as_soon() {
 }
 
 #[test]
-fn an_encoder_that_dies_at_any_place_never_brings_the_tool_back() {
-    // All along a plant's approach, its window and what follows.
+fn an_encoder_that_dies_anywhere_never_brings_the_tool_back() {
+    // All along a plant's approach, its zone and the ground after it.
     for died_after in (0..900).step_by(7) {
         let mut drive = Drive::at_work();
         drive.roll(0.78, 0.5);
@@ -216,7 +216,7 @@ fn plants_that_pass_a_rolling_machine_raise_no_doubt_in_the_encoder() {
     }
 }
 
-/// Has the encoder go to and fro between two counts, so many edges a second, for two seconds.
+/// Moves the encoder to and fro between two counts, this many edges a second, for two seconds.
 fn tremble(drive: &mut Drive, edges_a_second: u64) {
     let count = drive.place.floor() as i32;
     for turn in 0..2_000_000 / TURN_US {
@@ -245,11 +245,11 @@ fn a_wheel_that_trembles_on_an_edge_with_the_engine_is_no_alarm() {
     assert_eq!(drive.alarm(), None);
 }
 
-/// Either side of each grain's end, and the ends.
+/// Values on both sides of each scale's limit, and the extremes.
 const TICKS_PER_M: [u16; 11] = [900, 1910, 2400, 2401, 4800, 4801, 9600, 9601, 15_000, 19_200, 20_000];
 
 #[test]
-fn a_machine_that_turns_round_at_work_has_no_dead_channel_whatever_the_encoder() {
+fn a_machine_that_reverses_at_work_has_no_dead_channel_with_any_encoder() {
     for ticks_per_m in TICKS_PER_M {
         for (speed_m_s, braking_m_s2, rest_s) in [(0.3, 0.3, 0.0), (0.7, 1.0, 0.0), (0.7, 3.0, 0.2), (1.2, 2.0, 0.05)] {
             let mut machine = machine();
@@ -257,7 +257,7 @@ fn a_machine_that_turns_round_at_work_has_no_dead_channel_whatever_the_encoder()
             machine.start(false).unwrap();
             let (mut time_us, mut place_m, mut speed, mut alarms) = (0, 0.0, 0.0, Vec::new());
             for turned in 0..20 {
-                // Wherever within a tick and a progress it turns; at the end of its rest it goes the other way.
+                // It reverses at each position within a tick and a progress; after its rest it goes the other way.
                 let to = if turned % 2 == 0 { speed_m_s } else { -speed_m_s } + f64::from(turned) * 0.001;
                 let step = braking_m_s2 * 0.000_25 * f64::signum(to);
                 let rest = (rest_s / 0.000_25) as usize;
@@ -284,12 +284,12 @@ fn a_machine_that_turns_round_at_work_has_no_dead_channel_whatever_the_encoder()
 }
 
 #[test]
-fn a_dead_channel_is_an_alarm_whatever_the_encoder() {
+fn a_dead_channel_is_an_alarm_with_every_encoder() {
     for ticks_per_m in TICKS_PER_M {
         let mut machine = machine();
         machine.set(Setting::TicksPerM, ticks_per_m).unwrap();
         machine.start(false).unwrap();
-        // At 2.5 km/h every other tick comes, to and fro. The loop's turns are not in step with them.
+        // At 2.5 km/h each second tick comes, to and fro, not synchronous with the loop.
         let (mut time_us, mut place_m, mut dies_at) = (0, 0.0, 0);
         for turn in 0..8000 {
             time_us += 250 + turn % 7 * 20;
@@ -304,7 +304,7 @@ fn a_dead_channel_is_an_alarm_whatever_the_encoder() {
 }
 
 #[test]
-fn a_wheel_that_trembles_where_a_slow_machine_has_stopped_is_no_alarm() {
+fn a_wheel_that_trembles_after_a_slow_stop_is_no_alarm() {
     for speed_m_s in [0.05, 0.1, 0.15, 0.2] {
         let mut drive = Drive::at_work();
         for _ in 0..10 {
@@ -317,8 +317,8 @@ fn a_wheel_that_trembles_where_a_slow_machine_has_stopped_is_no_alarm() {
 }
 
 #[test]
-fn jumps_are_an_alarm_by_the_way_on_which_they_come() {
-    // From one side of the count's wrap to the other. Each brings two ticks that are not believed.
+fn jumps_are_an_alarm_by_the_distance_between_them() {
+    // Across the count's wrap. Each jump brings two ticks that are noise.
     for (metres_between, alarm) in [(0.02, Some(Alarm::EncoderJumps)), (0.05, None)] {
         for speed_m_s in [0.3, 1.2] {
             let mut startup = woken_up(Cause::PowerOn);
@@ -337,7 +337,7 @@ fn jumps_are_an_alarm_by_the_way_on_which_they_come() {
 }
 
 #[test]
-fn jumps_at_rest_move_nothing_and_are_an_alarm_where_there_are_many() {
+fn jumps_at_rest_move_nothing_and_many_are_an_alarm() {
     for (every_ms, alarm) in [(4, Some(Alarm::EncoderJumps)), (40, None)] {
         let mut drive = Drive::in_hold();
         for jump in 1..=200 {
@@ -351,7 +351,7 @@ fn jumps_at_rest_move_nothing_and_are_an_alarm_where_there_are_many() {
 }
 
 #[test]
-fn the_jumps_of_a_wheel_so_fast_that_an_edge_can_be_missed_are_believed() {
+fn jumps_count_for_a_wheel_so_fast_that_an_edge_can_be_missed() {
     for (speed_m_s, believed) in [(7.0, false), (15.0, true)] {
         let mut drive = Drive::in_hold();
         drive.roll(speed_m_s, 3.0);

@@ -1,6 +1,6 @@
-//! Each fault that the decisions know of: what shows it, what does not, and that the tool is out of the row then.
+//! Each fault of the decisions: what raises it, what does not, and that the tool is then out of the row.
 //!
-//! Here are those of the way, the speed, the tool and the stack; `encoder`, `crop` and `saved_settings` have the others.
+//! This file has distance, speed, tool and stack; `encoder`, `crop` and `saved_settings` have the others.
 
 #[path = "../common/mod.rs"]
 mod common;
@@ -38,8 +38,8 @@ fn working_faster_than_the_limit_is_an_alarm_in_both_directions() {
 }
 
 #[test]
-fn a_jump_in_speed_just_before_a_window_is_counted_as_late_and_the_tool_leaves_at_once() {
-    // The plant's margin is 350 mm behind the beam's place; the lead at 0.3 m/s is 54 mm, at 1.3 m/s 234 mm.
+fn a_jump_in_speed_just_before_a_zone_is_counted_as_late_and_the_tool_leaves_at_once() {
+    // The plant's margin is 350 mm behind the beam; the lead is 54 mm at 0.3 m/s, and 234 mm at 1.3 m/s.
     for (jumps, late) in [(false, 0), (true, 1)] {
         let mut drive = Drive::at_work();
         drive.roll(0.3, 0.5);
@@ -57,7 +57,7 @@ fn a_jump_in_speed_just_before_a_window_is_counted_as_late_and_the_tool_leaves_a
 }
 
 #[test]
-fn a_command_is_late_where_the_speed_rises_by_more_than_an_eighth_while_the_tool_swings() {
+fn a_command_is_late_if_the_speed_rises_by_more_than_an_eighth_while_the_tool_swings() {
     for (rises_by, late) in [(1.1, 0), (1.2, 1)] {
         let mut drive = Drive::at_work();
         drive.roll(0.5, 0.5);
@@ -87,7 +87,7 @@ fn rolling_back_to_forgotten_ground_is_an_alarm() {
         drive.pass_a_plant(0.5);
         drive.roll(0.5, 0.35);
     }
-    // The 16 canopies that are remembered go back 8 m; the oldest of them was not the first.
+    // The 16 remembered canopies reach 8 m back; the oldest of them was not the first.
     drive.roll(-0.5, 6.0);
     assert_eq!(drive.alarm(), None);
     drive.roll(-0.5, 3.0);
@@ -95,7 +95,7 @@ fn rolling_back_to_forgotten_ground_is_an_alarm() {
 }
 
 #[test]
-fn rolling_back_to_ground_that_was_never_seen_has_the_tool_out_and_is_no_alarm() {
+fn rolling_back_to_ground_never_seen_takes_the_tool_out_and_is_no_alarm() {
     let mut drive = Drive::at_work();
     drive.roll(-0.5, 2.0);
     assert_eq!((drive.alarm(), drive.machine.reason()), (None, Some(Reason::UnseenGround)));
@@ -104,16 +104,16 @@ fn rolling_back_to_ground_that_was_never_seen_has_the_tool_out_and_is_no_alarm()
 }
 
 #[test]
-fn a_tool_that_does_not_follow_is_an_alarm_where_an_end_switch_tells() {
-    // The switch never closes, though the tool is to be out.
+fn a_tool_that_does_not_follow_is_an_alarm_with_an_end_switch() {
+    // The switch never closes, although the tool is commanded out.
     let mut drive = Drive::in_hold();
     drive.roll(0.0, 1.0);
-    assert_eq!(drive.alarm(), None, "without a switch nobody knows");
+    assert_eq!(drive.alarm(), None, "without a switch it is unknown");
     drive.machine.set(Setting::EndSwitch, 1).unwrap();
     drive.roll(0.0, 0.1);
     assert_eq!(drive.alarm(), Some(Alarm::ToolStuck));
 
-    // The switch stays closed, though the tool is to be in the row.
+    // The switch stays closed, although the tool is commanded in.
     let mut drive = Drive::at_work();
     drive.machine.set(Setting::EndSwitch, 1).unwrap();
     drive.roll(0.5, 1.0);
@@ -126,7 +126,7 @@ fn a_tool_that_does_not_follow_is_an_alarm_where_an_end_switch_tells() {
     drive.machine.set(Setting::EndSwitch, 1).unwrap();
     drive.readings.end_switch_on = true;
     drive.roll(0.5, 0.05);
-    assert_eq!(drive.alarm(), Some(Alarm::ToolStuck), "closed, and the tool is told to be in the row");
+    assert_eq!(drive.alarm(), Some(Alarm::ToolStuck), "closed, and the tool is commanded in");
 }
 
 #[test]
@@ -141,7 +141,7 @@ fn a_tool_that_follows_within_its_time_is_no_alarm() {
         if turn % 2_000 == 1_000 {
             drive.beam(false);
         }
-        // 180 ms behind the command, and the contacts bounce.
+        // 180 ms after the command, with bouncing contacts.
         let place = turn % is_out.len();
         drive.readings.end_switch_on = is_out[place] ^ (turn % 50 == 0);
         drive.roll(0.5, 0.5 * TURN_US as f64 / 1e6);
@@ -162,7 +162,7 @@ fn a_stack_that_is_nearly_used_up_is_an_alarm() {
 }
 
 #[test]
-fn nothing_happens_where_time_and_place_wrap() {
+fn nothing_happens_when_time_and_position_wrap() {
     // Both counters pass their end in the middle of a row.
     let ticks_before = 3000;
     let steps_before = 1_000_000;

@@ -1,4 +1,4 @@
-//! Saved settings that a machine wakes up with, right or contradicting each other.
+//! Saved settings at start-up, valid or contradicting each other.
 
 use crate::common::{ByWidth, readings, woken_up};
 use control::{
@@ -22,7 +22,7 @@ fn saved_settings_are_in_use_after_a_restart() {
     assert_eq!((machine.state(), machine.settings()), (State::Hold, &settings));
 }
 
-/// A memory with these settings, right or not.
+/// A memory with these settings, valid or not.
 fn saved(settings: &Settings) -> Volatile {
     let mut saved = SavedSettings::new(Volatile::new());
     saved.save(settings);
@@ -31,7 +31,7 @@ fn saved(settings: &Settings) -> Volatile {
 }
 
 #[test]
-fn a_test_row_that_contradicting_settings_refuse_leaves_what_stands_in_the_beam() {
+fn a_dry_run_refused_for_contradicting_settings_keeps_the_open_detection() {
     let mut settings = Settings::new();
     settings.set(Setting::ServoInUs, 2000).unwrap();
     let mut machine = Controller::new(ByWidth::late_by(0), saved(&settings), woken_up(Cause::PowerOn));
@@ -59,7 +59,7 @@ fn saved_settings_that_contradict_each_other_are_an_alarm_and_do_not_start() {
     }
     assert_eq!(machine.state(), State::Alarm(Alarm::SettingsContradict));
     machine.clear();
-    // They can be mended one at a time.
+    // They can be corrected one at a time.
     machine.set(Setting::ServoInUs, 1500).unwrap();
     assert_eq!((machine.start(false), machine.needed_mm()), (Err(CommandError::BeamTooNear), 389));
     machine.set(Setting::BeamToToolMm, 400).unwrap();

@@ -147,6 +147,12 @@ impl Machine {
         stroke.times_below_s(self.servo.stroke_degrees() - self.clear_within_degrees, during_s)
     }
 
+    /// The times within `during_s` at which the tool's edge is nearer than this to the row's line, which a full stroke clears.
+    pub fn times_within_s(&self, aside_mm: f64, stroke: &Stroke, during_s: &Range<f64>) -> Vec<Range<f64>> {
+        let degrees = ((aside_mm + self.tool_width_mm / 2.0) / self.arm_mm).clamp(0.0, 1.0).asin().to_degrees();
+        stroke.times_below_s(degrees.min(self.servo.stroke_degrees() - self.clear_within_degrees), during_s)
+    }
+
     /// The times within `during_s` at which the tool works the row's line.
     pub fn times_weeding_s(&self, stroke: &Stroke, during_s: &Range<f64>) -> Vec<Range<f64>> {
         stroke.times_below_s(self.line_degrees(), during_s)

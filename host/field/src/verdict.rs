@@ -4,8 +4,9 @@
 //! angle over the ground. A plant is damaged if the tool was not fully out at any time over its canopy. It is also
 //! damaged if the stroke is too short for the canopy, which is taken to be as wide across the row as along it. Its
 //! margin is cut if the tool's distance from the canopy was less than the margin by more than [`MARGIN_TOLERANCE_MM`].
-//! Both rules are strict. For most of its stroke the tool is already beside the row's line. A canopy has the width that
-//! the beam saw only at the beam's height.
+//! With a stem zone, the tool is over it while its edge is nearer to the row's line than half of the zone. Both rules
+//! are strict. For most of its stroke the tool is already beside the row's line. A canopy has the width that the beam
+//! saw only at the beam's height.
 //!
 //! A swing is also compared with its ideal position. The ideal follows from the true ends of the canopy, the margin,
 //! the leads of the [`Timing`] and the true speed at that moment. Plants that share one swing share its two commands:
@@ -204,13 +205,17 @@ pub fn judge(
         union(stretches.collect())
     };
     let closed = ground_of(&machine.times_not_clear_s(&stroke, &whole_s));
+    let over_zone = match timing.stem_zone_mm {
+        0 => closed.clone(),
+        zone_mm => ground_of(&machine.times_within_s(f64::from(zone_mm) / 2.0, &stroke, &whole_s)),
+    };
     let weeded = ground_of(&machine.times_weeding_s(&stroke, &whole_s));
     let run = motion.stretch_mm(&whole_s);
     let run = machine.tool_mm(run.start)..machine.tool_mm(run.end);
     let swings = Swing::all(&commands, motion, start_cycle);
 
     let mut plants: Vec<PlantOutcome> =
-        row.plants().map(|plant| plant_outcome(plant, &closed, machine, timing)).collect();
+        row.plants().map(|plant| plant_outcome(plant, &over_zone, machine, timing)).collect();
     let mut idle_swings = 0;
     for swing in &swings {
         let passed = swing.passed_mm(machine, motion);

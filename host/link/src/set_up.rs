@@ -20,16 +20,16 @@ use super::settings::shown;
 use control::settings::{Setting, Settings};
 use std::{collections::VecDeque, fmt};
 
-/// Required timings of the servo, with three swings each, and measurements of the wheel.
-const TIMINGS: usize = 2;
+/// Required timings of the servo, each with three swings out and three in, and measurements of the wheel.
+const TIMINGS: usize = SetUp::TIMINGS;
 const STRETCHES: usize = SetUp::STRETCHES;
 
 /// The newest plants that count for the scatter of slip, as measured by a second beam.
 const PLANTS: usize = 12;
 
 /// The servo's least scatter, in milliseconds. By eye it is two frames of a phone's slow motion, and as much for the
-/// servo. By an end switch, six swings miss up to 12 ms of the default servo's slowest swing, and the pulse on the line
-/// adds 2.
+/// servo. By an end switch, a few swings miss up to 12 ms of the default servo's slowest swing, and the pulse on the
+/// line adds 2.
 const SERVO_MS: u16 = 15;
 
 /// The least scatter of a wheel's slip within some metres, as a share. Stretches of 10 m average it out. Assumed as for
@@ -171,7 +171,9 @@ fn pulses(settings: &Settings) -> (u16, u16) {
 }
 
 impl SetUp {
-    /// Required measurements of the wheel.
+    /// Required timings of the servo. Few swings do not show the slowest one.
+    pub const TIMINGS: usize = 3;
+    /// Required measurements of the wheel. Few stretches do not show the slip.
     pub const STRETCHES: usize = 3;
 
     /// Measurements of the wheel so far.
@@ -369,8 +371,11 @@ mod tests {
         settings
     }
 
-    const TIMED: [&str; 2] =
-        ["calibrated lead_out_ms=150 lead_in_ms=52 set=yes", "calibrated lead_out_ms=158 lead_in_ms=56 set=yes"];
+    const TIMED: [&str; 3] = [
+        "calibrated lead_out_ms=150 lead_in_ms=52 set=yes",
+        "calibrated lead_out_ms=158 lead_in_ms=56 set=yes",
+        "calibrated lead_out_ms=154 lead_in_ms=54 set=yes",
+    ];
 
     const MEASURED: [&str; 7] = [
         "> calibrate 10000",
@@ -393,7 +398,7 @@ mod tests {
         let mut lines = vec![TIMED[0]];
         let leads = [(Setting::LeadOutMs, 150), (Setting::LeadInMs, 56)];
         assert_eq!(SetUp::of_lines(lines.iter().copied()).next(&settings(&leads)), Some(Step::TimeServo(1)));
-        lines.push(TIMED[1]);
+        lines.extend(&TIMED[1..]);
         assert_eq!(
             SetUp::of_lines(lines.iter().copied()).next(&settings(&leads)),
             Some(Step::SetLead(Setting::LeadOutMs, 158))
@@ -472,7 +477,7 @@ mod tests {
     fn a_servo_that_was_timed_by_eye_scatters_by_the_error_of_the_eye() {
         let by_eye = "calibrated by=eye, set lead_out_ms and lead_in_ms to what you saw";
         let failed = "calibrated by=none, the end switch did not follow";
-        let mut lines = vec![by_eye, failed, by_eye];
+        let mut lines = vec![by_eye, failed, by_eye, by_eye];
         lines.extend(MEASURED);
         lines.extend(MEASURED);
         let step = SetUp::of_lines(lines.iter().copied()).next(&settings(&[(Setting::TicksPerM, 1930)]));

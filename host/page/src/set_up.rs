@@ -69,7 +69,7 @@ mod tests {
         assert_eq!(nothing["missing"].as_array().map(Vec::len), Some(2), "{nothing}");
         let timed = "calibrated lead_out_ms=158 lead_in_ms=52 set=yes";
         let begun = advice(&[timed, "> set margin_mm 13"], &[("margin_mm", 13)]);
-        assert_eq!(begun["next"], "time the servo: `calibrate servo` (1 of 2 done)");
+        assert_eq!(begun["next"], "time the servo: `calibrate servo` (1 of 3 done)");
         assert!(begun["warning"].as_str().is_some_and(|warning| warning.ends_with("50 is safe")), "{begun}");
     }
 
@@ -77,7 +77,7 @@ mod tests {
     fn the_page_is_told_the_margin_once_all_was_measured() {
         let timed = "calibrated lead_out_ms=158 lead_in_ms=40 set=yes";
         let stretch = ["> calibrate 10000", "ticks_per_m=2010"];
-        let all = [&[timed, timed][..], &stretch, &stretch, &stretch].concat();
+        let all = [&[timed; 3][..], &stretch, &stretch, &stretch].concat();
         // 3 % of 400 mm, 15 ms at 2.5 km/h and the firmware's 5 mm.
         assert_eq!(advice(&all, &[("ticks_per_m", 2010)])["marginMm"], 28);
     }

@@ -36,9 +36,9 @@ pub enum ManualError {
     Refused(#[from] Refused),
 }
 
-/// Times that the manual has the servo timed and the wheel measured.
-const TIMINGS: u64 = 2;
-const STRETCHES: u64 = 3;
+/// What the manual asks for. Each measurement has a chance of its own.
+const TIMINGS: u64 = SetUp::TIMINGS as u64;
+const STRETCHES: u64 = SetUp::STRETCHES as u64;
 
 /// Time between two swings of the firmware's measurement of the servo, in milliseconds.
 const SWING_MS: u32 = 1500;

@@ -1,8 +1,8 @@
 //! Frames: a message with its number and a CRC, between two zero bytes.
 //!
-//! A frame holds a number, a message in postcard's format, and a CRC-16 over both, and COBS keeps zero bytes out of it. A receiver that
-//! has lost its place waits for the next zero byte. A frame with a wrong CRC is dropped. The numbers count on by one, so a gap shows
-//! that a frame is missing.
+//! A frame holds a number, a message in postcard's format, and a CRC-16 over both. COBS keeps zero bytes out of it. A receiver that
+//! has lost synchronisation waits for the next zero byte. A frame with a wrong CRC is dropped. The numbers increase by one, so a
+//! gap shows a missing frame.
 
 use crc::{CRC_16_IBM_SDLC, Crc, NoTable};
 use heapless::Vec;
@@ -37,11 +37,11 @@ pub fn encode(number: u8, message: &impl Serialize) -> Option<Frame> {
     Some(frame)
 }
 
-/// Collects bytes to frames.
+/// Collects bytes into frames.
 #[derive(Debug, Default)]
 pub struct Receiver {
     bytes: Vec<u8, FRAME_BYTES>,
-    /// More bytes came than a frame has, and no zero byte since.
+    /// Whether more bytes came than a frame has, since the last zero byte.
     is_too_long: bool,
 }
 
@@ -51,7 +51,7 @@ impl Receiver {
         Self { bytes: Vec::new(), is_too_long: false }
     }
 
-    /// Takes a byte. Returns the number and message of a frame that it completes, or that the frame is damaged.
+    /// Takes a byte. If it completes a frame, returns its number and message, or [`Damaged`].
     pub fn take<Message: for<'a> Deserialize<'a>>(&mut self, byte: u8) -> Option<Result<(u8, Message), Damaged>> {
         if byte != 0 {
             self.is_too_long |= self.bytes.push(byte).is_err();
@@ -67,7 +67,7 @@ impl Receiver {
     }
 }
 
-/// A frame that noise has changed, or no frame.
+/// A frame changed by noise, or not a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Damaged;
 

@@ -1,8 +1,9 @@
 //! The tester: a second Uno that drives the weeder's inputs and measures its outputs.
 //!
-//! This crate is what its firmware decides, and what passes over its serial line. [`frame`] makes frames of messages and back, and finds a
-//! damaged one. [`message`] lists the messages. [`piece`] and [`player`] play a plan: levels on the lines at cycles. [`station`] obeys
-//! commands and sends records. [`pins`] has the wires. Registers are in the firmware (`tester/src/`), and all is tested on a computer.
+//! This crate holds the decisions of its firmware, and the protocol of its serial line. [`frame`] turns messages into frames and
+//! back, and finds damaged ones. [`message`] lists the messages. [`piece`] and [`player`] play a plan: levels on the lines at given
+//! cycles. [`station`] runs commands and sends records. [`pins`] lists the wires. Registers are in the firmware (`tester/src/`), so
+//! a computer can test all of this.
 
 #![no_std]
 #![forbid(unsafe_code)]

@@ -1,25 +1,26 @@
 //! Messages: commands from the computer to the tester, and records from the tester to the computer.
 //!
-//! The tester answers each command by one [`Record::Done`] with the command's number. A computer that gets no answer sends the command again
-//! with the same number, and the tester does not obey it a second time. Times are cycles of the tester's clock (62.5 ns), modulo 2^32.
+//! The tester answers each command with one [`Record::Done`] that has the command's number. Without an answer, the computer sends
+//! the command again with the same number. The tester does not run it twice. Times are cycles of the tester's clock (62.5 ns),
+//! modulo 2^32.
 
 use crate::piece::Piece;
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
-/// The version of the protocol. Both sides have to have the same.
+/// The version of the protocol. Both sides need the same.
 pub const PROTOCOL: u8 = 1;
 
-/// Pieces in a command at most.
+/// Most pieces in a command.
 pub const PIECES: usize = 4;
 
-/// Steps of a pattern in a command at most.
+/// Most steps of a pattern in a command.
 pub const STEPS: usize = 24;
 
-/// Steps of a pattern at most.
+/// Most steps of a pattern.
 pub const PATTERN_STEPS: usize = 128;
 
-/// Pieces that can wait in the tester.
+/// Most pieces in the tester's queue.
 pub const QUEUE_PIECES: usize = 64;
 
 /// A step of a pattern: it waits 10 cycles and 3 for each `delay`, and then changes the lines of `toggle`.
@@ -31,7 +32,7 @@ pub struct Step {
     pub toggle: u8,
 }
 
-/// Cycles by which a step is longer for each 1 of its `delay`.
+/// Cycles for each 1 of a step's `delay`.
 pub const STEP_CYCLES: u32 = 3;
 
 /// Cycles of a step, for `delay` from 1.
@@ -39,19 +40,19 @@ pub const fn step_cycles(delay: u8) -> u32 {
     10 + STEP_CYCLES * delay as u32
 }
 
-/// Cycles that the last step of a pattern takes longer, if the pattern is repeated.
+/// Additional cycles of a pattern's last step, if the pattern is repeated.
 pub const REPEAT_CYCLES: u32 = 6;
 
-/// What the computer wants.
+/// A command of the computer.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Command {
-    /// Start afresh: stop the plan, drop what waits, lines at rest, weeder's reset released.
+    /// Restart: stop the plan, drop waiting pieces and records, lines at rest, weeder's reset released.
     Hello,
-    /// Append pieces to the plan. Refused as a whole if they have no room.
+    /// Append pieces to the plan. All or none of them are taken.
     Pieces(Vec<Piece, PIECES>),
     /// Play the plan.
     Start,
-    /// Give up the plan.
+    /// Stop the plan.
     Stop,
     /// Set lines.
     Lines {
@@ -60,27 +61,28 @@ pub enum Command {
         /// Their levels.
         levels: u8,
     },
-    /// Pull the weeder's reset, or release it.
+    /// Pull the weeder's reset low, or release it.
     Reset {
         /// Whether it is pulled.
         pulled: bool,
     },
-    /// Put steps into the pattern, from a place on.
+    /// Write steps into the pattern, from an index on.
     Pattern {
-        /// The place of the first.
+        /// The index of the first.
         from: u8,
         /// The steps.
         steps: Vec<Step, STEPS>,
     },
-    /// Play the pattern with interrupts off, slowly first and then as it is. Nothing else is measured meanwhile, and the clock loses time.
+    /// Play the pattern with interrupts off, first with longer delays and then as it is. No measurement runs meanwhile, and the
+    /// clock loses time.
     Burst {
         /// Steps of the pattern, 1 to 128.
         steps: u8,
-        /// How often the pattern is played with longer delays.
+        /// Repetitions with longer delays.
         run_up: u16,
-        /// By how much they are longer, in units of 3 cycles.
+        /// Additional delay, in units of 3 cycles.
         slower: u8,
-        /// How often the pattern is played then, from 1.
+        /// Repetitions without it, at least 1.
         repeats: u16,
     },
     /// Make a pulse on the tester's own capture pin, and record it. The weeder must be held in reset.
@@ -88,11 +90,11 @@ pub enum Command {
         /// The pulse's width in cycles, 200 to 60000.
         width: u16,
     },
-    /// The clock's time.
+    /// Return the clock's time.
     Clock,
 }
 
-/// Why a command was refused.
+/// Why a command failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Refusal {
     /// The queue has no room for all of the pieces.
@@ -103,66 +105,66 @@ pub enum Refusal {
     Range,
 }
 
-/// What the tester says.
+/// A record of the tester.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Record {
     /// The answer to a command.
     Done {
         /// The command's number.
         number: u8,
-        /// Why it was refused, if it was.
+        /// The error, if the command failed.
         refusal: Option<Refusal>,
-        /// Pieces that have room now.
+        /// Free places for pieces.
         room: u8,
-        /// The time.
+        /// The time of the answer.
         time: u32,
-        /// The position.
+        /// The encoder's position.
         position: i32,
-        /// The levels that the lines have.
+        /// The levels of the lines.
         levels: u8,
         /// The protocol's version.
         protocol: u8,
     },
     /// A pulse on the servo's line.
     Pulse {
-        /// When it began.
+        /// The time of its rising edge.
         start: u32,
-        /// How long it lasted.
+        /// Its width in cycles.
         width: u32,
         /// The position at its beginning.
         position: i32,
     },
     /// The weeder's LED changed.
     Led {
-        /// When.
+        /// The time of the change.
         time: u32,
         /// Whether it is lit.
         lit: bool,
     },
     /// The plan began.
     Started {
-        /// When: the first piece's wait counts from here.
+        /// The time: the first piece's wait counts from here.
         time: u32,
     },
     /// The plan ended.
     Ended {
-        /// When.
+        /// The time of the end.
         time: u32,
-        /// The position.
+        /// The encoder's position.
         position: i32,
         /// Events that came more than 10 us late.
         late: u16,
     },
-    /// The plan stopped, because the next piece was not there in time.
+    /// The plan stopped, because the next piece came too late.
     Dry {
-        /// When.
+        /// The time of the stop.
         time: u32,
-        /// The position.
+        /// The encoder's position.
         position: i32,
     },
-    /// Pulses were lost, because the line to the computer was too slow.
+    /// Pulses were lost, because the serial line was too slow.
     Lost {
-        /// How many since the start.
+        /// Their number since the start.
         pulses: u16,
     },
 }

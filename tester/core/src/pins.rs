@@ -23,11 +23,11 @@ pub enum Line {
 }
 
 impl Line {
-    /// Every line, in the order of its bits.
+    /// All lines, in the order of their bits.
     pub const ALL: [Self; 6] =
         [Self::EncoderA, Self::EncoderB, Self::Beam, Self::SecondBeam, Self::EndSwitch, Self::WorkSwitch];
 
-    /// Its bit of port C, and of every mask in a message.
+    /// Its bit of port C, and in each mask of a message.
     pub const fn bit(self) -> u8 {
         self as u8
     }
@@ -42,7 +42,7 @@ pub const ALL_LINES: u8 = AT_REST | Line::EncoderA.bit() | Line::EncoderB.bit();
 /// A wire between the two boards.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Wire {
-    /// What it carries.
+    /// Its signal.
     pub name: &'static str,
     /// The tester's pin, as printed on the board.
     pub tester: &'static str,
@@ -50,7 +50,7 @@ pub struct Wire {
     pub weeder: &'static str,
 }
 
-/// Every wire, ground included.
+/// All wires, with ground.
 pub const WIRES: [Wire; 10] = [
     Wire { name: "encoder A", tester: "A0", weeder: "D2" },
     Wire { name: "encoder B", tester: "A1", weeder: "D3" },

@@ -1,30 +1,30 @@
-//! The player: takes pieces from a queue, and says which levels the lines have and when the next event is due.
+//! The player: takes pieces from a queue, and gives the lines' levels and the wait until the next event.
 //!
-//! It has no clock: the caller fires each event when it is due, and then waits as long as the player says.
+//! It has no clock: the caller fires each event in time, and then waits as long as the player says.
 
 use crate::piece::{Action, Piece};
 use crate::pins::{ALL_LINES, AT_REST, Line};
 
-/// What comes after an event.
+/// The result of an event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Next {
-    /// The next event, this many cycles after the one before.
+    /// The next event comes this many cycles after this one.
     After(u32),
-    /// Nothing: the plan has ended.
+    /// The plan has ended.
     Ended,
-    /// Nothing: the next piece is not there yet. The plan is void.
+    /// The next piece is missing, so the plan is invalid.
     Dry,
 }
 
 /// Plays a plan.
 #[derive(Debug)]
 pub struct Player {
-    /// The piece whose events come next, and how many are left.
+    /// The present piece, and its remaining events.
     piece: Option<Piece>,
     left: u8,
-    /// What the plan wants.
+    /// The plan's levels.
     wanted: u8,
-    /// What is on the lines.
+    /// The levels on the lines.
     shown: u8,
     frozen: u8,
     position: i32,
@@ -42,12 +42,12 @@ impl Player {
         Self { piece: None, left: 0, wanted: AT_REST, shown: AT_REST, frozen: 0, position: 0 }
     }
 
-    /// The levels that the lines have to have now.
+    /// The levels for the lines now.
     pub const fn levels(&self) -> u8 {
         self.shown
     }
 
-    /// Counts forward less counts back that the plans have wanted.
+    /// Counts forward minus counts back in the plans.
     pub const fn position(&self) -> i32 {
         self.position
     }
@@ -62,18 +62,18 @@ impl Player {
         self.load(take())
     }
 
-    /// Gives up the plan; the lines stay as they are.
+    /// Stops the plan; the lines keep their levels.
     pub const fn stop(&mut self) {
         self.piece = None;
     }
 
-    /// Sets lines beside a plan.
+    /// Sets lines outside a plan.
     pub const fn set(&mut self, mask: u8, levels: u8) {
         self.wanted = (self.wanted & !mask | levels & mask) & ALL_LINES;
         self.shown = self.shown & self.frozen | self.wanted & !self.frozen;
     }
 
-    /// The event that is due. `take` takes the next piece from the queue.
+    /// Fires the event that is due. `take` takes the next piece from the queue.
     pub fn fire(&mut self, take: impl FnOnce() -> Option<Piece>) -> Next {
         let Some(piece) = self.piece else { return Next::Dry };
         match piece.action {

@@ -1,52 +1,52 @@
-//! The station: obeys commands and sends records, on a board.
+//! The station: runs commands on a board, and sends records.
 //!
-//! It keeps the number of the last command that it obeyed, and answers a repeated one without obeying it again. Records wait in a queue
-//! for the line. A record without room is dropped, but it takes its number, so the computer sees the gap.
+//! It keeps the number of the last command, and answers a repeated command without running it again. Records wait in a queue for
+//! the line. A record without room is dropped, but uses up its number, so the computer sees the gap.
 
 use crate::frame::{self, Frame, Receiver};
 use crate::message::{Command, PATTERN_STEPS, PROTOCOL, Record, Refusal, Step};
 use crate::piece::Piece;
 use heapless::Deque;
 
-/// Records that can wait for the line.
+/// Most records in the queue.
 const RECORDS: usize = 12;
 
-/// The widths that [`Command::CheckCapture`] takes, in cycles.
+/// The widths for [`Command::CheckCapture`], in cycles.
 const CHECKED_WIDTHS: core::ops::RangeInclusive<u16> = 200..=60_000;
 
-/// What the station works on.
+/// The hardware below the station.
 pub trait Board {
     /// The time in cycles, modulo 2^32.
     fn now(&mut self) -> u32;
-    /// The position.
+    /// The encoder's position.
     fn position(&mut self) -> i32;
-    /// Pieces that have room.
+    /// Free places for pieces.
     fn room(&mut self) -> u8;
-    /// Queues a piece; only if there is room.
+    /// Queues a piece; only called if there is room.
     fn push(&mut self, piece: Piece);
     /// Whether a plan is being played.
     fn is_playing(&mut self) -> bool;
-    /// Starts the plan. Returns when.
+    /// Starts the plan. Returns the start time.
     fn start(&mut self) -> u32;
-    /// Gives up the plan, and drops its pieces.
+    /// Stops the plan, and drops its pieces.
     fn stop(&mut self);
     /// Sets lines.
     fn set(&mut self, mask: u8, levels: u8);
-    /// Pulls the weeder's reset, or releases it.
+    /// Pulls the weeder's reset low, or releases it.
     fn reset(&mut self, pulled: bool);
-    /// Plays these steps `run_up` times with delays that are longer by `slower`, and then `repeats` times.
+    /// Plays these steps `run_up` times with delays longer by `slower`, and then `repeats` times as they are.
     fn burst(&mut self, steps: &[Step], run_up: u16, repeats: u16, slower: u8);
-    /// The levels that the lines have.
+    /// The levels of the lines.
     fn levels(&mut self) -> u8;
     /// Makes a pulse on the capture pin.
     fn check_capture(&mut self, width: u16);
 }
 
-/// Obeys and records.
+/// Runs commands and queues records.
 #[derive(Debug)]
 pub struct Station {
     receiver: Receiver,
-    /// The number of the last command, and why it was refused.
+    /// The number of the last command, and its error.
     last: Option<(u8, Option<Refusal>)>,
     records: Deque<(u8, Record), RECORDS>,
     next_number: u8,
@@ -60,7 +60,7 @@ impl Default for Station {
 }
 
 impl Station {
-    /// A station that was told nothing.
+    /// A station before its first command.
     pub const fn new() -> Self {
         Self {
             receiver: Receiver::new(),
@@ -71,7 +71,7 @@ impl Station {
         }
     }
 
-    /// Takes a byte from the computer, and obeys the command that it completes. A damaged frame gets no answer.
+    /// Takes a byte from the computer, and runs the command that it completes. A damaged frame gets no answer.
     pub fn take(&mut self, byte: u8, board: &mut impl Board) {
         let Some(Ok((number, command))) = self.receiver.take(byte) else { return };
         let is_repeated = command != Command::Hello && self.last.is_some_and(|(last, _)| last == number);
@@ -134,11 +134,11 @@ impl Station {
     pub fn record(&mut self, record: Record) {
         let number = self.next_number;
         self.next_number = number.wrapping_add(1);
-        // One that has no room is missed by its number.
+        // The gap in the numbers reports a dropped record.
         let _ = self.records.push_back((number, record));
     }
 
-    /// The frame of the oldest record that waits.
+    /// The frame of the oldest record.
     pub fn next_frame(&mut self) -> Option<Frame> {
         let (number, record) = self.records.pop_front()?;
         frame::encode(number, &record)

@@ -1,4 +1,4 @@
-//! Frames over a line that damages them.
+//! Frames over a line with noise.
 
 use proptest::prelude::*;
 use tester_core::frame::{Damaged, Receiver, encode};
@@ -25,7 +25,7 @@ fn the_longest_messages_fit_a_frame() {
 }
 
 #[test]
-fn a_receiver_finds_the_next_frame_behind_noise() {
+fn a_receiver_finds_the_next_frame_after_noise() {
     let frame = encode(7, &Command::Start).expect("it fits");
     let noise = [1, 2, 3, 0, 0, 9];
     let bytes = [&noise[..], &[0], &frame, &[5; 200], &[0], &frame].concat();
@@ -35,7 +35,7 @@ fn a_receiver_finds_the_next_frame_behind_noise() {
 
 proptest! {
     #[test]
-    fn a_frame_with_a_wrong_bit_is_never_taken_for_another(place in 0_usize..16, bit in 0_u8..8, number: u8, width: u16) {
+    fn a_frame_with_a_wrong_bit_is_never_another_frame(place in 0_usize..16, bit in 0_u8..8, number: u8, width: u16) {
         let sent = Command::CheckCapture { width };
         let mut frame = encode(number, &sent).expect("it fits");
         let place = place % frame.len();

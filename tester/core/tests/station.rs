@@ -1,4 +1,4 @@
-//! What the station does on a board.
+//! The station's commands on a board without a chip.
 
 use std::collections::VecDeque;
 use tester_core::frame::{Receiver, encode};
@@ -56,7 +56,7 @@ impl Board for Bare {
     fn check_capture(&mut self, _: u16) {}
 }
 
-/// Types a command, and returns the records that come.
+/// Sends a command, and returns the records that follow.
 fn typed(station: &mut Station, board: &mut Bare, number: u8, command: &Command) -> Vec<Record> {
     for byte in encode(number, command).expect("it fits") {
         station.take(byte, board);
@@ -79,7 +79,7 @@ fn pieces(count: usize) -> Command {
 }
 
 #[test]
-fn a_command_that_is_sent_again_is_answered_and_not_obeyed_again() {
+fn a_repeated_command_is_answered_but_not_run_again() {
     let (mut station, mut board) = (Station::new(), Bare::default());
     for _ in 0..3 {
         let records = typed(&mut station, &mut board, 5, &pieces(2));

@@ -1,4 +1,4 @@
-//! The fragments of what is said, sorted: as the pairs that come most often are joined again and again. The test below finds them, and
+//! The fragments of the texts, sorted. The test below finds them by joining the most frequent pair again and again;
 //! `UPDATE_EXPECT=1 cargo test -p control fragments` writes them here.
 
 #[rustfmt::skip]
@@ -31,14 +31,14 @@ mod tests {
     use std::collections::{BTreeMap, BTreeSet};
     use std::{format, fs, string::String, vec::Vec};
 
-    /// The parts that a fragment is unpacked to, as the table has them.
+    /// The two parts of a fragment, as in the table.
     fn parts<'a>(fragment: &'a str, fragments: &BTreeSet<String>) -> (&'a str, &'a str) {
         let is_known = |part: &str| part.len() == 1 || fragments.contains(part);
         let mut splits = (1..fragment.len()).map(|at| fragment.split_at(at));
         splits.find(|(first, second)| is_known(first) && is_known(second)).expect("a fragment consists of two")
     }
 
-    /// Second halves that wait at once, and how often the first half is halved.
+    /// Second halves on the stack, and the steps to the first character.
     fn depth(part: &str, fragments: &BTreeSet<String>) -> (usize, usize) {
         if part.len() == 1 {
             return (0, 0);
@@ -55,7 +55,8 @@ mod tests {
         })
     }
 
-    /// Of all texts but the version, so that a commit changes nothing: joins the most frequent pair again and again, as long as bytes are left and a pair is worth its two bytes.
+    /// Joins the most frequent pair while bytes are free and a pair saves more than its two bytes. Leaves out the version, so that
+    /// a commit changes nothing.
     fn found() -> BTreeSet<String> {
         let said = GROUPS.iter().copied().flatten().filter(|text| **text != version::NAME);
         let mut texts: Vec<Vec<String>> = said.map(|text| text.chars().map(String::from).collect()).collect();

@@ -72,12 +72,13 @@ fn what_is_to_be_measured_next_is_said_once_calibrating_has_begun() {
     let mut model = machine(&["state is=hold"]);
     let none: Vec<String> = told(&model);
     assert_eq!(none, [""; 0]);
-    tell(&mut model, 0, &[timed, timed]);
+    tell(&mut model, 0, &[timed; 3]);
     let lines: Vec<String> = told(&model);
     assert_eq!(
         lines,
         [
-            "-- next, time the servo: `calibrate servo` (1 of 2 done)",
+            "-- next, time the servo: `calibrate servo` (1 of 3 done)",
+            "-- next, time the servo: `calibrate servo` (2 of 3 done)",
             "-- next, measure 10 m: `calibrate start`, roll, `calibrate 10000` (0 of 3 done)",
         ]
     );
