@@ -1,8 +1,8 @@
 //! The binomial model of counts on speed and spacing: the logarithm of the odds as `constant + a speed + b spacing`.
 //!
 //! A count of damaged plants or removed weeds is a number out of a total. Its scatter depends on its share and on the
-//! total, and a share ends at 0 and 1. The linear model ignores both. This is R's `glm(cbind(count, of - count) ~ speed
-//! + spacing, family = binomial)`, fitted by iteratively reweighted least squares with nalgebra.
+//! total, and a share ends at 0 and 1. The linear model ignores both. This is R's `glm(cbind(count, of - count) ~
+//! speed + spacing, family = binomial)`, fitted by iteratively reweighted least squares with nalgebra.
 //!
 //! Plots of one field differ by more than the scatter of counting. [`BinomialModel::dispersion`] measures this. If it
 //! is above 1, the true standard errors are larger by its root. The reported ones are those of R's binomial family,
